@@ -1,13 +1,15 @@
 """What is measured, one row a quantity: JSON, CSV, tables, figures and screens read it from here.
 
-A new measurand is a row here and the function that computes it in `rig.analysis.quantities`.
+A new measurand is a row of ``measurands.txt`` and the function that computes it in
+`rig.analysis.quantities`.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator
@@ -74,59 +76,21 @@ class Measurand:
         return f"{self.title} {self.symbol} ({self.unit})"
 
 
-MEASURANDS: dict[str, Measurand] = {
-    row.name: row
-    for row in (
-        Measurand(
-            "separation_m", "Δz", "Δz corrected", "separation",
-            "height of the free chain's top rod over the impact chain's when the middle of that "
-            "one passes the contact level, corrected to simultaneous release",
-            "cm", 100.0, 2, "mm", 1e3, 3, averaged=True, listed=True, told=True, by_chain=True,
-        ),
-        Measurand(
-            "separation_raw_m", "raw Δz", "Δz as it fell", "separation",
-            "the same as it happened",
-            "cm", 100.0, 2, "mm", 1e3, 3, listed=True, by_chain=True,
-        ),
-        Measurand(
-            "separation_strike_m", "Δz at strike", "Δz at strike", "separation",
-            "the corrected one when the impact chain's top rod really strikes, on the board or on "
-            "rods that lie there",
-            "cm", 100.0, 2, "mm", 1e3, 3,
-        ),
-        Measurand(
-            "speed_m_s", "V", "V", "end speed",
-            "speed of the impact chain's top rod as its middle passes the contact level",
-            "m/s", 1.0, 3, "mm/s", 1e3, 2, averaged=True, listed=True, told=True, by_chain=True,
-        ),
-        Measurand(
-            "speed_strike_m_s", "V at strike", "V at strike", "end speed",
-            "speed of the impact chain's top rod as it really strikes",
-            "m/s", 1.0, 3, "mm/s", 1e3, 2,
-        ),
-        Measurand(
-            "release_skew_s", "skew", "release skew", "release",
-            "release of the free chain less that of the impact chain; positive: the free chain "
-            "left later",
-            "ms", 1e3, 2, "ms", 1e3, 3, listed=True, told=True, by_chain=True, by_side=True,
-        ),
-        Measurand(
-            "fall_time_s", "t", "fall time", "fall time",
-            "from the impact chain's release until its top rod reaches the surface",
-            "s", 1.0, 5, "ms", 1e3, 3,
-        ),
-        Measurand(
-            "gravity_m_s2", "g", "g", "acceleration",
-            "acceleration of the free fall",
-            "m/s²", 1.0, 4, "mm/s²", 1e3, 2, averaged=True, listed=True, told=True,
-        ),
-        Measurand(
-            "acceleration_m_s2", "a", "a", "acceleration",
-            "acceleration of the object down its track, friction included",
-            "m/s²", 1.0, 4, "mm/s²", 1e3, 2, averaged=True, listed=True, told=True,
-        ),
+def _read_row(row: str) -> Measurand:
+    name, symbol, label, title, usual, fine, flags, meaning = map(str.strip, row.split("|"))
+    (unit, scale, decimals), (fine_unit, fine_scale, fine_decimals) = usual.split(), fine.split()
+    options: dict[str, Any] = dict.fromkeys(flags.split(), True)
+    return Measurand(
+        *(name, symbol, label, title, meaning, unit, float(scale), int(decimals)),
+        *(fine_unit, float(fine_scale), int(fine_decimals)),
+        **options,
     )
-}  # fmt: skip
+
+
+_LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
+MEASURANDS = {
+    row.name: row for row in (_read_row(line) for line in _LINES if not line.startswith("#"))
+}
 
 SEPARATION = MEASURANDS["separation_m"]
 SEPARATION_RAW = MEASURANDS["separation_raw_m"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -16,7 +15,7 @@ from rig.files import write_atomic
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
-from rig.protocol.draft import SCENES, STRUCK, Draft, draft_text
+from rig.protocol.draft import SCENES, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.ready import WIRED
 from rig.recorder.interrupts import Interrupts
@@ -32,24 +31,16 @@ if TYPE_CHECKING:
 
     from rig.protocol.draft import Scene
 
-_OTHER = "other"
-_INCLINES = {"coefficients": "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"}
-"""What is measured at several inclines, and these if none are given."""
-
-
-_DROPS = {
-    "object": "the zero of the gate heights to its middle",
-    "track": "the lower mark to its middle, along the track",
-    "picket-fence": "the zero of the gate heights to the lowest bar",
-}
-"""Where the drop of a scene without a surface is measured."""
+_COEFFICIENTS = "coefficients"
+_MANY_INCLINES = "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"
+"""Where the coefficients are to be measured, if no inclines are given."""
 
 
 def main(arguments: Namespace) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
     path = Path(arguments.output)
     mounting, wiring = (
-        path.with_name(f"{path.stem}-{what}.svg") for what in ("mounting", "wiring")
+        path.with_name(f"{path.stem}-{drawing}.svg") for drawing in ("mounting", "wiring")
     )
     for file in (path, mounting, wiring):
         if file.exists():
@@ -75,41 +66,31 @@ def main(arguments: Namespace) -> int:
 
 def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     """Return the board and the draft; ask for what the command line leaves open."""
-    answer = partial(_ask, arguments)
-    scene = answer("scene", "What do you drop?", "object", SCENES)
-    board = answer("board", "Which board times it?", "pico", dict.fromkeys((*BOARDS, _OTHER), ""))
-    struck, body = scene in STRUCK, scene in {"object", "track"}
-    fence = scene == "picket-fence"
-    part = "bar" if fence else "rod"
-    gates = answer("gates", "How many gates?", "2" if fence else "4")
-    rods, length = "1", ""
-    if not body:
-        parts = "bars of the fence" if fence else "rods of a chain"
-        rods = answer("rods", f"How many {parts}?", "8" if fence else "25")
-        words = f"Distance from the middle of the lowest {part} to that of the highest?"
-        length = answer("length", words, "350 mm" if fence else "1165 mm")
-    thick = {"object": "20 mm", "track": "100 mm", "picket-fence": "25 mm"}.get(scene, "12.7 mm")
-    words = "Its length in a beam, along its path?" if body else f"Height of one {part}?"
-    diameter = answer("diameter", words, thick)
-    inclines = ""
-    if struck:
-        result = "separation" if scene == "two-chains" else "speed"
-        aims = dict.fromkeys((result, *_INCLINES), "")
-        aim = answer("aim", "What do you want to measure?", result, aims)
-        inclines = answer("incline", "Inclines of the board?", _INCLINES.get(aim, "40 deg"))
-    elif scene == "track":
-        inclines = answer("incline", "Incline of the track?", "3 deg ± 0.1 deg")
-    drops = {"track": "1500 mm ± 1 mm", "object": "900 mm ± 1 mm", "picket-fence": "400 mm ± 2 mm"}
-    start = "Start" if scene == "track" else "Drop height"
-    words = f"{start}, from {_DROPS.get(scene, 'the contact point to the lowest rod')}?"
-    drop = answer("drop", words, drops.get(scene, "180 mm ± 2 mm"))
-    repeats = answer("repeats", f"How many drops{' at each incline' if struck else ''}?", "12")
-    title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
-    chosen: Scene = next(name for name in SCENES if name == scene)
-    return board, Draft(
-        title, chosen, _count("gates", gates, GATES), _count("rods", rods), length, diameter, drop,
-        inclines, _count("repeats", repeats),
-    )  # fmt: skip
+    word = _ask(arguments, "scene", "What do you drop?", "object", SCENES)
+    scene: Scene = next(name for name in SCENES if name == word)
+    answers = {"rods": "1", "length": "", "incline": ""}
+    lines = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
+    rows = (map(str.strip, line.split("|")) for line in lines if not line.startswith("#"))
+    for scenes, option, question, usual in rows:
+        if scenes and scene not in scenes.split():
+            continue
+        many = option == "incline" and answers.get("aim") == _COEFFICIENTS
+        default = _MANY_INCLINES if many else usual
+        words = {"board": (*BOARDS, "other"), "aim": (usual, _COEFFICIENTS)}.get(option, ())
+        answers[option] = _ask(arguments, option, question, default, dict.fromkeys(words, ""))
+    most = {"gates": GATES, "rods": 1000, "repeats": 1000}
+    counts = {option: _count(option, answers[option], limit) for option, limit in most.items()}
+    return answers["board"], Draft(
+        title=arguments.title or path.stem.replace("-", " ").replace("_", " "),
+        scene=scene,
+        gates=counts["gates"],
+        rods=counts["rods"],
+        length=answers["length"],
+        diameter=answers["diameter"],
+        drop=answers["drop"],
+        inclines=answers["incline"],
+        repeats=counts["repeats"],
+    )
 
 
 def _ask(
@@ -140,9 +121,9 @@ def _ask(
         say(f"  accepted: {', '.join(accepted)}")
 
 
-def _count(name: str, text: str, most: int = 1000) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= most:
-        raise InputError(f"--{name}: found {text}; accepted: a whole number from 1 to {most}")
+def _count(name: str, text: str, limit: int) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= limit:
+        raise InputError(f"--{name}: found {text}; accepted: a whole number from 1 to {limit}")
     return int(text)
 
 

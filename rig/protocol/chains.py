@@ -63,7 +63,7 @@ def read_chains(
             continue
         if name in bases:
             base = bases[name].text
-            message = _base_problem(base, chains, [other for other in nodes if other != name])
+            message = _base_problem(base, chains, [chain for chain in nodes if chain != name])
             if message:
                 faults.add(bases[name].place, f"{path}.like", message)
             own = _inherit(own, described.get(base) or own)
@@ -87,23 +87,23 @@ def _by_name(chain: Mapping) -> dict[str, Node]:
     }
 
 
-def _base_problem(base: str, read: Collection[str], others: list[str]) -> str:
+def _base_problem(base: str, read: Collection[str], candidates: list[str]) -> str:
     """Say why a chain cannot be like another one, or nothing if it can."""
-    if base not in others:
-        accepted = ", ".join(map(quoted, others)) or "no other chain is there"
-        return f"found {quoted(base)}; {did_you_mean(base, others)}accepted: {accepted}"
+    if base not in candidates:
+        accepted = ", ".join(map(quoted, candidates)) or "no other chain is there"
+        return f"found {quoted(base)}; {did_you_mean(base, candidates)}accepted: {accepted}"
     return "" if base in read else "like refers back to itself; describe one chain in full"
 
 
 def _inherit(own: Mapping, base: Mapping) -> Mapping:
     """Return a chain's own entries, then those of its base that it does not override."""
-    mine, theirs = _by_name(own), _by_name(base)
-    hidden = {*mine, "like"}
-    if "mass" in mine or "masses" in mine:
+    own_keys, base_keys = _by_name(own), _by_name(base)
+    hidden = {*own_keys, "like"}
+    if "mass" in own_keys or "masses" in own_keys:
         hidden |= {"mass", "masses"}
-    if isinstance(mine.get("spacing"), Sequence):
+    if isinstance(own_keys.get("spacing"), Sequence):
         hidden.add("length")
-    if "length" in mine and isinstance(theirs.get("spacing"), Sequence):
+    if "length" in own_keys and isinstance(base_keys.get("spacing"), Sequence):
         hidden.add("spacing")
     entries = [entry for entry in base.entries if getattr(entry[0], "text", None) not in hidden]
     return Mapping(own.place, [*own.entries, *entries], own.size)

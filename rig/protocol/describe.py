@@ -24,7 +24,7 @@ from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY
 from rig.units import Quantity, format_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from rig.protocol.protocol import Protocol, RodChain
 
@@ -48,60 +48,60 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
         ``Left out``; empty sections do not appear. Ends without a newline.
     """
     sections = {
-        "Scene": _scene(protocol),
-        "Gates": _gates(protocol),
-        "Assumed (change it if you know better)": _priors(protocol),
+        "Scene": [*_scene(protocol)],
+        "Gates": [*_gates(protocol)],
+        "Assumed (change it if you know better)": [*_priors(protocol)],
         "Plan and limits": [*_plan(protocol), *(f"note: {note}" for note in notes)],
-        "Left out": _left_out(protocol),
+        "Left out": [*_left_out(protocol)],
     }
-    blocks = [protocol.title]
-    blocks += ["\n".join([name, *(f"  {line}" for line in lines)])
-               for name, lines in sections.items() if lines]  # fmt: skip
-    return "\n\n".join(blocks)
+    blocks = ["\n  ".join([name, *lines]) for name, lines in sections.items() if lines]
+    return "\n\n".join([protocol.title, *blocks])
 
 
 def _number(value: float | Quantity, unit: str) -> str:
     return format_quantity(value if isinstance(value, Quantity) else Quantity(value), unit)
 
 
-def _scene(protocol: Protocol) -> list[str]:
+def _scene(protocol: Protocol) -> Iterator[str]:
     """Say what is there."""
     names, surface, track = " and ".join(protocol.chains), protocol.surface, protocol.track
     if track is not None:
-        lines = [f"{names} goes down a track"]
+        yield f"{names} goes down a track"
     elif surface is None:
-        lines = [f"{names} falls freely"]
+        yield f"{names} falls freely"
     elif protocol.two_chains:
-        lines = [f"two chains, {names}: one strikes the surface, the other falls beside it"]
+        yield f"two chains, {names}: one strikes the surface, the other falls beside it"
     else:
-        lines = [f"one chain, {names}, strikes the surface"]
+        yield f"one chain, {names}, strikes the surface"
     part, struck = protocol.vocabulary.part, surface is not None
-    lines += [_chain(chain, part, struck=struck) for chain in protocol.chains.values()]
+    for chain in protocol.chains.values():
+        yield _chain(chain, part, struck=struck)
     if surface is not None and _uses_surface(protocol):
-        coefficients = f"restitution {_number(surface.restitution, '1')}"
-        lines.append(f"surface: {coefficients}, friction {_number(surface.friction, '1')}")
+        text = f"surface: restitution {_number(surface.restitution, '1')}"
+        text += f", friction {_number(surface.friction, '1')}"
         if surface.pile is not None:
-            below = f"; below {_number(surface.pile.below_deg, 'deg')} a pile"
-            lines[-1] += f"{below}, restitution {_number(surface.pile.restitution, '1')}"
+            text += f"; below {_number(surface.pile.below_deg, 'deg')} a pile, restitution "
+            text += _number(surface.pile.restitution, "1")
+        yield text
+    pull, standard = "gravity", STANDARD_GRAVITY
     if track is not None:
         share = track.rolling_inertia
         rolls = f", rolling: I/(m r²) = {share:g}" if share else ""
-        lines.append(f"track: {_number(track.incline_deg, 'deg')}{rolls}; heights are along it")
-    pull = "gravity" if track is None else "acceleration without friction"
-    lines.append(f"{pull}: {_number(protocol.gravity, 'm/s^2')}")
-    if protocol.gravity == (track.along(STANDARD_GRAVITY) if track else STANDARD_GRAVITY):
-        lines[-1] += ", standard gravity: only the start value of the fit"
+        yield f"track: {_number(track.incline_deg, 'deg')}{rolls}; heights are along it"
+        pull, standard = "acceleration without friction", track.along(STANDARD_GRAVITY)
+    usual = protocol.gravity == standard
+    note = ", standard gravity: only the start value of the fit" if usual else ""
+    yield f"{pull}: {_number(protocol.gravity, 'm/s^2')}{note}"
     if struck or protocol.gates is not None:
-        lines.append(f"drop: {_number(protocol.drop, 'mm')} {protocol.drop_from}")
+        yield f"drop: {_number(protocol.drop, 'mm')} {protocol.drop_from}"
     if protocol.initial_speed != AT_REST:
-        lines.append(f"initial speed: {_number(protocol.initial_speed, 'm/s')} downward")
+        yield f"initial speed: {_number(protocol.initial_speed, 'm/s')} downward"
     drag = protocol.drag
     if drag is not None and drag.terminal_speed is not None:
-        lines.append(f"drag: terminal speed {_number(drag.terminal_speed, 'm/s')}")
+        yield f"drag: terminal speed {_number(drag.terminal_speed, 'm/s')}"
     elif drag is not None and drag.coefficient is not None:
         density = _number(drag.air_density, "kg/m^3")
-        lines.append(f"drag: coefficient {_number(drag.coefficient, '1')} in air of {density}")
-    return lines
+        yield f"drag: coefficient {_number(drag.coefficient, '1')} in air of {density}"
 
 
 def _chain(rods: RodChain, part: str, *, struck: bool) -> str:
@@ -130,23 +130,21 @@ def _chain(rods: RodChain, part: str, *, struck: bool) -> str:
     return text
 
 
-def _gates(protocol: Protocol) -> list[str]:
+def _gates(protocol: Protocol) -> Iterator[str]:
     """List the gates with the rods that pass each."""
     gates, words = protocol.gates, protocol.vocabulary
     if gates is None or not gates.gates:
-        return []
-    lines = []
+        return
+    totals = {name: rods.chain.rods for name, rods in protocol.chains.items()}
     for gate in gates.gates:
         side = f"{gate.side:6}  " if words.two_sides else ""
-        lines.append(f"{side}channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm")
-        if not protocol.one_object:
-            totals = {name: rods.chain.rods for name, rods in protocol.chains.items()}
-            passing = passing_rods(protocol, gate).items()
-            rods = (f"{name} {totals[name] - n + 1}–{totals[name]}" for name, n in passing)
-            lines[-1] += f"  {words.part}s {', '.join(rods)}"
+        passing = passing_rods(protocol, gate).items()
+        rods = ", ".join(f"{name} {totals[name] - n + 1}–{totals[name]}" for name, n in passing)
+        parts = "" if protocol.one_object else f"  {words.part}s {rods}"
+        yield f"{side}channel {gate.channel:2}  {gate.height * 1e3:8.1f} mm{parts}"
     height, datum = _number(gates.height_u, "mm"), _number(gates.datum_u, "mm")
-    each = " on each side" if words.two_sides else ""
-    return [*lines, f"each height ± {height}; the zero of the heights ± {datum}{each}"]
+    sides = " on each side" if words.two_sides else ""
+    yield f"each height ± {height}; the zero of the heights ± {datum}{sides}"
 
 
 SCENES: dict[str, Callable[[Protocol], bool]] = {
@@ -160,93 +158,82 @@ SCENES: dict[str, Callable[[Protocol], bool]] = {
 """What a scene may need for a key to matter, see `rig.protocol.keys.Key`."""
 
 
-def _priors(protocol: Protocol) -> list[str]:
+def _priors(protocol: Protocol) -> Iterator[str]:
     """List what is assumed where nothing was measured, as standard deviations."""
     if protocol.gates is None:
-        return []
-    lines = []
+        return
     for name, key in SECTIONS["priors"].items():
         if SCENES[key.scene](protocol):
             value = getattr(protocol.priors, name)
             stated = "" if value == DEFAULTS[key.path] else " (stated)"
             text = _number(value, range_of(key.path).unit)
-            lines.append(f"{name:14} {text:>8}{stated}  {key.meaning}")
+            yield f"{name:14} {text:>8}{stated}  {key.meaning}"
     if protocol.surface is not None:
-        contact = protocol.contact
-        lines += _touching(protocol, _number(contact.level, "mm"))
-        strike = _number(contact.strike, "mm")
-        lines.append(f"the top rod strikes {strike} above it, on the rods below")
-    return lines
+        yield from _touching(protocol, _number(protocol.contact.level, "mm"))
+        strike = _number(protocol.contact.strike, "mm")
+        yield f"the top rod strikes {strike} above it, on the rods below"
 
 
-def _touching(protocol: Protocol, level: str) -> list[str]:
+def _touching(protocol: Protocol, level: str) -> Iterator[str]:
     """Say at which height rods touch the surface."""
     if not protocol.contact.from_board:
-        return [f"contact level: {level} above the zero of the heights"]
-    lines = []
+        yield f"contact level: {level} above the zero of the heights"
+        return
     for incline in dict.fromkeys(protocol.plan.inclines):
         for name in protocol.strikers:
             heights = touching_heights(protocol.chains[name], incline)
             low, high = (_number(round(z, 4), "mm") for z in (min(heights), max(heights)))
             rod = "a rod" if not protocol.unlike_chains else f"a rod of {name}"
             middle = high if low == high else f"{low} to {high}"
-            lines.append(
-                f"at {incline:g}° {rod} touches when its middle is {middle} above the board"
-            )
-    return [*lines, f"further offset of the contact level: {level}"]
+            yield f"at {incline:g}° {rod} touches when its middle is {middle} above the board"
+    yield f"further offset of the contact level: {level}"
 
 
-def _plan(protocol: Protocol) -> list[str]:
+def _plan(protocol: Protocol) -> Iterator[str]:
     """List runs, edges, recording, boards and time."""
     planned, plan = runs(protocol), protocol.plan
-    lines = ["1 run" if len(planned) == 1 else f"{len(planned)} runs"]
-    if protocol.surface is not None:
-        angles = ", ".join(f"{angle:g}" for angle in plan.inclines)
-        lines[0] += f": {plan.repeats} at each incline ({angles} deg)"
+    count = "1 run" if len(planned) == 1 else f"{len(planned)} runs"
+    angles = ", ".join(f"{angle:g}" for angle in plan.inclines)
+    struck = protocol.surface is not None
+    yield f"{count}: {plan.repeats} at each incline ({angles} deg)" if struck else count
     if protocol.two_chains:
         first = next(iter(protocol.chains))
         share = sum(run.impact == first for run in planned)
-        lines.append(f"order {plan.order}: chain {first} strikes in {share} of {len(planned)} runs")
+        yield f"order {plan.order}: chain {first} strikes in {share} of {len(planned)} runs"
         period = len(PATTERNS[plan.order])
         if plan.repeats % period:
-            lines.append(
-                f"note: {plan.order} is balanced only if repeats is a multiple of {period}"
-            )
+            yield f"note: {plan.order} is balanced only if repeats is a multiple of {period}"
     if protocol.gates is None:
-        return lines
+        return
     if protocol.blind:
-        lines.append("blind: results stay hidden until rig unblind SESSION")
-    lines += [f"note: prediction only: {reason}" for reason in unmeasurable(protocol)]
+        yield "blind: results stay hidden until rig unblind SESSION"
+    yield from (f"note: prediction only: {reason}" for reason in unmeasurable(protocol))
     if (problem := too_long(protocol)) is not None:
-        lines.append(f"note: cannot be recorded: {problem}")
-    lines.append(f"at most {most_edges(protocol)} edges in a drop")
+        yield f"note: cannot be recorded: {problem}"
+    yield f"at most {most_edges(protocol)} edges in a drop"
     seconds = record_ms(protocol) / 1e3
-    lines.append(
-        f"recording: {seconds:g} s; the last edge comes within {longest_fall(protocol):.2g} s"
-    )
-    lines += _boards(protocol)
-    whole = len(planned) * (plan.settle + seconds)
-    time = f"{whole:.0f} s" if whole < 60 else f"{whole / 60:.0f} min"
-    lines.append(
+    fall_s = longest_fall(protocol)
+    yield f"recording: {seconds:g} s; the last edge comes within {fall_s:.2g} s"
+    yield from _boards(protocol)
+    total = len(planned) * (plan.settle + seconds)
+    time = f"{total:.0f} s" if total < 60 else f"{total / 60:.0f} min"
+    yield (
         f"duration: about {time}, with {plan.settle:g} s to settle before each drop; "
         f"{protocol.vocabulary.reset} adds to this"
     )
-    return lines
 
 
-def _boards(protocol: Protocol) -> list[str]:
+def _boards(protocol: Protocol) -> Iterator[str]:
     """Name the boards that can run a protocol, and what the other boards lack."""
     wants = {word: lacking(protocol, board) for word, board in BOARDS.items()}
-    able = [word for word, problems in wants.items() if not problems]
-    lines = [f"suitable boards: {', '.join(able)}"] if able else []
+    if able := [word for word, problems in wants.items() if not problems]:
+        yield f"suitable boards: {', '.join(able)}"
     for word, problems in wants.items():
         gates = [problem for problem in problems if problem.key.startswith("gates.")]
-        others = [problem for problem in problems if problem not in gates]
-        lines += [f"note: board {word} is not suitable: {problem}" for problem in others]
-        if gates:  # of many alike the first will do
-            more = f" (and {len(gates) - 1} more)" if len(gates) > 1 else ""
-            lines.append(f"note: board {word} is not suitable: {gates[0]}{more}")
-    return lines
+        for problem in [problem for problem in problems if problem not in gates] + gates[:1]:
+            # Of many alike the first will do.
+            more = f" (and {len(gates) - 1} more)" if problem in gates and gates[1:] else ""
+            yield f"note: board {word} is not suitable: {problem}{more}"
 
 
 def _uses_surface(protocol: Protocol) -> bool:
@@ -254,23 +241,21 @@ def _uses_surface(protocol: Protocol) -> bool:
     return any(rods.chain.alpha is None for rods in protocol.chains.values())
 
 
-def _left_out(protocol: Protocol) -> list[str]:
+def _left_out(protocol: Protocol) -> Iterator[str]:
     """List what the scene does not have, and what is therefore not computed."""
-    lines = []
     if protocol.surface is None:
-        what = "gravity" if protocol.track is None else "the acceleration with its friction"
-        lines.append(f"no surface: no impact, Δz or V; the drops measure {what}")
+        result = "gravity" if protocol.track is None else "the acceleration with its friction"
+        yield f"no surface: no impact, Δz or V; the drops measure {result}"
     else:
         if len(protocol.chains) == 1:
-            lines.append("no second chain: no Δz and no release skew")
+            yield "no second chain: no Δz and no release skew"
         if not _uses_surface(protocol):
-            lines.append("α is given: restitution, friction and inclination are not used")
+            yield "α is given: restitution, friction and inclination are not used"
         elif max(protocol.plan.inclines) == 0:
-            lines.append("level surface: no friction, no inclination")
+            yield "level surface: no friction, no inclination"
         elif protocol.surface.friction == Quantity(0.0):
-            lines.append("no friction given: taken as 0 at every incline")
+            yield "no friction given: taken as 0 at every incline"
     if protocol.gates is None:
-        lines.append("no gates: prediction only, nothing is measured")
+        yield "no gates: prediction only, nothing is measured"
     if protocol.drag is None:
-        lines.append("no drag: predictions ignore air; the fit estimates it")
-    return lines
+        yield "no drag: predictions ignore air; the fit estimates it"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from itertools import count, pairwise
+from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING, Literal
 
 from rig.errors import InputError
@@ -86,77 +88,27 @@ def draft_text(draft: Draft) -> str:
     return text
 
 
+_WIDTH = 26
+_LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
+"""Lines of a file behind the scenes that have them, all if none is named."""
+
+
 def _text(draft: Draft, gates: str) -> str:
     """Write the file around its gates; what is usual is as in the table of keys."""
-    struck = draft.scene in STRUCK
-    incline = f"incline: [{draft.inclines}], " if struck else ""
-    order = f", {_usual('plan.order')}" if draft.scene == "two-chains" else ""
-    return f"""{_HEAD}
-title: {json.dumps(draft.title, ensure_ascii=False)}
-
-{_chains(draft)}
-{_SURFACE if struck else ""}\
-{_heights(draft)}
-drop: {draft.drop}
-gravity: 9.81 m/s^2      # or  site: {{latitude: 50 deg, height: 100 m}}
-
-{gates}
-release: {{{_usual("release.channel")}, {_usual("release.pulse")}}}
-{"" if struck else _air(draft)}\
-plan: {{{incline}repeats: {draft.repeats}{order}, {_usual("plan.settle")}}}
-# Limits of a valid drop, stated before any result is known.
-accept: {{missed_edges: {5 if struck else 15} %}}
-"""
+    scenes = ((line[:_WIDTH].split(), line[_WIDTH:]) for line in _LINES)
+    lines = [text for scenes_of_line, text in scenes if draft.scene in (scenes_of_line or SCENES)]
+    values = {name: str(getattr(draft, name)) for name in Draft.__slots__}
+    values |= {f"usual_{name}": key_at(path).default for name, path in _USUAL.items()}
+    values |= {"title": json.dumps(draft.title, ensure_ascii=False), "gates": gates}
+    return Template("\n".join(lines) + "\n").substitute(values)
 
 
-_HEAD = """\
-# Written by rig new. Replace the values by yours; rig check FILE shows plan and limits.
-# A quantity may have its standard uncertainty, such as 900 mm ± 2 mm.
-protocol: 1"""
-_SURFACE = """\
-surface:                 # guesses; rig estimate SESSION measures them
-  restitution: 0.50 ± 0.10
-  friction: 0.20 ± 0.10
-
-"""
-
-
-def _usual(path: str) -> str:
-    """Write a key with its default."""
-    return f"{path.rpartition('.')[2]}: {key_at(path).default}"
-
-
-def _heights(draft: Draft) -> str:
-    """Say from where heights are measured."""
-    if draft.scene == "track":
-        return f"""\
-track: {{incline: {draft.inclines}}}   # rolling_inertia: 0.4 if a ball rolls
-# Gates and drop are lengths along the track, from a mark below all gates."""
-    zero = "the contact point" if draft.scene in STRUCK else "one level below the gates"
-    bodies = {"object": "object's", "picket-fence": "lowest bar's"}
-    body = bodies.get(draft.scene, "lowest rod's")
-    return f"# Heights are above {zero}; drop: that of the {body} middle before release."
-
-
-def _air(draft: Draft) -> str:
-    example = "   # a steel ball of 20 mm" if draft.scene == "object" else ""
-    return f"""\
-# The fit estimates the drag of the air. If you know the terminal speed, state it:
-# drag: {{terminal_speed: 60 m/s ± 6 m/s}}{example}
-"""
-
-
-def _chains(draft: Draft) -> str:
-    if draft.scene in {"object", "track"}:
-        return f"chains:\n  body: {{rods: 1, diameter: {draft.diameter}}}  # length in a beam\n"
-    rods = f"rods: {draft.rods}, length: {draft.length}, diameter: {draft.diameter}"
-    part, chains = "rod", f"  A: {{{rods}}}\n"
-    if draft.scene == "two-chains":
-        chains += "  B: {like: A}\n"
-    if draft.scene == "picket-fence":  # its bars are printed
-        part, chains = "bar", f"  fence: {{{rods}, position_uncertainty: 0.1 mm}}\n"
-    lengths = f"# length: middle of the lowest {part} to that of the highest"
-    return f"chains:                  {lengths}\n{chains}"
+_USUAL = {
+    "channel": "release.channel",
+    "pulse": "release.pulse",
+    "order": "plan.order",
+    "settle": "plan.settle",
+}
 
 
 def _gates(protocol: Protocol, draft: Draft) -> str:
@@ -202,8 +154,8 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
     for share in _HIGH:
         if len(heights) == number or not gaps:
             break
-        wanted = drop.value + share * rods.chain.length
-        gap = min(gaps, key=lambda gap, wanted=wanted: abs(gap - wanted))  # type: ignore[misc]
+        target = drop.value + share * rods.chain.length
+        gap = min(gaps, key=lambda gap, target=target: abs(gap - target))  # type: ignore[misc]
         gaps.remove(gap)
         heights.append(gap)
     if len(heights) < number:

@@ -141,8 +141,8 @@ def _unknown_key(name: str, accepted: Iterable[str]) -> str:
 
 def join(path: str, key: str) -> str:
     """Return a key path; a key that is no plain word is quoted, so that a line stays a line."""
-    shown = key if key.isidentifier() and len(key) <= 40 else quoted(key)
-    return f"{path}.{shown}" if path else shown
+    word = key if key.isidentifier() and len(key) <= 40 else quoted(key)
+    return f"{path}.{word}" if path else word
 
 
 def did_you_mean(word: str, accepted: Iterable[str]) -> str:

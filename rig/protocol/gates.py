@@ -97,7 +97,7 @@ def check_clear(
     )
     top = min(drop.value + chain.chain.length for chain in chains)
     part = vocabulary_of(chains, struck=surface).part
-    alone = next(iter(chains)).name if all(chain.chain.rods == 1 for chain in chains) else None
+    only = next(iter(chains)).name if all(chain.chain.rods == 1 for chain in chains) else None
     for gate in filter(Section.is_sound, _sections(section)):
         height = gate["height"]
         message = f"found {_mm(height)}"
@@ -107,12 +107,12 @@ def check_clear(
             message += f"{_mm(math.ceil(lowest * 1e4) / 1e4)} is needed"
         elif rod is not None:
             clear = " or ".join(_mm(z) for z in _clear_heights(height, rods, lowest, top))
-            name = f"{part} {rod.number} of {rod.chain}" if alone is None else alone
+            name = f"{part} {rod.number} of {rod.chain}" if only is None else only
             message += f", which {name} blocks before the release"
             message += f"; the nearest clear heights are {clear}" if clear else ""
         elif height > top:
-            passes = f"no {part} passes" if alone is None else f"{alone} does not pass"
-            start = f"the top {part} starts" if alone is None else "it starts"
+            passes = f"no {part} passes" if only is None else f"{only} does not pass"
+            start = f"the top {part} starts" if only is None else "it starts"
             message += f"; {passes} above {_mm(top)}, where {start}"
         else:
             continue

@@ -70,8 +70,8 @@ def with_gates(protocol: Protocol, channels: Collection[int]) -> Protocol:
     """Return a scene with those of its gates alone that are at some channels."""
     if protocol.gates is None:
         return protocol
-    kept = tuple(gate for gate in protocol.gates.gates if gate.channel in channels)
-    return replace(protocol, gates=replace(protocol.gates, gates=kept))
+    gates = tuple(gate for gate in protocol.gates.gates if gate.channel in channels)
+    return replace(protocol, gates=replace(protocol.gates, gates=gates))
 
 
 def check_gates(protocol: Protocol) -> Gates:
@@ -112,10 +112,10 @@ def too_long(protocol: Protocol) -> Problem | None:
         f"{record_ms(protocol) / 1e3:.3g} s; boards record for at most "
         f"{LONGEST_RECORD_MS / 1e3:g} s: shorten the drop"
     )
-    return _located(protocol, message, "drop")
+    return _locate(protocol, message, "drop")
 
 
-def _located(protocol: Protocol, message: str, *path: str | int) -> Problem:
+def _locate(protocol: Protocol, message: str, *path: str | int) -> Problem:
     """Return a problem at the place of the file that a path leads to."""
     place = place_of(load(protocol.text, protocol.source), *path)
     steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
@@ -144,15 +144,15 @@ def most_edges(protocol: Protocol) -> int:
 
 def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     """Say what a protocol wants of a board that it does not have, in the order of the file."""
-    found = []
+    problems = []
 
-    def want(kind: str, least: float, what: str, has: str, *path: str | int) -> None:
+    def want(kind: str, least: float, value: str, has: str, *path: str | int) -> None:
         if getattr(board, kind) >= least:
             return
-        others = [other.one for other in BOARDS.values() if getattr(other, kind) >= least]
-        other = f", or use {' or '.join(others)}" if others else ""
-        message = f"found {what}; the board ({board.name}) has {has}: change this{other}"
-        found.append(_located(protocol, message, *path))
+        able = [timer.one for timer in BOARDS.values() if getattr(timer, kind) >= least]
+        advice = f", or use {' or '.join(able)}" if able else ""
+        message = f"found {value}; the board ({board.name}) has {has}: change this{advice}"
+        problems.append(_locate(protocol, message, *path))
 
     release = protocol.release
     has = f"releases 0 to {board.releases - 1}"
@@ -166,7 +166,7 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
         for n, gate in enumerate(protocol.gates.on(side) if protocol.gates else ()):
             path = ("gates", side, n, "channel")
             want("gates", gate.channel + 1, str(gate.channel), has, *path)
-    return sorted(found)
+    return sorted(problems)
 
 
 def check_recordable(protocol: Protocol, board: Capabilities | None = None) -> None:

@@ -39,7 +39,7 @@ def runs(protocol: Protocol) -> tuple[Run, ...]:
     plan = protocol.plan
     inclines = list(plan.inclines)
     if plan.randomize == "incline":
-        inclines = _shuffled(inclines, plan.seed)
+        inclines = _shuffle(inclines, plan.seed)
     pattern = PATTERNS[plan.order]
     drops = [
         (incline, *_sides(protocol, pattern[repeat % len(pattern)]))
@@ -47,7 +47,7 @@ def runs(protocol: Protocol) -> tuple[Run, ...]:
         for repeat in range(plan.repeats)
     ]
     if plan.randomize == "all":
-        drops = _shuffled(drops, plan.seed)
+        drops = _shuffle(drops, plan.seed)
     return tuple(Run(number, *drop) for number, drop in enumerate(drops, start=1))
 
 
@@ -61,7 +61,7 @@ def _sides(protocol: Protocol, first: int) -> tuple[str | None, str | None]:
     return names[first], names[1 - first]
 
 
-def _shuffled(items: list[T], seed: int) -> list[T]:
+def _shuffle(items: list[T], seed: int) -> list[T]:
     """Return a Fisher–Yates shuffle that is the same everywhere.
 
     Python promises the sequence of ``random()`` for a given seed across versions and platforms,
@@ -72,6 +72,6 @@ def _shuffled(items: list[T], seed: int) -> list[T]:
     source = random.Random(seed)
     result = list(items)
     for last in range(len(result) - 1, 0, -1):
-        other = int(source.random() * (last + 1))
-        result[last], result[other] = result[other], result[last]
+        swap = int(source.random() * (last + 1))
+        result[last], result[swap] = result[swap], result[last]
     return result

@@ -67,12 +67,12 @@ class RodChain:
     @property
     def missing_keys(self) -> tuple[str, ...]:
         """The keys of the rods that the file leaves open, though a scene may do without them."""
-        known = {
+        stated_keys = {
             "mass": self.weighed,
             "diameter": min(self.diameters, default=0.0) > 0.0,
             "rod_length": not isnan(self.rod_length),
         }
-        return tuple(key for key, stated in known.items() if not stated)
+        return tuple(key for key, stated in stated_keys.items() if not stated)
 
 
 def vocabulary_of(chains: Collection[RodChain], *, struck: bool) -> Vocabulary:

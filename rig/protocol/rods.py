@@ -125,8 +125,8 @@ def are_apart(
             section.fault(key, message)
             return False
         if rise >= pitch:  # never true of an unknown rod length, which is a NaN
-            shown = format_quantity(Quantity(rise), "mm")
-            message = f"tilted ends rise {shown}, so rods {rod} and {rod + 1} would touch"
+            height = format_quantity(Quantity(rise), "mm")
+            message = f"tilted ends rise {height}, so rods {rod} and {rod + 1} would touch"
             section.fault("rod_length", message)
             return False
     return True

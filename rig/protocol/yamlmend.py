@@ -87,8 +87,8 @@ def _mends(text: str, stop: int, begin: int) -> Iterator[Mend]:
     `stop` is where it stopped, `begin` where that began which it could not finish.
     """
     at = _visible(text, stop)
-    here = text[at : at + 1]
-    if here == "\t":
+    character = text[at : at + 1]
+    if character == "\t":
         yield Mend(at, "a tab; use blanks", at, at + 1, " ")
     yield from _open_quotes(text, stop)
     for start in dict.fromkeys((_line_start(text, begin), _line_start(text, at))):
@@ -163,7 +163,7 @@ def _brackets(text: str, at: int, begin: int) -> Iterator[Mend]:
             opened.append(n)
         elif text[n] in "]}" and opened:
             opened.pop()
-    here = text[at : at + 1]
+    character = text[at : at + 1]
     if text[begin : begin + 1] in _PAIRS and begin not in opened:
         opened.insert(0, begin)
     if opened:
@@ -175,16 +175,16 @@ def _brackets(text: str, at: int, begin: int) -> Iterator[Mend]:
             yield Mend(gap.end(), message, gap.start(), gap.start(), ",")
         message = f"{text[last]} is open from here: close it with {bracket}"
         comment = re.compile(r"\s+#").search(text, last, end)
-        places = [at] if here in {"]", "}"} else []
+        places = [at] if character in {"]", "}"} else []
         for to in (*places, comment.start() if comment else len(text[:end].rstrip())):
             yield Mend(last, message, to, to, bracket)
-        if here in {"]", "}"}:
-            message = f"{quoted(here)} does not close {text[last]}: write {bracket}"
+        if character in {"]", "}"}:
+            message = f"{quoted(character)} does not close {text[last]}: write {bracket}"
             yield Mend(at, message, at, at + 1, bracket)
     start = _line_start(text, at)
     for bracket, closing in _PAIRS.items():
         starts = re.compile(r"(?:- |: +)(?=[^\s{\[])").finditer(text, start, _line_end(text, at))
-        for value in sorted((found.end() for found in starts), key=lambda n: abs(n - at)):
+        for value in sorted((match.end() for match in starts), key=lambda n: abs(n - at)):
             message = f"{bracket} is missing before {quoted(_word(text, value))}"
             if closing in text[value : _line_end(text, at)]:
                 yield Mend(value, message, value, value, bracket)
@@ -202,20 +202,20 @@ def _quotable(text: str, at: int) -> Iterator[Mend]:
         yield Mend(slash, message, slash, slash, "\\")
     value = _VALUE.search(text, start, end)
     if value is not None and value.group()[0] not in "[{\"'":
-        whole = '"' + value.group().replace("\\", "\\\\").replace('"', '\\"') + '"'
+        quoted_value = '"' + value.group().replace("\\", "\\\\").replace('"', '\\"') + '"'
         message = f"{quoted(text[at])} is not accepted here: put this value in quotes"
-        yield Mend(at, message, *value.span(), whole)
+        yield Mend(at, message, *value.span(), quoted_value)
 
 
 def _indents(text: str, at: int) -> Iterator[Mend]:
     """Give a line, or the one before it, the blanks and the hyphen of a line above or below."""
-    here = _line_start(text, at)
-    before = _line_start(text, max(here - 1, 0))
-    starts = [n + 1 for n in range(here) if text[n] == "\n"]
-    for start in dict.fromkeys((before, here)):
+    line_start = _line_start(text, at)
+    before = _line_start(text, max(line_start - 1, 0))
+    starts = [n + 1 for n in range(line_start) if text[n] == "\n"]
+    for start in dict.fromkeys((before, line_start)):
         indent = _indent(text, start)
-        others = {_lead(text, line): line for line in (0, *starts) if line != start}
-        for lead, line in reversed(others.items()):
+        leads = {_lead(text, line): line for line in (0, *starts) if line != start}
+        for lead, line in reversed(leads.items()):
             if lead == _lead(text, start) or text[line + len(lead) : line + len(lead) + 1] == "#":
                 continue
             number = text.count("\n", 0, line) + 1

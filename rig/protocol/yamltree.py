@@ -246,9 +246,9 @@ class _Builder:
         node = Sequence(place, parts, size) if is_list else Mapping(place, entries, size)
         self._add(node, place, anchor)
 
-    def _add(self, node: Node, place: Place, anchor: str | None, more: int = 1) -> None:
+    def _add(self, node: Node, place: Place, anchor: str | None, count: int = 1) -> None:
         """Append a node to what is open; its parts were counted as they came, but for an alias."""
-        self.nodes += more
+        self.nodes += count
         if self.nodes > MAX_NODES:
             raise _RefusalError(place, f"more than {MAX_NODES} values, aliases expanded")
         if anchor:

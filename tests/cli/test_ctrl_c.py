@@ -81,7 +81,7 @@ def test_a_signal_while_the_terminal_is_at_work():
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        asyncio.run(tui._shown(Headless()))
+        asyncio.run(tui._show(Headless()))
 
 
 def test_a_demo_that_was_interrupted_says_what_goes_on_with_it(call, tmp_path, monkeypatch):

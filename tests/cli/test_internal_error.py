@@ -23,13 +23,6 @@ sys.argv[1:] = {!r}
 rig.__main__.start()
 """
 AT_WORK = "lambda _: type('module', (), {'main': broken})"
-COMMANDS = {
-    "check": ["check", "x.yaml"],
-    "run": ["run", "x.yaml", "--port", "sim://", "--session", "s"],
-    "analyze": ["analyze", "s", "--json"],
-    "daemon": ["daemon", "--port", "sim://"],
-    "bench": ["bench", "stability"],
-}
 
 
 def ended(program: str, state: object, **options):
@@ -42,15 +35,14 @@ def ended(program: str, state: object, **options):
 
 
 @pytest.mark.parametrize("when", [AT_WORK, "broken"], ids=["at work", "while it loads"])
-@pytest.mark.parametrize("command", COMMANDS)
-def test_any_command_leaves_a_log_and_says_where(command, when, tmp_path):
-    done = ended(BROKEN.format("1 / 0", when, COMMANDS[command]), tmp_path)
+def test_a_command_leaves_a_log_and_says_where(when, tmp_path):
+    done = ended(BROKEN.format("1 / 0", when, ["analyze", "s", "--json"]), tmp_path)
     assert (done.returncode, done.stdout) == (1, "")
     told = r"rig: internal error \(ZeroDivisionError\); this is a bug, .* with the log at (.*)\n"
     log = Path(re.fullmatch(told, done.stderr)[1])
     assert log.parent == tmp_path / "chainrig"
     text = log.read_text("utf-8")
-    assert " ".join(COMMANDS[command]) in text
+    assert "analyze s --json" in text
     assert sys.version.split()[0] in text
     assert "in broken" in text
     assert text.endswith("ZeroDivisionError: division by zero\n")
@@ -90,5 +82,5 @@ def test_the_terminal_shows_no_traceback_either(capfd):
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        asyncio.run(tui._shown(Broken()))
+        asyncio.run(tui._show(Broken()))
     assert "Traceback" not in "".join(capfd.readouterr())

@@ -100,8 +100,17 @@ def test_every_command_that_takes_a_file_is_tried():
     assert taken == COMMANDS.keys() | WRITTEN
 
 
-@pytest.mark.parametrize("thing", ["pipe", "folder", "socket", "device"], indirect=True)
-@pytest.mark.parametrize("case", COMMANDS, ids="-".join)
+# One function looks what is there: every command asks it, and it knows every kind.
+@pytest.mark.parametrize(
+    ("case", "thing"),
+    [
+        *((case, "pipe") for case in COMMANDS),
+        *((("check", "protocol"), kind) for kind in ("folder", "socket", "device")),
+        *((("analyze", "session"), kind) for kind in ("folder", "socket", "device")),
+    ],
+    indirect=["thing"],
+    ids=lambda value: value if isinstance(value, str) else "-".join(value),
+)
 def test_what_is_no_file_is_refused_in_words(case, thing, places, request, call):
     words = [str({**places, "X": thing}.get(word, word)) for word in COMMANDS[case].split()]
     done = call(case[0], *words)

@@ -11,6 +11,7 @@ import jsonschema
 import pytest
 import yaml
 
+from rig.boards import GATES, RELEASES
 from rig.errors import InputError
 from rig.protocol import fields, keys
 from rig.protocol.keys import KEYS
@@ -26,6 +27,14 @@ BY_PATH = {key.path: key for key in KEYS}
 
 def text(data: dict) -> str:
     return yaml.safe_dump(data, allow_unicode=True, sort_keys=False)
+
+
+def test_the_table_knows_what_boards_have():
+    assert {BY_PATH[f"gates.{side}.[].channel"].accepted for side in ("impact", "free")} == {
+        keys.Whole(0, GATES - 1)
+    }
+    assert BY_PATH["release.channel"].accepted == keys.Whole(0, RELEASES - 1)
+    assert BY_PATH["chains.*.rods.[].count"].accepted == keys.Whole(1, keys.MOST_RODS)
 
 
 VALUED = [key for key in KEYS if key.example]
