@@ -93,22 +93,16 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+        self.commands: dict[str, Parser] = {}
 
     def parse(self, args: Sequence[str] | None) -> argparse.Namespace:
         """Parse; what is left over is the mistake of the sub-command that was named."""
         words = _join_pairs(sys.argv[1:] if args is None else args)
         arguments, rest = self.parse_known_args(words)
         if rest:
-            inner = next((parser for word in words if (parser := self._inner(word))), None)
-            (inner or self).error(f"unknown arguments: {' '.join(rest)}")
+            name = next((word for word in words if word in self.commands), "")
+            self.commands.get(name, self).error(f"unknown arguments: {' '.join(rest)}")
         return arguments
-
-    def _inner(self, word: str) -> argparse.ArgumentParser | None:
-        for action in self._actions:
-            if isinstance(action, argparse._SubParsersAction) and word in action.choices:
-                inner: argparse.ArgumentParser = action.choices[word]
-                return inner
-        return None
 
     def _check_value(self, action: argparse.Action, value: object) -> None:
         if action.choices is not None and value not in action.choices:
@@ -194,7 +188,7 @@ def build_parser(
     )
     parser.add_argument("--version", action="version", version=version)
     below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
-    parsers: dict[str, Parser] = {}
+    parsers = parser.commands
     for name, command in COMMANDS.items():
         outer, _, last = name.rpartition(" ")
         if outer not in below:

@@ -72,16 +72,13 @@ class Film:
 
     def slack(self, moment: int) -> tuple[list[bool], list[bool]]:
         """Whether each string is shorter than at rest: the left ones, and the right ones."""
-        left, right = (
-            [
-                math.dist(low, high) < rest - _LOOSE_M
-                for low, high, rest in zip(ends, ends[1:], lengths, strict=False)
-            ]
-            for ends, lengths in zip(
-                (self.left[moment], self.right[moment]), self.rest_m, strict=True
-            )
-        )
-        return left, right
+
+        def loose(ends: Sequence[Point], lengths: Sequence[float]) -> list[bool]:
+            strings = zip(ends, ends[1:], lengths, strict=False)
+            return [math.dist(low, high) < rest - _LOOSE_M for low, high, rest in strings]
+
+        left, right = self.rest_m
+        return loose(self.left[moment], left), loose(self.right[moment], right)
 
 
 def film_digest(session: Path) -> str:

@@ -252,10 +252,8 @@ _PHRASES: dict[str, Callable[[_Phrases], str]] = {
     "each_part": _each_part,
     "size": lambda p: f"{abs(p['size_m']) * 1e3:.1f} ± {max(p['U95_m'] * 1e3, _LEAST_MM):.1f} mm",
     "relative": lambda p: f"{abs(p['share']):.2%} ± {max(p['U95'], 1e-4):.2%}",
-    "share_of_edges": lambda p: (
-        f"{p['missed'] / p['expected']:.1%}"
-        if "missed" in p
-        else f"{p['unexplained'] / p['received']:.1%}"
+    "share_of_edges": lambda p: format(
+        p["missed"] / p["expected"] if "missed" in p else p["unexplained"] / p["received"], ".1%"
     ),
     "faults": lambda p: "; or ".join(
         make_reason(fault["code"], p.words, **fault["values"]).text for fault in p["candidates"]

@@ -92,16 +92,10 @@ def _compare(session: Reader, progress: Progress | None) -> Outcome:
 
 def _once(drops: list[Drop]) -> list[Drop]:
     """Leave out what was acknowledged again because the first ACKNOWLEDGE was lost on its way."""
-    unique: list[Drop] = []
+    unique: dict[object, Drop] = {}
     for drop in drops:
-        if not any(
-            (earlier.certificate, earlier.fire_tick, earlier.edges)
-            == (drop.certificate, drop.fire_tick, drop.edges)
-            for earlier in unique
-            if _key(earlier) == _key(drop)
-        ):
-            unique.append(drop)
-    return unique
+        unique.setdefault((_key(drop), drop.certificate, drop.fire_tick, drop.edges), drop)
+    return list(unique.values())
 
 
 def _key(drop: Drop) -> tuple[int, int]:

@@ -54,7 +54,7 @@ class Sections:
 
     def make(self, name: str, make: Callable[[], T]) -> T | None:
         """Make one section, see `alone`; `None` where that fails."""
-        made: list[T] = []
+        results: list[T] = []
         with self.alone(name):
-            made.append(make())
-        return made[0] if made else None
+            results.append(make())
+        return results[0] if results else None

@@ -50,15 +50,8 @@ class Dimension(Enum):
     TURNING = ("a rate of turning", "0.5 rad/s")
     NUMBER = ("a plain number", "0.50 ± 0.05")
 
-    @property
-    def noun(self) -> str:
-        """Name with its article."""
-        return str(self.value[0])
-
-    @property
-    def example(self) -> str:
-        """An example of a quantity of this kind."""
-        return str(self.value[1])
+    def __init__(self, noun: str, example: str) -> None:
+        self.noun, self.example = noun, example
 
     @property
     def units(self) -> tuple[str, ...]:

@@ -56,11 +56,9 @@ def _read_row(row: str) -> Vocabulary:
     return Vocabulary(scene, body, start, part, setup, f"{handling} {body}", two_sides)
 
 
-OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS = map(_read_row, _ROWS.splitlines())
+_SCENES = [_read_row(row) for row in _ROWS.splitlines()]
+OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS = _SCENES
 ANY_SCENE = Vocabulary(
     "", "what falls", "it starts", "part", "your set-up", "preparing it", two_sides=True
 )
-VOCABULARIES = {
-    words.scene: words
-    for words in (OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS, ANY_SCENE)
-}
+VOCABULARIES = {words.scene: words for words in (*_SCENES, ANY_SCENE)}

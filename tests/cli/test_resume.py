@@ -38,6 +38,13 @@ from tests.cli.lab import (
 )
 from tests.waiting import PATIENCE_S, until
 
+
+@pytest.fixture
+def protocol(fence):
+    """What falls is all the same to a recording: bars, whose edges are identified at once."""
+    return fence
+
+
 NAMES = {signal.SIGINT: "SIGINT", signal.SIGTERM: "SIGTERM", signal.SIGKILL: "SIGKILL"}
 
 

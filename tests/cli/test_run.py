@@ -87,10 +87,10 @@ def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
     assert_whole(finished.session, 4)
 
 
-def test_a_drop_is_read_once(run, monkeypatch):
+def test_a_drop_is_read_once(run, monkeypatch, fence):
     seen = []
     monkeypatch.setattr(identified, "identify", lambda *given: seen.append(0) or identify(*given))
-    assert run().code == 0
+    assert run(protocol=fence).code == 0
     assert len(seen) == 2
 
 
@@ -240,16 +240,18 @@ def test_no_such_port_is_device_trouble(run, tmp_path):
     assert not (tmp_path / "s").exists()
 
 
-def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(run, call, tmp_path):
-    done = run(port="sim://?lose=0.9")
+def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(
+    run, call, tmp_path, fence
+):
+    done = run(port="sim://?lose=0.9", protocol=fence)
     assert done.code == 4
     assert "did not answer" in done.err
     assert "Traceback" not in done.err
     assert done.out == ""
     assert call("analyze", tmp_path / "s").code == 0
-    assert run().code == 0
+    assert run(protocol=fence).code == 0
     assert_whole(tmp_path / "s", 2)
-    assert run().code == 0, "the line that never worked is forgotten"
+    assert run(protocol=fence).code == 0, "the line that never worked is forgotten"
 
 
 def connected(session):
@@ -257,32 +259,32 @@ def connected(session):
         return len(opened.identities())
 
 
-def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path):
+def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path, fence):
     for seed in range(1, 40):
         session = tmp_path / f"s{seed}"
-        done = run(session.name, "--seed", seed, port="sim://?lose=3%25")
+        done = run(session.name, "--seed", seed, port="sim://?lose=3%25", protocol=fence)
         assert "Traceback" not in done.err
         if done.code == 4 and connected(session):
             break
     else:
         pytest.fail("no seed gets through to the board and fails then")
-    assert run(session.name, port="sim://?lose=0").code == 0
+    assert run(session.name, port="sim://?lose=0", protocol=fence).code == 0
     assert_whole(session, 2)
-    assert run(session.name).code == 0, "the better line is what is gone on with"
+    assert run(session.name, protocol=fence).code == 0, "the better line is what is gone on with"
     with Session.open(session, readonly=True) as opened:
         ports = [identity["port"] for _, identity in opened.identities()]
     assert ports == [f"sim://?lose=3%25&seed={seed}", *[f"sim://?lose=0&seed={seed}"] * 2]
 
 
-def test_other_chains_are_not_mixed_into_a_simulated_session(run, tmp_path):
-    assert run("s", "--seed", 3).code == 0
+def test_other_chains_are_not_mixed_into_a_simulated_session(run, tmp_path, fence):
+    assert run("s", "--seed", 3, protocol=fence).code == 0
     before = (tmp_path / "s").read_bytes()
     for more, port in ((("--seed", 4), "sim://"), ((), "sim://?seed=4")):
-        done = run("s", *more, port=port)
+        done = run("s", *more, port=port, protocol=fence)
         assert done.code == 2
         assert "seed" in done.err
     assert (tmp_path / "s").read_bytes() == before
-    assert run("s").code == run("s", "--seed", 3).code == 0
+    assert run("s", protocol=fence).code == run("s", "--seed", 3, protocol=fence).code == 0
 
 
 def test_a_session_that_was_moved_can_be_continued(call, tmp_path, protocol):
@@ -302,7 +304,10 @@ def test_a_session_that_was_moved_can_be_continued(call, tmp_path, protocol):
 def reads(tmp_path_factory):
     """How often the port is read in a campaign of two runs that nothing disturbs."""
     folder, read, number = tmp_path_factory.mktemp("reads"), SimulatedSerial.read, count(1)
-    (folder / "short.yaml").write_text(short(repeats=1), "utf-8")
+    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
+    (folder / "short.yaml").write_text(
+        text.replace("{repeats: 10, settle: 5 s}", "{repeats: 2, settle: 1 s}"), "utf-8"
+    )
 
     def counted(port, size=1):
         next(number)
@@ -318,7 +323,7 @@ def reads(tmp_path_factory):
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
 def test_a_cable_that_is_pulled_costs_nothing_that_was_recorded(
-    run, tmp_path, monkeypatch, reads, share
+    run, tmp_path, monkeypatch, reads, share, fence
 ):
     read, number = SimulatedSerial.read, count(1)
 
@@ -328,14 +333,14 @@ def test_a_cable_that_is_pulled_costs_nothing_that_was_recorded(
         return read(port, size)
 
     monkeypatch.setattr(SimulatedSerial, "read", pull)
-    done = run("s")
+    done = run("s", protocol=fence)
     assert done.code == 4
     assert done.err.splitlines()[-2].startswith("connection lost: read failed")
     drops = drops_of(tmp_path / "s")
     with Session.open(tmp_path / "s", readonly=True) as session:
         assert replay(session).differences == ()
     monkeypatch.undo()
-    assert run("s").code == 0
+    assert run("s", protocol=fence).code == 0
     assert drops_of(tmp_path / "s")[: len(drops)] == drops
     assert_whole(tmp_path / "s", 2)
 
