@@ -16,8 +16,8 @@ from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translated
 from rig.session.foreign import limit_steps
 from rig.session.reason_rows import read_reasons
-from rig.session.rows import CERTIFICATE_AT, RowError, check_row, drop_of, identity
-from rig.session.schema import RunState
+from rig.session.rows import RowError, check_row, drop_of, named_values
+from rig.session.schema import TABLES, RunState, read_identity
 
 if TYPE_CHECKING:
     import sqlite3
@@ -139,7 +139,7 @@ class Reader:
     def identities(self) -> list[tuple[int, dict[str, Any]]]:
         """Host time and content of every identity, in order."""
         rows = self._rows("identity", "ORDER BY id")
-        return [(host_ns, identity(text)) for _, host_ns, text in rows]
+        return [(host_ns, read_identity(text)) for _, host_ns, text in rows]
 
     def byte_log(self, after: int = 0) -> Iterator[ByteChunk]:
         """All bytes in both directions, in order, but for the first so many chunks.
@@ -157,11 +157,11 @@ class Reader:
 
     def pulses(self) -> list[Pulse]:
         """All pulses of the 1 Hz reference that were asked for, in order."""
-        return [Pulse(*row[1:]) for row in self._newer("reference")]
+        return [Pulse(*row[1:]) for row in self._rows("reference", "ORDER BY id")]
 
     def host_breaks(self) -> list[HostBreak]:
         """When the host slept or its clock was set, in order."""
-        return [HostBreak(*row[1:]) for row in self._newer("host_break")]
+        return [HostBreak(*row[1:]) for row in self._rows("host_break", "ORDER BY id")]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording, compared with its bytes.
@@ -214,15 +214,13 @@ class Reader:
         SessionError
             Something of it cannot be read.
         """
-        self.identities()
-        self.pings()
-        self.pulses()
-        self.host_breaks()
-        self.states()
-        for drop in self.drops():  # and the bytes
+        for table in TABLES.keys() - {"drop", "edge"}:
+            for _ in self._rows(table):
+                pass
+        for drop in self.drops():
             if drop.damage:
                 raise self._damaged(f"run {drop.run}, attempt {drop.attempt}: {drop.damage}")
-        _ = self.protocol_text, self.protocol_source
+        _ = self.protocol_text
 
     def _opened(self) -> sqlite3.Connection:
         if self._connection is None:
@@ -253,17 +251,18 @@ class Reader:
         SessionError
             Which value of which row cannot be.
         """
+        # A file of an older format that was opened read-only has not all tables.
+        if TABLES[table].since > 1 and not any(self._raw("sqlite_master", "WHERE name = ?", table)):
+            return
         for row in self._raw(table, which, *values):
-            try:
-                check_row(table, row)
-            except RowError as error:
-                raise self._damaged(str(error)) from error
+            self._check(table, row)
             yield row
 
-    def _newer(self, table: str) -> Iterator[tuple[Any, ...]]:
-        """Read a table that a file of an older format, opened read-only, does not have."""
-        if any(self._raw("sqlite_master", "WHERE name = ?", table)):
-            yield from self._rows(table, "ORDER BY id")
+    def _check(self, table: str, row: tuple[Any, ...]) -> None:
+        try:
+            check_row(table, row)
+        except RowError as error:
+            raise self._damaged(str(error)) from error
 
     def _protocol(self) -> tuple[Any, ...]:
         row = next(self._rows("protocol"), None)
@@ -272,10 +271,7 @@ class Reader:
         return row
 
     def _drop(self, row: tuple[Any, ...], replayed: Mapping[Job, Drop]) -> Drop:
-        try:
-            check_row("drop", row[:3])
-        except RowError as error:  # nobody knows which drop it is
-            raise self._damaged(str(error)) from error
+        self._check("drop", row[:3])  # else nobody knows which drop it is
         try:
             check_row("drop", row)
             edges = self._edges(row)
@@ -295,7 +291,7 @@ class Reader:
         return make_error(SessionError, "session_wrong", path=self.path, text=text)
 
     def _edges(self, row: tuple[Any, ...]) -> list[tuple[Any, ...]]:
-        number, events = row[0], row[CERTIFICATE_AT]
+        number, events = row[0], named_values(row)["events"]
         # An event is a change of one gate or more.
         most = MOST_EDGES if events is None else min(MOST_EDGES, GATES * events)
         edges = [*self._raw("edge", 'WHERE "drop" = ? ORDER BY idx LIMIT ?', number, most + 1)]

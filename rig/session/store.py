@@ -8,7 +8,7 @@ import logging
 import os
 import platform
 import sqlite3
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -20,13 +20,15 @@ from rig.errors import InputError, SessionError
 from rig.files import make_folder, state_folder
 from rig.printable import encodable
 from rig.reasons import make_error
-from rig.session.database import build, check_free, check_place, connect
+from rig.session.database import build, check_place, connect
 from rig.session.faults import translated
 from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
 from rig.session.reason_rows import write_reasons
+from rig.session.rows import edge_rows, row_of
+from rig.session.schema import TABLES, insert_statement
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -37,11 +39,6 @@ if TYPE_CHECKING:
 
 
 log = logging.getLogger(__name__)
-_CERTIFIED = ("events", "crc32", "overflows", "glitches", "late")
-_OBSERVED = (
-    "release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"
-)  # fmt: skip
-"""Columns of a drop's certificate, before and after what the host adds."""
 
 
 class Session(Reader):
@@ -90,23 +87,22 @@ class Session(Reader):
         SessionError
             If something is already there or the place cannot be written.
         """
+        meta = {
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "rig_version": __version__,
+            "python_version": platform.python_version(),
+            "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
+            "simulated": "true" if simulated else "false",
+            "origin": encodable(origin),
+        }
         place = Path(os.path.realpath(path))
         lock = WriterLock(place)
         try:
-            check_free(place)
-            meta = {
-                "created": datetime.now(UTC).isoformat(timespec="seconds"),
-                "rig_version": __version__,
-                "python_version": platform.python_version(),
-                "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
-                "simulated": "true" if simulated else "false",
-                "origin": encodable(origin),
-            }
             build(place, meta, encodable(protocol_source), protocol_text)
-            return cls(place, connect(place, readonly=False), lock)
         except BaseException:
             lock.release()
             raise
+        return cls._connect(place, lock)
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Session:
@@ -127,12 +123,14 @@ class Session(Reader):
         """
         place = Path(os.path.realpath(path))
         check_place(place)
+        return cls._connect(place, None if readonly else WriterLock(place))
+
+    @classmethod
+    def _connect(cls, place: Path, lock: WriterLock | None) -> Self:
         with ExitStack() as undo:
-            lock = None if readonly else WriterLock(place)
             if lock is not None:
                 undo.callback(lock.release)
-            connection = connect(place, readonly=readonly)
-            undo.callback(connection.close)
+            connection = undo.enter_context(closing(connect(place, readonly=lock is None)))
             session = cls(place, connection, lock)
             undo.pop_all()
         return session
@@ -253,43 +251,31 @@ class Session(Reader):
 
     # ------------------------------------------------------------------ adding
 
+    def add_rows(self, table: str, rows: Iterable[Sequence[object]]) -> None:
+        """Add rows to a table, all or none; those with a number get the next ones."""
+        numbered = TABLES[table].columns[0].name == "id"
+        values = [(None, *row) if numbered else row for row in rows]
+        self._writable().add(Statement(insert_statement(table), values))
+
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
         """Add bytes exchanged with the device, as they came or went."""
-        self._add(
-            "INSERT INTO bytes (host_ns, direction, data) VALUES (?, ?, ?)",
-            (host_ns, direction, bytes(data)),
-        )
+        self.add_rows("bytes", [(host_ns, direction, bytes(data))])
 
     def add_identity(self, identity: Mapping[str, object], host_ns: int) -> None:
         """Add what a device said it is, each time it says so."""
-        self._add(
-            "INSERT INTO identity (host_ns, json) VALUES (?, ?)",
-            (host_ns, json.dumps(dict(identity))),
-        )
+        self.add_rows("identity", [(host_ns, json.dumps(dict(identity)))])
 
     def add_ping(self, ping: ClockSample) -> None:
         """Add one clock sample."""
-        self.add_pings([ping])
-
-    def add_pings(self, pings: Iterable[ClockSample]) -> None:
-        """Add clock samples, all or none."""
-        self._add(
-            "INSERT INTO ping (host_send_ns, host_recv_ns, tick) VALUES (?, ?, ?)",
-            *map(tuple, pings),
-        )
+        self.add_rows("ping", [ping])
 
     def add_pulse(self, pulse: Pulse) -> None:
         """Add what the device said of its 1 Hz reference."""
-        self._add(
-            "INSERT INTO reference (host_send_ns, host_recv_ns, number, tick) VALUES (?, ?, ?, ?)",
-            tuple(pulse),
-        )
+        self.add_rows("reference", [pulse])
 
-    def add_host_break(self, found: HostBreak) -> None:
+    def add_host_break(self, pause: HostBreak) -> None:
         """Add that the host slept or its clock was set."""
-        self._add(
-            "INSERT INTO host_break (host_ns, slept_ns, stepped_ns) VALUES (?, ?, ?)", tuple(found)
-        )
+        self.add_rows("host_break", [pause])
 
     def add_drop(self, drop: Drop, *, host_ns: int | None = None, provenance: str = "") -> None:
         """Add the raw record of one drop with its edges, all or nothing.
@@ -305,38 +291,18 @@ class Session(Reader):
         """
         journal = self._writable()
         self._last_drop += 1
-        number = self._last_drop
-        head = (number, drop.run, drop.attempt, drop.tick_hz, drop.fire_tick, drop.initial_state)
-        # Of a drop without a certificate all of them are NULL.
-        fields, tail = (
-            tuple(getattr(drop.certificate, name, None) for name in names)
-            for names in (_CERTIFIED, _OBSERVED)
-        )
-        faults = write_reasons(drop.faults)
+        row = row_of(drop, self._last_drop, host_ns, provenance)
         journal.add(
-            Statement(
-                'INSERT INTO "drop" VALUES '
-                "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                [(*head, *fields, encodable(faults), host_ns, encodable(provenance), *tail)],
-            ),
-            Statement(
-                "INSERT INTO edge VALUES (?, ?, ?, ?, ?)",
-                [
-                    (number, index, edge.tick, edge.channel, int(edge.blocked))
-                    for index, edge in enumerate(drop.edges)
-                ],
-            ),
+            Statement(insert_statement("drop"), [row]),
+            Statement(insert_statement("edge"), edge_rows(drop, self._last_drop)),
         )
 
     def add_state(
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
         """Add one line to the log of run states."""
-        text = write_reasons(reasons)
-        self._add(
-            "INSERT INTO run_state (run, attempt, state, reasons, host_ns) VALUES (?, ?, ?, ?, ?)",
-            (run, attempt, str(state), encodable(text), host_ns),
-        )
+        text = encodable(write_reasons(reasons))
+        self.add_rows("run_state", [(run, attempt, str(state), text, host_ns)])
 
     def unblind(self) -> None:
         """Record, once and on the disk, that from now on the numbers may be seen.
@@ -347,7 +313,7 @@ class Session(Reader):
             That was recorded before, or the disk fails.
         """
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        self._add("INSERT INTO meta VALUES (?, ?)", (UNBLINDED, now))
+        self.add_rows("meta", [(UNBLINDED, now)])
         self.commit()
         self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
 
@@ -358,9 +324,6 @@ class Session(Reader):
         if self.readonly:
             raise make_error(SessionError, "session_read_only", path=self.path)
         return self._journal
-
-    def _add(self, sql: str, *rows: Sequence[object]) -> None:
-        self._writable().add(Statement(sql, rows))
 
 
 def _unused(path: Path) -> Path:

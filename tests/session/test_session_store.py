@@ -59,7 +59,8 @@ def fill(session: Session) -> None:
     session.log_bytes("tx", 1, b"\x00\xff")
     session.log_bytes("rx", 2, b"")
     session.add_identity({"serial": "A1", "tick_hz": 2_000_000}, 3)
-    session.add_pings([ClockSample(1, 2, 3), ClockSample(4, 5, 2**32 - 1)])
+    session.add_ping(ClockSample(1, 2, 3))
+    session.add_ping(ClockSample(4, 5, 2**32 - 1))
     session.add_pulse(PULSE)
     session.add_host_break(BREAK)
     session.add_drop(DEVICE_DROP, host_ns=99, provenance="device")
@@ -93,7 +94,7 @@ def test_a_session_needs_a_folder_that_is_there(tmp_path):
 def test_everything_comes_back_as_it_went_in(path: Path) -> None:
     with make(path) as session:
         fill(session)
-        assert session.pending == 10
+        assert session.pending == 11
         session.commit()
         assert session.pending == 0
     with Session.open(path, readonly=True) as session:
