@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from rig import __version__
-from rig.boards import BOARDS, FLASHED
+from rig.boards import BOARDS, FLASHED, GATES
 from rig.command_help import Parser, overview, runnable
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
@@ -370,6 +370,8 @@ def _parser() -> Parser:
         type=int,
         choices=range(16),
     )
+    selftest.value("--protocol", "FILE", "whose gates are in use; others may be left open")
+    selftest.value("--gates", "LIST", "gates in use, such as 0,1,8,9", type=_gates)
     selftest.value("--drops", "N", "for that measurement (default 20)", type=_count, default=20)
     selftest.flag(
         "--release", "allow release 0 to be driven, once for 50 ms; without it no release ever is"
@@ -461,6 +463,15 @@ def _count(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError(f"found {text}; accepted: 1 or more")
     return number
+
+
+def _gates(text: str) -> int:
+    channels = text.split(",")
+    if not all(channel.isdecimal() and int(channel) < GATES for channel in channels):
+        raise argparse.ArgumentTypeError(
+            f"found '{text}'; accepted: numbers from 0 to {GATES - 1}, with commas between"
+        )
+    return sum(1 << channel for channel in set(map(int, channels)))
 
 
 def _trials(text: str) -> int | str:

@@ -49,7 +49,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "rig sweep protocols/inclined-uniform.yaml --vary drop=100mm..300mm:20 -o sweep.csv",
     ),
     "ports": ("rig ports", "rig ports --json"),
-    "flash": ("rig flash --board mega --port /dev/ttyACM0", "rig flash --board uno --port COM3"),
+    "flash": ("rig flash --board mega --port /dev/ttyACM0", "rig flash --board pico"),
     "selftest": ("rig selftest --port /dev/ttyACM0", "rig selftest --port sim:// --release"),
     "doctor": ("rig doctor", "rig doctor --port /dev/ttyACM0 --session my.session"),
     "run": (

@@ -337,6 +337,11 @@ WORDINGS: dict[str, Wording] = {
         "this computer was too busy to ask the board every {interval_s:.0f ms}",
         "close what keeps it busy, then rig selftest again"),
     "check_needs": _doubt("it needs {needed}"),
+    "gates_unused": _doubt(
+        "{gates_listed} blocked all the time: not in use, or a beam that is blocked",
+        "say which gates are in use: --protocol FILE, or --gates 0,1,8,9"),
+    "gates_not_fitted": _doubt(
+        "in use, but not on this board: {gates_listed}", "use gates that the board has"),
     # What is wrong with a timer's file, beside its line and column.
     "not_accepted": _doubt("{text!r:.40} is not {accepted}"),
     "backwards": _doubt("{text} is before the time above it"),

@@ -8,12 +8,11 @@ from __future__ import annotations
 import os
 import shutil
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.metadata import packages_distributions
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from rig.doctor.facts import BoardFacts, DiskFacts, Owner, PortFacts, SessionFacts
 from rig.flash.image import shipped_firmware
 from rig.link.client import Device
 from rig.link.gatewatch import watch_gates
@@ -28,19 +27,112 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.clock.host import Clock
+    from rig.link.gatewatch import GateStates
+    from rig.link.messages import Identity
     from rig.link.port import Port
-    from rig.records import Edge
+    from rig.records import ClockSample, Edge
 
 _PROC = Path("/proc")
 _UDEV = Path("/run/udev/data")
 _IGNORED = ("E:ID_MM_DEVICE_IGNORE=1", "E:ID_MM_PORT_IGNORE=1")
-WATCH_S = 1.0
 _GLANCE_S = 0.3
 _PINGS = 40
 _LABEL = pack_label(TEST_RUN, 1)
 _TRIES = 40
 _AGAIN = (RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY)
 """Refusals that a flickering gate gives now and then."""
+
+
+class Owner(NamedTuple):
+    """A process that has a port open."""
+
+    pid: int
+    command: str
+
+
+@dataclass(frozen=True, slots=True)
+class PortFacts:
+    """A device path and who may and does use it.
+
+    Attributes
+    ----------
+    exists, usable
+        Whether it is there, and may be read and written by this user.
+    group
+        The group it belongs to.
+    owners
+        Other processes that have it open.
+    modem_manager
+        Whether ModemManager runs.
+    left_alone
+        Whether udev tells ModemManager to leave it alone.
+    """
+
+    path: str
+    exists: bool
+    usable: bool
+    group: str
+    owners: tuple[Owner, ...]
+    modem_manager: bool
+    left_alone: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFacts:
+    """What a board says and does.
+
+    Attributes
+    ----------
+    shipped
+        The firmware that comes with this program for such a board; empty when none does.
+    held
+        Run and attempt of a drop that it holds, or `None`.
+    states
+        Its gates as STATUS had them for a moment.
+    edges
+        Of all gates that were not blocked, for `watched_s`, from a recording without a release;
+        `None` when none could be made, for the reason `unwatched`.
+    stopped
+        Whether that was because the emergency stop is open.
+    """
+
+    identity: Identity
+    shipped: str
+    pings: tuple[ClockSample, ...]
+    held: tuple[int, int] | None
+    states: GateStates
+    edges: tuple[Edge, ...] | None = None
+    watched_s: float = 1.0
+    unwatched: str = ""
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFacts:
+    """What `rig recover` says of a session file, and what its log of bytes tells of the board.
+
+    Attributes
+    ----------
+    foreign, trouble
+        Why it is no session, or the first of what is wrong with it; both empty for a whole one.
+    writer
+        Who writes it, in words.
+    restarts
+        Of the board, that nobody asked for.
+    unseen
+        Causes of restarts that no message told of, in the certificates of drops; by their names.
+    sunk
+        The drop in which the board's supply sank most, and its voltages at FIRE and lowest, V;
+        `None` where it is not measured.
+    """
+
+    path: str
+    foreign: str = ""
+    trouble: str = ""
+    writer: str = ""
+    restarts: tuple[Restart, ...] = ()
+    unseen: tuple[tuple[str, int], ...] = ()
+    sunk: tuple[str, float, float] | None = None
 
 
 def look_at_port(path: str, proc: Path = _PROC, udev: Path = _UDEV) -> PortFacts:
@@ -70,20 +162,20 @@ def look_at_packages() -> tuple[str, ...]:
     return tuple(sorted(set(packages_distributions().get("rig", ())) - {"chainrig"}))
 
 
-def look_at_disk(folder: Path) -> DiskFacts:
-    """Gather how much room there is in a folder, or where it will be made."""
+def look_at_disk(folder: Path) -> tuple[str, int]:
+    """Return a folder, or the first above it that is there, and how many bytes are free in it."""
     place = folder.absolute()
     while not place.exists():
         place = place.parent
-    return DiskFacts(str(place), shutil.disk_usage(place).free)
+    return str(place), shutil.disk_usage(place).free
 
 
 def look_at_session(path: str) -> SessionFacts:
     """Gather what is whole of a session file."""
-    file = examine(path)
-    trouble = next(iter(file.troubles), "")
-    facts = SessionFacts(path, file.whole, file.foreign, file.snapshot.writer, trouble)
-    return _look_at_drops(facts) if file.whole else facts
+    examined = examine(path)
+    trouble = next(iter(examined.troubles), "")
+    facts = SessionFacts(path, examined.foreign, trouble, examined.snapshot.writer)
+    return _look_at_drops(facts) if examined.whole else facts
 
 
 def _look_at_drops(facts: SessionFacts) -> SessionFacts:
@@ -155,54 +247,47 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
     """
     device = Device(port, clock)
     identity = device.connect()
-    pings = []
+    pings: list[ClockSample] = []
     for n in range(_PINGS):
-        ping = device.ping()
-        if ping is not None:
-            pings.append(ping)
+        pings += filter(None, [device.ping()])
         clock.sleep(0.023 + 0.0071 * (n % 5))
     state = device.status()
     states = watch_gates(lambda: device.status().gates, clock, _GLANCE_S)
-    edges, unwatched, stopped = None, "it holds a drop", False
-    if state.phase is Phase.IDLE:
-        clear = ((1 << identity.gates) - 1) & ~states.stuck
-        edges, unwatched, stopped = _record_gates(device, clear)
-    held = unpack_label(state.label) if state.phase is Phase.HOLDING else None
-    shipped = shipped_firmware(identity.board)
-    return BoardFacts(
-        identity, shipped, tuple(pings), held, states, edges, WATCH_S, unwatched, stopped
+    facts = BoardFacts(
+        identity,
+        shipped_firmware(identity.board),
+        tuple(pings),
+        unpack_label(state.label) if state.phase is Phase.HOLDING else None,
+        states,
     )
+    clear = ((1 << identity.gates) - 1) & ~states.stuck
+    if state.phase is not Phase.IDLE:
+        return replace(facts, unwatched="it holds a drop")
+    if not clear:
+        return replace(facts, unwatched="all gates are blocked")
+    return _record_gates(device, clear, facts)
 
 
-def _record_gates(device: Device, gates: int) -> tuple[tuple[Edge, ...] | None, str, bool]:
-    """Record the gates for a while with all releases off; else say why not, and if it is stopped.
+def _record_gates(device: Device, gates: int, facts: BoardFacts) -> BoardFacts:
+    """Add a recording of the gates with all releases off; else why there is none.
 
     A board fires only when all its gates are clear and keep still. One that flickers with the
     mains does so for some milliseconds between two pulses, so a few tries in a row get there.
     """
-    if not gates:
-        return None, "all gates are blocked", False
-    why, stopped = "", False
+    order = {"timeout_ms": 1000, "record_ms": round(facts.watched_s * 1000)}
     for _ in range(_TRIES):
         try:
-            token = device.arm(
-                label=_LABEL,
-                gates=gates,
-                release=0,
-                pulse_us=0,
-                timeout_ms=1000,
-                record_ms=round(WATCH_S * 1000),
-            )
-            device.fire(token)
+            device.fire(device.arm(label=_LABEL, gates=gates, release=0, pulse_us=0, **order))
         except DeviceRefusedError as refusal:
-            why, stopped = refusal.message, refusal.reason is RefusalReason.STOPPED
+            stopped = refusal.reason is RefusalReason.STOPPED
+            facts = replace(facts, unwatched=refusal.message, stopped=stopped)
             if refusal.reason not in _AGAIN:
                 break
-            continue
-        drop = device.collect(_LABEL)
-        if drop.certificate is not None:
-            device.acknowledge(_LABEL, drop.certificate.crc32)
-        return drop.edges, "", False
+        else:
+            drop = device.collect(_LABEL)
+            if drop.certificate is not None:
+                device.acknowledge(_LABEL, drop.certificate.crc32)
+            return replace(facts, edges=drop.edges, unwatched="", stopped=False)
     with suppress(DeviceRefusedError):
         device.abort()
-    return None, why, stopped
+    return facts

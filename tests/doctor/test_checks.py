@@ -10,7 +10,7 @@ import pytest
 
 from rig.doctor import checks
 from rig.doctor.checks import mains_ripple
-from rig.doctor.facts import BoardFacts, DiskFacts, Owner, PortFacts, SessionFacts
+from rig.doctor.gathering import BoardFacts, Owner, PortFacts, SessionFacts
 from rig.link.gatewatch import GateStates
 from rig.link.restarts import Restart
 from rig.records import ClockSample, Edge
@@ -36,8 +36,6 @@ BOARD = BoardFacts(
     held=None,
     states=GateStates(0, 0),
     edges=(),
-    watched_s=1.0,
-    unwatched="",
 )
 
 
@@ -48,120 +46,92 @@ def edges(gate, times_s):
     return tuple(found)
 
 
+SESSION = SessionFacts("s")
+CHECKS = {
+    **checks.PORT_CHECKS,
+    **checks.BOARD_CHECKS,
+    **checks.SESSION_CHECK,
+    **checks.WHOLE_SESSION_CHECKS,
+    "disk": checks.disk_room,
+}
+PERMISSION, OWNERS, MODEM = checks.PORT_CHECKS
+FILE = "session {path}"
+
+
 @pytest.mark.parametrize(
     ("check", "facts"),
     [
-        *((c, PORT) for c in (checks.permission, checks.other_owners)),
-        (checks.modem_manager, PORT),
-        (checks.modem_manager, replace(PORT, modem_manager=True, left_alone=True)),
-        *(
-            (c, BOARD)
-            for c in (
-                checks.firmware,
-                checks.held_drop,
-                checks.clock,
-                checks.round_trip,
-                checks.emergency_stop,
-                checks.stuck_gates,
-                checks.flickering_gates,
-            )
-        ),
-        (checks.firmware, replace(BOARD, shipped="")),
-        (checks.clock, replace(BOARD, pings=pings(ppm=4000))),
-        (checks.flickering_gates, replace(BOARD, edges=None, unwatched="a drop is held")),
-        (checks.disk_room, DiskFacts("/lab", 10**9)),
-        (checks.session_file, SessionFacts("s", True, "", "", "")),
-        (checks.session_file, SessionFacts("s", True, "", "process 7", "")),
+        *((name, PORT) for name in checks.PORT_CHECKS),
+        *((name, BOARD) for name in checks.BOARD_CHECKS),
+        (MODEM, replace(PORT, modem_manager=True, left_alone=True)),
+        ("firmware", replace(BOARD, shipped="")),
+        ("clock", replace(BOARD, pings=pings(ppm=4000))),
+        ("flickering gates", replace(BOARD, edges=None, unwatched="a drop is held")),
+        ("disk", ("/lab", 10**9)),
+        (FILE, SESSION),
+        (FILE, replace(SESSION, writer="process 7")),
+        ("restarts", SESSION),
     ],
 )
 def test_what_is_well_needs_no_advice(check, facts):
-    assert check(facts).advice == ""
-    assert check(facts).json()["reason_codes"] == []
+    (finding,) = checks.check_all({check: CHECKS[check]}, facts)
+    assert finding.advice == ""
+    assert finding.json()["reason_codes"] == []
 
 
 @pytest.mark.parametrize(
     ("check", "facts", "says", "advises"),
     [
-        (checks.permission, replace(PORT, exists=False), "no such port", "rig ports"),
-        (checks.permission, replace(PORT, usable=False), "the group dialout", "-aG dialout"),
-        (checks.permission, replace(PORT, usable=False, group=""), "its group", "-aG dialout"),
+        (PERMISSION, replace(PORT, exists=False), "no such port", "rig ports"),
+        (PERMISSION, replace(PORT, usable=False), "the group dialout", "-aG dialout"),
+        (PERMISSION, replace(PORT, usable=False, group=""), "its group", "-aG dialout"),
         (
-            checks.other_owners,
+            OWNERS,
             replace(PORT, owners=(Owner(71, "screen /dev/ttyACM0"),)),
             "screen /dev/ttyACM0 (process 71)",
             "close that program",
         ),
+        (OWNERS, replace(PORT, owners=(Owner(72, "rig daemon"),)), "process 72", "let that daemon"),
+        (MODEM, replace(PORT, modem_manager=True), "restarts", "rig.usb.udev"),
+        ("firmware", replace(BOARD, shipped="chainrig 9"), "but chainrig 9", "rig flash"),
+        ("held drop", replace(BOARD, held=(7, 2)), "run 7, attempt 2", "rig run"),
+        ("clock", replace(BOARD, pings=()), "from 0 pings", "cable"),
+        ("clock", replace(BOARD, pings=pings(5700, 1000)), "+5700", "resonator"),
+        ("round trip", replace(BOARD, pings=()), "no ping", "cable"),
+        ("round trip", replace(BOARD, pings=pings(trip_ns=130_000_000)), "130.0 ms", "busy"),
         (
-            checks.other_owners,
-            replace(PORT, owners=(Owner(72, "rig daemon --port x"),)),
-            "process 72",
-            "let that daemon do the work",
-        ),
-        (checks.modem_manager, replace(PORT, modem_manager=True), "restarts", "rig.usb.udev"),
-        (
-            checks.firmware,
-            replace(BOARD, shipped="chainrig 9"),
-            "but chainrig 9",
-            "rig flash",
-        ),
-        (checks.held_drop, replace(BOARD, held=(7, 2)), "run 7, attempt 2", "rig run"),
-        (checks.clock, replace(BOARD, pings=()), "from 0 pings", "cable"),
-        (checks.clock, replace(BOARD, pings=pings(5700, 1000)), "+5700", "resonator"),
-        (checks.round_trip, replace(BOARD, pings=()), "no ping", "cable"),
-        (
-            checks.round_trip,
-            replace(BOARD, pings=pings(trip_ns=130_000_000)),
-            "130.0 ms",
-            "busy",
-        ),
-        (
-            checks.emergency_stop,
+            "emergency stop",
             replace(BOARD, edges=None, unwatched="it is open", stopped=True),
             "open",
             "close it",
         ),
-        (
-            checks.flickering_gates,
-            replace(BOARD, states=GateStates(0, 4)),
-            "gate 2",
-            "clear the beam",
+        *(
+            ("flickering gates", replace(BOARD, **facts), "gate 2", "clear the beam")
+            for facts in (
+                {"states": GateStates(0, 4)},
+                {"states": GateStates(0, 4), "edges": None},
+            )
         ),
+        ("blocked gates", replace(BOARD, states=GateStates(0x102, 0)), "gates 1, 8", "leave it"),
         (
-            checks.stuck_gates,
-            replace(BOARD, states=GateStates(0x0102, 0)),
-            "gates 1, 8",
-            "leave it",
-        ),
-        (
-            checks.flickering_gates,
-            replace(BOARD, edges=None, states=GateStates(0, 4)),
-            "gate 2",
-            "clear the beam",
-        ),
-        (
-            checks.flickering_gates,
+            "flickering gates",
             replace(BOARD, edges=edges(5, [0.1, 0.3])),
             "gate 5 2 times within 1 s",
             "clear the beam",
         ),
         (
-            checks.flickering_gates,
+            "flickering gates",
             replace(BOARD, edges=edges(5, [n / 100 for n in range(90)])),
             "gate 5 90 times, in step with 100 Hz",
             "lamps",
         ),
-        (checks.disk_room, DiskFacts("/lab", 10**7), "10 MB free in /lab", "free 200 MB"),
-        (checks.session_file, SessionFacts("s", False, "it is empty", "", ""), "empty", "name a"),
-        (
-            checks.session_file,
-            SessionFacts("s", False, "", "", "9 pages"),
-            "damaged: 9 pages",
-            "rig recover s -o",
-        ),
+        ("disk", ("/lab", 10**7), "10 MB free in /lab", "free 200 MB"),
+        (FILE, replace(SESSION, foreign="it is empty"), "empty", "name a"),
+        (FILE, replace(SESSION, trouble="9 pages"), "damaged: 9 pages", "rig recover s -o"),
     ],
 )
 def test_what_is_wrong_is_said_with_what_to_do(check, facts, says, advises):
-    finding = check(facts)
+    (finding,) = checks.check_all({check: CHECKS[check]}, facts)
     assert says in finding.what
     assert advises in finding.advice
     assert "\n  do: " in str(finding)
@@ -190,13 +160,12 @@ def test_another_rhythm_is_not_the_mains(hz):
 
 
 def test_restarts_that_only_certificates_tell_of_and_a_supply_that_sinks():
-    whole = SessionFacts("s", True, "", "", "")
-    assert not checks.restarts(whole).advice
     name = "run 3, attempt 1"
-    facts = replace(whole, unseen=((name, 128 | 4 | 8),), sunk=(name, 4.96, 4.31))
-    found = checks.restarts(facts)
-    assert found.what == f"{name}: before it, unseen (brown-out, watchdog)"
-    assert "supply shared with the magnets" in found.advice
-    assert checks.supply(facts).what == f"at most from 4.96 V to 4.31 V, in {name}"
-    twice = replace(whole, restarts=(Restart(1, 0), Restart(2, 0)))
-    assert checks.restarts(twice).what == "while nothing fell, 2 times"
+    facts = replace(SESSION, unseen=((name, 128 | 4 | 8),), sunk=(name, 4.96, 4.31))
+    restarts, supply = checks.check_all(checks.WHOLE_SESSION_CHECKS, facts)
+    assert restarts.what == f"{name}: before it, unseen (brown-out, watchdog)"
+    assert "supply shared with the magnets" in restarts.advice
+    assert supply.what == f"at most from 4.96 V to 4.31 V, in {name}"
+    twice = replace(SESSION, restarts=(Restart(1, 0), Restart(2, 0)))
+    restarts, _ = checks.check_all(checks.WHOLE_SESSION_CHECKS, twice)
+    assert restarts.what == "while nothing fell, 2 times"

@@ -13,8 +13,8 @@ import pytest
 from rig.cli import main
 from rig.command_help import runnable
 from rig.doctor.checks import other_packages
-from rig.doctor.facts import Owner
 from rig.doctor.gathering import (
+    Owner,
     look_at_board,
     look_at_disk,
     look_at_packages,
@@ -24,6 +24,7 @@ from rig.doctor.gathering import (
 from rig.errors import DeviceError
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
+from rig.selftest.findings import make_check
 from rig.session.store import Session
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
@@ -86,20 +87,17 @@ def test_a_port_that_is_not_there(tmp_path):
 
 
 def test_room_where_a_session_will_be(tmp_path):
-    facts = look_at_disk(tmp_path / "not" / "yet")
-    assert facts.folder == str(tmp_path)
-    assert facts.free > 0
+    folder, free = look_at_disk(tmp_path / "not" / "yet")
+    assert (folder, free > 0) == (str(tmp_path), True)
 
 
 def test_a_session(tmp_path):
     path = tmp_path / "s.session"
     Session.create(path, "x", "x.yaml", simulated=True, origin="x").close()
-    assert look_at_session(str(path)).whole
+    assert not look_at_session(str(path)).trouble
     with unguarded(path) as connection:
         connection.execute("DELETE FROM meta WHERE key = 'simulated'")
-    facts = look_at_session(str(path))
-    assert not facts.whole
-    assert facts.first_trouble.endswith("s.session: it does not say simulated")
+    assert look_at_session(str(path)).trouble.endswith("s.session: it does not say simulated")
 
 
 # -- a board
@@ -270,5 +268,6 @@ def test_another_package_of_the_same_name_is_named(tmp_path, monkeypatch):
         (tmp_path / module / "__init__.py").touch()  # only what is there counts for some
     monkeypatch.setattr("sys.path", [str(tmp_path)])
     assert look_at_packages() == ("rig",)
-    assert "pip uninstall rig chainrig" in other_packages(look_at_packages()).advice
-    assert not other_packages(()).advice
+    finding = make_check("packages", other_packages, look_at_packages())
+    assert "pip uninstall rig chainrig" in finding.advice
+    assert not make_check("packages", other_packages, ()).advice

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -13,6 +14,7 @@ from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.selftest.findings import Verdict
 from rig.selftest.run import CHECKS
+from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import GATE, LoopedBoard, Wire, outcomes, port_of
 
@@ -121,6 +123,69 @@ def test_json_lists_each_check_with_its_codes(rig):
     assert listed["STOPPED"]["reason_codes"] == [
         {"code": "check_needs", "values": {"needed": "a hand at the emergency stop"}}
     ]
+
+
+UNWIRED = 0xFFF0
+"""Inputs that nothing holds to ground."""
+
+
+@pytest.mark.parametrize(
+    ("gates", "verdict", "what"),
+    [
+        (None, Verdict.NOT_POSSIBLE, "gates 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 blocked all"),
+        (0xF, Verdict.OK, "4 gates clear; not in use and blocked: gates 4, 5,"),
+        (0x1F, Verdict.FAILED, "gate 4 blocked all the time"),
+    ],
+)
+def test_inputs_without_a_gate_fail_no_rig(gates, verdict, what, unwired):
+    results = outcomes(port_of(unwired), gates=gates)
+    assert (results["gates"].verdict, results["gates"].what[: len(what)]) == (verdict, what)
+    assert failed({name: result for name, result in results.items() if name != "gates"}) == []
+    assert results["GATE_BLOCKED"].verdict is Verdict.OK
+
+
+@pytest.fixture
+def unwired(monkeypatch):
+    class Lab(Wire):
+        def rest(self, label):
+            return UNWIRED
+
+    class Open(Microcontroller):
+        def _status(self):
+            self.gates |= UNWIRED
+            return super()._status()
+
+    monkeypatch.setattr("sim.board.Microcontroller", Open)
+    return LoopedBoard(Lab())
+
+
+def test_a_gate_that_the_board_has_not_is_named():
+    board = LoopedBoard(Wire())
+    names = " ".join(board.identity.channels.split()[:12])
+    board.identity = replace(board.identity, gates=12, channels=names)
+    gates = outcomes(port_of(board), gates=0x300F)["gates"]
+    assert (gates.verdict, gates.reason.code) == (Verdict.FAILED, "gates_not_fitted")
+    assert gates.what == "in use, but not on this board: gates 12, 13"
+
+
+def test_a_bare_board_says_which_wires_let_it_test_more(monkeypatch, unwired):
+    monkeypatch.setattr("tests.selftest.test_good_boards.UNWIRED", 0xFFFF)
+    results = outcomes(port_of(unwired), loopback=None)
+    assert failed(results) == []
+    assert "a wire from one gate input to ground" in results["certificate"].what
+    assert "--loopback GATE" in results["certificate"].what
+
+
+def test_a_protocol_says_which_gates_are_in_use(rig):
+    code, lines, _ = rig("--port", FENCE, "--protocol", "protocols/picket-fence.yaml")
+    assert code == 0
+    assert any(line.startswith("gates: ok: ") and "gates clear" in line for line in lines)
+
+
+@pytest.mark.parametrize("gates", ["", "0,", "0,16", "a"])
+def test_gates_are_a_list_of_numbers(rig, gates):
+    with pytest.raises(SystemExit, match="2"):
+        rig("--port", FENCE, "--gates", gates)
 
 
 def test_behind_a_terminal_in_real_time(rig):

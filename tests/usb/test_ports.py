@@ -141,6 +141,21 @@ def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):
     assert path_of("85430") == "/dev/ttyACM9"
 
 
+def test_a_pico_with_another_program_is_not_opened(plugged):
+    numbers = 0x2E8A, 0x000A
+    plugged(
+        info("/dev/ttyACM0", *numbers, product="MicroPython"),
+        info("/dev/ttyACM1", *numbers),
+        info("/dev/ttyACM2", *numbers, product="chainrig on a Pico"),
+    )
+    ports = serial_ports()
+    assert [(port.path, port.candidate) for port in ports] == [
+        *(("/dev/ttyACM2", True), ("/dev/ttyACM0", False), ("/dev/ttyACM1", False))
+    ]
+    assert "another program" in ports[1].skipped
+    assert pico_ports() == {"/dev/ttyACM2"}
+
+
 def test_copies_that_share_a_number_are_not_confused(plugged):
     plugged(info("/dev/ttyUSB0", serial_number="0001"), info("/dev/ttyUSB1", serial_number="0001"))
     with pytest.raises(DeviceError, match="/dev/ttyUSB0 and /dev/ttyUSB1 have the same"):
