@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
 from rig.commands.output import print_json, say
-from rig.doctor import checks
-from rig.doctor.checks import check_all
-from rig.doctor.gathering import (
-    look_at_board,
-    look_at_disk,
-    look_at_packages,
-    look_at_port,
-    look_at_session,
+from rig.doctor.board import BOARD_CHECKS, look_at_board
+from rig.doctor.computer import (
+    PORT_CHECKS,
+    PortPlace,
+    check_packages,
+    check_room,
+    describe_cache,
 )
+from rig.doctor.session import check_session
 from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
 from rig.reasons import make_reason
@@ -26,7 +26,7 @@ from rig.usb.listing import serial_ports
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
 
 def main(arguments: Namespace) -> int:
@@ -53,28 +53,31 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     paths = [url] if url and "://" not in url else []
     free = True
     for path in paths or [port.path for port in serial_ports() if port.candidate and not url]:
-        facts = look_at_port(path)
-        free = facts.usable and not facts.owners
-        yield from check_all(checks.PORT_CHECKS, facts)
+        permission, owners, modem = _check_all(PORT_CHECKS, PortPlace(path), path)
+        free = not (permission.reason or owners.reason)
+        yield from (permission, owners, modem)
     if url and free:
         yield from _board(url)
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
-    cache = CacheFile()
     folder = Path(session).parent if session else Path()
-    yield make_check("packages called rig", checks.other_packages, look_at_packages())
-    yield make_check("kept results", checks.kept_results, (str(cache.folder), cache.size()))
-    yield make_check("disk", checks.disk_room, look_at_disk(folder))
+    yield make_check("packages called rig", check_packages, "chainrig")
+    yield make_check("kept results", describe_cache, CacheFile())
+    yield make_check("disk", check_room, folder)
     if session and not Path(session).exists():
         yield explain(f"session {session}", make_reason("session_missing"))
     elif session:
         try:
-            file = look_at_session(session)
-            yield from check_all(checks.SESSION_CHECK, file)
-            if not (file.foreign or file.trouble):
-                yield from check_all(checks.WHOLE_SESSION_CHECKS, file)
+            yield from check_session(session)
         except SessionError as error:
             yield _failure(f"session {session}", error)
+
+
+def _check_all(
+    checks: Mapping[str, Callable[..., str]], facts: object, path: str = ""
+) -> Iterator[Finding]:
+    for name, check in checks.items():
+        yield make_check(name.format(path=path), check, facts)
 
 
 def _failure(name: str, error: RigError) -> Finding:
@@ -92,4 +95,4 @@ def _board(url: str) -> Iterator[Finding]:
         return
     identity = facts.identity
     yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}")
-    yield from check_all(checks.BOARD_CHECKS, facts)
+    yield from _check_all(BOARD_CHECKS, facts)

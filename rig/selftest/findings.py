@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from rig.reasons import make_reason, remedies
 
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from rig.reasons import Reason
 
-Facts = TypeVar("Facts")
 _ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
 
 
@@ -75,10 +74,10 @@ class NotPossibleError(CheckEndedError):
     verdict = Verdict.NOT_POSSIBLE
 
 
-def make_check(name: str, check: Callable[[Facts], str | None], facts: Facts) -> Finding:
+def make_check(name: str, check: Callable[..., str | None], *facts: object) -> Finding:
     """Make a check; give what it returned, in words, or the reason for which it ended."""
     try:
-        return Finding(name, check(facts) or "")
+        return Finding(name, check(*facts) or "")
     except CheckEndedError as end:
         return explain(name, end.reason, end.verdict)
 

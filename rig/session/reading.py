@@ -214,9 +214,10 @@ class Reader:
         SessionError
             Something of it cannot be read.
         """
-        for table in TABLES.keys() - {"drop", "edge"}:
-            for _ in self._rows(table):
-                pass
+        for table in TABLES:
+            if table not in {"drop", "edge"}:
+                for _ in self._rows(table):
+                    pass
         for drop in self.drops():
             if drop.damage:
                 raise self._damaged(f"run {drop.run}, attempt {drop.attempt}: {drop.damage}")

@@ -194,35 +194,35 @@ def test_behind_a_terminal_in_real_time(rig):
     assert code == 0, lines
 
 
-def test_a_drop_of_a_session_is_left_alone():
-    port = port_of(LoopedBoard(Wire()))
+def hold_drop(port, run):
+    """Have a board hold a drop; give the client, the order of the drop and the drop."""
     device = Device(port, port.clock)
     device.connect()
-    label = pack_label(7, 2)
     order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    device.fire(device.arm(label=label, **order))
-    drop = device.collect(label)
-    found = outcomes(port)
-    assert failed(found) == []
-    assert found["BUSY"].what == "the board holds a drop (run 7, attempt 2)"
-    assert found["BUSY"].reason.values == {"run": 7, "attempt": 2}
-    assert found["every message"].verdict is Verdict.NOT_POSSIBLE
-    assert found["VERSION"].verdict is Verdict.OK
+    order["label"] = pack_label(run, 2)
+    device.fire(device.arm(**order))
+    return device, order, device.collect(order["label"])
+
+
+def test_a_drop_of_a_session_is_left_alone():
+    port = port_of(LoopedBoard(Wire()))
+    _, order, drop = hold_drop(port, 7)
+    results = outcomes(port)
+    assert failed(results) == []
+    assert results["BUSY"].what == "the board holds a drop (run 7, attempt 2)"
+    assert results["BUSY"].reason.values == {"run": 7, "attempt": 2}
+    assert results["every message"].verdict is Verdict.NOT_POSSIBLE
+    assert results["VERSION"].verdict is Verdict.OK
     again = Device(port, port.clock)
     again.connect(boot_wait_s=0)
-    assert again.fetch(label) == drop
+    assert again.fetch(order["label"]) == drop
     with pytest.raises(DeviceError, match="still holds the drop of run 7"):
-        again.arm(label=label, **order)  # no ABORT made it free to be discarded
+        again.arm(**order)  # no ABORT made it free to be discarded
 
 
 def test_a_drop_that_an_earlier_test_left_is_cleared_away():
     port = port_of(LoopedBoard(Wire()))
-    device = Device(port, port.clock)
-    device.connect()
-    label = pack_label(wire.TEST_RUN, 9)
-    order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    device.fire(device.arm(label=label, **order))
-    device.collect(label)
+    device, *_ = hold_drop(port, wire.TEST_RUN)
     assert failed(outcomes(port)) == []
     assert device.status().phase is Phase.IDLE
 
