@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from rig.records import Drop
-    from rig.recover.examine import Examined
+    from rig.recover.examine import ExaminedFile
     from rig.selftest.findings import Finding
 
 
@@ -39,7 +39,7 @@ def check_session(path: str) -> Iterator[Finding]:
         yield make_check("supply", describe_supply, drops)
 
 
-def check_whole(examined: Examined, path: str) -> str:
+def check_whole(examined: ExaminedFile, path: str) -> str:
     """See that a session file is whole."""
     if examined.foreign:
         raise CheckFailedError("no_session", text=examined.foreign)

@@ -39,7 +39,7 @@ def waiting_drives(mounts: Path = _MOUNTS) -> list[Path]:
     mounts
         The kernel's account of what is mounted.
     """
-    return [folder for folder in _mounted(mounts) if _is_drive(folder)]
+    return [folder for folder in _fat_mounts(mounts) if _is_drive(folder)]
 
 
 def sees_boot_pico(devices: Path = _USB) -> bool:
@@ -52,7 +52,7 @@ def sees_boot_pico(devices: Path = _USB) -> bool:
     return False
 
 
-def choose_drive(given: str | None, mounts: Path = _MOUNTS, devices: Path = _USB) -> Path:
+def choose_drive(folder: str | None, mounts: Path = _MOUNTS, devices: Path = _USB) -> Path:
     """Find the one drive to copy to.
 
     Raises
@@ -62,10 +62,10 @@ def choose_drive(given: str | None, mounts: Path = _MOUNTS, devices: Path = _USB
     DeviceError
         There is none, or several.
     """
-    if given is not None:
-        if not _is_drive(Path(given)):
-            raise InputError(f"{given} is no drive of a Pico: it has no {_ABOUT} of one", _HOW)
-        return Path(given)
+    if folder is not None:
+        if not _is_drive(Path(folder)):
+            raise InputError(f"{folder} is no drive of a Pico: it has no {_ABOUT} of one", _HOW)
+        return Path(folder)
     drives = waiting_drives(mounts)
     if len(drives) == 1:
         return drives[0]
@@ -134,7 +134,7 @@ def pico_ports() -> set[str]:
     return {p.path for p in serial_ports() if p.candidate and DRIVE.board.name in p.kinds}
 
 
-def _mounted(mounts: Path) -> Iterator[Path]:
+def _fat_mounts(mounts: Path) -> Iterator[Path]:
     try:
         lines = mounts.read_text("utf-8", "surrogateescape").splitlines()
     except OSError:  # another kernel

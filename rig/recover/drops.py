@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rig.recover.rows import Row, Rows
 
 
-class Recovered(NamedTuple):
+class RecoveredDrop(NamedTuple):
     """A drop, what can be said of it, and what was stored about it besides."""
 
     drop: Drop
@@ -24,31 +24,31 @@ class Recovered(NamedTuple):
     provenance: str = "recovered"
 
 
-def recover_drops(rows: Rows) -> list[Recovered]:
+def recover_drops(rows: Rows) -> list[RecoveredDrop]:
     """Give the best of every drop, in the order of recording.
 
     The device's CRC-32 over a drop's events is in the bytes, not in the edges: where the two
     differ, a drop that the bytes give without a fault is the right one.
     """
     replay = ByteReplay()
-    replay.feed(row[1:] for row in rows.ordered("bytes"))
+    replay.feed(row[1:] for row in rows.in_order("bytes"))
     replayed = replay.drops()
     edges: dict[int, list[Row]] = {}
-    for edge in rows.ordered("edge"):
+    for edge in rows.in_order("edge"):
         edges.setdefault(edge[0], []).append(edge)
     stored_jobs = set()
-    drops: list[Recovered] = []
-    for row in rows.ordered("drop"):
+    drops: list[RecoveredDrop] = []
+    for row in rows.in_order("drop"):
         values, own = named_values(row), edges.get(row[0], [])
         stored = drop_of(row, own)
         job = Job(stored.run, stored.attempt)
         fate = check_drop(stored, replayed, torn=any(edge[1] != n for n, edge in enumerate(own)))
         best = _best(stored, replayed.get(job), fate)
-        drops.append(Recovered(best, fate, values["host_ns"], values["provenance"]))
+        drops.append(RecoveredDrop(best, fate, values["host_ns"], values["provenance"]))
         stored_jobs.add(job)
     # What was never stored is only worth having whole.
     return drops + [
-        Recovered(drop, Fate.RESTORED)
+        RecoveredDrop(drop, Fate.RESTORED)
         for job, drop in sorted(replayed.items())
         if job not in stored_jobs and drop.certificate is not None and not drop.faults
     ]

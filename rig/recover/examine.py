@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.printable import printable
 from rig.reasons import sentences
-from rig.recover.drops import Recovered, recover_drops
+from rig.recover.drops import RecoveredDrop, recover_drops
 from rig.recover.pages import MAGIC, read_pages
 from rig.recover.rows import Rows, find_rows
 from rig.recover.snapshot import SessionCopy, take_snapshot
@@ -32,7 +32,7 @@ _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
 
 @dataclass(frozen=True, slots=True)
-class Examined:
+class ExaminedFile:
     """A session file after a look at it.
 
     Attributes
@@ -51,7 +51,7 @@ class Examined:
 
     snapshot: SessionCopy
     rows: Rows
-    drops: list[Recovered]
+    drops: list[RecoveredDrop]
     foreign: str
     damage: Sequence[str] = ()
     lost: Sequence[str] = ()
@@ -68,7 +68,7 @@ class Examined:
         return list(dict.fromkeys([*self.damage, *self.lost, *doubtful]))
 
 
-def examine(path: str | os.PathLike[str]) -> Examined:
+def examine(path: str | os.PathLike[str]) -> ExaminedFile:
     """Look at a session file, which stays as it is.
 
     Raises
@@ -81,7 +81,7 @@ def examine(path: str | os.PathLike[str]) -> Examined:
     rows = find_rows(pages)
     drops = recover_drops(rows)
     if foreign := _foreign(snapshot.data, pages.pages.get(1, b""), rows):
-        return Examined(snapshot, rows, drops, foreign)
+        return ExaminedFile(snapshot, rows, drops, foreign)
     orphans = len({drop for drop, _ in rows.tables["edge"]} - rows.tables["drop"].keys())
     torn = f"{pages.missing} of {pages.expected} pages are not there: the file is torn"
     damage = {
@@ -100,16 +100,16 @@ def examine(path: str | os.PathLike[str]) -> Examined:
         **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
         **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
     }
-    return Examined(snapshot, rows, drops, "", _true(damage), _true(lost))
+    return ExaminedFile(snapshot, rows, drops, "", _true(damage), _true(lost))
 
 
-def describe(session: Examined) -> list[str]:
+def describe(session: ExaminedFile) -> list[str]:
     """Say it in lines, safe for a terminal whatever stands in the file."""
-    lines = _described(session)
+    lines = _lines(session)
     return [printable(line).replace("\n", " ").replace("\t", " ") for line in lines]
 
 
-def _described(session: Examined) -> list[str]:
+def _lines(session: ExaminedFile) -> list[str]:
     snapshot, rows, meta = session.snapshot, session.rows, session.rows.meta
     lines = [f"{snapshot.path}: {len(snapshot.data)} bytes"]
     if snapshot.writer:
@@ -135,11 +135,11 @@ def _described(session: Examined) -> list[str]:
         name = f"run {drop.run}, attempt {drop.attempt}: {len(drop.edges)} edges: {recovered.fate}"
         faults = f" (recorded with faults: {sentences(drop.faults)})" if drop.faults else ""
         lines.append(name + faults)
-    lines += [f"damaged: {what}" for what in session.damage]
-    lines += [f"lost: {what}" for what in session.lost]
+    lines += [f"damaged: {text}" for text in session.damage]
+    lines += [f"lost: {text}" for text in session.lost]
     if session.whole:
         lines.append("everything is whole")
-    states = rows.ordered("run_state")
+    states = rows.in_order("run_state")
     if snapshot.logged is None and not snapshot.writer and (not states or states[-1][3] in _OPEN):
         lines.append(
             "its last run is open: if there was a file of this name with -wal behind it, "
@@ -164,7 +164,7 @@ def _true(sentences: Mapping[str, object]) -> list[str]:
     return [sentence for sentence, holds in sentences.items() if holds]
 
 
-def _describe_fate(recovered: Recovered) -> str:
+def _describe_fate(recovered: RecoveredDrop) -> str:
     return f"run {recovered.drop.run}, attempt {recovered.drop.attempt}: {recovered.fate}"
 
 

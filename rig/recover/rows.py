@@ -31,7 +31,7 @@ class Rows:
     tables: dict[str, dict[Any, Row]] = field(default_factory=lambda: {name: {} for name in TABLES})
     bad: int = 0
 
-    def ordered(self, table: str) -> list[Row]:
+    def in_order(self, table: str) -> list[Row]:
         """List the rows of a table by key."""
         return [row for _, row in sorted(self.tables[table].items())]
 

@@ -16,12 +16,12 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     import os
 
-    from rig.recover.examine import Examined
+    from rig.recover.examine import ExaminedFile
     from rig.recover.rows import Rows
 
 
 def save(
-    examined: Examined, target: str | os.PathLike[str], protocol: str | None = None
+    examined: ExaminedFile, target: str | os.PathLike[str], protocol: str | None = None
 ) -> list[str]:
     """Write a new session with everything that could be read.
 
@@ -48,7 +48,7 @@ def save(
         raise SessionError(f"{examined.snapshot.path} is not a session file: {examined.foreign}")
     rows = examined.rows
     source, text = _protocol(examined, protocol)
-    simulated, notes = _simulated(rows)
+    simulated, notes = _find_world(rows)
     session = Session.create(
         target,
         text,
@@ -58,18 +58,18 @@ def save(
     )
     with session:
         for table in ("identity", "ping", "reference", "host_break", "bytes"):
-            session.add_rows(table, [row[1:] for row in rows.ordered(table)])
+            session.add_rows(table, [row[1:] for row in rows.in_order(table)])
         notes += _drops(session, examined)
         session.commit()
     return [*examined.lost, *notes]
 
 
-def _protocol(examined: Examined, given: str | None) -> tuple[str, str]:
-    if given is not None:
+def _protocol(examined: ExaminedFile, file: str | None) -> tuple[str, str]:
+    if file is not None:
         try:
-            return Path(given).name, read_input(given).decode()
+            return Path(file).name, read_input(file).decode()
         except (OSError, UnicodeDecodeError) as error:
-            raise SessionError(f"cannot read {given}: {error}") from error
+            raise SessionError(f"cannot read {file}: {error}") from error
     if examined.rows.protocol is None or not protocol_sound(examined.rows):
         raise SessionError(
             f"{examined.snapshot.path} has lost its protocol file", "give it: --protocol FILE"
@@ -77,25 +77,25 @@ def _protocol(examined: Examined, given: str | None) -> tuple[str, str]:
     return examined.rows.protocol
 
 
-def _simulated(rows: Rows) -> tuple[bool, list[str]]:
+def _find_world(rows: Rows) -> tuple[bool, list[str]]:
     """Say whether the data are simulated; where nobody knows they are stamped so."""
     if "simulated" in rows.meta:
         return rows.meta["simulated"] == "true", []
-    for identity in rows.ordered("identity"):
+    for identity in rows.in_order("identity"):
         port = json.loads(identity[2]).get("port")
         if isinstance(port, str):
             return is_simulated(port), []
     return True, ["nothing says whether it is real, so the new session is stamped as simulated"]
 
 
-def _drops(session: Session, examined: Examined) -> list[str]:
+def _drops(session: Session, examined: ExaminedFile) -> list[str]:
     """Add drops and the log of states; a drop that no state tells of gets one."""
     seen = set()
     for drop, _, host_ns, provenance in examined.drops:
         if (drop.run, drop.attempt) not in seen:
             session.add_drop(drop, host_ns=host_ns, provenance=provenance)
         seen.add((drop.run, drop.attempt))
-    states = examined.rows.ordered("run_state")
+    states = examined.rows.in_order("run_state")
     session.add_rows("run_state", [row[1:] for row in states])
     last_ns = states[-1][-1] if states else 0
     notes = []

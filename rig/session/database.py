@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from rig.errors import InputError, SessionError
 from rig.files import replacing, require_file
 from rig.reasons import make_error
-from rig.session.faults import not_a_session, translated
+from rig.session.faults import not_a_session, translate_errors
 from rig.session.foreign import check_schema, guard
 from rig.session.lock import writer_of
 from rig.session.schema import (
@@ -82,7 +82,7 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
     """
     # Never read the header by hand: closing a second handle on the file would drop the POSIX
     # locks of a writer in this very process.
-    with translated(path):
+    with translate_errors(path):
         connection = _reading(path) if readonly else _connect(path, "rw")
         try:
             guard(connection)
@@ -132,8 +132,8 @@ def copy_session(path: Path, folder: Path) -> Path:
 def _reading(path: Path) -> sqlite3.Connection:
     """Open a session so that its file, and what lies beside it, stay as they are."""
     # A log whose writer is gone would be brought into the file by whoever closes it last.
-    left = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
-    if left and not writer_of(path):
+    leftover = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
+    if leftover and not writer_of(path):
         connection = _read_copy(path)
         if not writer_of(path):  # else it may have been copied in the middle of a write
             return connection

@@ -40,12 +40,12 @@ def guard(connection: sqlite3.Connection) -> None:
 
 def limit_steps(connection: sqlite3.Connection) -> None:
     """Have statements end that take far more steps, from now on, than any session needs."""
-    left = _MOST_STEPS
+    budget = _MOST_STEPS
 
     def step() -> bool:
-        nonlocal left
-        left -= _STEPS
-        return left < 0
+        nonlocal budget
+        budget -= _STEPS
+        return budget < 0
 
     connection.set_progress_handler(step, _STEPS)
 
@@ -73,20 +73,20 @@ def check_schema(path: Path, connection: sqlite3.Connection) -> int:
         formats = {"format": version, "known": SCHEMA_VERSION}
         raise make_error(SessionError, "session_newer", path=path, **formats)
     shapes = _schema(connection)
-    for name, shape in _known(version).items():
+    for name, shape in _schema_of(version).items():
         if shapes.pop(name, None) != shape:
-            raise _altered(path, f"{name} is missing or not as rig makes it")
+            raise _alteration(path, f"{name} is missing or not as rig makes it")
     if strange := sorted(shapes.keys() - _OF_ANALYZE):
-        raise _altered(path, f"it has {strange[0]}, which rig does not make")
+        raise _alteration(path, f"it has {strange[0]}, which rig does not make")
     return int(version)
 
 
-def _altered(path: Path, what: str) -> SessionError:
-    return make_error(SessionError, "session_altered", path=path, text=what)
+def _alteration(path: Path, text: str) -> SessionError:
+    return make_error(SessionError, "session_altered", path=path, text=text)
 
 
 @cache
-def _known(version: int) -> dict[str, Shape]:
+def _schema_of(version: int) -> dict[str, Shape]:
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(create_script(version))
         return _schema(connection)

@@ -55,7 +55,7 @@ class Column(NamedTuple):
     since: int = 1
 
 
-def _whole(
+def _integer(
     name: str, low: int, high: int, sql: str = "INTEGER NOT NULL", *, since: int = 1
 ) -> Column:
     """Return a column of whole numbers; one that is declared as INTEGER alone may be empty."""
@@ -68,14 +68,14 @@ def _whole(
     return Column(name, sql, f"a whole number from {low} to {high}", accepts, since)
 
 
-def _counted(name: str, *, since: int = 1) -> Column:
+def _counter(name: str, *, since: int = 1) -> Column:
     """Return a column of 32-bit numbers that a device gives in a certificate, or of nothing."""
-    return _whole(name, 0, _U32, "INTEGER", since=since)
+    return _integer(name, 0, _U32, "INTEGER", since=since)
 
 
 def _host_ns(name: str = "host_ns", sql: str = "INTEGER NOT NULL") -> Column:
     """Return a column of times of the host's clock."""
-    return _whole(name, -_NS, _NS, sql)
+    return _integer(name, -_NS, _NS, sql)
 
 
 def _text(name: str, sql: str = "TEXT NOT NULL") -> Column:
@@ -105,8 +105,8 @@ def _json(name: str, accepted: str, read: Callable[[str], object]) -> Column:
     return Column(name, f"TEXT NOT NULL CHECK (json_valid({name}))", accepted, accepts)
 
 
-_TICK_HZ = _whole("tick_hz", 1, _MOST_HZ, "INTEGER NOT NULL CHECK (tick_hz > 0)")
-_CHANNEL = _whole("channel", 0, GATES - 1, "INTEGER NOT NULL CHECK (channel >= 0)")
+_TICK_HZ = _integer("tick_hz", 1, _MOST_HZ, "INTEGER NOT NULL CHECK (tick_hz > 0)")
+_CHANNEL = _integer("channel", 0, GATES - 1, "INTEGER NOT NULL CHECK (channel >= 0)")
 _IDENTITY: dict[str, Callable[[Any], bool]] = {
     "tick_hz": _TICK_HZ.accepts,
     "clock_u": lambda u: type(u) in {int, float} and math.isfinite(u) and 0 <= u < 1,
@@ -163,15 +163,15 @@ class Table:
         return [column.name for column in self.columns if column.since <= version]
 
 
-_ID = _whole("id", 1, _INT64, "INTEGER PRIMARY KEY")
-_RUN = _whole("run", 1, _INT64, "INTEGER NOT NULL CHECK (run >= 1)")
+_ID = _integer("id", 1, _INT64, "INTEGER PRIMARY KEY")
+_RUN = _integer("run", 1, _INT64, "INTEGER NOT NULL CHECK (run >= 1)")
 _TRIP = (_host_ns("host_send_ns"), _host_ns("host_recv_ns"))
 _CERTIFIED = ("events", "crc32", "overflows", "glitches", "late")
 _ACCOUNT = ("pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv")
 TABLES = {
     "meta": Table(_text("key", "TEXT PRIMARY KEY"), _text("value"), collides="key = NEW.key"),
     "protocol": Table(
-        _whole("id", 1, _INT64, "INTEGER PRIMARY KEY CHECK (id = 1)"),
+        _integer("id", 1, _INT64, "INTEGER PRIMARY KEY CHECK (id = 1)"),
         _text("source"),
         _text("text"),
     ),
@@ -182,31 +182,33 @@ TABLES = {
         _word("direction", "rx", "tx"),
         Column("data", "BLOB NOT NULL", "bytes", lambda value: type(value) is bytes),
     ),
-    "ping": Table(_ID, *_TRIP, _whole("tick", 0, _U32)),
-    "reference": Table(_ID, *_TRIP, _whole("number", 0, _U16), _whole("tick", 0, _U32), since=3),
+    "ping": Table(_ID, *_TRIP, _integer("tick", 0, _U32)),
+    "reference": Table(
+        _ID, *_TRIP, _integer("number", 0, _U16), _integer("tick", 0, _U32), since=3
+    ),
     "host_break": Table(_ID, _host_ns(), _host_ns("slept_ns"), _host_ns("stepped_ns"), since=3),
     "drop": Table(
         _ID,
         _RUN,
-        _whole("attempt", 1, _INT64, "INTEGER NOT NULL CHECK (attempt >= 1)"),
+        _integer("attempt", 1, _INT64, "INTEGER NOT NULL CHECK (attempt >= 1)"),
         _TICK_HZ,
-        _counted("fire_tick"),
-        _whole("initial_state", 0, _U16),
-        *map(_counted, _CERTIFIED),
+        _counter("fire_tick"),
+        _integer("initial_state", 0, _U16),
+        *map(_counter, _CERTIFIED),
         _json("faults", "a JSON list of reasons", read_reasons),
         _host_ns(sql="INTEGER"),
         _text("provenance"),
-        _whole("release_sense", -_U32, _U32, "INTEGER", since=2),
-        *(_counted(name, since=4) for name in _ACCOUNT),
+        _integer("release_sense", -_U32, _U32, "INTEGER", since=2),
+        *(_counter(name, since=4) for name in _ACCOUNT),
         collides="id = NEW.id OR (run = NEW.run AND attempt = NEW.attempt)",
         constraint=", UNIQUE (run, attempt)",
     ),
     "edge": Table(
-        _whole("drop", 1, _INT64, 'INTEGER NOT NULL REFERENCES "drop" (id)'),
-        _whole("idx", 0, _INT64, "INTEGER NOT NULL CHECK (idx >= 0)"),
-        _whole("tick", -_INT64 - 1, _INT64),
+        _integer("drop", 1, _INT64, 'INTEGER NOT NULL REFERENCES "drop" (id)'),
+        _integer("idx", 0, _INT64, "INTEGER NOT NULL CHECK (idx >= 0)"),
+        _integer("tick", -_INT64 - 1, _INT64),
         _CHANNEL,
-        _whole("blocked", 0, 1, "INTEGER NOT NULL CHECK (blocked IN (0, 1))"),
+        _integer("blocked", 0, 1, "INTEGER NOT NULL CHECK (blocked IN (0, 1))"),
         collides='"drop" = NEW."drop" AND idx = NEW.idx',
         constraint=', PRIMARY KEY ("drop", idx)',
         option=", WITHOUT ROWID",
@@ -214,7 +216,7 @@ TABLES = {
     "run_state": Table(
         _ID,
         _RUN,
-        _whole("attempt", 0, _INT64, "INTEGER NOT NULL CHECK (attempt >= 0)"),
+        _integer("attempt", 0, _INT64, "INTEGER NOT NULL CHECK (attempt >= 0)"),
         _word("state", *RunState),
         _json("reasons", "a JSON list of reasons", read_reasons),
         _host_ns(),
@@ -234,7 +236,7 @@ CREATE TABLE result (run INTEGER NOT NULL, attempt INTEGER NOT NULL, analysis_ve
 def create_script(version: int = SCHEMA_VERSION) -> str:
     """Return the script that makes an empty session of a format inside a transaction."""
     return (
-        "".join(_created(name, version) for name in TABLES if TABLES[name].since <= version)
+        "".join(_table_script(name, version) for name in TABLES if TABLES[name].since <= version)
         + _BESIDES
         + f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {version};\n"
     )
@@ -245,7 +247,7 @@ def upgrade_script(version: int) -> str:
     script = ""
     for name, table in TABLES.items():
         if table.since == version:
-            script += _created(name, version)
+            script += _table_script(name, version)
         for column in table.columns:
             if column.since == version:
                 script += f'ALTER TABLE "{name}" ADD COLUMN {column.name} {column.sql};\n'
@@ -258,7 +260,7 @@ def insert_statement(name: str) -> str:
     return f'INSERT INTO "{name}" VALUES ({values})'  # noqa: S608 - a constant of this file
 
 
-def _created(name: str, version: int) -> str:
+def _table_script(name: str, version: int) -> str:
     table = TABLES[name]
     columns = ", ".join(f'"{c.name}" {c.sql}' for c in table.columns if c.since <= version)
     # "INSERT OR REPLACE" deletes without asking the delete trigger, so it has one of its own.

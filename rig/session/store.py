@@ -21,7 +21,7 @@ from rig.files import make_folder, state_folder
 from rig.printable import encodable
 from rig.reasons import make_error
 from rig.session.database import build, check_place, connect
-from rig.session.faults import translated
+from rig.session.faults import translate_errors
 from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
@@ -54,7 +54,7 @@ class Session(Reader):
         super().__init__(path, connection)
         self._journal = Journal(connection, path)
         self._presence = Presence(path)
-        self._gone: SessionError | None = None
+        self._loss: SessionError | None = None
         self.rescued = False  # saved elsewhere, whole, since the file is not at its place any more
         # Counted here, not by SQLite, so that a commit tried again writes the same rows.
         self._last_drop = max((row[0] for row in self._raw("drop", "")), default=0)
@@ -178,21 +178,21 @@ class Session(Reader):
         SessionError
             It is not; with the name of the file that has everything.
         """
-        if self._gone is None and (trouble := self._presence.trouble()):
-            self._gone = self._rescued(trouble)
-        if self._gone is not None:
-            raise self._gone
+        if self._loss is None and (trouble := self._presence.trouble()):
+            self._loss = self._rescue(trouble)
+        if self._loss is not None:
+            raise self._loss
 
     def settle(self) -> None:
         """Bring what is in the log (``-wal``) into the file, so that a copy of it alone is whole.
 
         A reader that is at it may keep the last of it back until the next time.
         """
-        with translated(self.path):
-            self._opened().execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+        with translate_errors(self.path):
+            self._open_connection().execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         self.require_presence()
 
-    def _rescued(self, trouble: str) -> SessionError:
+    def _rescue(self, trouble: str) -> SessionError:
         """Save what the open file and this memory have; give the error that says where.
 
         All goes into the open file too: it is whole then, wherever it was moved.
@@ -202,10 +202,10 @@ class Session(Reader):
         self._fold_in()
         try:
             try:
-                place = _unused(self.path)
+                place = _unused_name(self.path)
                 lost = self._journal.save(place)
             except (sqlite3.Error, OSError):  # its folder is gone too
-                place = _unused(make_folder(state_folder()) / self.path.name)
+                place = _unused_name(make_folder(state_folder()) / self.path.name)
                 lost = self._journal.save(place)
         except (sqlite3.Error, OSError, InputError) as error:
             return make_error(SessionError, "session_unsaved", trouble=trouble, text=error)
@@ -227,7 +227,7 @@ class Session(Reader):
             return
         connection = self._connection
         try:
-            if not self.readonly and self._gone is None:
+            if not self.readonly and self._loss is None:
                 self.commit()
                 self._fold_in()
         finally:
@@ -241,7 +241,7 @@ class Session(Reader):
     def _fold_in(self) -> None:
         """Leave one file to copy, even while a reader keeps the log from being removed."""
         with suppress(sqlite3.Error):
-            self._opened().execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            self._open_connection().execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def __enter__(self) -> Self:
         return self
@@ -318,15 +318,15 @@ class Session(Reader):
         self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
 
     def _writable(self) -> Journal:
-        self._opened()
-        if self._gone is not None:
-            raise self._gone
+        self._open_connection()
+        if self._loss is not None:
+            raise self._loss
         if self.readonly:
             raise make_error(SessionError, "session_read_only", path=self.path)
         return self._journal
 
 
-def _unused(path: Path) -> Path:
+def _unused_name(path: Path) -> Path:
     """Name a file beside a session that is not there yet."""
     names = (path.with_name(f"{path.name}.saved-{number}") for number in count(1))
     return next(name for name in names if not name.exists())

@@ -168,8 +168,8 @@ def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> st
     str or None
         `None` when it has none (CH340 chips have none), and for URLs.
     """
-    here = os.path.realpath(path)
+    place = os.path.realpath(path)
     for port in serial_ports() if ports is None else ports:
-        if os.path.realpath(port.path) == here:
+        if os.path.realpath(port.path) == place:
             return port.serial_number
     return None
