@@ -131,10 +131,10 @@ def test_a_port_that_stays_forbidden_is_said(flash, tmp_path, monkeypatch):
 
 
 def test_several_drives_are_named(flash, tmp_path, monkeypatch):
-    one, other = picos(tmp_path, monkeypatch, "one", "other")
+    drives = picos(tmp_path, monkeypatch, "one", "other")
     code, _, err = flash()
     assert code == 4
-    assert f"{one}, {other}" in err
+    assert ", ".join(map(str, drives)) in err
     assert "--drive" in err
 
 
@@ -171,23 +171,19 @@ def test_ports_tells_of_a_board_that_waits(capsys, tmp_path, monkeypatch):
     assert f"a Pico waits for firmware at {drive}" in capsys.readouterr().err
 
 
-def _without(at: int, size: int):
-    return lambda data: data[:at] + data[at + size :]
-
-
-def _with(at: int, value: bytes):
-    return lambda data: data[:at] + value + data[at + len(value) :]
+def _with(at: int, value: bytes, size: int = 4):
+    return lambda data: data[:at] + value + data[at + size :]
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_without(0, 1), "no whole UF2 file"),
+        (_with(0, b"", 1), "no whole UF2 file"),
         (lambda _: b"", "no whole UF2 file"),
-        (_without(512, 512), "not whole: block 0"),
+        (_with(512, b"", 512), "not whole: block 0"),
         (_with(512 + 12, bytes(4)), "not whole: block 1"),
         (_with(28, bytes(4)), "not for an RP2040"),
-        (_with(0, b"X"), "no UF2 file, or damaged: block 0"),
+        (_with(0, b"X", 1), "no UF2 file, or damaged: block 0"),
         (lambda data: data.replace(b"Raspberry Pi Pico\0", b"Raspberry Pi Pika\0"), "no firmware"),
     ],
 )
