@@ -253,8 +253,7 @@ class Session(Reader):
 
     def add_rows(self, table: str, rows: Iterable[Sequence[object]]) -> None:
         """Add rows to a table, all or none; those with a number get the next ones."""
-        numbered = TABLES[table].columns[0].name == "id"
-        values = [(None, *row) if numbered else row for row in rows]
+        values = [(None, *row) if TABLES[table].numbered else row for row in rows]
         self._writable().add(Statement(insert_statement(table), values))
 
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
