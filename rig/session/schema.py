@@ -42,7 +42,7 @@ _NS = (1 << 62) - 1  # two of them can be added: 146 years
 _MOST_HZ = 10**12  # of imported times, whose unit is 1 ps; boards count far slower
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column: its name, its SQL type, the values it accepts (in words, as a check), its age.
 
     `since` is the first format of the file that has it.
@@ -57,7 +57,7 @@ class Column(NamedTuple):
 
 def _integer(
     name: str, low: int, high: int, sql: str = "INTEGER NOT NULL", *, since: int = 1
-) -> Column:
+) -> TableColumn:
     """Return a column of whole numbers; one that is declared as INTEGER alone may be empty."""
 
     def accepts(value: object) -> bool:
@@ -65,32 +65,32 @@ def _integer(
             return sql == "INTEGER"
         return type(value) is int and low <= value <= high
 
-    return Column(name, sql, f"a whole number from {low} to {high}", accepts, since)
+    return TableColumn(name, sql, f"a whole number from {low} to {high}", accepts, since)
 
 
-def _counter(name: str, *, since: int = 1) -> Column:
+def _counter(name: str, *, since: int = 1) -> TableColumn:
     """Return a column of 32-bit numbers that a device gives in a certificate, or of nothing."""
     return _integer(name, 0, _U32, "INTEGER", since=since)
 
 
-def _host_ns(name: str = "host_ns", sql: str = "INTEGER NOT NULL") -> Column:
+def _host_ns(name: str = "host_ns", sql: str = "INTEGER NOT NULL") -> TableColumn:
     """Return a column of times of the host's clock."""
     return _integer(name, -_NS, _NS, sql)
 
 
-def _text(name: str, sql: str = "TEXT NOT NULL") -> Column:
+def _text(name: str, sql: str = "TEXT NOT NULL") -> TableColumn:
     """Return a column of any text."""
-    return Column(name, sql, "text", lambda value: type(value) is str)
+    return TableColumn(name, sql, "text", lambda value: type(value) is str)
 
 
-def _word(name: str, *words: str) -> Column:
+def _word(name: str, *words: str) -> TableColumn:
     """Return a column of some words."""
     quoted = ", ".join(f"'{word}'" for word in words)
     sql = f"TEXT NOT NULL CHECK ({name} IN ({quoted}))"
-    return Column(name, sql, f"one of {', '.join(words)}", lambda value: value in words)
+    return TableColumn(name, sql, f"one of {', '.join(words)}", lambda value: value in words)
 
 
-def _json(name: str, accepted: str, read: Callable[[str], object]) -> Column:
+def _json(name: str, accepted: str, read: Callable[[str], object]) -> TableColumn:
     """Return a column of JSON that `read` takes."""
 
     def accepts(value: Any) -> bool:
@@ -102,7 +102,7 @@ def _json(name: str, accepted: str, read: Callable[[str], object]) -> Column:
             return False
         return True
 
-    return Column(name, f"TEXT NOT NULL CHECK (json_valid({name}))", accepted, accepts)
+    return TableColumn(name, f"TEXT NOT NULL CHECK (json_valid({name}))", accepted, accepts)
 
 
 _TICK_HZ = _integer("tick_hz", 1, _MOST_HZ, "INTEGER NOT NULL CHECK (tick_hz > 0)")
@@ -131,7 +131,7 @@ def read_identity(record: str) -> dict[str, Any]:
     return members
 
 
-class Table:
+class SessionTable:
     """A table that only grows.
 
     Parameters
@@ -148,7 +148,7 @@ class Table:
 
     def __init__(
         self,
-        *columns: Column,
+        *columns: TableColumn,
         collides: str = "id = NEW.id",
         constraint: str = "",
         option: str = "",
@@ -169,25 +169,31 @@ _TRIP = (_host_ns("host_send_ns"), _host_ns("host_recv_ns"))
 _CERTIFIED = ("events", "crc32", "overflows", "glitches", "late")
 _ACCOUNT = ("pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv")
 TABLES = {
-    "meta": Table(_text("key", "TEXT PRIMARY KEY"), _text("value"), collides="key = NEW.key"),
-    "protocol": Table(
+    "meta": SessionTable(
+        _text("key", "TEXT PRIMARY KEY"), _text("value"), collides="key = NEW.key"
+    ),
+    "protocol": SessionTable(
         _integer("id", 1, _INT64, "INTEGER PRIMARY KEY CHECK (id = 1)"),
         _text("source"),
         _text("text"),
     ),
-    "identity": Table(_ID, _host_ns(), _json("json", "a JSON object of a device", read_identity)),
-    "bytes": Table(
+    "identity": SessionTable(
+        _ID, _host_ns(), _json("json", "a JSON object of a device", read_identity)
+    ),
+    "bytes": SessionTable(
         _ID,
         _host_ns(),
         _word("direction", "rx", "tx"),
-        Column("data", "BLOB NOT NULL", "bytes", lambda value: type(value) is bytes),
+        TableColumn("data", "BLOB NOT NULL", "bytes", lambda value: type(value) is bytes),
     ),
-    "ping": Table(_ID, *_TRIP, _integer("tick", 0, _U32)),
-    "reference": Table(
+    "ping": SessionTable(_ID, *_TRIP, _integer("tick", 0, _U32)),
+    "reference": SessionTable(
         _ID, *_TRIP, _integer("number", 0, _U16), _integer("tick", 0, _U32), since=3
     ),
-    "host_break": Table(_ID, _host_ns(), _host_ns("slept_ns"), _host_ns("stepped_ns"), since=3),
-    "drop": Table(
+    "host_break": SessionTable(
+        _ID, _host_ns(), _host_ns("slept_ns"), _host_ns("stepped_ns"), since=3
+    ),
+    "drop": SessionTable(
         _ID,
         _RUN,
         _integer("attempt", 1, _INT64, "INTEGER NOT NULL CHECK (attempt >= 1)"),
@@ -203,7 +209,7 @@ TABLES = {
         collides="id = NEW.id OR (run = NEW.run AND attempt = NEW.attempt)",
         constraint=", UNIQUE (run, attempt)",
     ),
-    "edge": Table(
+    "edge": SessionTable(
         _integer("drop", 1, _INT64, 'INTEGER NOT NULL REFERENCES "drop" (id)'),
         _integer("idx", 0, _INT64, "INTEGER NOT NULL CHECK (idx >= 0)"),
         _integer("tick", -_INT64 - 1, _INT64),
@@ -213,7 +219,7 @@ TABLES = {
         constraint=', PRIMARY KEY ("drop", idx)',
         option=", WITHOUT ROWID",
     ),
-    "run_state": Table(
+    "run_state": SessionTable(
         _ID,
         _RUN,
         _integer("attempt", 0, _INT64, "INTEGER NOT NULL CHECK (attempt >= 0)"),
