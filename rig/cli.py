@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
+from rig.boards import GATES
 from rig.command_help import build_parser, runnable
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
@@ -128,6 +129,15 @@ def _count(text: str) -> int:
     return number
 
 
+def _gates(text: str) -> int:
+    channels = text.split(",")
+    if not all(channel.isdecimal() and int(channel) < GATES for channel in channels):
+        raise argparse.ArgumentTypeError(
+            f"found '{text}'; accepted: numbers from 0 to {GATES - 1}, with commas between"
+        )
+    return sum(1 << channel for channel in set(map(int, channels)))
+
+
 def _trials(text: str) -> int | str:
     if text == "adaptive":
         return text
@@ -177,6 +187,7 @@ def _typed(read: Callable[[str], object]) -> Callable[[str], dict[str, Any]]:
 _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     "int": _typed(int),
     "count": _typed(_count),
+    "gates": _typed(_gates),
     "trials": _typed(_trials),
     "seed": _typed(_seed),
     "port": _typed(_port),

@@ -34,11 +34,11 @@ class _ByBytes(Reader):
         self.chunks = replay.fed
         self._samples = [sample for sample in replay.records if isinstance(sample, ClockSample)]
         self._pulses = [pulse for pulse in replay.records if isinstance(pulse, Pulse)]
-        acknowledged = replay.acknowledged()
+        acknowledged = replay.acknowledged_drops()
         # What was stored and not acknowledged any more still is in the bytes.
         have = {_key(drop) for drop in acknowledged}
         stored = {_key(drop): drop for drop in session.drops()}
-        late = [drop for drop in replay.unfinished() if _key(drop) in stored.keys() - have]
+        late = [drop for drop in replay.unfinished_drops() if _key(drop) in stored.keys() - have]
         drops = sorted(_once([*acknowledged, *late]), key=_key)
         self._drops = [as_old_as(stored.get(_key(drop), drop), drop) for drop in drops]
 

@@ -9,33 +9,24 @@ from typing import TYPE_CHECKING
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
 from rig.commands.output import print_json, say
-from rig.doctor import checks
-from rig.doctor.gathering import (
-    look_at_board,
-    look_at_disk,
-    look_at_packages,
-    look_at_port,
-    look_at_session,
+from rig.doctor.board import BOARD_CHECKS, look_at_board
+from rig.doctor.computer import (
+    PORT_CHECKS,
+    PortPlace,
+    check_packages,
+    check_room,
+    describe_cache,
 )
+from rig.doctor.session import check_session
 from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
-from rig.selftest.findings import Finding, explain
+from rig.reasons import make_reason
+from rig.selftest.findings import Finding, explain, make_check
 from rig.usb.listing import serial_ports
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator
-
-_PORT = (checks.permission, checks.other_owners, checks.modem_manager)
-_BOARD = (
-    checks.firmware,
-    checks.held_drop,
-    checks.clock,
-    checks.round_trip,
-    checks.emergency_stop,
-    checks.stuck_gates,
-    checks.flickering_gates,
-)
+    from collections.abc import Callable, Iterator, Mapping
 
 
 def main(arguments: Namespace) -> int:
@@ -62,33 +53,37 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     paths = [url] if url and "://" not in url else []
     free = True
     for path in paths or [port.path for port in serial_ports() if port.candidate and not url]:
-        facts = look_at_port(path)
-        free = facts.usable and not facts.owners
-        yield from (check(facts) for check in _PORT)
+        permission, owners, modem = _check_all(PORT_CHECKS, PortPlace(path), path)
+        free = not (permission.reason or owners.reason)
+        yield from (permission, owners, modem)
     if url and free:
         yield from _board(url)
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
-    yield checks.other_packages(look_at_packages())
-    cache = CacheFile()
-    yield checks.kept_results(str(cache.folder), cache.size())
-    yield checks.disk_room(look_at_disk(Path(session).parent if session else Path()))
+    folder = Path(session).parent if session else Path()
+    yield make_check("packages called rig", check_packages, "chainrig")
+    yield make_check("kept results", describe_cache, CacheFile())
+    yield make_check("disk", check_room, folder)
     if session and not Path(session).exists():
-        yield checks.problem(f"session {session}", "session_missing")
+        yield explain(f"session {session}", make_reason("session_missing"))
     elif session:
         try:
-            file = look_at_session(session)
-            yield checks.session_file(file)
-            if file.whole:
-                yield from (checks.restarts(file), checks.supply(file))
+            yield from check_session(session)
         except SessionError as error:
             yield _failure(f"session {session}", error)
+
+
+def _check_all(
+    checks: Mapping[str, Callable[..., str]], facts: object, path: str = ""
+) -> Iterator[Finding]:
+    for name, check in checks.items():
+        yield make_check(name.format(path=path), check, facts)
 
 
 def _failure(name: str, error: RigError) -> Finding:
     if error.reasons:
         return explain(name, error.reasons[0])
-    return checks.problem(name, "failed", text=error.message, hint=error.hint)
+    return explain(name, make_reason("failed", text=error.message, hint=error.hint))
 
 
 def _board(url: str) -> Iterator[Finding]:
@@ -100,4 +95,4 @@ def _board(url: str) -> Iterator[Finding]:
         return
     identity = facts.identity
     yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}")
-    yield from (check(facts) for check in _BOARD)
+    yield from _check_all(BOARD_CHECKS, facts)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
-from rig.flash.drive import waiting_drives
+from rig.flash.drive import UNMOUNTED, sees_boot_pico, waiting_drives
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
 from rig.usb.listing import SerialPort, serial_ports
@@ -37,6 +37,8 @@ def main(arguments: Namespace) -> int:
         say(f"several boards have the id {shared}: erase the EEPROM of all but one board")
     for drive in waiting_drives():
         say(f"a Pico waits for firmware at {drive}: rig flash --board pico")
+    if sees_boot_pico() and not waiting_drives():
+        say(f"{UNMOUNTED}: rig flash --board pico")
     if not any(port.candidate for port in ports):
         say("no board found: check its plug, and use a USB cable with data wires")
     return 0

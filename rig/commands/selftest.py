@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
+from rig.protocol import reader
 from rig.reasons import remedies
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
@@ -19,7 +20,11 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Make all checks, one line each, then say what to do about those that failed."""
-    options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release)
+    gates = arguments.gates
+    if arguments.protocol is not None:
+        protocol = reader.read(arguments.protocol)
+        gates = (gates or 0) | (protocol.gates.mask if protocol.gates else 0)
+    options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release, gates)
     if options.release:
         say("release 0 will be driven once: keep clear of it")
     findings = []

@@ -53,9 +53,9 @@ def find_avrdude(path: str | None) -> str:
     InputError
         It is not there.
     """
-    found = shutil.which(path or "avrdude")
-    if found:
-        return found
+    program = shutil.which(path or "avrdude")
+    if program:
+        return program
     if path:
         raise InputError(f"{path} is no program that can be run")
     raise InputError("avrdude is not installed", "apt-get install avrdude, or say --avrdude PATH")
@@ -94,19 +94,19 @@ def write_flash(avrdude: str, target: AvrTarget, port: str, image: Path) -> None
     except OSError as error:
         raise InputError(f"cannot run {avrdude}: {error.strerror}") from error
     with child:
-        said = _shown(child, port)
+        output = _relay_output(child, port)
     if not os.path.lexists(port):
         raise DeviceError(
             f"flashing {port} failed: the connection broke",
             "plug the board in again and flash it once more: its boot loader was not touched",
         )
     if child.returncode:
-        raise DeviceError(*_cause(port, child.returncode, said))
+        raise DeviceError(*_cause(port, child.returncode, output))
 
 
-def _shown(child: subprocess.Popen[bytes], port: str) -> str:
+def _relay_output(child: subprocess.Popen[bytes], port: str) -> str:
     """Pass on what a program says as it says it: its progress is a line that grows."""
-    said = bytearray()
+    output = bytearray()
     assert child.stdout is not None
     while True:
         readable, _, _ = select.select([child.stdout], [], [], _LOOK_S)
@@ -115,15 +115,15 @@ def _shown(child: subprocess.Popen[bytes], port: str) -> str:
         if readable:
             chunk = child.stdout.read(4096)
             if not chunk:
-                return said.decode(errors="replace")
-            said += chunk
+                return output.decode(errors="replace")
+            output += chunk
             with suppress(OSError):
                 sys.stderr.write(chunk.decode(errors="replace"))
                 sys.stderr.flush()
 
 
-def _cause(port: str, code: int, said: str) -> tuple[str, str]:
-    lower = said.lower()
+def _cause(port: str, code: int, output: str) -> tuple[str, str]:
+    lower = output.lower()
     for clue, cause, hint in _CAUSES:
         if clue in lower:
             return f"flashing {port} failed: {cause}", hint

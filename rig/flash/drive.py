@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 _MOUNTS = Path("/proc/mounts")
 _ABOUT = "INFO_UF2.TXT"  # the boot program's file about the board
 _BOARD = "RPI-RP2"
+_USB = Path("/sys/bus/usb/devices")
+_BOOT = ["2e8a", "0003"]  # USB vendor and product of the RP2040's boot program
+UNMOUNTED = f"a Pico waits for firmware, but its drive {_BOARD} is not mounted"
+_MOUNT = f"mount /dev/disk/by-label/{_BOARD} (as with udisksctl mount -b) and say --drive FOLDER"
 _HOW = (
     f"hold its BOOTSEL button while you put in the plug: a drive {_BOARD} appears; "
     "if nothing mounts it by itself, mount it and say --drive FOLDER"
@@ -34,10 +39,20 @@ def waiting_drives(mounts: Path = _MOUNTS) -> list[Path]:
     mounts
         The kernel's account of what is mounted.
     """
-    return [folder for folder in _mounted(mounts) if _is_drive(folder)]
+    return [folder for folder in _fat_mounts(mounts) if _is_drive(folder)]
 
 
-def choose_drive(given: str | None, mounts: Path = _MOUNTS) -> Path:
+def sees_boot_pico(devices: Path = _USB) -> bool:
+    """Whether a Pico in boot mode is plugged in, by the kernel's account of USB devices."""
+    names = ("idVendor", "idProduct")
+    for device in devices.glob("*"):
+        with suppress(OSError):
+            if [(device / name).read_text("ascii").strip() for name in names] == _BOOT:
+                return True
+    return False
+
+
+def choose_drive(folder: str | None, mounts: Path = _MOUNTS, devices: Path = _USB) -> Path:
     """Find the one drive to copy to.
 
     Raises
@@ -47,19 +62,20 @@ def choose_drive(given: str | None, mounts: Path = _MOUNTS) -> Path:
     DeviceError
         There is none, or several.
     """
-    if given is not None:
-        if not _is_drive(Path(given)):
-            raise InputError(f"{given} is no drive of a Pico: it has no {_ABOUT} of one", _HOW)
-        return Path(given)
-    found = waiting_drives(mounts)
-    if not found:
-        raise DeviceError("no Pico waits for firmware", _HOW)
-    if len(found) > 1:
-        raise DeviceError(
-            f"{len(found)} Picos wait for firmware: {', '.join(map(str, found))}",
-            "choose one with --drive FOLDER",
-        )
-    return found[0]
+    if folder is not None:
+        if not _is_drive(Path(folder)):
+            raise InputError(f"{folder} is no drive of a Pico: it has no {_ABOUT} of one", _HOW)
+        return Path(folder)
+    drives = waiting_drives(mounts)
+    if len(drives) == 1:
+        return drives[0]
+    if drives:
+        names = ", ".join(map(str, drives))
+        hint = "choose one with --drive FOLDER"
+        raise DeviceError(f"{len(drives)} Picos wait for firmware: {names}", hint)
+    if sees_boot_pico(devices):
+        raise DeviceError(UNMOUNTED, _MOUNT)
+    raise DeviceError("no Pico waits for firmware", _HOW)
 
 
 def copy_to(drive: Path, image: Path) -> None:
@@ -70,17 +86,15 @@ def copy_to(drive: Path, image: Path) -> None:
     DeviceError
         The drive could not be written.
     """
-    data = image.read_bytes()
     try:
         file = os.open(drive / "chainrig.uf2", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     except OSError as error:
         raise DeviceError(f"cannot write to {drive}: {error.strerror}", _HOW) from None
     try:
-        written = 0
-        while written < len(data):
-            written += os.write(file, data[written:])
-        os.fsync(file)
-        os.close(file)
+        with open(file, "wb") as stream:  # noqa: PTH123 - of the handle
+            stream.write(image.read_bytes())
+            stream.flush()
+            os.fsync(file)
     except OSError as error:
         # The board may be gone before the computer has noticed that everything was written: who it
         # is afterwards decides.
@@ -116,11 +130,11 @@ def new_port(before: set[str], patience_s: float = 10.0) -> str:
 
 
 def pico_ports() -> set[str]:
-    """List the ports that are a Pico's by their numbers."""
-    return {port.path for port in serial_ports() if DRIVE.board.name in port.kinds}
+    """List the ports of Picos with this project's firmware."""
+    return {p.path for p in serial_ports() if p.candidate and DRIVE.board.name in p.kinds}
 
 
-def _mounted(mounts: Path) -> Iterator[Path]:
+def _fat_mounts(mounts: Path) -> Iterator[Path]:
     try:
         lines = mounts.read_text("utf-8", "surrogateescape").splitlines()
     except OSError:  # another kernel

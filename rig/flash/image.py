@@ -65,8 +65,8 @@ def read_image(path: Path, target: Target) -> Image:
         raise InputError(f"{path}: {error.strerror or error}") from None
     flash = read_blocks(data, path) if target is DRIVE else _records(data, path)
     versions = set(_VERSION.findall(flash))
-    known = {one.board for one in (*TARGETS.values(), DRIVE)}
-    boards = [board for board in known if board.name.encode() + b"\0" in flash]
+    boards_known = {one.board for one in (*TARGETS.values(), DRIVE)}
+    boards = [board for board in boards_known if board.name.encode() + b"\0" in flash]
     if len(versions) != 1 or len(boards) != 1:
         raise InputError(f"{path} is no firmware of this rig", "make -C firmware prebuilt makes it")
     if boards != [target.board]:
@@ -99,8 +99,8 @@ def _flash(text: str, path: Path) -> bytes:
     number = 0
     for number, line in enumerate(text.splitlines(), 1):
 
-        def fault(what: str, at: int = number) -> InputError:
-            return InputError(problems=[Problem(str(path), at, 1, "", what)])
+        def fault(text: str, at: int = number) -> InputError:
+            return InputError(problems=[Problem(str(path), at, 1, "", text)])
 
         try:
             record = bytes.fromhex(line.removeprefix(":"))

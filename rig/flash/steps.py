@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,11 @@ if TYPE_CHECKING:
 
     from rig.flash.boards import Target
     from rig.link.messages import Identity
+    from rig.link.port import Port
+
+_UDEV_S = 2.0
+"""For which a port that has just appeared may be forbidden: udev gives permission after it."""
+_LOOK_S = 0.1
 
 
 def flash(
@@ -122,7 +128,7 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
     DeviceError
         It does not answer, or with other names.
     """
-    with closing(open_port(port)) as opened:
+    with closing(_open_soon(port)) as opened:
         try:
             identity = Device(opened, port_clock(opened)).connect()
         except DeviceTimeoutError as error:
@@ -137,3 +143,16 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
             "is this the port of the board that was flashed? rig ports",
         )
     return identity
+
+
+def _open_soon(port: str) -> Port:
+    """Open a port as soon as it is permitted."""
+    end = time.monotonic() + _UDEV_S
+    while True:
+        try:
+            return open_port(port)
+        except DeviceError as error:
+            denied = any(reason.code == "port_denied" for reason in error.reasons)
+            if not denied or time.monotonic() > end:
+                raise
+        time.sleep(_LOOK_S)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.reasons import make_reason
 from rig.records import Job
 from rig.session.drop_check import ByteReplay, Fate, check_drop
-from rig.session.rows import drop_of
+from rig.session.rows import drop_of, named_values
 
 if TYPE_CHECKING:
     from rig.records import Drop
-    from rig.recover.rows import Rows
+    from rig.recover.rows import Row, Rows
 
 
-@dataclass(frozen=True, slots=True)
-class Recovered:
+class RecoveredDrop(NamedTuple):
     """A drop, what can be said of it, and what was stored about it besides."""
 
     drop: Drop
@@ -25,30 +24,33 @@ class Recovered:
     provenance: str = "recovered"
 
 
-def recover_drops(rows: Rows) -> list[Recovered]:
+def recover_drops(rows: Rows) -> list[RecoveredDrop]:
     """Give the best of every drop, in the order of recording.
 
     The device's CRC-32 over a drop's events is in the bytes, not in the edges: where the two
     differ, a drop that the bytes give without a fault is the right one.
     """
     replay = ByteReplay()
-    replay.feed(cast("Any", row[1:]) for _, row in sorted(rows.bytes.items()))
-    again = replay.drops()
-    known = set()
-    drops: list[Recovered] = []
-    for number, row in sorted(rows.drop.items()):
-        values: Any = row  # checked when the row was found
-        edges = rows.edge.get(number, {})
-        stored = drop_of(values, cast("Any", [edge for _, edge in sorted(edges.items())]))
+    replay.feed(row[1:] for row in rows.in_order("bytes"))
+    replayed = replay.drops()
+    edges: dict[int, list[Row]] = {}
+    for edge in rows.in_order("edge"):
+        edges.setdefault(edge[0], []).append(edge)
+    stored_jobs = set()
+    drops: list[RecoveredDrop] = []
+    for row in rows.in_order("drop"):
+        values, own = named_values(row), edges.get(row[0], [])
+        stored = drop_of(row, own)
         job = Job(stored.run, stored.attempt)
-        fate = check_drop(stored, again, torn=len(edges) != max(edges, default=-1) + 1)
-        drops.append(Recovered(_best(stored, again.get(job), fate), fate, values[12], values[13]))
-        known.add(job)
+        fate = check_drop(stored, replayed, torn=any(edge[1] != n for n, edge in enumerate(own)))
+        best = _best(stored, replayed.get(job), fate)
+        drops.append(RecoveredDrop(best, fate, values["host_ns"], values["provenance"]))
+        stored_jobs.add(job)
     # What was never stored is only worth having whole.
     return drops + [
-        Recovered(drop, Fate.RESTORED)
-        for job, drop in sorted(again.items())
-        if job not in known and drop.certificate is not None and not drop.faults
+        RecoveredDrop(drop, Fate.RESTORED)
+        for job, drop in sorted(replayed.items())
+        if job not in stored_jobs and drop.certificate is not None and not drop.faults
     ]
 
 

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 
 from rig.printable import printable
 from rig.reasons import sentences
-from rig.recover.drops import Recovered, recover_drops
-from rig.recover.pages import MAGIC, Pages, read_pages
-from rig.recover.rows import Rows, find_rows, gaps
+from rig.recover.drops import RecoveredDrop, recover_drops
+from rig.recover.pages import MAGIC, read_pages
+from rig.recover.rows import Rows, find_rows
 from rig.recover.snapshot import SessionCopy, take_snapshot
 from rig.session.drop_check import Fate
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping, Sequence
 
 _NUMBERED = {
     "bytes": "chunks of bytes",
@@ -31,13 +32,13 @@ _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
 
 @dataclass(frozen=True, slots=True)
-class Examined:
+class ExaminedFile:
     """A session file after a look at it.
 
     Attributes
     ----------
-    snapshot, pages, rows
-        What was read, from bytes to rows.
+    snapshot, rows
+        What was read: the file, and the rows in it.
     drops
         The best of each drop.
     foreign
@@ -49,12 +50,11 @@ class Examined:
     """
 
     snapshot: SessionCopy
-    pages: Pages
     rows: Rows
-    drops: list[Recovered]
+    drops: list[RecoveredDrop]
     foreign: str
-    damage: tuple[str, ...]
-    lost: tuple[str, ...]
+    damage: Sequence[str] = ()
+    lost: Sequence[str] = ()
 
     @property
     def whole(self) -> bool:
@@ -64,11 +64,11 @@ class Examined:
     @property
     def troubles(self) -> list[str]:
         """Everything that is not as it should be, one sentence each."""
-        doubtful = [_fate(one) for one in self.drops if one.fate not in _GOOD]
+        doubtful = [_describe_fate(drop) for drop in self.drops if drop.fate not in _GOOD]
         return list(dict.fromkeys([*self.damage, *self.lost, *doubtful]))
 
 
-def examine(path: str | os.PathLike[str]) -> Examined:
+def examine(path: str | os.PathLike[str]) -> ExaminedFile:
     """Look at a session file, which stays as it is.
 
     Raises
@@ -80,53 +80,67 @@ def examine(path: str | os.PathLike[str]) -> Examined:
     pages = read_pages(snapshot.data)
     rows = find_rows(pages)
     drops = recover_drops(rows)
-    foreign = _foreign(snapshot, pages, rows)
-    if foreign:
-        return Examined(snapshot, pages, rows, drops, foreign, (), ())
-    damage, lost = tuple(_damage(snapshot, pages, rows)), tuple(_lost(rows, drops))
-    return Examined(snapshot, pages, rows, drops, foreign, damage, lost)
+    if foreign := _foreign(snapshot.data, pages.pages.get(1, b""), rows):
+        return ExaminedFile(snapshot, rows, drops, foreign)
+    orphans = len({drop for drop, _ in rows.tables["edge"]} - rows.tables["drop"].keys())
+    torn = f"{pages.missing} of {pages.expected} pages are not there: the file is torn"
+    damage = {
+        torn: pages.missing,
+        snapshot.trouble: snapshot.trouble,
+        f"{rows.bad} records cannot be read": rows.bad,
+        f"nothing says what drops {orphans} groups of edges belong to": orphans,
+    }
+    facts = "whether it is simulated, when and by what it was made"
+    lost = {
+        facts: "simulated" not in rows.meta,
+        "the protocol file": rows.protocol is None,
+        "the protocol's text has changed since the session was made": (
+            rows.protocol and not protocol_sound(rows)
+        ),
+        **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
+        **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
+    }
+    return ExaminedFile(snapshot, rows, drops, "", _true(damage), _true(lost))
 
 
-def describe(found: Examined) -> list[str]:
+def describe(session: ExaminedFile) -> list[str]:
     """Say it in lines, safe for a terminal whatever stands in the file."""
-    return [printable(line).replace("\n", " ").replace("\t", " ") for line in _described(found)]
+    lines = _lines(session)
+    return [printable(line).replace("\n", " ").replace("\t", " ") for line in lines]
 
 
-def _described(found: Examined) -> list[str]:
-    snapshot, rows = found.snapshot, found.rows
+def _lines(session: ExaminedFile) -> list[str]:
+    snapshot, rows, meta = session.snapshot, session.rows, session.rows.meta
     lines = [f"{snapshot.path}: {len(snapshot.data)} bytes"]
     if snapshot.writer:
         lines.append(f"is being written by {snapshot.writer}; this is how it was a moment ago")
     if not snapshot.writable:
         lines.append("may not be written by you: only reading is possible")
-    if found.foreign:
-        return [*lines, f"not a session: {found.foreign}"]
+    if session.foreign:
+        return [*lines, f"not a session: {session.foreign}"]
     if snapshot.logged:
         lines.append(f"{snapshot.logged} pages are in the log beside it (-wal) only: keep both")
-    meta = rows.meta
-    what = {"true": "simulated", "false": "real"}.get(meta.get("simulated", ""), "unknown if real")
+    world = {"true": "simulated", "false": "real"}.get(meta.get("simulated", ""), "unknown if real")
     lines.append(
         f"a session made {meta.get('created', 'at an unknown time')} by rig "
-        f"{meta.get('rig_version', 'of unknown version')}, {what}"
+        f"{meta.get('rig_version', 'of unknown version')}, {world}"
     )
     for table, name in _NUMBERED.items():
-        numbers = getattr(rows, table)
-        if numbers:
-            missing = gaps(numbers)
-            lines.append(
-                f"{len(numbers)} {name}: "
-                + (f"{missing} before the last are missing" if missing else "no gap")
-            )
-    lines += [
-        f"run {one.drop.run}, attempt {one.drop.attempt}: {len(one.drop.edges)} edges: {one.fate}"
-        + (f" (recorded with faults: {sentences(one.drop.faults)})" if one.drop.faults else "")
-        for one in found.drops
-    ]
-    lines += [f"damaged: {what}" for what in found.damage]
-    lines += [f"lost: {what}" for what in found.lost]
-    if found.whole:
+        if count := len(rows.tables[table]):
+            missing = rows.gaps(table)
+            gap = f"{missing} before the last are missing" if missing else "no gap"
+            lines.append(f"{count} {name}: {gap}")
+    for recovered in session.drops:
+        drop = recovered.drop
+        name = f"run {drop.run}, attempt {drop.attempt}: {len(drop.edges)} edges: {recovered.fate}"
+        faults = f" (recorded with faults: {sentences(drop.faults)})" if drop.faults else ""
+        lines.append(name + faults)
+    lines += [f"damaged: {text}" for text in session.damage]
+    lines += [f"lost: {text}" for text in session.lost]
+    if session.whole:
         lines.append("everything is whole")
-    if snapshot.logged is None and not snapshot.writer and _unfinished(rows):
+    states = rows.in_order("run_state")
+    if snapshot.logged is None and not snapshot.writer and (not states or states[-1][3] in _OPEN):
         lines.append(
             "its last run is open: if there was a file of this name with -wal behind it, "
             "put it back beside this one, since it holds what came last"
@@ -134,55 +148,24 @@ def _described(found: Examined) -> list[str]:
     return lines
 
 
-def _foreign(snapshot: SessionCopy, pages: Pages, rows: Rows) -> str:
-    if not snapshot.data:
+def _foreign(data: bytes, first: bytes, rows: Rows) -> str:
+    if not data:
         return "it is empty"
-    first = pages.pages.get(1, b"")
     if first.startswith(MAGIC):
-        application = int.from_bytes(first[68:72], "big")
+        application, version = (int.from_bytes(first[at : at + 4], "big") for at in (68, 60))
         if application != APPLICATION_ID and not rows.any():
             return "it is another program's SQLite database"
-        if application == APPLICATION_ID and int.from_bytes(first[60:64], "big") > SCHEMA_VERSION:
+        if application == APPLICATION_ID and version > SCHEMA_VERSION:
             return "it was written by a newer rig: update rig"
-    if not rows.any():
-        return "there is nothing of a session in it"
-    return ""
+    return "" if rows.any() else "there is nothing of a session in it"
 
 
-def _damage(snapshot: SessionCopy, pages: Pages, rows: Rows) -> list[str]:
-    damage = []
-    if pages.missing:
-        damage.append(f"{pages.missing} of {pages.expected} pages are not there: the file is torn")
-    if snapshot.complaints:
-        damage.append(f"SQLite cannot read it as it is: {snapshot.complaints[0]}")
-    if snapshot.unreadable:
-        damage.append(f"rig cannot read it as it is: {snapshot.unreadable}")
-    if rows.bad:
-        damage.append(f"{rows.bad} records cannot be read")
-    orphans = len(rows.edge.keys() - rows.drop.keys())
-    if orphans:
-        damage.append(f"nothing says what drops {orphans} groups of edges belong to")
-    return damage
+def _true(sentences: Mapping[str, object]) -> list[str]:
+    return [sentence for sentence, holds in sentences.items() if holds]
 
 
-def _lost(rows: Rows, drops: list[Recovered]) -> list[str]:
-    lost = []
-    if "simulated" not in rows.meta:
-        lost.append("whether it is simulated, when and by what it was made")
-    if rows.protocol is None:
-        lost.append("the protocol file")
-    elif not protocol_sound(rows):
-        lost.append("the protocol's text has changed since the session was made")
-    lost += [
-        f"{missing} {name}"
-        for table, name in _NUMBERED.items()
-        if (missing := gaps(getattr(rows, table)))
-    ]
-    return [*lost, *(_fate(one) for one in drops if one.fate is Fate.PARTIAL)]
-
-
-def _fate(one: Recovered) -> str:
-    return f"run {one.drop.run}, attempt {one.drop.attempt}: {one.fate}"
+def _describe_fate(recovered: RecoveredDrop) -> str:
+    return f"run {recovered.drop.run}, attempt {recovered.drop.attempt}: {recovered.fate}"
 
 
 def protocol_sound(rows: Rows) -> bool:
@@ -191,9 +174,3 @@ def protocol_sound(rows: Rows) -> bool:
         return False
     digest = hashlib.sha256(rows.protocol[1].encode()).hexdigest()
     return rows.meta.get("protocol_sha256", digest) == digest
-
-
-def _unfinished(rows: Rows) -> bool:
-    if not rows.run_state:
-        return True
-    return RunState(str(rows.run_state[max(rows.run_state)][3])) in _OPEN

@@ -74,10 +74,6 @@ class PageCell(NamedTuple):
     values: tuple[Value, ...]
 
 
-class BadCellError(ValueError):
-    """Bytes that are no record."""
-
-
 class PageRecords(NamedTuple):
     """The records of a page, and how many of its cells are none."""
 
@@ -104,14 +100,14 @@ def read_cells(pages: Pages, number: int) -> PageRecords:
     pointers = start + (12 if kind == INDEX_INTERIOR else 8)
     if pointers + 2 * count > pages.usable:
         return PageRecords([], 1)
-    found, bad = [], 0
+    cells, bad = [], 0
     for n in range(count):
         at = int.from_bytes(page[pointers + 2 * n : pointers + 2 * n + 2], "big")
         try:
-            found.append(_cell(pages, page, kind, at))
-        except (BadCellError, IndexError, struct.error):
+            cells.append(_cell(pages, page, kind, at))
+        except (ValueError, IndexError):
             bad += 1
-    return PageRecords(found, bad)
+    return PageRecords(cells, bad)
 
 
 def _cell(pages: Pages, page: bytes, kind: int, at: int) -> PageCell:
@@ -128,30 +124,30 @@ def _cell(pages: Pages, page: bytes, kind: int, at: int) -> PageCell:
 def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:
     """Put a record together from its page and the pages it flows over to."""
     usable = pages.usable
-    most = usable - 35 if kind == TABLE_LEAF else (usable - 12) * 64 // 255 - 23
+    limit = usable - 35 if kind == TABLE_LEAF else (usable - 12) * 64 // 255 - 23
     if size > len(pages.pages) * usable:
-        raise BadCellError("longer than the file")
-    if size <= most:
+        raise ValueError("longer than the file")
+    if size <= limit:
         return _cut(page, at, size, usable)
     least = (usable - 12) * 32 // 255 - 23
-    here = least + (size - least) % (usable - 4)
-    here = here if here <= most else least
-    parts = [_cut(page, at, here, usable)]
-    follow = int.from_bytes(_cut(page, at + here, 4, usable), "big")
-    left = size - here
-    while left > 0:
+    local = least + (size - least) % (usable - 4)
+    local = local if local <= limit else least
+    parts = [_cut(page, at, local, usable)]
+    follow = int.from_bytes(_cut(page, at + local, 4, usable), "big")
+    remaining = size - local
+    while remaining > 0:
         if follow not in pages.pages:
-            raise BadCellError("its end is missing")
+            raise ValueError("its end is missing")
         over = pages.pages[follow]
-        parts.append(over[4 : min(4 + left, usable)])
-        left -= len(parts[-1])
+        parts.append(over[4 : min(4 + remaining, usable)])
+        remaining -= len(parts[-1])
         follow = int.from_bytes(over[:4], "big")
     return b"".join(parts)
 
 
 def _cut(page: bytes, at: int, size: int, usable: int) -> bytes:
     if at < 8 or at + size > usable:
-        raise BadCellError("outside of its page")
+        raise ValueError("outside of its page")
     return page[at : at + size]
 
 
@@ -161,15 +157,15 @@ def _record(payload: bytes) -> Iterator[Value]:
     while at < header:
         kind, at = _varint(payload, at)
         if kind in {10, 11}:
-            raise BadCellError("no such type")
+            raise ValueError("no such type")
         size = _INTEGERS.get(kind, 8 if kind == 7 else max(0, kind - 12) // 2)
         data = payload[body : body + size]
         if len(data) != size:
-            raise BadCellError("cut short")
+            raise ValueError("cut short")
         body += size
         yield _value(kind, data)
     if at != header or body != len(payload):
-        raise BadCellError("of another length than it says")
+        raise ValueError("of another length than it says")
 
 
 def _value(kind: int, data: bytes) -> Value:
@@ -178,16 +174,12 @@ def _value(kind: int, data: bytes) -> Value:
     if kind in {8, 9}:
         return kind - 8
     if kind == 7:
-        (number,) = struct.unpack(">d", data)
-        return float(number)
+        return float(struct.unpack(">d", data)[0])
     if kind < 7:
         return int.from_bytes(data, "big", signed=True)
     if kind % 2 == 0:
         return data
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise BadCellError("no text") from error
+    return data.decode("utf-8")
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:

@@ -3,40 +3,56 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rig.recover.pages import read_cells
-from rig.session.rows import COLUMNS, RowError, check_row
+from rig.session.rows import RowError, check_row
+from rig.session.schema import SCHEMA_VERSION, TABLES
 
 if TYPE_CHECKING:
-    from rig.recover.pages import PageCell, Pages, Value
+    from rig.recover.pages import PageCell, Pages
 
-Row: TypeAlias = "tuple[Value, ...]"
+Row: TypeAlias = "tuple[Any, ...]"
 
-_TABLES = ("bytes", "identity", "ping", "host_break", "reference", "run_state", "drop")
-_LENGTHS = {"drop": {14, 15, 20}}  # of each format
+_LENGTHS = {
+    name: {len(table.names(version)) for version in range(table.since, SCHEMA_VERSION + 1)}
+    for name, table in TABLES.items()
+}
 _TRIP_NS = 60 * 10**9  # no answer takes longer
 
 
 @dataclass
 class Rows:
-    """The rows of a session, by table; those with a number by it. `bad` counts unreadable ones."""
+    """The rows of a session by table, each by its key; `bad` counts unreadable ones.
 
-    meta: dict[str, str] = field(default_factory=dict)
-    protocol: tuple[str, str] | None = None
-    identity: dict[int, Row] = field(default_factory=dict)
-    bytes: dict[int, Row] = field(default_factory=dict)
-    ping: dict[int, Row] = field(default_factory=dict)
-    reference: dict[int, Row] = field(default_factory=dict)
-    host_break: dict[int, Row] = field(default_factory=dict)
-    drop: dict[int, Row] = field(default_factory=dict)
-    edge: dict[int, dict[int, Row]] = field(default_factory=dict)
-    run_state: dict[int, Row] = field(default_factory=dict)
+    The key is the row's number, in ``meta`` its name, and of an edge the drop's number and its own.
+    """
+
+    tables: dict[str, dict[Any, Row]] = field(default_factory=lambda: {name: {} for name in TABLES})
     bad: int = 0
+
+    def in_order(self, table: str) -> list[Row]:
+        """List the rows of a table by key."""
+        return [row for _, row in sorted(self.tables[table].items())]
+
+    @property
+    def meta(self) -> dict[str, str]:
+        """What is known of the session."""
+        return dict(self.tables["meta"].values())
+
+    @property
+    def protocol(self) -> tuple[str, str] | None:
+        """Name and text of the protocol file."""
+        return next(((source, text) for _, source, text in self.tables["protocol"].values()), None)
 
     def any(self) -> bool:
         """Whether anything of a session was found."""
-        return bool(self.meta or self.protocol or self.bytes or self.drop or self.run_state)
+        return any(self.tables[name] for name in ("meta", "protocol", "bytes", "drop", "run_state"))
+
+    def gaps(self, table: str) -> int:
+        """Count the rows that are missing: a session numbers its rows from 1 without gaps."""
+        numbers = self.tables[table]
+        return max(numbers) - len(numbers) if numbers else 0
 
 
 def find_rows(pages: Pages) -> Rows:
@@ -55,36 +71,23 @@ def find_rows(pages: Pages) -> Rows:
     return rows
 
 
-def gaps(numbers: dict[int, Row]) -> int:
-    """Count the rows that are missing: a session numbers its rows from 1 without gaps."""
-    return max(numbers) - len(numbers) if numbers else 0
-
-
 def _sort(rows: Rows, cell: PageCell) -> None:
     """Put a record where it belongs by its shape; one that is no row of a session is left out."""
-    rowid, values = cell
-    match rowid, values:
-        case None, (int(drop), int(index), *_) if _fits("edge", values):
-            rows.edge.setdefault(drop, {}).setdefault(index, values)
-        case None, _:
+    for name, table in TABLES.items():
+        row: Row = cell.values
+        if table.numbered and row[:1] == (None,):  # SQLite leaves the number out of the record
+            row = (cell.rowid, *row[1:])
+        if (cell.rowid is None) == (name == "edge") and _fits(name, row):
+            rows.tables[name].setdefault(row[:2] if name == "edge" else row[0], row)
             return
-        case int(), (str(key), str(value)):
-            rows.meta.setdefault(key, value)
-        case int(), (None, str(source), str(text)):
-            rows.protocol = rows.protocol or (source, text)
-        case int(), (None, *rest):
-            row = (rowid, *rest)  # SQLite leaves the number out of the record
-            table = next((name for name in _TABLES if _fits(name, row)), None)
-            if table is not None:
-                getattr(rows, table).setdefault(rowid, row)
 
 
 def _fits(table: str, row: Row) -> bool:
-    if len(row) not in _LENGTHS.get(table, {len(COLUMNS[table])}):
+    if len(row) not in _LENGTHS[table]:
         return False
     try:
         check_row(table, row)
     except RowError:
         return False
     # Breaks of the host have the same columns.
-    return table != "ping" or 0 <= cast("int", row[2]) - cast("int", row[1]) <= _TRIP_NS
+    return table != "ping" or 0 <= row[2] - row[1] <= _TRIP_NS

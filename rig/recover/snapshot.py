@@ -35,10 +35,8 @@ class SessionCopy:
         Process that has it open for writing, in words; empty without one.
     writable
         Whether this user may write it.
-    complaints
-        What SQLite has to say against it; empty when it is sound.
-    unreadable
-        Why this program cannot read it all the same; empty when it can.
+    trouble
+        Why SQLite, or this program, cannot read it; empty when both can.
     """
 
     path: Path
@@ -46,8 +44,7 @@ class SessionCopy:
     logged: int | None
     writer: str
     writable: bool
-    complaints: tuple[str, ...]
-    unreadable: str
+    trouble: str
 
 
 def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
@@ -71,8 +68,7 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
                 if copy.with_name("copy-wal").exists():
                     logged = _fold_in(copy)
             data = copy.read_bytes()
-            complaints = _complaints(copy)
-            unreadable = "" if complaints else _unreadable(copy, place)
+            trouble = _trouble(copy, place.name)
     except SessionError:
         raise
     except OSError as error:
@@ -80,9 +76,7 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
             f"cannot read {path}: {error.strerror or error}",
             "check its name and permissions, and that there is room for a copy in TMPDIR",
         ) from error
-    return SessionCopy(
-        place, data, logged, writer, os.access(place, os.W_OK), complaints, unreadable
-    )
+    return SessionCopy(place, data, logged, writer, os.access(place, os.W_OK), trouble)
 
 
 def _copy_beside_writer(place: Path, copy: Path) -> None:
@@ -108,22 +102,17 @@ def _fold_in(copy: Path) -> int:
     return max(0, int(logged))
 
 
-def _complaints(copy: Path) -> tuple[str, ...]:
+def _trouble(copy: Path, name: str) -> str:
+    """Say what SQLite, or this program, has against a copy; empty when both can read it."""
     try:
         with closing(sqlite3.connect(copy)) as connection:
-            said = [str(row[0]) for row in connection.execute("PRAGMA integrity_check(20)")]
-    except _TROUBLE as error:
-        return (str(error),)
-    if said != ["ok"]:
-        return tuple(line for text in said for line in text.splitlines())
-    return ()
-
-
-def _unreadable(copy: Path, place: Path) -> str:
-    """Say why `rig report` cannot read a file that is sound for SQLite; empty when it can."""
-    try:
+            complaints = [str(text) for (text,) in connection.execute("PRAGMA integrity_check(20)")]
+        if complaints != ["ok"]:
+            return f"SQLite cannot read it as it is: {complaints[0].splitlines()[0]}"
         with Session.open(copy, readonly=True) as session:
             session.check()
+    except _TROUBLE as error:
+        return f"SQLite cannot read it as it is: {error}"
     except SessionError as error:
-        return error.message.replace(str(copy), place.name)
+        return f"rig cannot read it as it is: {error.message.replace(str(copy), name)}"
     return ""

@@ -5,17 +5,16 @@ from __future__ import annotations
 import zlib
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from rig.link import messages as wire
-from rig.link.frames import DELIMITER
+from rig.link.frames import DELIMITER, Decoder, Frame, encode
 from rig.link.gatewatch import watch_gates
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
-from rig.selftest.findings import CheckFailedError, NotPossibleError, insist_refusal, wrong_answer
-from rig.selftest.line import Heard, RawLine
+from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rig.clock.host import Clock
     from rig.link.gatewatch import GateStates
@@ -31,6 +30,67 @@ _TRIES = 3
 _ANSWER_S = 0.3
 _END_S = 1.0  # at most, from the end of a recording to its certificate
 _WATCH_S = 0.4
+_QUIET = (
+    "a gate that is clear and steady; on a bare board a wire from one gate input to ground, and "
+    "for the sync output a wire to another one (--loopback GATE)"
+)
+
+
+class RawRequest(NamedTuple):
+    """Any frame, sent as a request."""
+
+    code: int
+    payload: bytes = b""
+
+
+class Heard(NamedTuple):
+    """One message of the device; `ack` is 0 when it came unasked."""
+
+    at_ns: int
+    ack: int
+    message: wire.Message
+
+
+class RawLine:
+    """A port without any of the client's courtesies: nothing is repeated, nothing is added.
+
+    Parameters
+    ----------
+    port, clock
+        The open port and its time.
+    """
+
+    def __init__(self, port: Port, clock: Clock) -> None:
+        self.port = port
+        self.clock = clock
+        self._decoder = Decoder()
+        self._waiting: deque[Heard] = deque()  # came together with what somebody waited for
+
+    def send(self, code: int, payload: bytes, seq: int) -> None:
+        """Send a frame, be it a message or not."""
+        self.port.write(encode(Frame(code, seq, 0, payload)))
+
+    def say(self, message: wire.Message, seq: int) -> None:
+        """Send a message."""
+        self.send(*wire.pack(message), seq)
+
+    def listen(self, seconds: float) -> Iterator[Heard]:
+        """Give messages as they come, until the time is over.
+
+        Raises
+        ------
+        MessageError
+            A frame that is no message.
+        """
+        end = self.clock.now_ns() + round(seconds * 1e9)
+        while True:
+            while self._waiting:
+                yield self._waiting.popleft()
+            if self.clock.now_ns() >= end:
+                return
+            for frame in self._decoder.feed(self.port.read(max(1, self.port.in_waiting))):
+                message = wire.unpack(frame.type, frame.payload)
+                self._waiting.append(Heard(self.clock.now_ns(), frame.ack, message))
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +105,24 @@ class SelftestOptions:
         How often to fire for the loop-back's statistics.
     release
         Whether release 0 may be driven.
+    gates
+        Mask of the gates in use; `None`: whichever are clear.
     """
 
     loopback: int | None = None
     drops: int = 20
     release: bool = False
+    gates: int | None = None
+
+
+def name_request(request: wire.HostMessage | RawRequest) -> str:
+    """Name a request for a message."""
+    if not isinstance(request, RawRequest):
+        return type(request).__name__
+    kind = wire.TABLE.get(request.code)
+    if kind is None or request.code >= 0x80:
+        return f"type 0x{request.code:02X}"
+    return f"{kind.__name__} of {len(request.payload)} bytes"
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +182,7 @@ class BoardUnderTest:
         self._seq = self._seq % 255 + 1
         return self._seq
 
-    def ask(self, message: wire.HostMessage, seq: int = 0) -> wire.Message:
+    def ask(self, request: wire.HostMessage | RawRequest, seq: int = 0) -> wire.Message:
         """Send a request, a few times if need be, and give its answer.
 
         Raises
@@ -117,35 +190,39 @@ class BoardUnderTest:
         CheckFailedError
             None came.
         """
-        code, payload = wire.pack(message)
-        if isinstance(message, wire.Arm) and message.release and not self.options.release:
+        if isinstance(request, wire.Arm) and request.release and not self.options.release:
             self._may_release = True
-        if isinstance(message, wire.Fire) and self._may_release:
+        if isinstance(request, wire.Fire) and self._may_release:
             raise CheckFailedError("fire_withheld")
-        return self.ask_raw(code, payload, type(message).__name__, seq)
-
-    def ask_raw(self, code: int, payload: bytes, name: str, seq: int = 0) -> wire.Message:
-        """Send any frame as a request, and give its answer; as `ask`."""
+        frame = request if isinstance(request, RawRequest) else RawRequest(*wire.pack(request))
         seq = seq or self.next_seq()
         for _ in range(_TRIES):
-            self.line.send(code, payload, seq)
+            self.line.send(*frame, seq)
             heard = self.wait(_ANSWER_S, lambda heard: heard.ack == seq)
             if heard is not None:
                 return heard.message
-        raise CheckFailedError("no_answer", request=name)
+        raise CheckFailedError("no_answer", request=name_request(request))
 
     def answer(self, message: wire.HostMessage, kind: type[Answer], seq: int = 0) -> Answer:
         """Ask, and insist on one kind of answer."""
         answer = self.ask(message, seq)
         if not isinstance(answer, kind):
-            raise wrong_answer(type(message).__name__, kind.__name__, answer)
+            raise wrong_answer(name_request(message), kind.__name__, answer)
         return answer
 
     def refuse(
-        self, message: wire.HostMessage, reason: RefusalReason, detail: int | None = None
+        self,
+        request: wire.HostMessage | RawRequest,
+        reason: RefusalReason,
+        detail: int | None = None,
+        name: str = "",
     ) -> wire.Refused:
-        """Ask, and insist on being refused."""
-        return insist_refusal(type(message).__name__, self.ask(message), reason, detail)
+        """Ask, and insist on being refused, for a reason and with a detail where one is given."""
+        answer, name = self.ask(request), name or name_request(request)
+        if not isinstance(answer, wire.Refused):
+            raise wrong_answer(name, f"Refused({reason.name})", answer)
+        insist(name, answer, wire.Refused(reason, answer.detail if detail is None else detail))
+        return answer
 
     def wait(self, seconds: float, accepts: Callable[[Heard], bool]) -> Heard | None:
         """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
@@ -297,12 +374,12 @@ class BoardUnderTest:
         NotPossibleError
             There is none.
         """
-        states, identity = self.gates(), self.known_identity()
+        states = self.gates()
         restless = states.stuck | states.flickering
-        for gate in reversed(range(identity.gates)):
+        for gate in reversed(range(self.known_identity().gates)):
             if not restless >> gate & 1 and gate != self.options.loopback:
                 return 1 << gate
-        raise NotPossibleError("check_needs", needed="a gate that is clear and steady")
+        raise NotPossibleError("check_needs", needed=_QUIET)
 
     def known_identity(self) -> wire.Identity:
         """Who the board is."""

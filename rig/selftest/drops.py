@@ -21,7 +21,7 @@ _BUSY_MS = 400
 _WRAP = 1 << 32
 
 
-def compare_certificate(board: BoardUnderTest) -> str:
+def compare_certificate(board: BoardUnderTest) -> None:
     """See that the certificate is about what was ordered and what was sent."""
     order = board.order()
     recorded = board.drop(gates=order.gates)
@@ -32,10 +32,9 @@ def compare_certificate(board: BoardUnderTest) -> str:
     state = board.answer(wire.Status(), wire.State)
     held = replace(state, phase=Phase.HOLDING, label=LABEL, events=events)
     insist("Status after a drop", state, held)
-    return ""
 
 
-def ask_while_recording(board: BoardUnderTest) -> str:
+def ask_while_recording(board: BoardUnderTest) -> None:
     """See that nothing else is begun while the board records."""
     token = board.arm(record_ms=_BUSY_MS)
     fired = board.fire(token)
@@ -46,19 +45,17 @@ def ask_while_recording(board: BoardUnderTest) -> str:
     board.refuse(wire.Acknowledge(LABEL, 0), RefusalReason.BUSY)
     board.refuse(wire.Fire(token), RefusalReason.NOT_ARMED)
     board.collect_drop(fired, _BUSY_MS)
-    return ""
 
 
-def abort_a_recording(board: BoardUnderTest) -> str:
+def abort_a_recording(board: BoardUnderTest) -> None:
     """See that ABORT ends a recording at once and keeps what there is."""
     fired = board.fire(board.arm(record_ms=20_000))
     board.answer(wire.Abort(), wire.Done)
     board.collect_drop(fired)
     board.insist_phase(Phase.HOLDING, "Abort")
-    return ""
 
 
-def arm_while_holding(board: BoardUnderTest) -> str:
+def arm_while_holding(board: BoardUnderTest) -> None:
     """See that a held drop forbids arming, until it is aborted and armed anew."""
     board.drop()
     for label in (LABEL, OTHER_LABEL):
@@ -66,7 +63,6 @@ def arm_while_holding(board: BoardUnderTest) -> str:
     board.answer(wire.Abort(), wire.Done)
     board.refuse(board.order(label=OTHER_LABEL), RefusalReason.HOLDING_A_DROP, TEST_RUN)
     board.arm()
-    return ""
 
 
 def read_again(board: BoardUnderTest) -> str:
@@ -83,7 +79,7 @@ def read_again(board: BoardUnderTest) -> str:
     return f"{count} events"
 
 
-def acknowledge_drop(board: BoardUnderTest) -> str:
+def acknowledge_drop(board: BoardUnderTest) -> None:
     """See that only the right label and CRC-32 let a drop be forgotten."""
     recorded = board.drop()
     crc32 = recorded.certificate.crc32
@@ -92,7 +88,6 @@ def acknowledge_drop(board: BoardUnderTest) -> str:
     board.acknowledge(recorded)
     board.insist_phase(Phase.IDLE, "Acknowledge")
     board.refuse(wire.Acknowledge(LABEL, crc32), RefusalReason.NO_SUCH_DROP)
-    return ""
 
 
 def arm_while_cooling(board: BoardUnderTest) -> str:

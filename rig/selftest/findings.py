@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from rig.link import messages as wire
 from rig.reasons import make_reason, remedies
 
 if TYPE_CHECKING:
-    from rig.link.messages import RefusalReason
+    from collections.abc import Callable
+
     from rig.reasons import Reason
 
 _ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
@@ -74,6 +74,14 @@ class NotPossibleError(CheckEndedError):
     verdict = Verdict.NOT_POSSIBLE
 
 
+def make_check(name: str, check: Callable[..., str | None], *facts: object) -> Finding:
+    """Make a check; give what it returned, in words, or the reason for which it ended."""
+    try:
+        return Finding(name, check(*facts) or "")
+    except CheckEndedError as end:
+        return explain(name, end.reason, end.verdict)
+
+
 def wrong_answer(request: str, expected: object, answer: object) -> CheckFailedError:
     """Return the failure of a board that gave another answer than expected."""
     texts = {"expected": str(expected), "answer": str(answer)}
@@ -85,13 +93,3 @@ def insist(request: str, answer: object, expected: object) -> None:
     """Let a check fail unless a request had the expected answer."""
     if answer != expected:
         raise wrong_answer(request, expected, answer)
-
-
-def insist_refusal(
-    request: str, answer: wire.Message, reason: RefusalReason, detail: int | None = None
-) -> wire.Refused:
-    """Return an answer that is the right refusal, of any detail where none is given."""
-    if not isinstance(answer, wire.Refused):
-        raise wrong_answer(request, f"Refused({reason.name})", answer)
-    insist(request, answer, wire.Refused(reason, answer.detail if detail is None else detail))
-    return answer

@@ -107,7 +107,7 @@ def _insist_disarmed(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_
     return f"after {delay:.0f} ms"
 
 
-def repeat_requests(board: BoardUnderTest) -> str:
+def repeat_requests(board: BoardUnderTest) -> None:
     """See that a repeated request is answered as before and not executed again."""
     order = board.order()
     seq = board.next_seq()
@@ -122,16 +122,14 @@ def repeat_requests(board: BoardUnderTest) -> str:
     seq = board.next_seq()
     done = wire.Acknowledge(recorded.certificate.label, recorded.certificate.crc32)
     insist("a repeated Acknowledge", [board.ask(done, seq) for _ in range(2)], [wire.Done()] * 2)
-    return ""
 
 
-def send_without_seq(board: BoardUnderTest) -> str:
+def send_without_seq(board: BoardUnderTest) -> None:
     """See that a frame without a seq is passed over."""
     board.line.say(wire.Status(), 0)
     heard = board.wait(_QUIET_S, lambda h: isinstance(h.message, wire.State))
     if heard is not None:
         raise wrong_answer("Status without seq", "no answer", heard.message)
-    return ""
 
 
 def send_junk(board: BoardUnderTest) -> str:

@@ -1,14 +1,23 @@
-"""Requests that every device must refuse, and one good example of each kind."""
+"""Checks of who is there, and of every request that fires nothing, good and bad."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.boards import GATES, RELEASES
 from rig.link import messages as wire
+from rig.link.client import BOOT_WAIT_S
+from rig.link.frames import DELIMITER
+from rig.link.gatewatch import listed
+from rig.link.messages import PROTOCOL_VERSION, Phase, RefusalReason
+from rig.selftest.board import LABEL, RawRequest
+from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from rig.selftest.board import BoardUnderTest
 
 BAD_ORDERS: tuple[dict[str, int], ...] = (
     {"label": 0},
@@ -22,11 +31,140 @@ BAD_ORDERS: tuple[dict[str, int], ...] = (
 )
 """Each makes an ARM that pulses a release one that no device may accept."""
 
-UNKNOWN_CODES = (0x55, 0x00, 0x82, 0xFF)
+_UNKNOWN_CODES = (0x55, 0x00, 0x82, 0xFF)
 """Types that are no requests."""
 
 
-def beyond(identity: wire.Identity) -> Iterator[dict[str, int]]:
+def identify(board: BoardUnderTest) -> str:
+    """See that the board introduces itself, sensibly and twice alike."""
+    board.line.port.write(DELIMITER)
+    board.wait_unasked(BOOT_WAIT_S, wire.Boot)
+    identity = board.answer(wire.Identify(), wire.Identity)
+    board.identity = identity
+    faults = [
+        fault
+        for fault, present in (
+            ("no name", not (identity.board and identity.firmware)),
+            ("no id", not any(identity.unique_id)),
+            ("no gates", not identity.gates),
+            ("gates without a name", len(identity.channels.split()) != identity.gates),
+            ("no release", not identity.releases),
+            ("an impossible tick rate", identity.tick_hz < 1_000_000),
+            ("hardly any memory", identity.capacity < 100),
+        )
+        if present
+    ]
+    if faults:
+        values = {"expected": "a complete identity", "answer": ", ".join(faults)}
+        raise CheckFailedError("wrong_answer", request="Identify", **values)
+    insist("a second Identify", board.answer(wire.Identify(), wire.Identity), identity)
+    return f"{identity.board}, {identity.firmware}, id {identity.unique_id.hex()}"
+
+
+def ask_other_versions(board: BoardUnderTest) -> None:
+    """See that clients of other versions are turned away."""
+    for version in (0, PROTOCOL_VERSION + 1):
+        board.refuse(wire.Identify(version), RefusalReason.VERSION, PROTOCOL_VERSION)
+
+
+def ask_every_message(board: BoardUnderTest) -> None:
+    """See that each request gets its own kind of answer; those about drops have their own tests."""
+    board.answer(wire.Ping(), wire.Pong)
+    board.answer(wire.Status(), wire.State)
+    board.answer(wire.Reference(), wire.ReferencePulse)
+    board.need_idle()  # ABORT would let a held drop be discarded
+    board.answer(wire.Abort(), wire.Done)
+
+
+def send_unknown_messages(board: BoardUnderTest) -> None:
+    """See that types that are no requests are refused."""
+    for code in _UNKNOWN_CODES:
+        board.refuse(RawRequest(code), RefusalReason.UNKNOWN_MESSAGE, code)
+
+
+def send_other_lengths(board: BoardUnderTest) -> None:
+    """See that a request that is too long or too short is refused."""
+    for request in _wrong_lengths(wire.Arm(1, 1, 0, 0, 1, 1)):
+        board.refuse(request, RefusalReason.BAD_PARAMETER, 0)
+
+
+def look_at_gates(board: BoardUnderTest) -> str:
+    """See that every gate in use is clear and keeps still."""
+    states, fitted = board.gates(), (1 << board.known_identity().gates) - 1
+    in_use = board.options.gates
+    counted = fitted if in_use is None else in_use
+    if absent := counted & ~fitted:
+        raise CheckFailedError("gates_not_fitted", gates_listed=listed(absent))
+    if states.flickering & counted:
+        raise CheckFailedError("gates_flicker", gates_listed=listed(states.flickering & counted))
+    stuck = listed(states.stuck) if states.stuck else ""
+    if in_use is None and stuck:
+        raise NotPossibleError("gates_unused", gates_listed=stuck)
+    if states.stuck & counted:
+        raise CheckFailedError("gates_blocked", gates_listed=listed(states.stuck & counted))
+    unused = f"; not in use and blocked: {stuck}" if stuck else ""
+    return f"{counted.bit_count()} gates clear{unused}"
+
+
+def arm_blocked_gate(board: BoardUnderTest) -> str:
+    """See that a gate that is blocked forbids arming."""
+    stuck = board.gates().stuck
+    if not stuck:
+        raise NotPossibleError("check_needs", needed="a gate that is blocked by hand")
+    gate = stuck & -stuck
+    order = board.order(gates=gate)
+    if board.ask(order) == wire.Refused(RefusalReason.STOPPED, 0):
+        raise NotPossibleError("refused_stopped")
+    board.refuse(order, RefusalReason.GATE_BLOCKED, gate)
+    return listed(gate)
+
+
+def arm_and_abort(board: BoardUnderTest) -> None:
+    """See that a board that was armed says so, and that ABORT disarms it."""
+    token = board.arm()
+    state = board.answer(wire.Status(), wire.State)
+    insist("Status when armed", state, replace(state, phase=Phase.ARMED, label=LABEL, events=0))
+    board.answer(wire.Abort(), wire.Done)
+    board.insist_phase(Phase.IDLE, "Abort")
+    board.refuse(wire.Fire(token), RefusalReason.NOT_ARMED)
+
+
+def fire_unarmed(board: BoardUnderTest) -> None:
+    """See that FIRE alone does nothing."""
+    board.refuse(wire.Fire(1), RefusalReason.NOT_ARMED)
+
+
+def send_wrong_tokens(board: BoardUnderTest) -> None:
+    """See that a token which is not the latest does not fire."""
+    old = board.arm()
+    board.refuse(wire.Fire(old ^ 1), RefusalReason.WRONG_TOKEN)
+    if board.arm() == old:
+        raise wrong_answer("a second Arm", "another token", old)
+    board.refuse(wire.Fire(old), RefusalReason.WRONG_TOKEN)
+
+
+def send_bad_orders(board: BoardUnderTest) -> str:
+    """See that no order is accepted that its table excludes, and that refusing changes nothing."""
+    variants = [*BAD_ORDERS, *_beyond(board.known_identity())]
+    good = board.releasing_order()
+    for changes in variants:
+        name = "Arm with " + ", ".join(f"{name} {value}" for name, value in changes.items())
+        board.refuse(replace(good, **changes), RefusalReason.BAD_PARAMETER, 0, name)
+    board.settle()
+    token = board.arm()
+    board.refuse(board.order(gates=0), RefusalReason.BAD_PARAMETER)
+    board.refuse(wire.Fire(token ^ 1), RefusalReason.WRONG_TOKEN)
+    board.insist_phase(Phase.ARMED, "a refused order")
+    return f"{len(variants)} orders"
+
+
+def read_no_drop(board: BoardUnderTest) -> None:
+    """See that nothing is read or acknowledged while nothing is held."""
+    board.refuse(wire.Read(LABEL, 0, 1), RefusalReason.NO_SUCH_DROP)
+    board.refuse(wire.Acknowledge(LABEL, 0), RefusalReason.NO_SUCH_DROP)
+
+
+def _beyond(identity: wire.Identity) -> Iterator[dict[str, int]]:
     """Ask for what this very device says it has not."""
     yield {"pulse_us": identity.max_pulse_us + 1}
     if identity.gates < GATES:
@@ -35,7 +173,7 @@ def beyond(identity: wire.Identity) -> Iterator[dict[str, int]]:
         yield {"release": 1 << identity.releases}
 
 
-def wrong_lengths(order: wire.Arm) -> Iterator[tuple[int, bytes]]:
+def _wrong_lengths(order: wire.Arm) -> Iterator[RawRequest]:
     """Give every request with a byte too many, and with one too few.
 
     Parameters
@@ -53,6 +191,6 @@ def wrong_lengths(order: wire.Arm) -> Iterator[tuple[int, bytes]]:
         if code < 0x80:
             example = examples[kind] if kind in examples else kind()  # type: ignore[call-arg]
             _, payload = wire.pack(example)
-            yield code, payload + b"\1"
+            yield RawRequest(code, payload + b"\1")
             if payload:
-                yield code, payload[:-1]
+                yield RawRequest(code, payload[:-1])

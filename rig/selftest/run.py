@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DeviceError
 from rig.reasons import make_reason
-from rig.selftest import arming, drops, greeting, line_checks
+from rig.selftest import drops, line_checks, requests
 from rig.selftest.board import BoardUnderTest
-from rig.selftest.findings import CheckEndedError, Finding, NotPossibleError, Verdict, explain
+from rig.selftest.findings import (
+    CheckEndedError,
+    Finding,
+    NotPossibleError,
+    Verdict,
+    explain,
+    make_check,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -24,7 +32,7 @@ class Check(NamedTuple):
     """A check; one that needs a board that is idle cannot be made while it holds a drop."""
 
     name: str
-    make: Callable[[BoardUnderTest], str]
+    make: Callable[[BoardUnderTest], str | None]
     idle: bool = True
 
 
@@ -36,19 +44,19 @@ def _needs(needed: str) -> Callable[[BoardUnderTest], str]:
 
 
 CHECKS = (
-    Check("handshake", greeting.identify, idle=False),
-    Check("VERSION", greeting.ask_other_versions, idle=False),
-    Check("every message", greeting.ask_every_message, idle=False),
-    Check("UNKNOWN_MESSAGE", greeting.send_unknown_messages, idle=False),
-    Check("BAD_PARAMETER by length", greeting.send_other_lengths, idle=False),
+    Check("handshake", requests.identify, idle=False),
+    Check("VERSION", requests.ask_other_versions, idle=False),
+    Check("every message", requests.ask_every_message, idle=False),
+    Check("UNKNOWN_MESSAGE", requests.send_unknown_messages, idle=False),
+    Check("BAD_PARAMETER by length", requests.send_other_lengths, idle=False),
     Check("round trips", line_checks.measure_round_trips, idle=False),
-    Check("gates", greeting.look_at_gates, idle=False),
-    Check("GATE_BLOCKED", greeting.arm_blocked_gate),
-    Check("NOT_ARMED", arming.fire_unarmed),
-    Check("NO_SUCH_DROP", arming.read_no_drop),
-    Check("BAD_PARAMETER", arming.send_bad_orders),
-    Check("ARM and ABORT", arming.arm_and_abort),
-    Check("WRONG_TOKEN", arming.send_wrong_tokens),
+    Check("gates", requests.look_at_gates, idle=False),
+    Check("GATE_BLOCKED", requests.arm_blocked_gate),
+    Check("NOT_ARMED", requests.fire_unarmed),
+    Check("NO_SUCH_DROP", requests.read_no_drop),
+    Check("BAD_PARAMETER", requests.send_bad_orders),
+    Check("ARM and ABORT", requests.arm_and_abort),
+    Check("WRONG_TOKEN", requests.send_wrong_tokens),
     Check("arming times out", line_checks.let_arming_time_out),
     Check("a silent host disarms", line_checks.stay_silent),
     Check("repeated frames", line_checks.repeat_requests),
@@ -95,7 +103,7 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
             if lost is not None:
                 yield explain(check.name, lost, Verdict.NOT_POSSIBLE)
                 continue
-            finding = _make_check(check, board)
+            finding = make_check(check.name, partial(_make, check), board)
             yield finding
             if finding.verdict is Verdict.FAILED:
                 lost = _why_lost(board)
@@ -108,15 +116,12 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
             board.settle()
 
 
-def _make_check(check: Check, board: BoardUnderTest) -> Finding:
-    try:
-        if board.identity is not None:
-            board.settle()
-        if check.idle:
-            board.need_idle()
-        return Finding(check.name, check.make(board))
-    except CheckEndedError as end:
-        return explain(check.name, end.reason, end.verdict)
+def _make(check: Check, board: BoardUnderTest) -> str | None:
+    if board.identity is not None:
+        board.settle()
+    if check.idle:
+        board.need_idle()
+    return check.make(board)
 
 
 def _why_lost(board: BoardUnderTest) -> Reason | None:

@@ -9,13 +9,18 @@ from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rig.errors import SessionError
-from rig.files import require_file, sync_directory
+from rig.errors import InputError, SessionError
+from rig.files import replacing, require_file
 from rig.reasons import make_error
-from rig.session.faults import not_a_session, translated
+from rig.session.faults import not_a_session, translate_errors
 from rig.session.foreign import check_schema, guard
 from rig.session.lock import writer_of
-from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION, UPGRADES
+from rig.session.schema import (
+    SCHEMA_VERSION,
+    create_script,
+    insert_statement,
+    upgrade_script,
+)
 
 _BUSY_S = 2.0  # only a program other than this one can hold the database for longer
 
@@ -26,47 +31,28 @@ def build(path: Path, meta: dict[str, str], protocol_source: str, protocol_text:
     Parameters
     ----------
     path
-        Where; the caller holds its lock and has seen that nothing is there.
+        Where nothing is yet; the caller holds its lock.
     meta, protocol_source, protocol_text
         The first rows.
 
     Raises
     ------
     SessionError
-        If the place cannot be written.
-    """
-    # Built under another name: a crash here must not leave a half-made session under the real one.
-    temporary = path.with_name(f".{path.name[:40]}.{os.getpid()}.new")
-    try:
-        temporary.unlink(missing_ok=True)
-        with translated(path), closing(_connect(temporary, "rwc")) as connection:
-            connection.execute("PRAGMA synchronous = FULL")
-            connection.executescript(f"BEGIN;\n{CREATE}")
-            connection.executemany("INSERT INTO meta VALUES (?, ?)", meta.items())
-            connection.execute(
-                "INSERT INTO protocol VALUES (1, ?, ?)", (protocol_source, protocol_text)
-            )
-            connection.execute("COMMIT")
-        temporary.replace(path)
-    except SessionError:
-        raise
-    except OSError as error:
-        raise make_error(SessionError, "session_unmade", path=path, text=error) from error
-    finally:
-        temporary.unlink(missing_ok=True)
-    sync_directory(path.parent)
-
-
-def check_free(path: Path) -> None:
-    """Refuse to make a session where something already is.
-
-    Raises
-    ------
-    SessionError
-        If the path exists.
+        If something is there, or the place cannot be written.
     """
     if path.exists():
         raise make_error(SessionError, "session_there", path=path)
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
+        memory.executescript(f"BEGIN;\n{create_script()}COMMIT;")
+        memory.executemany(insert_statement("meta"), meta.items())
+        memory.execute(insert_statement("protocol"), (1, protocol_source, protocol_text))
+        content = memory.serialize()
+    try:
+        with replacing(path) as stream:
+            stream.write(content)
+    except InputError as error:
+        text = error.__cause__ or error
+        raise make_error(SessionError, "session_unmade", path=path, text=text) from error
 
 
 def check_place(path: Path) -> None:
@@ -96,11 +82,11 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
     """
     # Never read the header by hand: closing a second handle on the file would drop the POSIX
     # locks of a writer in this very process.
-    with translated(path):
+    with translate_errors(path):
         connection = _reading(path) if readonly else _connect(path, "rw")
         try:
             guard(connection)
-            check_schema(path, connection, _format(path, connection))
+            version = check_schema(path, connection)
             connection.execute("PRAGMA foreign_keys = ON")
             connection.execute("PRAGMA recursive_triggers = ON")
             if readonly:
@@ -111,19 +97,12 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
                 # macOS: fsync alone leaves data in the drive's cache.
                 connection.execute("PRAGMA fullfsync = ON")
                 connection.execute("PRAGMA checkpoint_fullfsync = ON")
-                _upgrade(connection)
+                for newer in range(version + 1, SCHEMA_VERSION + 1):
+                    connection.executescript(upgrade_script(newer))
         except BaseException:
             connection.close()
             raise
     return connection
-
-
-def _upgrade(connection: sqlite3.Connection) -> None:
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    for old in range(version, SCHEMA_VERSION):
-        connection.executescript(
-            f"BEGIN; {UPGRADES[old]}; PRAGMA user_version = {old + 1}; COMMIT;"
-        )
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
@@ -153,8 +132,8 @@ def copy_session(path: Path, folder: Path) -> Path:
 def _reading(path: Path) -> sqlite3.Connection:
     """Open a session so that its file, and what lies beside it, stay as they are."""
     # A log whose writer is gone would be brought into the file by whoever closes it last.
-    left = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
-    if left and not writer_of(path):
+    leftover = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
+    if leftover and not writer_of(path):
         connection = _read_copy(path)
         if not writer_of(path):  # else it may have been copied in the middle of a write
             return connection
@@ -165,8 +144,8 @@ def _reading(path: Path) -> sqlite3.Connection:
 def _read_copy(path: Path) -> sqlite3.Connection:
     with TemporaryDirectory(prefix="rig-session-") as folder:
         copy = copy_session(path, Path(folder))
+        memory = sqlite3.connect(":memory:", isolation_level=None)
         with closing(_connect(copy, "rw")) as source:
-            memory = sqlite3.connect(":memory:", isolation_level=None)
             source.backup(memory)
     return memory
 
@@ -179,23 +158,3 @@ def _reading_mode(path: Path) -> str:
     # Without a log nobody is writing: on a CD or a write-protected share the file may be read
     # as it stands.
     return "ro" if path.with_name(path.name + "-wal").exists() else "ro&immutable=1"
-
-
-def _format(path: Path, connection: sqlite3.Connection) -> int:
-    """Read the version of a session's format.
-
-    Raises
-    ------
-    SessionError
-        It is no session, or a newer one.
-    """
-    (application,) = connection.execute("PRAGMA application_id").fetchone()
-    if application != APPLICATION_ID:
-        raise not_a_session(path, "it is another program's SQLite database")
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    if version < 1:
-        raise not_a_session(path, "it was never finished")
-    if version > SCHEMA_VERSION:
-        formats = {"format": version, "known": SCHEMA_VERSION}
-        raise make_error(SessionError, "session_newer", path=path, **formats)
-    return int(version)

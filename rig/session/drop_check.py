@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rig.records import ClockSample, Edge, Pulse
 
 _U32 = (1 << 32) - 1
-_LATER = [one.name for one in fields(Certificate) if one.default is None]
+_LATER = [field.name for field in fields(Certificate) if field.default is None]
 """What certificates of older formats do not have."""
 
 
@@ -65,21 +65,21 @@ class ByteReplay:
         for host_ns, direction, data in chunks:
             self.fed += 1
             records: Iterable[Record] = self._transcript.feed(direction, host_ns, data)
-            self.records += [one for one in records if not isinstance(one, Received)]
+            self.records += [record for record in records if not isinstance(record, Received)]
 
-    def acknowledged(self) -> list[Drop]:
+    def acknowledged_drops(self) -> list[Drop]:
         """List the drops that the host has read enough of, without those of no plan."""
         drops = (record for record in self.records if isinstance(record, Drop))
         return [drop for drop in drops if drop.run != TEST_RUN]
 
-    def unfinished(self) -> list[Drop]:
+    def unfinished_drops(self) -> list[Drop]:
         """List the drops that were never acknowledged, as far as they are there."""
         return [drop for drop in self._transcript.unfinished() if drop.run != TEST_RUN]
 
     def drops(self) -> dict[Job, Drop]:
         """Give every drop once, as it was told last."""
-        drops = {Job(drop.run, drop.attempt): drop for drop in self.acknowledged()}
-        for drop in self.unfinished():
+        drops = {Job(drop.run, drop.attempt): drop for drop in self.acknowledged_drops()}
+        for drop in self.unfinished_drops():
             drops.setdefault(Job(drop.run, drop.attempt), drop)
         return drops
 
@@ -104,8 +104,8 @@ def check_drop(stored: Drop, replayed: Mapping[Job, Drop], *, torn: bool = False
     if not torn and as_old_as(stored, again) == stored:
         return Fate.CONFIRMED
     if again.certificate is not None and again.tick_hz:
-        right = _accounted(again, again.certificate)
-        if right or (right is None and not again.faults):
+        holds = _account_holds(again, again.certificate)
+        if holds or (holds is None and not again.faults):
             return Fate.RESTORED
     return Fate.PARTIAL if torn or not _sound(stored) else Fate.UNCONFIRMED
 
@@ -134,10 +134,10 @@ def _sound(drop: Drop) -> bool:
     if drop.faults:
         return True
     seen = drop.certificate
-    return bool(drop.edges) if seen is None else _accounted(drop, seen) is not False
+    return bool(drop.edges) if seen is None else _account_holds(drop, seen) is not False
 
 
-def _accounted(drop: Drop, seen: Certificate) -> bool | None:
+def _account_holds(drop: Drop, seen: Certificate) -> bool | None:
     """Whether edges are what the certificate says, their number and the CRC of their events.
 
     `None` where pulses too short to be seen leave it open: nobody knows when these events were.

@@ -50,12 +50,12 @@ _MEANINGS = {
 
 def _meanings() -> dict[str, str]:
     """What columns mean, those of the measurands too."""
-    found = dict(_MEANINGS)
+    meanings = dict(_MEANINGS)
     for row in MEASURANDS.values():
-        found[row.name] = row.meaning
-        found[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
-        found[row.key("se")] = f"{row.symbol}: standard error of the mean"
-    return found
+        meanings[row.name] = row.meaning
+        meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
+        meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
+    return meanings
 
 
 def csv_files(
@@ -87,9 +87,9 @@ def csv_files(
         {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
     ]
     tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
-    made = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
-    made["edges.csv"] = edges_text(session.latest_drops(), tick_hz)
-    return made | {"README.txt": _readme(session, tables)}
+    files = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
+    files["edges.csv"] = edges_text(session.latest_drops(), tick_hz)
+    return files | {"README.txt": _readme(session, tables)}
 
 
 def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:

@@ -37,7 +37,7 @@ def as_session_error(path: Path, error: sqlite3.Error) -> SessionError:
 
 
 @contextmanager
-def translated(path: Path) -> Iterator[None]:
+def translate_errors(path: Path) -> Iterator[None]:
     """Raise SQLite's errors inside the block as `SessionError`."""
     try:
         yield

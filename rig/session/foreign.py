@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from rig.errors import SessionError
 from rig.reasons import make_error
-from rig.session.schema import CREATE, LATER
+from rig.session.faults import not_a_session
+from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, create_script
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,61 +40,69 @@ def guard(connection: sqlite3.Connection) -> None:
 
 def limit_steps(connection: sqlite3.Connection) -> None:
     """Have statements end that take far more steps, from now on, than any session needs."""
-    left = _MOST_STEPS
+    budget = _MOST_STEPS
 
     def step() -> bool:
-        nonlocal left
-        left -= _STEPS
-        return left < 0
+        nonlocal budget
+        budget -= _STEPS
+        return budget < 0
 
     connection.set_progress_handler(step, _STEPS)
 
 
-def check_schema(path: Path, connection: sqlite3.Connection, version: int) -> None:
+def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     """Compare a file's tables, indices and triggers with those that this program makes.
+
+    Returns
+    -------
+    int
+        The version of its format.
 
     Raises
     ------
     SessionError
-        It has others, or they are built in another way.
+        It is no session, a newer one, or its tables are others or built in another way.
     """
-    found, known = _schema(connection), _known()
-    for name, shape in known.items():
-        columns, since = LATER.get(name, ((), 1))
-        if version < since:
-            continue
-        wanted = shape
-        if columns:  # only these are missing before
-            missing = sum(version < at for at in columns)
-            wanted = shape[: len(shape) - missing]
-        if found.pop(name, None) != wanted:
-            raise _altered(path, f"{name} is missing or not as rig makes it")
-    if strange := sorted(found.keys() - _OF_ANALYZE):
-        raise _altered(path, f"it has {strange[0]}, which rig does not make")
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if application != APPLICATION_ID:
+        raise not_a_session(path, "it is another program's SQLite database")
+    if version < 1:
+        raise not_a_session(path, "it was never finished")
+    if version > SCHEMA_VERSION:
+        formats = {"format": version, "known": SCHEMA_VERSION}
+        raise make_error(SessionError, "session_newer", path=path, **formats)
+    shapes = _schema(connection)
+    for name, shape in _schema_of(version).items():
+        if shapes.pop(name, None) != shape:
+            raise _alteration(path, f"{name} is missing or not as rig makes it")
+    if strange := sorted(shapes.keys() - _OF_ANALYZE):
+        raise _alteration(path, f"it has {strange[0]}, which rig does not make")
+    return int(version)
 
 
-def _altered(path: Path, what: str) -> SessionError:
-    return make_error(SessionError, "session_altered", path=path, text=what)
+def _alteration(path: Path, text: str) -> SessionError:
+    return make_error(SessionError, "session_altered", path=path, text=text)
 
 
 @cache
-def _known() -> dict[str, Shape]:
+def _schema_of(version: int) -> dict[str, Shape]:
     with closing(sqlite3.connect(":memory:")) as connection:
-        connection.executescript(CREATE)
+        connection.executescript(create_script(version))
         return _schema(connection)
 
 
 def _schema(connection: sqlite3.Connection) -> dict[str, Shape]:
     """Give by name what there is: tables with their columns, all else as it is written."""
     kinds = {name: tuple(how) for _, name, *how in connection.execute("PRAGMA table_list")}
-    found: dict[str, Shape] = {}
+    shapes: dict[str, Shape] = {}
     for kind, name, of, sql in connection.execute(
         "SELECT type, name, tbl_name, sql FROM main.sqlite_master"
     ):
         if kind == "table":
             columns = connection.execute("SELECT * FROM pragma_table_xinfo(?)", (name,))
             table_kind, _, *how = kinds.get(name, ("", 0))
-            found[name] = (kind, table_kind, *how, *columns)
+            shapes[name] = (kind, table_kind, *how, *columns)
         else:
-            found[name] = (kind, of, " ".join((sql or "").split()))
-    return found
+            shapes[name] = (kind, of, " ".join((sql or "").split()))
+    return shapes

@@ -69,9 +69,13 @@ class Journal:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
+        """Time a write; when the disk fails all that is pending is applied anew by the next."""
         self._begun_s = monotonic()
         try:
             yield
+        except sqlite3.Error as error:
+            self._give_up()
+            raise as_session_error(self._path, error) from error
         finally:
             self._begun_s = None
 
@@ -88,7 +92,8 @@ class Journal:
         # quadratic, and the caller already knows.
         if not self._failed:
             with self._writing():
-                self._run()
+                refusal = self._run()
+            self._report(refusal)
 
     def commit(self) -> None:
         """Make everything added so far durable.
@@ -138,43 +143,31 @@ class Journal:
         return refused
 
     def _commit(self) -> None:
-        refusal: SessionError | None = None
-        try:
-            self._run()
-        except SessionError as error:
-            if self._failed:
-                raise
-            refusal = error
-        try:
-            if self._connection.in_transaction:
-                self._connection.execute("COMMIT")
-        except sqlite3.Error as error:
-            self._give_up()
-            raise as_session_error(self._path, error) from error
+        refusal = self._run()
+        if self._connection.in_transaction:
+            self._connection.execute("COMMIT")
         self._pending.clear()
         self._applied = 0
-        if refusal is not None:
-            raise refusal
+        self._report(refusal)
 
-    def _run(self) -> None:
-        """Apply what is pending; refused records are left out and reported after the rest."""
+    def _run(self) -> Exception | None:
+        """Apply what is pending; records that are refused are left out, the last one returned."""
         refusal: Exception | None = None
-        try:
-            if not self._connection.in_transaction:
-                self._applied = 0
-                self._connection.execute("BEGIN IMMEDIATE")
-            while self._applied < len(self._pending):
-                try:
-                    self._apply(self._pending[self._applied])
-                except _BAD_ROW as error:
-                    del self._pending[self._applied]
-                    refusal = error
-                else:
-                    self._applied += 1
-        except sqlite3.Error as error:
-            self._give_up()
-            raise as_session_error(self._path, error) from error
+        if not self._connection.in_transaction:
+            self._applied = 0
+            self._connection.execute("BEGIN IMMEDIATE")
+        while self._applied < len(self._pending):
+            try:
+                self._apply(self._pending[self._applied])
+            except _BAD_ROW as error:
+                del self._pending[self._applied]
+                refusal = error
+            else:
+                self._applied += 1
         self._failed = False
+        return refusal
+
+    def _report(self, refusal: Exception | None) -> None:
         if isinstance(refusal, sqlite3.Error):
             raise as_session_error(self._path, refusal) from refusal
         if refusal is not None:

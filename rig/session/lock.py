@@ -53,9 +53,8 @@ class WriterLock:
                     os.write(handle, f"{os.getpid()}\n".encode())
                     return handle
             except BlockingIOError:
-                owner = os.pread(handle, 32, 0).decode("ascii", "replace").strip()
+                holder = _holder(handle)
                 os.close(handle)
-                holder = f"process {owner}" if owner else "another process"
                 used = make_error(SessionError, "session_in_use", path=session, holder=holder)
                 raise used from None
             except BaseException:
@@ -80,17 +79,18 @@ class WriterLock:
         self._handle = None
 
 
+def _holder(handle: int) -> str:
+    owner = os.pread(handle, 32, 0).decode("ascii", "replace").strip()
+    return f"process {owner}" if owner else "another process"
+
+
 def writer_of(session: Path) -> str:
     """Name the process that has a session open for writing; empty without one."""
-    try:
-        with session.with_name(session.name + ".lock").open("rb") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except BlockingIOError:
-                owner = lock.read(32).decode("ascii", "replace").strip()
-                return f"process {owner}" if owner else "another process"
-    except OSError:
-        return ""
+    with suppress(OSError), session.with_name(session.name + ".lock").open("rb") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return _holder(lock.fileno())
     return ""
 
 

@@ -25,7 +25,9 @@ class Presence:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._files = {one: identity_of(one) for one in (path, path.with_name(path.name + "-wal"))}
+        self._files = {
+            file: identity_of(file) for file in (path, path.with_name(path.name + "-wal"))
+        }
         self._size = path.stat().st_size
 
     def remove_log(self) -> None:
@@ -42,12 +44,12 @@ class Presence:
     def trouble(self) -> str:
         """Say in words what has become of it; empty while it is there."""
         for path, before in self._files.items():
-            now = identity_of(path)
+            identity = identity_of(path)
             if before is None:
-                self._files[path] = now
-            elif now is None:
+                self._files[path] = identity
+            elif identity is None:
                 return f"{path} was deleted or moved"
-            elif now != before:
+            elif identity != before:
                 return f"{path} was replaced by another file"
         try:
             size = self._path.stat().st_size

@@ -13,11 +13,11 @@ from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.records import ClockSample, Drop, HostBreak, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
-from rig.session.faults import translated
+from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
 from rig.session.reason_rows import read_reasons
-from rig.session.rows import CERTIFICATE_AT, RowError, check_row, drop_of, identity
-from rig.session.schema import RunState
+from rig.session.rows import RowError, check_row, drop_of, named_values
+from rig.session.schema import TABLES, RunState, read_identity
 
 if TYPE_CHECKING:
     import sqlite3
@@ -76,9 +76,9 @@ class Reader:
             {str(key): str(value) for key, value in self._rows("meta")}
         )
         if missing := sorted(_ALWAYS - self._meta.keys()):
-            raise self._damaged(f"it does not say {missing[0]}")
+            raise self._damage(f"it does not say {missing[0]}")
         if self._meta["simulated"] not in {"true", "false"}:
-            raise self._damaged("it does not say whether it is simulated")
+            raise self._damage("it does not say whether it is simulated")
 
     @property
     def readonly(self) -> bool:
@@ -88,10 +88,12 @@ class Reader:
     @contextmanager
     def snapshot(self) -> Iterator[None]:
         """See the records as they stand at the first question, whatever another adds meanwhile."""
-        if not self.readonly or self._opened().in_transaction:  # it alone writes, or has one
+        if (
+            not self.readonly or self._open_connection().in_transaction
+        ):  # it alone writes, or has one
             yield
             return
-        self._opened().execute("BEGIN")
+        self._open_connection().execute("BEGIN")
         try:
             yield
         finally:
@@ -101,7 +103,7 @@ class Reader:
     @property
     def connection(self) -> sqlite3.Connection:
         """The open file, for another way to read it."""
-        return self._opened()
+        return self._open_connection()
 
     @property
     def meta(self) -> Mapping[str, str]:
@@ -110,8 +112,8 @@ class Reader:
 
     def digest(self) -> str | None:
         """Return the SHA-256 of all records as they stand; `None` where they are not the file's."""
-        with translated(self.path):
-            return hashlib.sha256(self._opened().serialize()).hexdigest()
+        with translate_errors(self.path):
+            return hashlib.sha256(self._open_connection().serialize()).hexdigest()
 
     @property
     def simulated(self) -> bool:
@@ -128,7 +130,7 @@ class Reader:
         """The protocol file word for word."""
         text = str(self._protocol()[2])
         if hashlib.sha256(text.encode()).hexdigest() != self._meta["protocol_sha256"]:
-            raise self._damaged("its protocol was altered")
+            raise self._damage("its protocol was altered")
         return text
 
     @property
@@ -139,7 +141,7 @@ class Reader:
     def identities(self) -> list[tuple[int, dict[str, Any]]]:
         """Host time and content of every identity, in order."""
         rows = self._rows("identity", "ORDER BY id")
-        return [(host_ns, identity(text)) for _, host_ns, text in rows]
+        return [(host_ns, read_identity(text)) for _, host_ns, text in rows]
 
     def byte_log(self, after: int = 0) -> Iterator[ByteChunk]:
         """All bytes in both directions, in order, but for the first so many chunks.
@@ -157,11 +159,11 @@ class Reader:
 
     def pulses(self) -> list[Pulse]:
         """All pulses of the 1 Hz reference that were asked for, in order."""
-        return [Pulse(*row[1:]) for row in self._newer("reference")]
+        return [Pulse(*row[1:]) for row in self._rows("reference", "ORDER BY id")]
 
     def host_breaks(self) -> list[HostBreak]:
         """When the host slept or its clock was set, in order."""
-        return [HostBreak(*row[1:]) for row in self._newer("host_break")]
+        return [HostBreak(*row[1:]) for row in self._rows("host_break", "ORDER BY id")]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording, compared with its bytes.
@@ -214,17 +216,16 @@ class Reader:
         SessionError
             Something of it cannot be read.
         """
-        self.identities()
-        self.pings()
-        self.pulses()
-        self.host_breaks()
-        self.states()
-        for drop in self.drops():  # and the bytes
+        for table in TABLES:
+            if table not in {"drop", "edge"}:
+                for _ in self._rows(table):
+                    pass
+        for drop in self.drops():
             if drop.damage:
-                raise self._damaged(f"run {drop.run}, attempt {drop.attempt}: {drop.damage}")
-        _ = self.protocol_text, self.protocol_source
+                raise self._damage(f"run {drop.run}, attempt {drop.attempt}: {drop.damage}")
+        _ = self.protocol_text
 
-    def _opened(self) -> sqlite3.Connection:
+    def _open_connection(self) -> sqlite3.Connection:
         if self._connection is None:
             raise make_error(SessionError, "session_closed", path=self.path)
         return self._connection
@@ -232,18 +233,18 @@ class Reader:
     def _raw(self, table: str, which: str, *values: object) -> Iterator[tuple[Any, ...]]:
         """Read rows as they are; `table` and `which` are of this module only."""
 
-        def fetched() -> list[tuple[Any, ...]]:
-            with translated(self.path):
+        def fetch() -> list[tuple[Any, ...]]:
+            with translate_errors(self.path):
                 return cursor.fetchmany(_AT_ONCE)
 
-        with translated(self.path):
-            connection = self._opened()
+        with translate_errors(self.path):
+            connection = self._open_connection()
             if self.readonly:
                 limit_steps(connection)
             cursor = connection.execute(f'SELECT * FROM "{table}" {which}', values)  # noqa: S608
         # No generator: where one is left half read, Python ends it by its own hand, and a Ctrl-C
         # that comes meanwhile is shown and lost.
-        return chain.from_iterable(iter(fetched, []))
+        return chain.from_iterable(iter(fetch, []))
 
     def _rows(self, table: str, which: str = "", *values: object) -> Iterator[tuple[Any, ...]]:
         """Read rows, each of them checked.
@@ -253,29 +254,27 @@ class Reader:
         SessionError
             Which value of which row cannot be.
         """
+        # A file of an older format that was opened read-only has not all tables.
+        if TABLES[table].since > 1 and not any(self._raw("sqlite_master", "WHERE name = ?", table)):
+            return
         for row in self._raw(table, which, *values):
-            try:
-                check_row(table, row)
-            except RowError as error:
-                raise self._damaged(str(error)) from error
+            self._check(table, row)
             yield row
 
-    def _newer(self, table: str) -> Iterator[tuple[Any, ...]]:
-        """Read a table that a file of an older format, opened read-only, does not have."""
-        if any(self._raw("sqlite_master", "WHERE name = ?", table)):
-            yield from self._rows(table, "ORDER BY id")
+    def _check(self, table: str, row: tuple[Any, ...]) -> None:
+        try:
+            check_row(table, row)
+        except RowError as error:
+            raise self._damage(str(error)) from error
 
     def _protocol(self) -> tuple[Any, ...]:
         row = next(self._rows("protocol"), None)
         if row is None:
-            raise self._damaged("it has lost its protocol")
+            raise self._damage("it has lost its protocol")
         return row
 
     def _drop(self, row: tuple[Any, ...], replayed: Mapping[Job, Drop]) -> Drop:
-        try:
-            check_row("drop", row[:3])
-        except RowError as error:  # nobody knows which drop it is
-            raise self._damaged(str(error)) from error
+        self._check("drop", row[:3])  # else nobody knows which drop it is
         try:
             check_row("drop", row)
             edges = self._edges(row)
@@ -291,11 +290,11 @@ class Reader:
         run, attempt = row[1:3]
         return Drop(run, attempt, tick_hz=1, edges=(), damage=why)
 
-    def _damaged(self, text: str) -> SessionError:
+    def _damage(self, text: str) -> SessionError:
         return make_error(SessionError, "session_wrong", path=self.path, text=text)
 
     def _edges(self, row: tuple[Any, ...]) -> list[tuple[Any, ...]]:
-        number, events = row[0], row[CERTIFICATE_AT]
+        number, events = row[0], named_values(row)["events"]
         # An event is a change of one gate or more.
         most = MOST_EDGES if events is None else min(MOST_EDGES, GATES * events)
         edges = [*self._raw("edge", 'WHERE "drop" = ? ORDER BY idx LIMIT ?', number, most + 1)]

@@ -8,7 +8,7 @@ import logging
 import os
 import platform
 import sqlite3
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -20,13 +20,15 @@ from rig.errors import InputError, SessionError
 from rig.files import make_folder, state_folder
 from rig.printable import encodable
 from rig.reasons import make_error
-from rig.session.database import build, check_free, check_place, connect
-from rig.session.faults import translated
+from rig.session.database import build, check_place, connect
+from rig.session.faults import translate_errors
 from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
 from rig.session.reason_rows import write_reasons
+from rig.session.rows import edge_rows, row_of
+from rig.session.schema import TABLES, insert_statement
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -37,11 +39,6 @@ if TYPE_CHECKING:
 
 
 log = logging.getLogger(__name__)
-_CERTIFIED = ("events", "crc32", "overflows", "glitches", "late")
-_OBSERVED = (
-    "release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"
-)  # fmt: skip
-"""Columns of a drop's certificate, before and after what the host adds."""
 
 
 class Session(Reader):
@@ -57,7 +54,7 @@ class Session(Reader):
         super().__init__(path, connection)
         self._journal = Journal(connection, path)
         self._presence = Presence(path)
-        self._gone: SessionError | None = None
+        self._loss: SessionError | None = None
         self.rescued = False  # saved elsewhere, whole, since the file is not at its place any more
         # Counted here, not by SQLite, so that a commit tried again writes the same rows.
         self._last_drop = max((row[0] for row in self._raw("drop", "")), default=0)
@@ -90,23 +87,22 @@ class Session(Reader):
         SessionError
             If something is already there or the place cannot be written.
         """
+        meta = {
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "rig_version": __version__,
+            "python_version": platform.python_version(),
+            "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
+            "simulated": "true" if simulated else "false",
+            "origin": encodable(origin),
+        }
         place = Path(os.path.realpath(path))
         lock = WriterLock(place)
         try:
-            check_free(place)
-            meta = {
-                "created": datetime.now(UTC).isoformat(timespec="seconds"),
-                "rig_version": __version__,
-                "python_version": platform.python_version(),
-                "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
-                "simulated": "true" if simulated else "false",
-                "origin": encodable(origin),
-            }
             build(place, meta, encodable(protocol_source), protocol_text)
-            return cls(place, connect(place, readonly=False), lock)
         except BaseException:
             lock.release()
             raise
+        return cls._connect(place, lock)
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Session:
@@ -127,12 +123,14 @@ class Session(Reader):
         """
         place = Path(os.path.realpath(path))
         check_place(place)
+        return cls._connect(place, None if readonly else WriterLock(place))
+
+    @classmethod
+    def _connect(cls, place: Path, lock: WriterLock | None) -> Self:
         with ExitStack() as undo:
-            lock = None if readonly else WriterLock(place)
             if lock is not None:
                 undo.callback(lock.release)
-            connection = connect(place, readonly=readonly)
-            undo.callback(connection.close)
+            connection = undo.enter_context(closing(connect(place, readonly=lock is None)))
             session = cls(place, connection, lock)
             undo.pop_all()
         return session
@@ -180,21 +178,21 @@ class Session(Reader):
         SessionError
             It is not; with the name of the file that has everything.
         """
-        if self._gone is None and (trouble := self._presence.trouble()):
-            self._gone = self._rescued(trouble)
-        if self._gone is not None:
-            raise self._gone
+        if self._loss is None and (trouble := self._presence.trouble()):
+            self._loss = self._rescue(trouble)
+        if self._loss is not None:
+            raise self._loss
 
     def settle(self) -> None:
         """Bring what is in the log (``-wal``) into the file, so that a copy of it alone is whole.
 
         A reader that is at it may keep the last of it back until the next time.
         """
-        with translated(self.path):
-            self._opened().execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+        with translate_errors(self.path):
+            self._open_connection().execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         self.require_presence()
 
-    def _rescued(self, trouble: str) -> SessionError:
+    def _rescue(self, trouble: str) -> SessionError:
         """Save what the open file and this memory have; give the error that says where.
 
         All goes into the open file too: it is whole then, wherever it was moved.
@@ -204,10 +202,10 @@ class Session(Reader):
         self._fold_in()
         try:
             try:
-                place = _unused(self.path)
+                place = _unused_name(self.path)
                 lost = self._journal.save(place)
             except (sqlite3.Error, OSError):  # its folder is gone too
-                place = _unused(make_folder(state_folder()) / self.path.name)
+                place = _unused_name(make_folder(state_folder()) / self.path.name)
                 lost = self._journal.save(place)
         except (sqlite3.Error, OSError, InputError) as error:
             return make_error(SessionError, "session_unsaved", trouble=trouble, text=error)
@@ -229,7 +227,7 @@ class Session(Reader):
             return
         connection = self._connection
         try:
-            if not self.readonly and self._gone is None:
+            if not self.readonly and self._loss is None:
                 self.commit()
                 self._fold_in()
         finally:
@@ -243,7 +241,7 @@ class Session(Reader):
     def _fold_in(self) -> None:
         """Leave one file to copy, even while a reader keeps the log from being removed."""
         with suppress(sqlite3.Error):
-            self._opened().execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            self._open_connection().execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def __enter__(self) -> Self:
         return self
@@ -253,43 +251,30 @@ class Session(Reader):
 
     # ------------------------------------------------------------------ adding
 
+    def add_rows(self, table: str, rows: Iterable[Sequence[object]]) -> None:
+        """Add rows to a table, all or none; those with a number get the next ones."""
+        values = [(None, *row) if TABLES[table].numbered else row for row in rows]
+        self._writable().add(Statement(insert_statement(table), values))
+
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
         """Add bytes exchanged with the device, as they came or went."""
-        self._add(
-            "INSERT INTO bytes (host_ns, direction, data) VALUES (?, ?, ?)",
-            (host_ns, direction, bytes(data)),
-        )
+        self.add_rows("bytes", [(host_ns, direction, bytes(data))])
 
     def add_identity(self, identity: Mapping[str, object], host_ns: int) -> None:
         """Add what a device said it is, each time it says so."""
-        self._add(
-            "INSERT INTO identity (host_ns, json) VALUES (?, ?)",
-            (host_ns, json.dumps(dict(identity))),
-        )
+        self.add_rows("identity", [(host_ns, json.dumps(dict(identity)))])
 
     def add_ping(self, ping: ClockSample) -> None:
         """Add one clock sample."""
-        self.add_pings([ping])
-
-    def add_pings(self, pings: Iterable[ClockSample]) -> None:
-        """Add clock samples, all or none."""
-        self._add(
-            "INSERT INTO ping (host_send_ns, host_recv_ns, tick) VALUES (?, ?, ?)",
-            *map(tuple, pings),
-        )
+        self.add_rows("ping", [ping])
 
     def add_pulse(self, pulse: Pulse) -> None:
         """Add what the device said of its 1 Hz reference."""
-        self._add(
-            "INSERT INTO reference (host_send_ns, host_recv_ns, number, tick) VALUES (?, ?, ?, ?)",
-            tuple(pulse),
-        )
+        self.add_rows("reference", [pulse])
 
-    def add_host_break(self, found: HostBreak) -> None:
+    def add_host_break(self, pause: HostBreak) -> None:
         """Add that the host slept or its clock was set."""
-        self._add(
-            "INSERT INTO host_break (host_ns, slept_ns, stepped_ns) VALUES (?, ?, ?)", tuple(found)
-        )
+        self.add_rows("host_break", [pause])
 
     def add_drop(self, drop: Drop, *, host_ns: int | None = None, provenance: str = "") -> None:
         """Add the raw record of one drop with its edges, all or nothing.
@@ -305,38 +290,18 @@ class Session(Reader):
         """
         journal = self._writable()
         self._last_drop += 1
-        number = self._last_drop
-        head = (number, drop.run, drop.attempt, drop.tick_hz, drop.fire_tick, drop.initial_state)
-        # Of a drop without a certificate all of them are NULL.
-        fields, tail = (
-            tuple(getattr(drop.certificate, name, None) for name in names)
-            for names in (_CERTIFIED, _OBSERVED)
-        )
-        faults = write_reasons(drop.faults)
+        row = row_of(drop, self._last_drop, host_ns, provenance)
         journal.add(
-            Statement(
-                'INSERT INTO "drop" VALUES '
-                "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                [(*head, *fields, encodable(faults), host_ns, encodable(provenance), *tail)],
-            ),
-            Statement(
-                "INSERT INTO edge VALUES (?, ?, ?, ?, ?)",
-                [
-                    (number, index, edge.tick, edge.channel, int(edge.blocked))
-                    for index, edge in enumerate(drop.edges)
-                ],
-            ),
+            Statement(insert_statement("drop"), [row]),
+            Statement(insert_statement("edge"), edge_rows(drop, self._last_drop)),
         )
 
     def add_state(
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
         """Add one line to the log of run states."""
-        text = write_reasons(reasons)
-        self._add(
-            "INSERT INTO run_state (run, attempt, state, reasons, host_ns) VALUES (?, ?, ?, ?, ?)",
-            (run, attempt, str(state), encodable(text), host_ns),
-        )
+        text = encodable(write_reasons(reasons))
+        self.add_rows("run_state", [(run, attempt, str(state), text, host_ns)])
 
     def unblind(self) -> None:
         """Record, once and on the disk, that from now on the numbers may be seen.
@@ -347,23 +312,20 @@ class Session(Reader):
             That was recorded before, or the disk fails.
         """
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        self._add("INSERT INTO meta VALUES (?, ?)", (UNBLINDED, now))
+        self.add_rows("meta", [(UNBLINDED, now)])
         self.commit()
         self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
 
     def _writable(self) -> Journal:
-        self._opened()
-        if self._gone is not None:
-            raise self._gone
+        self._open_connection()
+        if self._loss is not None:
+            raise self._loss
         if self.readonly:
             raise make_error(SessionError, "session_read_only", path=self.path)
         return self._journal
 
-    def _add(self, sql: str, *rows: Sequence[object]) -> None:
-        self._writable().add(Statement(sql, rows))
 
-
-def _unused(path: Path) -> Path:
+def _unused_name(path: Path) -> Path:
     """Name a file beside a session that is not there yet."""
     names = (path.with_name(f"{path.name}.saved-{number}") for number in count(1))
     return next(name for name in names if not name.exists())

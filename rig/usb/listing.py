@@ -28,18 +28,21 @@ class Known:
     board
         Whether the numbers belong to a board. A chip that is on cheap copies of boards is on
         other instruments too, so it says only that there may be one.
+    product
+        What the text of the product begins with, where other devices have the numbers too.
     """
 
     name: str
     numbers: str
     board: bool = False
+    product: str = ""
 
 
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
 _MEGAS = "2341:0010 2341:0042 2341:0210 2341:0242 2a03:0010 2a03:0042"
 KNOWN = (
-    Known(PICO.name, "2e8a:000a", board=True),
+    Known(PICO.name, "2e8a:000a", board=True, product="chainrig"),
     Known(MEGA.name, _MEGAS, board=True),
     Known(UNO.name, "2341:0001 2341:0043 2341:0243 2a03:0043", board=True),
     Known("CH341", "1a86:5523"),
@@ -90,11 +93,11 @@ def serial_ports() -> list[SerialPort]:
     # Imported when it is used: it looks through /sys, and few commands want that.
     from serial.tools.list_ports import comports  # noqa: PLC0415
 
-    found = [described(info) for info in comports()]
-    return sorted(found, key=lambda port: (not port.candidate, port.path))
+    ports = map(_describe, comports())
+    return sorted(ports, key=lambda port: (not port.candidate, port.path))
 
 
-def described(info: ListPortInfo) -> SerialPort:
+def _describe(info: ListPortInfo) -> SerialPort:
     """Say what a port is and whether it may be a board's."""
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
     kinds = [kind for kind in KNOWN if numbers in kind.numbers.split()]
@@ -104,6 +107,8 @@ def described(info: ListPortInfo) -> SerialPort:
         skipped = "no board's USB numbers: name it with --port if it is one"
     elif not any(kind.board for kind in kinds):
         skipped = "a chip that boards and other instruments have: name it with --port"
+    elif not any(kind.board and (info.product or "").startswith(kind.product) for kind in kinds):
+        skipped = "a board with another program: name it with --port if it is one of this rig"
     else:
         skipped = ""
     return SerialPort(
@@ -138,17 +143,14 @@ def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> st
     DeviceError
         Several have this number, as some copies of boards do.
     """
-    found = [
-        port.path
-        for port in (serial_ports() if ports is None else ports)
-        if port.serial_number == serial_number
-    ]
-    if len(found) > 1:
+    ports = serial_ports() if ports is None else ports
+    paths = [port.path for port in ports if port.serial_number == serial_number]
+    if len(paths) > 1:
         raise DeviceError(
-            f"{' and '.join(found)} have the same serial number {serial_number}",
+            f"{' and '.join(paths)} have the same serial number {serial_number}",
             "unplug the others, or name the port",
         )
-    return found[0] if found else None
+    return paths[0] if paths else None
 
 
 def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> str | None:
@@ -166,8 +168,8 @@ def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> st
     str or None
         `None` when it has none (CH340 chips have none), and for URLs.
     """
-    here = os.path.realpath(path)
+    place = os.path.realpath(path)
     for port in serial_ports() if ports is None else ports:
-        if os.path.realpath(port.path) == here:
+        if os.path.realpath(port.path) == place:
             return port.serial_number
     return None

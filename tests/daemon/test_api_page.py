@@ -12,7 +12,7 @@ from rig.daemon import admission, rpc
 from rig.daemon.lease import LEASE_S
 from rig.daemon.service import Service
 from rig.recorder.published import PublishedState
-from rig.session.schema import APPLICATION_ID, CREATE, SCHEMA_VERSION
+from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, create_script
 
 PAGE = (Path(__file__).parents[2] / "rig/daemon/API.md").read_text("utf-8")
 
@@ -58,7 +58,7 @@ def test_the_session_files_tables_are_on_the_page():
         for table, columns in re.findall(r"^\| `(\w+)` \| (.*?) \|", part, re.MULTILINE)
     }
     with closing(sqlite3.connect(":memory:")) as made:
-        made.executescript(CREATE)
+        made.executescript(create_script())
         tables = made.execute("SELECT name FROM sqlite_schema WHERE type = 'table'").fetchall()
         assert said == {
             name: [row[1] for row in made.execute(f'PRAGMA table_info("{name}")')]

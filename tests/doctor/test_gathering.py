@@ -7,23 +7,20 @@ import os
 import pty
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
 from rig.cli import main
 from rig.command_help import runnable
-from rig.doctor.checks import other_packages
-from rig.doctor.facts import Owner
-from rig.doctor.gathering import (
-    look_at_board,
-    look_at_disk,
-    look_at_packages,
-    look_at_port,
-    look_at_session,
-)
+from rig.doctor.board import look_at_board
+from rig.doctor.computer import PORT_CHECKS, PortPlace, check_packages, check_room
+from rig.doctor.session import check_session
 from rig.errors import DeviceError
 from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
+from rig.selftest.findings import make_check
 from rig.session.store import Session
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
@@ -57,49 +54,81 @@ def proc(tmp_path):
     return make
 
 
-def test_who_has_a_port_open(terminal, proc):
+def verdicts(port):
+    """What the doctor says of a port, and what to do: of permission, owners and ModemManager."""
+    findings = [make_check(name, check, port) for name, check in PORT_CHECKS.items()]
+    return [(finding.what, finding.advice) for finding in findings]
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "advises"),
+    [("screen", b"screen", "close that program"), ("python", b"rig daemon", "let that daemon")],
+)
+def test_who_has_a_port_open(name, words, advises, terminal, proc):
     proc(7, "sleep", [b"sleep"], "/dev/null")
-    folder = proc(4711, "screen", [b"screen", terminal.encode()], "/dev/null", terminal)
-    facts = look_at_port(terminal, folder)
-    assert facts.exists
-    assert facts.usable
-    assert [(owner.pid, owner.command) for owner in facts.owners] == [(4711, f"screen {terminal}")]
-    assert not facts.modem_manager
+    folder = proc(4711, name, [words, terminal.encode()], "/dev/null", terminal)
+    permission, owners, modem = verdicts(PortPlace(terminal, folder))
+    assert permission == ("given", "")
+    assert owners[0] == f"{words.decode()} {terminal} (process 4711)"
+    assert advises in owners[1]
+    assert modem == ("it does not run", "")
 
 
 def test_modem_manager_and_what_udev_tells_it(terminal, proc, tmp_path):
     folder = proc(9, "ModemManager", [b"/usr/sbin/ModemManager"])
     udev = tmp_path / "udev"
     udev.mkdir()
-    facts = look_at_port(terminal, folder, udev)
-    assert facts.modem_manager
-    assert not facts.left_alone
+    port = PortPlace(terminal, folder, udev)
+    assert "rig.usb.udev" in verdicts(port)[2][1]
     number = Path(terminal).stat().st_rdev
     account = udev / f"c{os.major(number)}:{os.minor(number)}"
     account.write_text("E:ID_BUS=usb\nE:ID_MM_DEVICE_IGNORE=1\n")
-    assert look_at_port(terminal, folder, udev).left_alone
+    assert verdicts(port)[1:] == [("none seen", ""), ("it is told to leave this port alone", "")]
 
 
-def test_a_port_that_is_not_there(tmp_path):
-    facts = look_at_port(str(tmp_path / "ttyACM0"))
-    assert (facts.exists, facts.usable, facts.group, facts.owners) == (False, False, "", ())
+@pytest.mark.parametrize(
+    ("group", "says", "advises"),
+    [
+        ("dialout", "the group dialout", "-aG dialout"),
+        (None, "its group", "-aG dialout"),
+        ("root", "the group root", "udev"),
+    ],
+)
+def test_a_port_that_is_forbidden(group, says, advises, terminal, proc, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)  # root may do everything
+    named = {"return_value": group} if group else {"side_effect": KeyError}
+    monkeypatch.setattr(Path, "group", Mock(**named))
+    permission = verdicts(PortPlace(terminal, proc(7, "sleep", [])))[0]
+    assert says in permission[0]
+    assert advises in permission[1]
 
 
-def test_room_where_a_session_will_be(tmp_path):
-    facts = look_at_disk(tmp_path / "not" / "yet")
-    assert facts.folder == str(tmp_path)
-    assert facts.free > 0
+def test_a_port_that_is_not_there(tmp_path, proc):
+    permission = verdicts(PortPlace(str(tmp_path / "ttyACM0"), proc(7, "sleep", [])))[0]
+    assert permission[0] == "there is no such port"
+    assert "rig ports" in permission[1]
+
+
+def test_room_where_a_session_will_be(tmp_path, monkeypatch):
+    for free, says, advises in ((10**9, "1000 MB free in", ""), (10**7, "10 MB", "free 200 MB")):
+        monkeypatch.setattr("shutil.disk_usage", lambda _, free=free: SimpleNamespace(free=free))
+        finding = make_check("disk", check_room, tmp_path / "not" / "yet")
+        assert finding.what.startswith(says)
+        assert finding.what.endswith(str(tmp_path))
+        assert advises in finding.advice
 
 
 def test_a_session(tmp_path):
     path = tmp_path / "s.session"
     Session.create(path, "x", "x.yaml", simulated=True, origin="x").close()
-    assert look_at_session(str(path)).whole
+    whole = [(finding.name, finding.what) for finding in check_session(str(path))]
+    assert whole == [
+        *((f"session {path}", "whole"), ("restarts", "none"), ("supply", "not measured"))
+    ]
     with unguarded(path) as connection:
         connection.execute("DELETE FROM meta WHERE key = 'simulated'")
-    facts = look_at_session(str(path))
-    assert not facts.whole
-    assert facts.first_trouble.endswith("s.session: it does not say simulated")
+    (damaged,) = check_session(str(path))
+    assert damaged.what.endswith("s.session: it does not say simulated")
 
 
 # -- a board
@@ -219,7 +248,7 @@ def test_a_port_that_somebody_uses_is_not_opened(doctor, terminal, monkeypatch):
         raise AssertionError(f"{url} was opened")
 
     monkeypatch.setattr("rig.commands.doctor.open_port", fail)
-    monkeypatch.setattr("rig.doctor.gathering._owners", lambda *_: [Owner(5, "screen")])
+    monkeypatch.setattr("rig.doctor.computer._owners", lambda _: ["screen (process 5)"])
     code, out, _ = doctor("--port", terminal)
     assert code == 4
     assert "screen (process 5)" in out
@@ -269,6 +298,6 @@ def test_another_package_of_the_same_name_is_named(tmp_path, monkeypatch):
         (tmp_path / module).mkdir(exist_ok=True)
         (tmp_path / module / "__init__.py").touch()  # only what is there counts for some
     monkeypatch.setattr("sys.path", [str(tmp_path)])
-    assert look_at_packages() == ("rig",)
-    assert "pip uninstall rig chainrig" in other_packages(look_at_packages()).advice
-    assert not other_packages(()).advice
+    finding = make_check("packages", check_packages, "chainrig")
+    assert finding.what.startswith("rig")
+    assert "pip uninstall rig chainrig" in finding.advice

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from rig.cli import main
-from rig.errors import DeviceTimeoutError, InputError
+from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash import drive as drives
+from rig.flash import steps
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.image import read_image, shipped_firmware
+from rig.link.port import open_port
+from rig.reasons import make_error
 from tests.flash.pty_board import PtyBoard
 
 VERSION = shipped_firmware(DRIVE.board.name)
@@ -32,7 +36,9 @@ def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
     lines += [f"/dev/sdc1 {str(one).replace(' ', chr(92) + '040')} vfat rw 0 0" for one in made]
     (mounts := folder / "mounts").write_text("\n".join(lines) + "\n")
     monkeypatch.setattr(drives.waiting_drives, "__defaults__", (mounts,))
-    monkeypatch.setattr(drives.choose_drive, "__defaults__", (mounts,))
+    (folder / "usb").mkdir()
+    monkeypatch.setattr(drives.choose_drive, "__defaults__", (mounts, folder / "usb"))
+    monkeypatch.setattr(drives.sees_boot_pico, "__defaults__", (folder / "usb",))
     return made
 
 
@@ -43,7 +49,7 @@ def plugged(monkeypatch, path: str, after: int = 1) -> None:
     def ports():
         looks.append(path)
         info = ListPortInfo(path)
-        info.vid, info.pid = 0x2E8A, 0x000A
+        info.vid, info.pid, info.product = 0x2E8A, 0x000A, "chainrig on a Pico"
         return [info] if len(looks) > after else []
 
     monkeypatch.setattr("serial.tools.list_ports.comports", ports)
@@ -82,11 +88,53 @@ def test_no_drive_says_how_to_make_it_appear(flash, tmp_path, monkeypatch):
     assert "hold its BOOTSEL button" in err
 
 
-def test_several_drives_are_named(flash, tmp_path, monkeypatch):
-    one, other = picos(tmp_path, monkeypatch, "one", "other")
+def test_a_pico_in_boot_mode_that_nothing_has_mounted_is_said(flash, tmp_path, monkeypatch, capsys):
+    picos(tmp_path, monkeypatch)
+    for name, product in (("1-1", "0042"), ("1-2", "0003")):
+        (device := tmp_path / "usb" / name).mkdir()
+        (device / "idVendor").write_text("2e8a\n")
+        (device / "idProduct").write_text(f"{product}\n")
+    code, out, err = flash()
+    assert (code, out) == (4, "")
+    assert "a Pico waits for firmware, but its drive RPI-RP2 is not mounted" in err
+    assert "/dev/disk/by-label/RPI-RP2" in err
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    assert main(["ports"]) == 0
+    assert "drive RPI-RP2 is not mounted: " in capsys.readouterr().err
+
+
+def test_a_port_that_udev_permits_a_little_later_is_waited_for(flash, tmp_path, monkeypatch):
+    picos(tmp_path, monkeypatch, "RPI-RP2")
+    refusals = iter([make_error(DeviceError, "port_denied", port="x", text="")] * 3)
+
+    def open_later(port):
+        for refusal in refusals:
+            raise refusal
+        return open_port(port)
+
+    monkeypatch.setattr(steps, "open_port", open_later)
+    with PtyBoard(**NAMES) as there:
+        plugged(monkeypatch, there.path)
+        code, _, err = flash()
+    assert code == 0, err
+
+
+def test_a_port_that_stays_forbidden_is_said(flash, tmp_path, monkeypatch):
+    picos(tmp_path, monkeypatch, "RPI-RP2")
+    refusal = make_error(DeviceError, "port_denied", port="/dev/ttyACM0", text="")
+    monkeypatch.setattr(steps, "open_port", Mock(side_effect=refusal))
+    monkeypatch.setattr(steps, "_UDEV_S", 0.2)
+    plugged(monkeypatch, "/dev/ttyACM0")
     code, _, err = flash()
     assert code == 4
-    assert f"{one}, {other}" in err
+    assert "dialout" in err
+
+
+def test_several_drives_are_named(flash, tmp_path, monkeypatch):
+    drives = picos(tmp_path, monkeypatch, "one", "other")
+    code, _, err = flash()
+    assert code == 4
+    assert ", ".join(map(str, drives)) in err
     assert "--drive" in err
 
 
@@ -123,23 +171,19 @@ def test_ports_tells_of_a_board_that_waits(capsys, tmp_path, monkeypatch):
     assert f"a Pico waits for firmware at {drive}" in capsys.readouterr().err
 
 
-def _without(at: int, size: int):
-    return lambda data: data[:at] + data[at + size :]
-
-
-def _with(at: int, value: bytes):
-    return lambda data: data[:at] + value + data[at + len(value) :]
+def _with(at: int, value: bytes, size: int = 4):
+    return lambda data: data[:at] + value + data[at + size :]
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_without(0, 1), "no whole UF2 file"),
+        (_with(0, b"", 1), "no whole UF2 file"),
         (lambda _: b"", "no whole UF2 file"),
-        (_without(512, 512), "not whole: block 0"),
+        (_with(512, b"", 512), "not whole: block 0"),
         (_with(512 + 12, bytes(4)), "not whole: block 1"),
         (_with(28, bytes(4)), "not for an RP2040"),
-        (_with(0, b"X"), "no UF2 file, or damaged: block 0"),
+        (_with(0, b"X", 1), "no UF2 file, or damaged: block 0"),
         (lambda data: data.replace(b"Raspberry Pi Pico\0", b"Raspberry Pi Pika\0"), "no firmware"),
     ],
 )

@@ -16,6 +16,8 @@ from tests.flash.pty_board import PtyBoard
 
 VERSION = read_image(TARGETS["mega"].shipped, TARGETS["mega"]).firmware
 NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
+PTY = "where nobody answers"
+OTHER = "is for an Arduino Uno, not for an Arduino Mega 2560"
 
 
 @contextmanager
@@ -90,56 +92,46 @@ def test_avrdude_fails(says, message, avrdude, flash):
     with silent_port() as path:
         code, out, err = flash("--port", path)
     assert (code, out) == (4, "")
-    assert says in err
-    assert f"flashing {path} failed: " in err
+    for words in (says, f"flashing {path} failed: ", message, "hint: "):
+        assert words in err
+
+
+def broken_program(folder):
+    program = folder / "broken"
+    program.write_bytes(b"#!/nowhere/at-all\n")
+    program.chmod(0o755)
+    return program
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (lambda _: ["--port", "/dev/null", "--avrdude", "/none"], 2, "is no program that can be"),
+        (lambda d: ["--port", PTY, "--avrdude", broken_program(d)], 2, "cannot run"),
+        (lambda _: ["--port", "/dev/null", "--hex", TARGETS["uno"].shipped], 2, OTHER),
+        (lambda d: ["--port", d / "ttyACM0"], 4, "there is no such port"),
+        *(
+            (lambda _, url=url: ["--port", url], 2, f"{url} is no board that can be flashed")
+            for url in ("sim://", "emu://", "replay://x", "socket://lab:7")
+        ),
+    ],
+)
+def test_nothing_is_flashed_where_something_is_wrong(
+    arguments, code, message, avrdude, flash, tmp_path
+):
+    with silent_port() as path:
+        given = [path if word is PTY else word for word in arguments(tmp_path)]
+        result, _, err = flash(*given)
+    assert result == code
     assert message in err
-    assert "hint: " in err
+    assert avrdude.argv is None
 
 
 def test_avrdude_is_missing(flash, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with silent_port() as path:
-        code, _, err = flash("--port", path)
+    code, _, err = flash("--port", "/dev/null")
     assert code == 2
     assert "apt-get install avrdude" in err
-
-
-def test_avrdude_is_not_where_it_should_be(flash, tmp_path):
-    code, _, err = flash("--port", "/dev/null", "--avrdude", tmp_path / "none")
-    assert code == 2
-    assert "is no program that can be run" in err
-
-
-def test_a_program_that_does_not_start(flash, tmp_path):
-    program = tmp_path / "avrdude"
-    program.write_bytes(b"#!/nowhere/at-all\n")
-    program.chmod(0o755)
-    with silent_port() as path:
-        code, _, err = flash("--port", path, "--avrdude", program)
-    assert code == 2
-    assert f"cannot run {program}" in err
-
-
-@pytest.mark.parametrize("port", ["sim://", "emu://", "replay://x", "socket://lab:7"])
-def test_a_simulation_is_not_flashed(port, avrdude, flash):
-    code, _, err = flash("--port", port)
-    assert code == 2
-    assert f"{port} is no board that can be flashed" in err
-    assert avrdude.argv is None
-
-
-def test_an_image_of_another_board_is_not_flashed(avrdude, flash):
-    code, _, err = flash("--port", "/dev/null", "--hex", TARGETS["uno"].shipped)
-    assert code == 2
-    assert "is for an Arduino Uno, not for an Arduino Mega 2560" in err
-    assert avrdude.argv is None
-
-
-def test_no_such_port(avrdude, flash, tmp_path):
-    code, _, err = flash("--port", tmp_path / "ttyACM0")
-    assert code == 4
-    assert "there is no such port" in err
-    assert avrdude.argv is None
 
 
 def test_a_port_somebody_uses(avrdude, flash):

@@ -6,7 +6,7 @@ import random
 
 from rig.link import messages as wire
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.selftest.line import RawLine
+from rig.selftest.board import RawLine
 from tests.link.bench import GATES, LABEL, Bench
 
 ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "record_ms": 150}

@@ -32,9 +32,9 @@ class LoopedBoard(VirtualBoard):
         self.touch(0)
 
 
-def outcomes(port, loopback=GATE, drops=5, release=True):
+def outcomes(port, loopback=GATE, drops=5, release=True, gates=None):
     """Test a board; give its findings by the name of the check."""
-    findings = list(selftest(port, port.clock, SelftestOptions(loopback, drops, release)))
+    findings = list(selftest(port, port.clock, SelftestOptions(loopback, drops, release, gates)))
     assert len({finding.name for finding in findings}) == len(findings)
     for finding in findings:
         assert (finding.reason is None) is (finding.verdict is Verdict.OK)

@@ -103,34 +103,9 @@ class Lapses(Microcontroller):
 
 
 @caught_by("arming times out")
-class TimesOutLate(Lapses):
-    deadline_ms = 100
-
-
-@caught_by("arming times out")
-class TimesOutEarly(Lapses):
-    deadline_ms = -10
-
-
-@caught_by("arming times out")
 class NamesTheWrongReason(Microcontroller):
     def lapse(self, now_ns):
         return self._disarm(DisarmReason.HOST_SILENT)
-
-
-@caught_by("a silent host disarms")
-class PatientForTooLong(Lapses):
-    silence_ms = 60
-
-
-@caught_by("a silent host disarms")
-class WaitsForEver(Lapses):
-    silence_ms = 10_000
-
-
-@caught_by("a silent host disarms")
-class Impatient(Lapses):
-    silence_ms = -20
 
 
 @caught_by("a silent host disarms")
@@ -234,21 +209,6 @@ class Forgetful(LoopedBoard):
         if self._last is not None and self._last[0] == wire.CODES[self.forgets]:
             self._last = None
         super()._listen()
-
-
-@caught_by("repeated frames")
-class ArmsTwice(Forgetful):
-    pass
-
-
-@caught_by("repeated frames")
-class FiresTwice(Forgetful):
-    forgets = wire.Fire
-
-
-@caught_by("repeated frames")
-class AcknowledgesTwice(Forgetful):
-    forgets = wire.Acknowledge
 
 
 @caught_by("frames without seq")
@@ -376,3 +336,19 @@ class WireToSupply(Microcontroller):
     def _status(self):
         self.gates |= 1 << GATE
         return super()._status()
+
+
+# -- boards that differ in a number
+
+
+for name, kind, check, changes in (
+    ("TimesOutLate", Lapses, "arming times out", {"deadline_ms": 100}),
+    ("TimesOutEarly", Lapses, "arming times out", {"deadline_ms": -10}),
+    ("PatientForTooLong", Lapses, "a silent host disarms", {"silence_ms": 60}),
+    ("WaitsForEver", Lapses, "a silent host disarms", {"silence_ms": 10_000}),
+    ("Impatient", Lapses, "a silent host disarms", {"silence_ms": -20}),
+    ("ArmsTwice", Forgetful, "repeated frames", {"forgets": wire.Arm}),
+    ("FiresTwice", Forgetful, "repeated frames", {"forgets": wire.Fire}),
+    ("AcknowledgesTwice", Forgetful, "repeated frames", {"forgets": wire.Acknowledge}),
+):
+    caught_by(check)(type(name, (kind,), changes))

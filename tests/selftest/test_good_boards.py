@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -13,6 +14,7 @@ from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.selftest.findings import Verdict
 from rig.selftest.run import CHECKS
+from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import GATE, LoopedBoard, Wire, outcomes, port_of
 
@@ -123,41 +125,104 @@ def test_json_lists_each_check_with_its_codes(rig):
     ]
 
 
+UNWIRED = 0xFFF0
+"""Inputs that nothing holds to ground."""
+
+
+@pytest.mark.parametrize(
+    ("gates", "verdict", "what"),
+    [
+        (None, Verdict.NOT_POSSIBLE, "gates 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15 blocked all"),
+        (0xF, Verdict.OK, "4 gates clear; not in use and blocked: gates 4, 5,"),
+        (0x1F, Verdict.FAILED, "gate 4 blocked all the time"),
+    ],
+)
+def test_inputs_without_a_gate_fail_no_rig(gates, verdict, what, unwired):
+    results = outcomes(port_of(unwired), gates=gates)
+    assert (results["gates"].verdict, results["gates"].what[: len(what)]) == (verdict, what)
+    assert failed({name: result for name, result in results.items() if name != "gates"}) == []
+    assert results["GATE_BLOCKED"].verdict is Verdict.OK
+
+
+@pytest.fixture
+def unwired(monkeypatch):
+    class Lab(Wire):
+        def rest(self, label):
+            return UNWIRED
+
+    class Open(Microcontroller):
+        def _status(self):
+            self.gates |= UNWIRED
+            return super()._status()
+
+    monkeypatch.setattr("sim.board.Microcontroller", Open)
+    return LoopedBoard(Lab())
+
+
+def test_a_gate_that_the_board_has_not_is_named():
+    board = LoopedBoard(Wire())
+    names = " ".join(board.identity.channels.split()[:12])
+    board.identity = replace(board.identity, gates=12, channels=names)
+    gates = outcomes(port_of(board), gates=0x300F)["gates"]
+    assert (gates.verdict, gates.reason.code) == (Verdict.FAILED, "gates_not_fitted")
+    assert gates.what == "in use, but not on this board: gates 12, 13"
+
+
+def test_a_bare_board_says_which_wires_let_it_test_more(monkeypatch, unwired):
+    monkeypatch.setattr("tests.selftest.test_good_boards.UNWIRED", 0xFFFF)
+    results = outcomes(port_of(unwired), loopback=None)
+    assert failed(results) == []
+    assert "a wire from one gate input to ground" in results["certificate"].what
+    assert "--loopback GATE" in results["certificate"].what
+
+
+def test_a_protocol_says_which_gates_are_in_use(rig):
+    code, lines, _ = rig("--port", FENCE, "--protocol", "protocols/picket-fence.yaml")
+    assert code == 0
+    assert any(line.startswith("gates: ok: ") and "gates clear" in line for line in lines)
+
+
+@pytest.mark.parametrize("gates", ["", "0,", "0,16", "a"])
+def test_gates_are_a_list_of_numbers(rig, gates):
+    with pytest.raises(SystemExit, match="2"):
+        rig("--port", FENCE, "--gates", gates)
+
+
 def test_behind_a_terminal_in_real_time(rig):
     with PtyBoard() as there:
         code, lines, _ = rig("--port", there.path)
     assert code == 0, lines
 
 
-def test_a_drop_of_a_session_is_left_alone():
-    port = port_of(LoopedBoard(Wire()))
+def hold_drop(port, run):
+    """Have a board hold a drop; give the client, the order of the drop and the drop."""
     device = Device(port, port.clock)
     device.connect()
-    label = pack_label(7, 2)
     order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    device.fire(device.arm(label=label, **order))
-    drop = device.collect(label)
-    found = outcomes(port)
-    assert failed(found) == []
-    assert found["BUSY"].what == "the board holds a drop (run 7, attempt 2)"
-    assert found["BUSY"].reason.values == {"run": 7, "attempt": 2}
-    assert found["every message"].verdict is Verdict.NOT_POSSIBLE
-    assert found["VERSION"].verdict is Verdict.OK
+    order["label"] = pack_label(run, 2)
+    device.fire(device.arm(**order))
+    return device, order, device.collect(order["label"])
+
+
+def test_a_drop_of_a_session_is_left_alone():
+    port = port_of(LoopedBoard(Wire()))
+    _, order, drop = hold_drop(port, 7)
+    results = outcomes(port)
+    assert failed(results) == []
+    assert results["BUSY"].what == "the board holds a drop (run 7, attempt 2)"
+    assert results["BUSY"].reason.values == {"run": 7, "attempt": 2}
+    assert results["every message"].verdict is Verdict.NOT_POSSIBLE
+    assert results["VERSION"].verdict is Verdict.OK
     again = Device(port, port.clock)
     again.connect(boot_wait_s=0)
-    assert again.fetch(label) == drop
+    assert again.fetch(order["label"]) == drop
     with pytest.raises(DeviceError, match="still holds the drop of run 7"):
-        again.arm(label=label, **order)  # no ABORT made it free to be discarded
+        again.arm(**order)  # no ABORT made it free to be discarded
 
 
 def test_a_drop_that_an_earlier_test_left_is_cleared_away():
     port = port_of(LoopedBoard(Wire()))
-    device = Device(port, port.clock)
-    device.connect()
-    label = pack_label(wire.TEST_RUN, 9)
-    order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    device.fire(device.arm(label=label, **order))
-    device.collect(label)
+    device, *_ = hold_drop(port, wire.TEST_RUN)
     assert failed(outcomes(port)) == []
     assert device.status().phase is Phase.IDLE
 

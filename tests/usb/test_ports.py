@@ -106,17 +106,12 @@ def test_only_candidates_are_asked_who_they_are(plugged, monkeypatch, capsys):
     assert opened == ["/dev/ttyACM3", "/dev/ttyUSB0"]
 
 
-def test_a_port_that_is_named_says_who_is_there(plugged, capsys):
-    with PtyBoard(board="Arduino Uno") as there:
-        assert main(["ports", "--identify", there.path]) == 0
-    last = capsys.readouterr().out.splitlines()[-1]
-    assert last.startswith(f"{there.path}  Arduino Uno, sim, id ")
-
-
-def test_boards_of_one_name_are_told(plugged, capsys):
+def test_who_is_there_is_said_and_that_boards_share_an_id(plugged, capsys):
     with PtyBoard(board="Arduino Uno") as one, PtyBoard(board="Arduino Uno") as other:
         assert main(["ports", "--identify", one.path, other.path]) == 0
-    assert re.search("several boards have the id [0-9a-f]{16}: erase", capsys.readouterr().err)
+    out, err = capsys.readouterr()
+    assert f"{other.path}  Arduino Uno, sim, id " in out.splitlines()[-1]
+    assert re.search("several boards have the id [0-9a-f]{16}: erase", err)
 
 
 def test_a_board_with_another_s_name_is_told(plugged, caplog):
@@ -129,16 +124,29 @@ def test_a_board_with_another_s_name_is_told(plugged, caplog):
 
 
 def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):
-    assert serial_number_at("/dev/ttyACM3") == "85430"
-    link = tmp_path / "by-id"
-    link.symlink_to("/dev/ttyACM3")
-    assert serial_number_at(str(link)) == "85430"
-    assert serial_number_at("/dev/ttyUSB0") is None
-    assert serial_number_at("sim://") is None
-    plugged(info("/dev/ttyACM3", 0x2341, 0x43, "other"))
+    (link := tmp_path / "by-id").symlink_to("/dev/ttyACM3")
+    places = "/dev/ttyACM3", str(link), "/dev/ttyUSB0", "sim://"
+    assert [*map(serial_number_at, places)] == ["85430", "85430", None, None]
+    other = info("/dev/ttyACM3", 0x2341, 0x43, "other")
+    plugged(other)
     assert path_of("85430") is None
-    plugged(info("/dev/ttyACM3", 0x2341, 0x43, "other"), info("/dev/ttyACM9", 1, 2, "85430"))
+    plugged(other, info("/dev/ttyACM9", 1, 2, "85430"))
     assert path_of("85430") == "/dev/ttyACM9"
+
+
+def test_a_pico_with_another_program_is_not_opened(plugged):
+    numbers = 0x2E8A, 0x000A
+    plugged(
+        info("/dev/ttyACM0", *numbers, product="MicroPython"),
+        info("/dev/ttyACM1", *numbers),
+        info("/dev/ttyACM2", *numbers, product="chainrig on a Pico"),
+    )
+    ports = serial_ports()
+    assert [(port.path, port.candidate) for port in ports] == [
+        *(("/dev/ttyACM2", True), ("/dev/ttyACM0", False), ("/dev/ttyACM1", False))
+    ]
+    assert "another program" in ports[1].skipped
+    assert pico_ports() == {"/dev/ttyACM2"}
 
 
 def test_copies_that_share_a_number_are_not_confused(plugged):

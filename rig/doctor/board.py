@@ -1,0 +1,229 @@
+"""Checks of a board: what it says of itself, its clock, its stop and its gates.
+
+No release is driven, and no drop of anybody is touched. A check returns what is well, in words, or
+raises why it is not.
+"""
+
+from __future__ import annotations
+
+import cmath
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import tau
+from typing import TYPE_CHECKING
+
+from rig.flash.image import shipped_firmware
+from rig.link.client import Device
+from rig.link.gatewatch import listed, watch_gates
+from rig.link.messages import (
+    HOST_SILENCE_MS,
+    TEST_RUN,
+    Phase,
+    RefusalReason,
+    pack_label,
+    unpack_label,
+)
+from rig.link.refusals import DeviceRefusedError
+from rig.selftest.findings import CheckFailedError
+from rig.selftest.line_checks import judge_clock
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rig.clock.host import Clock
+    from rig.link.gatewatch import GateStates
+    from rig.link.messages import Identity
+    from rig.link.port import Port
+    from rig.records import ClockSample, Edge
+
+_GLANCE_S = 0.3
+_PINGS = 40
+_LABEL = pack_label(TEST_RUN, 1)
+_TRIES = 40
+_AGAIN = (RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY)
+"""Refusals that a flickering gate gives now and then."""
+_MAINS_HZ = (50, 60, 100, 120)  # lamps flicker at twice the mains' frequency
+_IN_STEP = 0.8
+_ENOUGH = 10  # edges to tell a rhythm from chance
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFacts:
+    """What a board says and does.
+
+    Attributes
+    ----------
+    shipped
+        The firmware that comes with this program for such a board; empty when none does.
+    held
+        Run and attempt of a drop that it holds, or `None`.
+    states
+        Its gates as STATUS had them for a moment.
+    edges
+        Of all gates that were not blocked, for `watched_s`, from a recording without a release;
+        `None` when none could be made, for the reason `unwatched`.
+    stopped
+        Whether that was because the emergency stop is open.
+    """
+
+    identity: Identity
+    shipped: str
+    pings: tuple[ClockSample, ...]
+    held: tuple[int, int] | None
+    states: GateStates
+    edges: tuple[Edge, ...] | None = None
+    watched_s: float = 1.0
+    unwatched: str = ""
+    stopped: bool = False
+
+
+def look_at_board(port: Port, clock: Clock) -> BoardFacts:
+    """Ask a board about everything that can be asked in a few seconds.
+
+    Raises
+    ------
+    DeviceError
+        It does not answer, or speaks another version.
+    """
+    device = Device(port, clock)
+    identity = device.connect()
+    pings: list[ClockSample] = []
+    for n in range(_PINGS):
+        pings += filter(None, [device.ping()])
+        clock.sleep(0.023 + 0.0071 * (n % 5))
+    state = device.status()
+    states = watch_gates(lambda: device.status().gates, clock, _GLANCE_S)
+    facts = BoardFacts(
+        identity,
+        shipped_firmware(identity.board),
+        tuple(pings),
+        unpack_label(state.label) if state.phase is Phase.HOLDING else None,
+        states,
+    )
+    clear = ((1 << identity.gates) - 1) & ~states.stuck
+    if state.phase is not Phase.IDLE:
+        return replace(facts, unwatched="it holds a drop")
+    if not clear:
+        return replace(facts, unwatched="all gates are blocked")
+    return _record_gates(device, clear, facts)
+
+
+def _record_gates(device: Device, gates: int, facts: BoardFacts) -> BoardFacts:
+    """Add a recording of the gates with all releases off; else why there is none.
+
+    A board fires only when all its gates are clear and keep still. One that flickers with the
+    mains does so for some milliseconds between two pulses, so a few tries in a row get there.
+    """
+    order = {"timeout_ms": 1000, "record_ms": round(facts.watched_s * 1000)}
+    for _ in range(_TRIES):
+        try:
+            device.fire(device.arm(label=_LABEL, gates=gates, release=0, pulse_us=0, **order))
+        except DeviceRefusedError as refusal:
+            stopped = refusal.reason is RefusalReason.STOPPED
+            facts = replace(facts, unwatched=refusal.message, stopped=stopped)
+            if refusal.reason not in _AGAIN:
+                break
+        else:
+            drop = device.collect(_LABEL)
+            if drop.certificate is not None:
+                device.acknowledge(_LABEL, drop.certificate.crc32)
+            return replace(facts, edges=drop.edges, unwatched="", stopped=False)
+    with suppress(DeviceRefusedError):
+        device.abort()
+    return facts
+
+
+def _firmware(board: BoardFacts) -> str:
+    """See that the board has the firmware that comes with this program."""
+    firmware = board.identity.firmware
+    if not board.shipped:
+        return f"{firmware}; none for a {board.identity.board} comes with rig"
+    if firmware != board.shipped:
+        raise CheckFailedError("firmware_differs", firmware=firmware, shipped=board.shipped)
+    return f"{firmware}, as it comes with rig"
+
+
+def _held_drop(board: BoardFacts) -> str:
+    """See that the board holds no drop that somebody waits for."""
+    if board.held is not None:
+        raise CheckFailedError("drop_held", run=board.held[0], attempt=board.held[1])
+    return "none"
+
+
+def _round_trip(board: BoardFacts) -> str:
+    """See that answers come fast enough to keep an armed board armed."""
+    if not board.pings:
+        raise CheckFailedError("no_ping")
+    slowest = max(ping.host_recv_ns - ping.host_send_ns for ping in board.pings) * 1e-9
+    if slowest > HOST_SILENCE_MS / 2000:
+        raise CheckFailedError("slow_answers", slowest_s=slowest)
+    return f"{slowest * 1e3:.1f} ms at most"
+
+
+def _emergency_stop(board: BoardFacts) -> str:
+    """See that the emergency stop lets the board arm."""
+    if board.stopped:
+        raise CheckFailedError("stop_open")
+    return "closed" if board.edges is not None else "not tried"
+
+
+def _stuck_gates(board: BoardFacts) -> str:
+    """See that no gate is blocked all the time."""
+    if board.states.stuck:
+        raise CheckFailedError("gates_blocked", gates_listed=listed(board.states.stuck))
+    return "none"
+
+
+def _flickering_gates(board: BoardFacts) -> str:
+    """See that no gate changes while nothing moves, and whether the mains do it if one does."""
+    if not board.edges:
+        if seen := board.states.flickering:
+            raise CheckFailedError("gates_flicker", gates_listed=listed(seen))
+        if board.edges is None:
+            return f"none seen at a glance; not recorded: {board.unwatched}"
+        return f"none within {board.watched_s:g} s"
+    rises: dict[int, list[float]] = {}
+    for edge in board.edges:
+        if edge.blocked:
+            rises.setdefault(edge.channel, []).append(edge.tick / board.identity.tick_hz)
+    ripples = {channel: mains_ripple(times) for channel, times in sorted(rises.items())}
+    gates = "; ".join(
+        f"gate {channel} {len(rises[channel])} times" + (f", in step with {hz} Hz" if hz else "")
+        for channel, hz in ripples.items()
+    )
+    code = "gates_flicker_mains" if any(ripples.values()) else "gates_flicker"
+    raise CheckFailedError(code, gates_listed=f"{gates} within {board.watched_s:g} s")
+
+
+def mains_ripple(times_s: Sequence[float]) -> int | None:
+    """Find the mains' rhythm in a gate's edges.
+
+    Parameters
+    ----------
+    times_s
+        When the gate was blocked, over about a second.
+
+    Returns
+    -------
+    int or None
+        The lowest of 50, 60, 100 and 120 Hz with which the edges keep step: the length of their
+        mean phasor is above 0.8, where edges at random times would give 1/√n.
+    """
+    if len(times_s) < _ENOUGH:
+        return None
+    for hz in _MAINS_HZ:
+        mean = sum(cmath.exp(1j * tau * hz * t) for t in times_s) / len(times_s)
+        if abs(mean) > _IN_STEP:
+            return hz
+    return None
+
+
+BOARD_CHECKS: Mapping[str, Callable[[BoardFacts], str]] = {
+    "firmware": _firmware,
+    "held drop": _held_drop,
+    "clock": lambda board: judge_clock(board.pings, board.identity.tick_hz),
+    "round trip": _round_trip,
+    "emergency stop": _emergency_stop,
+    "blocked gates": _stuck_gates,
+    "flickering gates": _flickering_gates,
+}
