@@ -22,7 +22,7 @@ from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.recorder.opening import known_before, open_for, shown
-from rig.recorder.published import PublishedState
+from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
 from rig.session.schema import RunState
@@ -103,6 +103,11 @@ class Controller:
         if self._session is None:
             raise make_error(SessionError, "no_session_open")
         return self._session
+
+    @property
+    def armed(self) -> tuple[int, int] | None:
+        """Run and attempt of the drop that waits for `fire`."""
+        return None if self.recorder is None else self.recorder.armed
 
     @property
     def recording(self) -> bool:
@@ -202,9 +207,7 @@ class Controller:
         finally:
             session.close()
             self.published.plan(())
-            self.published.set(
-                session=None, drop=None, link={"state": "closed", "error": None, "retry_s": None}
-            )
+            self.published.set(session=None, drop=None, link=link_state("closed"))
             if port is not None:
                 self.connect(port)
 
@@ -225,7 +228,7 @@ class Controller:
                 self.recorder.close()
         sink = NullSink() if self._session is None else self._session
         self.recorder = None
-        self.published.set(link={"state": "opening", "error": None, "retry_s": None})
+        self.published.set(link=link_state("opening"))
         url = self._line_url
         if not is_simulated(url):
             url = self._locator.now if port is not None else self._locator.look()
@@ -238,7 +241,7 @@ class Controller:
             port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.now}
         )
         self.recorder = recorder
-        self.published.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
+        self.published.set(link=link_state("up"), phase="idle")
         if port is None:
             log.info("up: %s, id %s", identity.board, identity.unique_id.hex())
         return identity

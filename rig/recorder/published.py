@@ -16,10 +16,17 @@ if TYPE_CHECKING:
 
 EDGES_LIMIT = 1 << 16
 """Edges shown of one drop; all of them are in the session file."""
+
+
+def link_state(state: str, error: object = None, retry_s: float | None = None) -> dict[str, Any]:
+    """Describe the link: closed, opening, up, down."""
+    return {"state": state, "error": error, "retry_s": retry_s}
+
+
 _FIRST: dict[str, Any] = {
     "daemon": None,
     "port": None,
-    "link": {"state": "closed", "error": None, "retry_s": None},
+    "link": link_state("closed"),
     "device": None,
     "statistics": None,
     "gates": None,

@@ -94,7 +94,7 @@ def test_what_comes_next_is_the_daemons_to_know(processes, armed):
 def test_a_client_that_is_lost_while_armed_disarms(processes, armed):
     one, _ = armed
     processes.await_phase(Phase.ARMED)
-    one._socket.close()
+    one.line.close()
     processes.await_phase(Phase.IDLE)
     gone_on_with(processes)
     assert (1, 1, "interrupted") in states(processes)
@@ -217,7 +217,7 @@ def test_a_stop_ends_a_wait(processes, client):
     one, two = client("one"), client("two")
     one.take_control()
     one.open_session(str(processes.protocol), str(processes.session))
-    one._send(b'{"jsonrpc":"2.0","id":99,"method":"wait","params":{"seconds":600}}\n')
+    one.line.ask("wait", seconds=600)
     two.stop("no need")
     assert one.arm(1, 1)
 
@@ -225,7 +225,7 @@ def test_a_stop_ends_a_wait(processes, client):
 def test_a_client_that_leaves_after_the_release_leaves_a_recorded_drop(processes, armed):
     one, token = armed
     one.fire(token)
-    one._socket.close()
+    one.line.close()
     processes.await_phase(Phase.HOLDING)
     processes.await_phase(Phase.IDLE)
     assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]

@@ -21,6 +21,7 @@ from rig.daemon import admission, rpc, socket_path
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
 from rig.daemon.server import Server
+from rig.daemon.service import METHODS
 from rig.session.store import Session
 from tests.waiting import PATIENCE_S
 
@@ -194,7 +195,7 @@ def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
             raise SystemError
 
         monkeypatch.setattr(server._worker, "_attend", broken)
-        server._worker.lost()
+        server._worker.wake()
         with pytest.raises(SystemError):
             await serving
 
@@ -241,7 +242,7 @@ def test_batches_and_ids_are_as_json_rpc_has_them(door):
         assert [one["id"] for one in answers if "result" in one] in (["a", None], [None, "a"])
         assert last == {"jsonrpc": "2.0", "id": None, "result": {"disk_s": 0.0}}
         told = {one["id"]: one["error"]["message"] for one in answers if "error" in one}
-        assert told[3] == "unsubscribe: no such parameter: from"
+        assert told[3] == "unsubscribe: Object contains unknown field `from`"
 
     door(test)
 
@@ -252,7 +253,7 @@ def test_no_error_speaks_of_python(door):
             rpc.request(method, params, number)
             for number, (method, params) in enumerate(
                 (method, params)
-                for method in server._service._methods
+                for method in METHODS
                 for params in ({}, {"x": 1}, {"reason": 1, "seed": "x"})
             )
         ]

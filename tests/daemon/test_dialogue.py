@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.daemon import rpc
-from rig.daemon.client_protocol import ClientProtocol
+from rig.daemon.client import MessageReader
 from rig.errors import DeviceError
 
 MESSAGES = st.lists(st.dictionaries(st.text(max_size=4), st.text(max_size=9), max_size=3))
@@ -20,30 +20,23 @@ def test_any_cut_gives_the_same_messages(messages, data):
     stream = b"".join(json.dumps(one).encode() + b"\n" for one in messages)
     cuts = data.draw(st.lists(st.integers(1, max(1, len(stream))), max_size=9, unique=True))
     ends = sorted({*cuts, len(stream)} - {0})
-    dialogue, found = ClientProtocol(), []
+    dialogue, found = MessageReader(), []
     for begin, end in zip([0, *ends], ends, strict=False):
         if part := stream[begin:end]:
             found += dialogue.feed(part)
     assert found == messages
     with pytest.raises(DeviceError, match="hung up"):
-        dialogue.feed(b"")
+        list(dialogue.feed(b""))
 
 
 @pytest.mark.parametrize("line", [b"HTTP/1.1 400 Bad Request\n", b"\xff\xfe\n", b"[1]\n", b"\n"])
 def test_who_is_no_daemon_is_told_so(line):
     with pytest.raises(DeviceError, match="not a daemon of this rig"):
-        ClientProtocol().feed(line)
+        list(MessageReader().feed(line))
 
 
 def test_a_line_without_an_end_is_no_daemons():
-    dialogue = ClientProtocol()
-    assert dialogue.feed(b"x" * rpc.MESSAGE_LIMIT) == []
+    dialogue = MessageReader()
+    assert list(dialogue.feed(b"x" * rpc.MESSAGE_LIMIT)) == []
     with pytest.raises(DeviceError, match="not a daemon of this rig"):
-        dialogue.feed(b"x")
-
-
-def test_requests_are_numbered():
-    dialogue = ClientProtocol()
-    asked = [dialogue.ask("wait", {"seconds": n}) for n in (1, 2)]
-    assert [number for number, _ in asked] == [1, 2]
-    assert [rpc.read_line(line).id for _, line in asked] == [1, 2]
+        list(dialogue.feed(b"x"))

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.admission import CLIENTS, Admission
-from rig.daemon.client_protocol import Replica
 from rig.daemon.lease import LEASE_S, ControlError, Lease
 from rig.daemon.listener import Door
+from rig.daemon.replica import Replica
 from rig.daemon.stopper import Stopper
 from rig.errors import (
     DeviceError,
@@ -51,13 +51,11 @@ ERRORS = [
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
 def test_an_error_comes_out_as_it_went_in(error):
     line = rpc.failure(7, error)
-    with pytest.raises(type(error)) as again:
-        rpc.result_of(json.loads(line))
-    assert type(again.value) is type(error)
-    assert str(again.value) == str(error)
-    assert again.value.exit_code == error.exit_code
-    for name in ("reason", "detail", "disarmed", "reasons"):
-        assert getattr(again.value, name, None) == getattr(error, name, None)
+    again = rpc.error_of(json.loads(line))
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    for name in ("exit_code", "reason", "detail", "disarmed", "reasons"):
+        assert getattr(again, name, None) == getattr(error, name, None)
 
 
 def test_a_refusal_has_its_code_and_values_as_results_have_them():
@@ -209,9 +207,9 @@ def test_a_replica_shows_what_is_published_whenever_it_is_looked_at():
                     change = published.take()
                     if replica is None:
                         replica = Replica()
-                        replica.snapshot(json.loads(json.dumps(published.snapshot())))
+                        replica.notified("snapshot", json.loads(json.dumps(published.snapshot())))
                     elif change is not None:
-                        replica.change(json.loads(json.dumps(change)))
+                        replica.notified("change", json.loads(json.dumps(change)))
                     assert replica.n == published.snapshot()["n"]
                     assert json.loads(json.dumps(published.snapshot()["state"])) == replica.state
 
@@ -239,9 +237,9 @@ def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
 
 def test_a_replica_does_not_swallow_a_gap():
     replica = Replica()
-    replica.snapshot({"n": 3, "state": {"edges": []}})
+    replica.notified("snapshot", {"n": 3, "state": {"edges": []}})
     with pytest.raises(ValueError, match="change 5 behind 3"):
-        replica.change({"n": 5})
+        replica.notified("change", {"n": 5})
 
 
 @pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])
