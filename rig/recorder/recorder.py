@@ -164,7 +164,7 @@ class Recorder:
         """Log what STOP sent past everything, and no request has followed."""
         if self._device is not None:
             with suppress(SessionError):  # it waits in memory
-                self._device.finish()
+                self._device.log_past()
 
     @property
     def armed(self) -> tuple[int, int] | None:

@@ -196,7 +196,7 @@ def test_reading_from_a_closed_port_is_a_lost_connection(clock):
     port = FakePort(clock, {})
     port.read = lambda size=1: (_ for _ in ()).throw(serial.PortNotOpenError())
     with pytest.raises(DeviceError, match="connection lost"):
-        Device(port, clock).poll()
+        Device(port, clock).receive()
 
 
 def test_counting_on_a_closed_port_is_a_lost_connection(clock, monkeypatch):
@@ -316,7 +316,7 @@ def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(cl
         code, payload = wire.pack(wire.EventsFrame(1, n, (wire.Event(100 + n, n % 2),)))
         port.out += encode(Frame(code, 1, 0, payload))
     while port.out:
-        one.poll()
+        one.receive()
     drop = one.fetch(1)
     assert drop.faults == (make_reason("crc_mismatch"),)
     assert [edge.tick for edge in drop.edges] == [1, 2, 3]  # event 4 as it was read: no change
