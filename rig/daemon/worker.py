@@ -167,7 +167,7 @@ class Worker:
 
     def at_rest(self) -> Future[bool]:
         """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
-        return self._put(lambda: not self.controller.unsaved())
+        return self._put(lambda: not self.controller.has_unsaved())
 
     def end(self) -> None:
         """Finish: what is armed is disarmed, what is being recorded is recorded to its end."""

@@ -21,7 +21,7 @@ from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts, StoppedError
-from rig.recorder.opening import known_before, open_for, shown
+from rig.recorder.opening import describe_session, latest_board, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
@@ -143,10 +143,10 @@ class Controller:
         check_gates(scene)
         fresh = completed(self.url, source, path, seed)
         self.close_session()
-        made = not path.exists()
+        is_new = not path.exists()
         opened = open_for(scene, source, fresh, path)
         try:
-            before = known_before(opened)
+            before = latest_board(opened)
             self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
             self._locator.seek(before.get(SERIAL_NUMBER))
             self._session, self._protocol = opened, scene
@@ -156,14 +156,14 @@ class Controller:
         except BaseException as error:
             # With other input it would be another protocol's, or of another kind of port: in the
             # way of the next try, and where no byte went over the line there is nothing in it.
-            empty = made and (isinstance(error, InputError) or not any(opened.byte_log()))
+            empty = is_new and (isinstance(error, InputError) or not any(opened.byte_log()))
             try:
                 self._part_with(opened)
             finally:
                 if empty:
                     path.unlink(missing_ok=True)
             raise
-        about, plan = shown(opened, scene)
+        about, plan = describe_session(opened, scene)
         log.info("session: %s", path)
         self.published.plan(plan)
         self.published.set(session=about, drop=None, release_test=None)
@@ -183,7 +183,7 @@ class Controller:
         assert protocol is not None
         with self.interrupts.held():
             session.unblind()
-        self.published.set(session=shown(session, protocol)[0])
+        self.published.set(session=describe_session(session, protocol)[0])
 
     def close_session(self) -> None:
         """Make safe and close the file, whole; nothing when none is open."""
@@ -231,14 +231,14 @@ class Controller:
         self.published.set(link=link_state("opening"))
         url = self._line_url
         if not is_simulated(url):
-            url = self._locator.now if port is not None else self._locator.look()
+            url = self._locator.path if port is not None else self._locator.look()
         recorder = Recorder(
             sink, url, self.interrupts, feed=StateFeed(self.published), halted=self._halted,
             meet=self._locator.meet,
         )  # fmt: skip
         identity = recorder.connect(port)
         self.published.set(
-            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.now}
+            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path}
         )
         self.recorder = recorder
         self.published.set(link=link_state("up"), phase="idle")
@@ -287,7 +287,7 @@ class Controller:
 
     # ------------------------------------------------------------------ drops
 
-    def unsaved(self) -> bool:
+    def has_unsaved(self) -> bool:
         """Ask whether a drop is armed or falls, or fell and is in no file yet.
 
         Raises
@@ -419,9 +419,9 @@ class Controller:
         if self._protocol is None or recorder.armed or self.due:
             raise make_error(InputError, "not_now", act="test the release")
         self.published.set(release_test=None)
-        found = release_test.drive(recorder, self._protocol, self._halted)
-        self.published.set(release_test=found)
-        return found
+        result = release_test.drive(recorder, self._protocol, self._halted)
+        self.published.set(release_test=result)
+        return result
 
     def log_state(
         self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()

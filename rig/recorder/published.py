@@ -64,7 +64,7 @@ class PublishedState:
         self._n = 0
         self._dirty: set[str] = set()
         self._dirty_runs: set[int] = set()
-        self._told = 0  # edges that went out
+        self._sent = 0  # edges that went out
 
     def set(self, **sections: Any) -> None:
         """Give sections new values; equal ones are no change."""
@@ -97,7 +97,7 @@ class PublishedState:
         """Show these edges instead."""
         with self._changing():
             self._edges = list(edges)[:EDGES_LIMIT]
-            self._told = len(self._edges)
+            self._sent = len(self._edges)
             self._dirty.add("edges")
 
     def planned(self, number: int) -> bool:
@@ -128,10 +128,10 @@ class PublishedState:
             if self._dirty_runs and "runs" not in self._dirty:
                 change["runs"] = [self._runs[number] for number in sorted(self._dirty_runs)]
             if "edges" in self._dirty:
-                self._told = len(self._edges)
-            elif self._told < len(self._edges):
-                change["edges"] = self._edges[self._told :]
-                self._told = len(self._edges)
+                self._sent = len(self._edges)
+            elif self._sent < len(self._edges):
+                change["edges"] = self._edges[self._sent :]
+                self._sent = len(self._edges)
             self._dirty.clear()
             self._dirty_runs.clear()
             return change
@@ -148,7 +148,7 @@ class PublishedState:
 
     @property
     def _clean(self) -> bool:
-        return not self._dirty and not self._dirty_runs and self._told >= len(self._edges)
+        return not self._dirty and not self._dirty_runs and self._sent >= len(self._edges)
 
     def _state(self, *, edges: bool = True) -> dict[str, Any]:
         state = self._sections | {"runs": list(self._runs.values())}
