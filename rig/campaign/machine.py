@@ -109,19 +109,19 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
     """Take one event."""
     match event:
         case events.Stopped():
-            return _stopped(flow)
+            return _stop(flow)
         case events.Lost(trouble):
             return _lost(flow, trouble)
         case events.Warned(trouble):
             return replace(flow, trouble=flow.trouble or trouble), ()
         case events.Answered(ticket, token):
-            return _answered(flow, ticket, token)
+            return _take_answer(flow, ticket, token)
         case events.EffectFailed():
             return _effect_failed(flow, event)
         case events.Tick(seconds):
             return _tick(flow, seconds)
         case events.Judged():
-            return _judged(flow, event)
+            return _take_verdict(flow, event)
         case events.GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
         case events.Try() if flow.stage in _IDLE:
@@ -137,16 +137,16 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case events.Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
             if flow.verdict != "rejected":
                 flow = replace(flow, judged=(flow.verdict, flow.reasons))
-            return _relogged(
+            return _log_again(
                 flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow))
             )
         case events.Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
             verdict, reasons = flow.judged
-            return _relogged(flow, verdict, (*_noteless(reasons), *_notes(flow)))
+            return _log_again(flow, verdict, (*_noteless(reasons), *_notes(flow)))
         case events.Note(text) if flow.stage is Stage.RESULT:
             note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
             if note != _notes(flow):  # what was noted before stays in the log
-                return _relogged(flow, flow.verdict, (*_noteless(flow.reasons), *note))
+                return _log_again(flow, flow.verdict, (*_noteless(flow.reasons), *note))
     return flow, ()
 
 
@@ -158,7 +158,7 @@ def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
     return tuple(reason for reason in reasons if reason.code != NOTE)
 
 
-def _stopped(flow: Flow) -> Outcome:
+def _stop(flow: Flow) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
         said = "stopped: the release is off"
         if flow.stage is not Stage.TESTING:
@@ -177,7 +177,7 @@ def _lost(flow: Flow, trouble: str) -> Outcome:
     return flow, ()
 
 
-def _answered(flow: Flow, ticket: int, token: int | None) -> Outcome:
+def _take_answer(flow: Flow, ticket: int, token: int | None) -> Outcome:
     if ticket != flow.ticket:
         # What was stopped while the device was arming must not stay armed.
         return flow, () if token is None else (events.Stop(),)
@@ -240,7 +240,7 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
     return replace(flow.to(Stage.FIRING), left_s=0.0), (events.FireRelease(flow.token),)
 
 
-def _judged(flow: Flow, event: events.Judged) -> Outcome:
+def _take_verdict(flow: Flow, event: events.Judged) -> Outcome:
     if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
         return flow, ()
     job, verdict, reasons = flow.job, event.verdict, event.reasons
@@ -273,7 +273,7 @@ def _onward(flow: Flow, job: Job | None) -> Outcome:
     return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
-def _relogged(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
+def _log_again(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
     """Log the drop once more."""
     job = flow.job
     assert job is not None

@@ -114,7 +114,7 @@ def ping_rate(split: Epochs) -> TickRate:
         The rate; the nominal one with u = 0.5 %/√3 when the samples say no more than that.
     """
     pieces = [_ping_piece(pings, split.nominal_hz) for pings in split.pings if len(pings) > 1]
-    rate = _fitted(pieces, split.nominal_hz)
+    rate = _fit_track(pieces, split.nominal_hz)
     return replace(rate, outliers=sum(map(len, split.pings)) - rate.n)
 
 
@@ -158,7 +158,7 @@ def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
         stretch = [(pulse.number, moment.tick)]
         began_ns, epoch = moment.at_ns, moment.epoch
     pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
-    return _fitted([piece for piece in pieces if len(piece.at) > 1], split.nominal_hz)
+    return _fit_track([piece for piece in pieces if len(piece.at) > 1], split.nominal_hz)
 
 
 class _Piece(NamedTuple):
@@ -203,7 +203,7 @@ def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: 
     )
 
 
-def _fitted(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
+def _fit_track(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
     """Fit a track, leave out what is far off even for its own scatter, and fit again."""
     at, phase, sigma = (np.concatenate([[], *(piece[n] for piece in pieces)]) for n in range(3))
     everything = Readings(
@@ -215,11 +215,11 @@ def _fitted(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
     nominal = TickRate(*_least(nominal_hz), 0, 0.0, nominal_hz=nominal_hz)
     # A walk can follow stray samples, and a steady rate takes a walk's ends for stray: what
     # little strays from a steady rate is left out first, and the rest asked whether it wanders.
-    readings, track = _gated(everything, steady=True)
+    readings, track = _reject_outliers(everything, steady=True)
     if track is not None:
         track.search()
         if track.seen or readings.at.size < _MOSTLY * everything.at.size:
-            readings, track = _gated(everything, steady=False)
+            readings, track = _reject_outliers(everything, steady=False)
     if track is None:
         return nominal
     hz, u_hz = _least(nominal_hz, track.mean())
@@ -232,7 +232,7 @@ def _fitted(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
     return TickRate(hz, u_hz, n, span, everything.at.size - n, nominal_hz, track)
 
 
-def _gated(readings: Readings, *, steady: bool) -> tuple[Readings, Track | None]:
+def _reject_outliers(readings: Readings, *, steady: bool) -> tuple[Readings, Track | None]:
     """Leave out what is far off, a few passes long; no track where too little is left."""
     for number in range(_PASSES):
         if readings.at.size < 2 or readings.at[-1] <= readings.at[0]:

@@ -85,7 +85,7 @@ class AsyncClient:
             self._loop.call_soon_threadsafe(what, *values)
 
     def _follow(self, method: str, params: dict[str, Any]) -> None:
-        self.replica.notified(method, params)
+        self.replica.follow(method, params)
         self.changed()
 
     def _end(self) -> None:

@@ -33,7 +33,7 @@ class Admission:
         """Give every connection there is."""
         return iter([*self._standings])
 
-    def arrived(self, connection: Connection) -> None:
+    def register(self, connection: Connection) -> None:
         """Count a connection of which nothing is known yet."""
         if self._count(Standing.STRANGER) >= STRANGERS:
             self.make_room()
@@ -44,7 +44,7 @@ class Admission:
         for connection, standing in self._standings.items():
             # Who said hello and waits for the answer has done what there is to do.
             if standing is Standing.STRANGER and not connection.spoke:
-                self.left(connection)
+                self.forget(connection)
                 connection.turn_away(make_error(BusyError, "connections_silent"))
                 return True
         return False
@@ -78,7 +78,7 @@ class Admission:
         if self._standings.get(connection) is Standing.RESERVE and method != "stop":
             raise make_error(BusyError, "clients_only_stop", clients=CLIENTS)
 
-    def left(self, connection: Connection) -> None:
+    def forget(self, connection: Connection) -> None:
         """Forget a connection."""
         self._standings.pop(connection, None)
 

@@ -20,7 +20,7 @@ class Replica:
         self.n = 0
         self.state: dict[str, Any] = {}
 
-    def notified(self, method: str, params: dict[str, Any]) -> None:
+    def follow(self, method: str, params: dict[str, Any]) -> None:
         """Take a notification: a whole state, or a change.
 
         Raises

@@ -120,7 +120,7 @@ class Server:
             parts.append(self._watch_clients(self._idle_s))
         tasks = [loop.create_task(part) for part in parts]
         for task in tasks:
-            task.add_done_callback(self._ended)
+            task.add_done_callback(self._on_end)
 
         def died(error: BaseException) -> None:
             loop.call_soon_threadsafe(self._fail, error)
@@ -150,7 +150,7 @@ class Server:
         """End as a signal would."""
         self._over.set()
 
-    def _ended(self, task: asyncio.Task[None]) -> None:
+    def _on_end(self, task: asyncio.Task[None]) -> None:
         """See that no part of the daemon dies in silence."""
         if not task.cancelled() and (error := task.exception()) is not None:
             self._fail(error)
@@ -183,14 +183,14 @@ class Server:
             return
         reader, writer = await asyncio.open_connection(sock=line, limit=rpc.REQUEST_LIMIT)
         connection = Connection(reader, writer, self._service.do, self._lease.heard, self._turns)
-        self._admission.arrived(connection)
+        self._admission.register(connection)
         late = loop.call_later(HELLO_S, self._hurry, connection)
         try:
             await connection.serve()
         finally:
             late.cancel()
             self._left_at = loop.time()
-            self._service.left(connection)
+            self._service.forget(connection)
             connection.close()
 
     def _hurry(self, connection: Connection) -> None:
@@ -210,7 +210,7 @@ class Server:
         data, before = None, "idle"
         while True:
             await asyncio.sleep(STALL_S / 10)
-            stalled = self._worker.stalled()
+            stalled = self._worker.stall()
             if stalled is not None:
                 if data is None:
                     log.warning("%s (%s)", stalled.message, stalled.hint)

@@ -92,9 +92,9 @@ class Service:
             result = await result
         return result if isinstance(result, dict) else {}
 
-    def left(self, client: Connection) -> None:
+    def forget(self, client: Connection) -> None:
         """Note that a client is gone: what it had armed is disarmed."""
-        self.admission.left(client)
+        self.admission.forget(client)
         self.publisher.discard(client)
         self.release(client)
 
@@ -190,7 +190,7 @@ async def _stop(service: Service, client: Connection, reason: str) -> None:
     done = asyncio.wrap_future(service.worker.stop(text))
     await asyncio.wait([done], timeout=_STOP_S)
     if not done.done():
-        stalled = service.worker.stalled()
+        stalled = service.worker.stall()
         because = f": {stalled.message}" if stalled else ""
         raise make_error(DeviceTimeoutError, "stop_unknown", because=because)
     done.result()

@@ -96,7 +96,9 @@ class Worker:
         self._trouble_session: object = None  # that was open then
         self._begun: dict[str, float] = {}  # when each duty was done last
         self.died: Callable[[BaseException], None] = lambda _: None
-        self.controller = Controller(url, published=published, halted=self._halted, keep_port=True)
+        self.controller = Controller(
+            url, published=published, halted=self._is_halted, keep_port=True
+        )
         self._stopper = Stopper(self.controller.stop_past)
         self._thread = threading.Thread(target=self._run, name="rig worker")
 
@@ -154,7 +156,7 @@ class Worker:
             return self.controller.session.write_s
         return 0.0
 
-    def stalled(self) -> RigError | None:
+    def stall(self) -> RigError | None:
         """Say that nothing is known of the board, when the worker has been held up for long."""
         late_s, recorder = time.monotonic() - self._due_s, self.controller.recorder
         disk = self.disk_s() > 0.0
@@ -181,7 +183,7 @@ class Worker:
 
     # ------------------------------------------------------------------ the thread
 
-    def _halted(self) -> bool:
+    def _is_halted(self) -> bool:
         """Whether what is under way shall end: asked by the recorder, many times a second."""
         self._beat()
         if self._stops:
@@ -233,7 +235,7 @@ class Worker:
         if job is None or not job.outcome.set_running_or_notify_cancel():
             return  # somebody only wants to be heard, or nobody waits any more
         if self._stops:
-            job.outcome.set_exception(self._stopped())
+            job.outcome.set_exception(self._stop_error())
             return
         self._at_work = True
         try:
@@ -244,7 +246,7 @@ class Worker:
             if self._trouble is None:
                 self._weigh(failure)
             is_stopped = isinstance(error, StoppedError | DeviceRefusedError) and self._stops
-            job.outcome.set_exception(self._stopped() if is_stopped else failure)
+            job.outcome.set_exception(self._stop_error() if is_stopped else failure)
         else:
             if self._trouble is not None and self._over():
                 self._well()
@@ -262,7 +264,7 @@ class Worker:
     def _open_session(self) -> object:
         return self.controller.session if self.controller.recording else None
 
-    def _stopped(self) -> StoppedError:
+    def _stop_error(self) -> StoppedError:
         return make_error(StoppedError, "stopped", text=self._stops[0].reason)
 
     def _drain(self, error: RigError) -> None:
@@ -279,7 +281,7 @@ class Worker:
         why: Reason | str = ""
         if stops:
             why = stops[0].reason
-            self._drain(self._stopped())
+            self._drain(self._stop_error())
         elif self.controller.armed is not None and not self._held:
             silence = self._lease.silence(self._holder)
             client = {"client": self._lease.name, "silence_s": silence} if silence else {}

@@ -188,7 +188,7 @@ class Transcript:
                 records.append(Pulse(self._sample_sent[1], host_ns, count, tick))
                 self._sample_sent = None
             case wire.Armed(token=token) if isinstance(asked, wire.Arm):
-                self._armed(token, asked)
+                self._begin_drop(token, asked)
             case wire.Fired(tick=tick) if isinstance(asked, wire.Fire):
                 label = self._tokens.get(asked.token)
                 if label in self._drops:
@@ -205,10 +205,10 @@ class Transcript:
                 self._sample_sent = None
                 for drop in self._drops.values():
                     drop.reset = True
-                records += self._booted(host_ns, cause)
+                records += self._restart_records(host_ns, cause)
         return records
 
-    def _booted(self, host_ns: int, cause: int) -> list[Record]:
+    def _restart_records(self, host_ns: int, cause: int) -> list[Record]:
         opened_ns, fired = self._opened_ns, self._fired
         self._opened_ns = self._fired = None
         if opened_ns is not None:
@@ -219,7 +219,7 @@ class Transcript:
         label, fired_ns = fired
         return [Restart(host_ns, cause, label, (host_ns - fired_ns) * 1e-9, self._start_up_s)]
 
-    def _armed(self, token: int, request: wire.Arm) -> None:
+    def _begin_drop(self, token: int, request: wire.Arm) -> None:
         self._tokens = {token: request.label}
         self._given.discard(request.label)
         drop = self._drops[request.label] = Assembly(request.label)

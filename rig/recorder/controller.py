@@ -265,7 +265,7 @@ class Controller:
         DeviceError
             The device holds a drop of another session, or is in trouble.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         held = recorder.held()
         if held is not None and held[0] == TEST_RUN:
             release_test.forget(recorder)
@@ -318,7 +318,7 @@ class Controller:
 
     def wait(self, seconds: float) -> None:
         """Let time pass, see `Recorder.wait`."""
-        self._connected().wait(seconds)
+        self._require_recorder().wait(seconds)
 
     def arm(self, run: int, attempt: int) -> int:
         """Prepare a drop.
@@ -335,11 +335,11 @@ class Controller:
         DeviceRefusedError
             As for `Recorder.arm`.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         if self._protocol is None or recorder.armed or self.due:
             raise make_error(InputError, "not_now", act="arm")
         last = self.session.latest_state(run)
-        planned = self.published.planned(run)
+        planned = self.published.has_run(run)
         if not planned or attempt != (last.attempt if last else 0) + 1:
             raise make_error(InputError, "not_next", run=run, attempt=attempt)
         self.session.require_presence()
@@ -363,7 +363,7 @@ class Controller:
         DeviceRefusedError
             As for `Recorder.fire`.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         armed = recorder.armed
         if armed is None:
             raise self._unarmed or make_error(InputError, "nothing_armed")
@@ -385,7 +385,7 @@ class Controller:
             return
         due = self.due
         try:
-            self._connected().collect(*due)
+            self._require_recorder().collect(*due)
         except RigError as error:
             self._lost[due] = error
             raise
@@ -415,7 +415,7 @@ class Controller:
         InputError
             No session is open, or a drop is under way.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         if self._protocol is None or recorder.armed or self.due:
             raise make_error(InputError, "not_now", act="test the release")
         self.published.set(release_test=None)
@@ -443,7 +443,7 @@ class Controller:
             which = {"run": run, "attempt": attempt, "state": state}
             raise make_error(InputError, "cannot_judge", **which)
         if (last.state, last.reasons) != (state, reasons):
-            self._connected().state(run, attempt, state, reasons)
+            self._require_recorder().state(run, attempt, state, reasons)
             self.session.settle()
 
     def stop(self, reason: Reason | str) -> None:
@@ -485,7 +485,7 @@ class Controller:
         finally:
             self.disconnect()
 
-    def _connected(self) -> Recorder:
+    def _require_recorder(self) -> Recorder:
         if self.recorder is None:
             raise make_error(DeviceError, "no_connection")
         return self.recorder

@@ -100,7 +100,7 @@ class PublishedState:
             self._sent = len(self._edges)
             self._dirty.add("edges")
 
-    def planned(self, number: int) -> bool:
+    def has_run(self, number: int) -> bool:
         """Whether the plan has this run."""
         with self._guard:
             return number in self._runs

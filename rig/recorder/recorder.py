@@ -355,7 +355,7 @@ class Recorder:
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
         log.info("run %d, attempt %d: recorded, %d edges", drop.run, drop.attempt, len(drop.edges))
         if self._feed is not None:
-            self._feed.recorded(drop)
+            self._feed.show_drop(drop)
         self._acknowledge(drop)
         return drop
 

@@ -326,7 +326,7 @@ def test_the_oldest_that_says_nothing_makes_room():
     door = admission.Admission()
     for number in range(admission.STRANGERS + 3):
         said = number == 1
-        door.arrived(Mock(spoke=said, turn_away=lambda _why, n=number: turned_away.append(n)))
+        door.register(Mock(spoke=said, turn_away=lambda _why, n=number: turned_away.append(n)))
     assert turned_away == [0, 2, 3]  # 1 waits for an answer
     while door.make_room():
         pass

@@ -174,7 +174,7 @@ def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch)
 def test_a_client_in_the_reserve_has_no_more_time_than_a_stranger():
     admission, *clients = Admission(), *(Mock() for _ in range(CLIENTS + 1))
     for client in clients:
-        admission.arrived(client)
+        admission.register(client)
         assert admission.late(client)
         admission.welcome(client)
     assert [client for client in clients if admission.late(client)] == clients[-1:]
@@ -207,9 +207,9 @@ def test_a_replica_shows_what_is_published_whenever_it_is_looked_at():
                     change = published.take()
                     if replica is None:
                         replica = Replica()
-                        replica.notified("snapshot", json.loads(json.dumps(published.snapshot())))
+                        replica.follow("snapshot", json.loads(json.dumps(published.snapshot())))
                     elif change is not None:
-                        replica.notified("change", json.loads(json.dumps(change)))
+                        replica.follow("change", json.loads(json.dumps(change)))
                     assert replica.n == published.snapshot()["n"]
                     assert json.loads(json.dumps(published.snapshot()["state"])) == replica.state
 
@@ -237,9 +237,9 @@ def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
 
 def test_a_replica_does_not_swallow_a_gap():
     replica = Replica()
-    replica.notified("snapshot", {"n": 3, "state": {"edges": []}})
+    replica.follow("snapshot", {"n": 3, "state": {"edges": []}})
     with pytest.raises(ValueError, match="change 5 behind 3"):
-        replica.notified("change", {"n": 5})
+        replica.follow("change", {"n": 5})
 
 
 @pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])
