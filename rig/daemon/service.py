@@ -113,7 +113,7 @@ class Service:
         published.set(control=control)
 
 
-class Method(NamedTuple):
+class ApiMethod(NamedTuple):
     """One row of the table.
 
     Attributes
@@ -207,12 +207,12 @@ def _log_state(rig: Controller, reasons: Reasons, **values: Any) -> None:
     rig.log_state(reasons=tuple(reasons), **values)
 
 
-def _at_once(do: Callable[..., Any], **parameters: Any) -> Method:
-    return Method(do, _declare(parameters))
+def _at_once(do: Callable[..., Any], **parameters: Any) -> ApiMethod:
+    return ApiMethod(do, _declare(parameters))
 
 
-def _of_rig(do: Callable[..., Any], *, writes: bool = True, **parameters: Any) -> Method:
-    return Method(do, _declare(parameters), of_rig=True, writes=writes)
+def _of_rig(do: Callable[..., Any], *, writes: bool = True, **parameters: Any) -> ApiMethod:
+    return ApiMethod(do, _declare(parameters), of_rig=True, writes=writes)
 
 
 def _declare(parameters: dict[str, Any]) -> type[msgspec.Struct]:

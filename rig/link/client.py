@@ -219,10 +219,6 @@ class Device(Exchange):
         """Switch the release off, disarm, end a recording."""
         self.request(wire.Abort(), wire.Done, wait=_ABORT_WAIT_S)
 
-    def abort_past(self) -> None:
-        """Send ABORT from any thread, whatever is under way, see `Exchange.write_past`."""
-        self.write_past(wire.Abort())
-
     def acknowledge(self, label: int, crc32: int) -> None:
         """Let the device forget a drop: call it when the drop is safe on disk, not before.
 

@@ -32,6 +32,8 @@ _LONGEST_WAIT_S = 0.5
 _BACK_OFF = 1.5
 _PAST_SEQ = 255
 """Of what goes past a request that is under way, whose answer it must not be taken for."""
+# The delimiter ends what another thread may be in the middle of: that is sent again.
+_ABORT = DELIMITER + encode(Frame(wire.CODES[wire.Abort], _PAST_SEQ, 0, b""))
 STRANGE_BYTES = 1 << 20
 """Read and kept at most of somebody who has not said who he is."""
 _AT_ONCE = 1 << 16
@@ -82,7 +84,7 @@ class Exchange:
         self._on_record = on_record
         self._seq = 0
         self._part = b""  # of a frame that has not ended yet
-        self._past: deque[tuple[int, bytes]] = deque()  # what `write_past` sent, for the tap
+        self._past: deque[tuple[int, bytes]] = deque()  # what `abort_past` sent, for the tap
 
     def request(
         self,
@@ -211,8 +213,8 @@ class Exchange:
         except OSError as error:
             raise _lost(error) from error
 
-    def write_past(self, message: wire.HostMessage) -> None:
-        """Send a request at once, from any thread, past one that is under way.
+    def abort_past(self) -> None:
+        """Send ABORT at once, from any thread, past a request that is under way.
 
         Nobody waits for its answer. The tap is given it before whatever comes next.
 
@@ -221,11 +223,8 @@ class Exchange:
         OSError
             The connection broke.
         """
-        # The delimiter ends what another thread may be in the middle of: that is sent again.
-        code, payload = wire.pack(message)
-        data = DELIMITER + encode(Frame(code, _PAST_SEQ, 0, payload))
-        self._past.append((self.clock.now_ns(), data))
-        self._port.write(data)
+        self._past.append((self.clock.now_ns(), _ABORT))
+        self._port.write(_ABORT)
 
     def waiting(self) -> int:
         """Count the bytes that have arrived and were not read yet.
