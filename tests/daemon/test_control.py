@@ -10,7 +10,7 @@ import pytest
 
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
-from rig.daemon.lease import ControlError, Lease
+from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, InputError
 from rig.link.client import Device
 from rig.link.frames import Decoder
@@ -112,21 +112,6 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     one, token = armed
     with pytest.raises(StoppedError, match=reason.text):
         one.fire(token)
-
-
-def test_who_was_silent_too_long_is_told_that_another_has_control():
-    now = [0.0]
-    lease = Lease(lambda: now[0])
-    lease.take("runner", "rig run 1")
-    now[0] = 5.0
-    lease.take("other", "a tui")
-    now[0] = 7.5
-    lease.heard("runner")
-    with pytest.raises(ControlError, match=r"nothing was heard .* for 7\.5 s, and a tui has it"):
-        lease.require("runner")
-    lease.release("other")
-    lease.take("runner", "rig run 1")
-    lease.require("runner")
 
 
 def test_a_device_that_disarms_itself_is_noticed(processes, armed):

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.admission import CLIENTS, Admission
+from rig.daemon.client import MessageReader
 from rig.daemon.lease import LEASE_S, ControlError, Lease
 from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
@@ -26,7 +27,7 @@ from rig.errors import (
     SessionError,
 )
 from rig.files import identity_of
-from rig.link.messages import DisarmReason, RefusalReason
+from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
 from rig.recorder.controller import Controller
@@ -46,6 +47,8 @@ ERRORS = [
     make_error(ControlError, "control_lost", silence_s=3.25, holder="Ada"),
     rpc.VersionError("old"),
 ]
+
+MESSAGES = st.lists(st.dictionaries(st.text(max_size=4), st.text(max_size=9), max_size=3))
 
 
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
@@ -106,6 +109,33 @@ def test_a_request_is_read_as_it_was_written():
     assert line.count(b"\n") == 1
 
 
+@given(MESSAGES, st.data())
+def test_any_cut_gives_the_same_messages(messages, data):
+    stream = b"".join(json.dumps(one).encode() + b"\n" for one in messages)
+    cuts = data.draw(st.lists(st.integers(1, max(1, len(stream))), max_size=9, unique=True))
+    ends = sorted({*cuts, len(stream)} - {0})
+    dialogue, found = MessageReader(), []
+    for begin, end in zip([0, *ends], ends, strict=False):
+        if part := stream[begin:end]:
+            found += dialogue.feed(part)
+    assert found == messages
+    with pytest.raises(DeviceError, match="hung up"):
+        list(dialogue.feed(b""))
+
+
+@pytest.mark.parametrize("line", [b"HTTP/1.1 400 Bad Request\n", b"\xff\xfe\n", b"[1]\n", b"\n"])
+def test_who_is_no_daemon_is_told_so(line):
+    with pytest.raises(DeviceError, match="not a daemon of this rig"):
+        list(MessageReader().feed(line))
+
+
+def test_a_line_without_an_end_is_no_daemons():
+    dialogue = MessageReader()
+    assert list(dialogue.feed(b"x" * rpc.MESSAGE_LIMIT)) == []
+    with pytest.raises(DeviceError, match="not a daemon of this rig"):
+        list(dialogue.feed(b"x"))
+
+
 class Time:
     """A clock that is set by hand."""
 
@@ -142,18 +172,23 @@ def test_one_client_has_control_until_it_is_not_heard():
     assert lease.holder is None
 
 
-def test_who_gives_control_up_is_not_told_later_that_it_was_lost():
+def test_who_was_silent_too_long_is_told_so_until_it_gives_control_up_or_has_it_again():
     time = Time()
     lease = Lease(time)
     lease.take("one", "rig run 1")
-    time.now = LEASE_S
-    lease.take("two", "tui 2")
+    time.now = 5.0
+    lease.take("two", "a tui")
+    time.now = 7.5
     lease.heard("one")
-    with pytest.raises(ControlError, match="control was lost"):
+    lost = r"control was lost: nothing was heard .* for 7\.5 s, and a tui has it"
+    with pytest.raises(ControlError, match=lost):
         lease.require("one")
     assert not lease.release("one")
     with pytest.raises(ControlError, match="take control first"):
         lease.require("one")
+    lease.release("two")
+    lease.take("one", "rig run 1")
+    lease.require("one")
 
 
 def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch):
@@ -243,21 +278,23 @@ def test_a_replica_does_not_swallow_a_gap():
 
 
 @pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])
-def test_stop_is_sent_five_times_unless_the_worker_takes_over(worker_comes, times):
-    sent = []
+def test_stop_is_sent_five_times_unless_the_worker_takes_over(monkeypatch, worker_comes, times):
+    sent, paused = [], []
 
     def send():
         sent.append(1)
         stopper._ending = True  # behind what is asked for now
         stopper._asked.set()
-        if worker_comes:
-            stopper.taken_over()
         return True
 
     stopper = Stopper(send)  # never started: this thread is its thread
+    pause = lambda seconds: paused.append(seconds) or worker_comes  # noqa: E731
+    monkeypatch.setattr(stopper._taken_over, "wait", pause)
     stopper.ask()
     stopper._run()
     assert len(sent) == times
+    # The board switches itself off by then, and a later one could end what somebody armed anew.
+    assert 0.0 < sum(paused) < HOST_SILENCE_MS * 1e-3
 
 
 def test_who_asks_for_stop_again_waits_until_that_one_has_left_too():

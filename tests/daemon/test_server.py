@@ -18,37 +18,13 @@ from rig.daemon import rpc
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
 from rig.daemon.listener import listen, notify_systemd
-from rig.daemon.server import Server
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, InputError, RigError
-from tests.waiting import PATIENCE_S
 
 _SECTIONS = {
     "daemon", "port", "link", "device", "statistics", "gates", "phase", "drop", "edges", "session",
     "runs", "control", "clients", "error", "release_test",
 }  # fmt: skip
-
-
-@pytest.fixture
-def door(tmp_path):
-    """Run a test inside the daemon's own loop: a daemon whose simulated port is still closed."""
-
-    def within(test, *, tcp=False):
-        async def run():
-            path = tmp_path / "door" / "rig.sock"
-            server, ready = Server("sim://", path, tcp=tcp), asyncio.Event()
-            serving = asyncio.get_running_loop().create_task(server.run(ready.set))
-            await asyncio.wait_for(ready.wait(), PATIENCE_S)
-            try:
-                await asyncio.wait_for(test(server, path), PATIENCE_S)
-            finally:
-                server.end()
-                await serving
-            assert not path.exists()
-
-        asyncio.run(run())
-
-    return within
 
 
 async def told(path, *lines):
