@@ -175,8 +175,8 @@ def _look(processes: ProcessFixture, moments: list[float], tally: FaultTally) ->
         tally.drops += sum(1 for _ in session.drops())
         for host_ns, direction, data in session.byte_log():
             transcript.feed(direction, host_ns, data)
-    tally.frames += transcript.good_frames + transcript.bad_frames
-    tally.bad_frames += transcript.bad_frames
+    tally.frames += transcript.rx.good + transcript.rx.bad
+    tally.bad_frames += transcript.rx.bad
 
 
 def faults(

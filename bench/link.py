@@ -164,7 +164,7 @@ def _read(folder: Path, server: Server, terminal: PtyWriter, count: int) -> None
         port = open_port(terminal.path)
         line = Exchange(port, SystemClock(), session.log_bytes, view.know, 1)
         terminal.start()
-        while line.transcript.good_frames < count:
+        while line.transcript.rx.good < count:
             line.receive()
         session.commit()
         port.close()

@@ -125,7 +125,7 @@ def _flood(processes: ProcessFixture) -> Iterator[None]:
         for number in range(_FLOODERS):
             client = stack.enter_context(closing(processes.client(f"flood {number}")))
             line = b"".join(rpc.request("subscribe", {}, n) for n in range(_FLOOD))
-            client._socket.sendall(line)
+            client.line._socket.sendall(line)
         yield
 
 

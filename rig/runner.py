@@ -7,23 +7,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.campaign.events import (
-    Answered,
-    ArmRelease,
-    Collect,
-    FireRelease,
-    Found,
-    GiveUp,
-    GoOn,
-    Judge,
-    Judged,
-    Log,
-    Stage,
-    Stop,
-    Tick,
-    Wait,
-    effect_failed,
-)
+from rig.campaign import events
+from rig.campaign.events import Stage
 from rig.campaign.machine import Flow, step
 from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
 from rig.campaign.voids import voids_of
@@ -55,6 +40,7 @@ if TYPE_CHECKING:
     from rig.results import SessionResults
 
 
+_FALL = (events.FireRelease, events.Collect, events.Stop)
 _VALUE = 17  # characters, as of −3.2076 ± 0.0017
 
 
@@ -192,14 +178,14 @@ class Campaign:
     def _next(self) -> Event:
         """Say what the operator would: at each stage where the campaign waits for one."""
         if self.flow.stage is Stage.COUNTDOWN:
-            return Tick(0.0)
+            return events.Tick(0.0)
         if self._unjudged and self.flow.stage is not Stage.RESULT:
-            return Found(self._unjudged.popleft())
+            return events.Found(self._unjudged.popleft())
         job = self._unjudged[0] if self._unjudged else self._next_job()
         if self.flow.stage is not Stage.PREPARE or job is None:
-            return GoOn(job)
+            return events.GoOn(job)
         self._request(job)
-        return GoOn(job, self._rest_s())
+        return events.GoOn(job, self._rest_s())
 
     def _next_job(self) -> Job | None:
         """Name the next attempt; runs before it are done for good."""
@@ -248,9 +234,9 @@ class Campaign:
         """Carry out what is wanted, and what comes of that, until nothing is."""
         while self._effects:
             match self._effects[0]:
-                case FireRelease():
+                case events.FireRelease():
                     self._fall()
-                case GiveUp():
+                case events.GiveUp():
                     assert self._failed is not None
                     raise self._failed
                 case effect:
@@ -261,7 +247,9 @@ class Campaign:
         """Let go, and stay until the drop is recorded: preparing it took minutes."""
         with self.interrupts.held():
             try:
-                while self._effects and isinstance(self._effects[0], FireRelease | Collect | Stop):
+                while self._effects and isinstance(
+                    self._effects[0], events.FireRelease | events.Collect | events.Stop
+                ):
                     self._do(self._effects.popleft())
             except KeyboardInterrupt:
                 self._stop("interrupted by the operator")
@@ -272,21 +260,21 @@ class Campaign:
         token = None
         try:
             match effect:
-                case Stop(reason):
+                case events.Stop(reason):
                     self._stop(reason)
                     return
-                case Wait(seconds):
+                case events.Wait(seconds):
                     self.rig.wait(seconds)
-                case ArmRelease(job):
+                case events.ArmRelease(job):
                     token = self.rig.arm(*job)
-                case FireRelease(armed):
+                case events.FireRelease(armed):
                     self.rig.fire(armed)
-                case Collect(job):
+                case events.Collect(job):
                     self._drop = self.rig.collect(*job)
-                case Judge(job):
+                case events.Judge(job):
                     self._judge(job)
                     return
-                case Log(job, state, reasons):
+                case events.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
                     if self.operator.judged is None:
@@ -295,15 +283,15 @@ class Campaign:
                         self.operator.judged(self._result, len(self.plan))
         except DeviceRefusedError as refusal:
             self._failed = refusal
-            self._take(effect_failed(self.flow.ticket, refusal))
+            self._take(events.effect_failed(self.flow.ticket, refusal))
         else:
-            self._take(Answered(self.flow.ticket, token))
+            self._take(events.Answered(self.flow.ticket, token))
 
     def _judge(self, job: Job) -> None:
         if self._drop is None or job != (self._drop.run, self._drop.attempt):
             self._drop = self.rig.collect(*job)
         result = self._result = self.live.judge(self.session, self._drop)
-        self._take(Judged(self.flow.ticket, result.verdict, result.reasons))
+        self._take(events.Judged(self.flow.ticket, result.verdict, result.reasons))
 
     def _stop(self, why: str) -> None:
         with suppress(DeviceError):

@@ -59,7 +59,7 @@ def test_an_import_does_show(package):
 
 
 def test_help_loads_neither_numpy_nor_yaml():
-    heavy = {"numpy", "scipy", "yaml", "matplotlib", "textual"}
+    heavy = {"msgspec", "numpy", "scipy", "yaml", "matplotlib", "textual"}
     assert packages_loaded_by(HELP).isdisjoint(heavy)
 
 

@@ -10,34 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
-from rig.campaign.events import (
-    Again,
-    Answered,
-    ArmRelease,
-    Closed,
-    Collect,
-    Drive,
-    EffectFailed,
-    FireRelease,
-    Found,
-    GiveUp,
-    GoOn,
-    Judge,
-    Judged,
-    Log,
-    Lost,
-    Note,
-    Opened,
-    Reject,
-    Restore,
-    Stage,
-    Stop,
-    Stopped,
-    Tick,
-    Try,
-    Wait,
-    Warned,
-)
+from rig.campaign import events
+from rig.campaign.events import Stage
 from rig.campaign.voids import after, why_halted
 from rig.link.messages import RefusalReason
 from rig.reasons import plain_reason
@@ -134,45 +108,45 @@ class Flow:
 def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an event
     """Take one event."""
     match event:
-        case Stopped():
-            return _stopped(flow)
-        case Lost(trouble):
+        case events.Stopped():
+            return _stop(flow)
+        case events.Lost(trouble):
             return _lost(flow, trouble)
-        case Warned(trouble):
+        case events.Warned(trouble):
             return replace(flow, trouble=flow.trouble or trouble), ()
-        case Answered(ticket, token):
-            return _answered(flow, ticket, token)
-        case EffectFailed():
+        case events.Answered(ticket, token):
+            return _take_answer(flow, ticket, token)
+        case events.EffectFailed():
             return _effect_failed(flow, event)
-        case Tick(seconds):
+        case events.Tick(seconds):
             return _tick(flow, seconds)
-        case Judged():
-            return _judged(flow, event)
-        case GoOn(job, settle_s):
+        case events.Judged():
+            return _take_verdict(flow, event)
+        case events.GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
-        case Try() if flow.stage in _IDLE:
-            return replace(flow.to(Stage.TESTING), home=flow.stage), (Drive(),)
-        case Opened() if flow.stage is Stage.PROTOCOL:
+        case events.Try() if flow.stage in _IDLE:
+            return replace(flow.to(Stage.TESTING), home=flow.stage), (events.Drive(),)
+        case events.Opened() if flow.stage is Stage.PROTOCOL:
             return flow.to(Stage.DEVICE), ()
-        case Closed() if flow.stage in {*_IDLE, *_VERDICT}:
+        case events.Closed() if flow.stage in {*_IDLE, *_VERDICT}:
             return replace(flow.to(Stage.PROTOCOL), job=None, row=()), ()
-        case Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
-            return replace(flow, job=job).to(Stage.JUDGING), (Judge(job),)
-        case Again(job) if flow.stage in {*_IDLE, *_VERDICT}:
+        case events.Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
+            return replace(flow, job=job).to(Stage.JUDGING), (events.Judge(job),)
+        case events.Again(job) if flow.stage in {*_IDLE, *_VERDICT}:
             return _onward(flow, job)
-        case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
+        case events.Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
             if flow.verdict != "rejected":
                 flow = replace(flow, judged=(flow.verdict, flow.reasons))
-            return _relogged(
+            return _log_again(
                 flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow))
             )
-        case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
+        case events.Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
             verdict, reasons = flow.judged
-            return _relogged(flow, verdict, (*_noteless(reasons), *_notes(flow)))
-        case Note(text) if flow.stage is Stage.RESULT:
+            return _log_again(flow, verdict, (*_noteless(reasons), *_notes(flow)))
+        case events.Note(text) if flow.stage is Stage.RESULT:
             note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
             if note != _notes(flow):  # what was noted before stays in the log
-                return _relogged(flow, flow.verdict, (*_noteless(flow.reasons), *note))
+                return _log_again(flow, flow.verdict, (*_noteless(flow.reasons), *note))
     return flow, ()
 
 
@@ -184,47 +158,47 @@ def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
     return tuple(reason for reason in reasons if reason.code != NOTE)
 
 
-def _stopped(flow: Flow) -> Outcome:
+def _stop(flow: Flow) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
         said = "stopped: the release is off"
         if flow.stage is not Stage.TESTING:
             said = "stopped: nothing fell"
-        return flow.to(flow.home, said), (Stop(),)
-    return flow, (Stop(),)
+        return flow.to(flow.home, said), (events.Stop(),)
+    return flow, (events.Stop(),)
 
 
 def _lost(flow: Flow, trouble: str) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
         # Where it is only late, it must not go on with what was armed.
-        return flow.to(flow.home, trouble), (Stop(trouble.partition("\n")[0]),)
+        return flow.to(flow.home, trouble), (events.Stop(trouble.partition("\n")[0]),)
     if flow.stage in {Stage.LIVE, Stage.JUDGING}:
         # A chain that fell is recorded by the daemon, and found when it is back.
         return flow.to(flow.home, trouble), ()
     return flow, ()
 
 
-def _answered(flow: Flow, ticket: int, token: int | None) -> Outcome:
+def _take_answer(flow: Flow, ticket: int, token: int | None) -> Outcome:
     if ticket != flow.ticket:
         # What was stopped while the device was arming must not stay armed.
-        return flow, () if token is None else (Stop(),)
+        return flow, () if token is None else (events.Stop(),)
     if flow.stage is Stage.TESTING:
         return flow.to(flow.home), ()
     job = flow.job
     if job is None:
         return flow, ()
     if flow.stage is Stage.SETTLING:
-        return flow.to(Stage.ARMING), (ArmRelease(job),)
+        return flow.to(Stage.ARMING), (events.ArmRelease(job),)
     if flow.stage is Stage.ARMING:
         armed = replace(flow.to(Stage.COUNTDOWN), not_armed=0)
         return replace(armed, token=token or 0, left_s=flow.countdown_s), ()
     if flow.stage is Stage.FIRING:
-        return replace(flow.to(Stage.LIVE), not_fired=0), (Collect(job),)
+        return replace(flow.to(Stage.LIVE), not_fired=0), (events.Collect(job),)
     if flow.stage is Stage.LIVE:
-        return flow.to(Stage.JUDGING), (Judge(job),)
+        return flow.to(Stage.JUDGING), (events.Judge(job),)
     return replace(flow, logged=True), ()
 
 
-def _effect_failed(flow: Flow, event: EffectFailed) -> Outcome:
+def _effect_failed(flow: Flow, event: events.EffectFailed) -> Outcome:
     if event.ticket != flow.ticket:
         return flow, ()
     if flow.stage is Stage.ARMING:
@@ -232,28 +206,28 @@ def _effect_failed(flow: Flow, event: EffectFailed) -> Outcome:
     if flow.stage is Stage.FIRING:
         return _not_fired(flow, event)
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
-        return flow.to(flow.home, event.trouble), (GiveUp(),)
-    unlogged = () if flow.logged else (GiveUp(),)
+        return flow.to(flow.home, event.trouble), (events.GiveUp(),)
+    unlogged = () if flow.logged else (events.GiveUp(),)
     return replace(flow, trouble=event.trouble, logged=True), unlogged
 
 
-def _not_armed(flow: Flow, event: EffectFailed) -> Outcome:
+def _not_armed(flow: Flow, event: events.EffectFailed) -> Outcome:
     refusals = flow.not_armed + 1
     if event.reason not in _PASSING or (not flow.attended and refusals >= LOOKS):
-        return flow.to(flow.home, event.trouble), (GiveUp(),)
+        return flow.to(flow.home, event.trouble), (events.GiveUp(),)
     if flow.attended:  # who has been asked, and arms again when all is well
         return flow.to(flow.home, event.trouble), ()
     pause = event.detail / 1000 if event.reason is RefusalReason.COOLING else LOOK_S
-    return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
+    return replace(flow.to(Stage.SETTLING), not_armed=refusals), (events.Wait(pause),)
 
 
-def _not_fired(flow: Flow, event: EffectFailed) -> Outcome:
+def _not_fired(flow: Flow, event: events.EffectFailed) -> Outcome:
     refusals = flow.not_fired + 1
     flow = replace(flow.to(Stage.PREPARE, event.trouble), not_fired=refusals)
     # Whether it was let go is not known for sure when the answer is an error.
-    stop = Stop(event.trouble.partition("\n")[0])
+    stop = events.Stop(event.trouble.partition("\n")[0])
     if event.reason not in _DISTURBED or (not flow.attended and refusals >= LOOKS):
-        return flow, (stop, GiveUp())
+        return flow, (stop, events.GiveUp())
     return flow, (stop,)
 
 
@@ -263,10 +237,10 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
     left = flow.left_s - seconds
     if left > 0.0:
         return replace(flow, left_s=left), ()
-    return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
+    return replace(flow.to(Stage.FIRING), left_s=0.0), (events.FireRelease(flow.token),)
 
 
-def _judged(flow: Flow, event: Judged) -> Outcome:
+def _take_verdict(flow: Flow, event: events.Judged) -> Outcome:
     if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
         return flow, ()
     job, verdict, reasons = flow.job, event.verdict, event.reasons
@@ -274,12 +248,12 @@ def _judged(flow: Flow, event: Judged) -> Outcome:
     flow = replace(flow, verdict=verdict, reasons=reasons, logged=False)
     before = flow.row if event.row is None else event.row
     row = after(before, job, verdict, reasons)
-    return replace(flow.to(Stage.RESULT), row=row), (Log(job, verdict, reasons),)
+    return replace(flow.to(Stage.RESULT), row=row), (events.Log(job, verdict, reasons),)
 
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
-        return replace(flow, job=job, not_armed=0).to(Stage.SETTLING), (Wait(settle_s),)
+        return replace(flow, job=job, not_armed=0).to(Stage.SETTLING), (events.Wait(settle_s),)
     if flow.stage is Stage.RESULT and not flow.logged:
         return flow, ()  # what comes next depends on it
     if flow.stage is Stage.HALTED and flow.job is not None:
@@ -299,11 +273,11 @@ def _onward(flow: Flow, job: Job | None) -> Outcome:
     return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
-def _relogged(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
+def _log_again(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
     """Log the drop once more."""
     job = flow.job
     assert job is not None
     flow = replace(flow, verdict=state, reasons=reasons, logged=False)
     row = after(flow.row, job, state, reasons)
     flow = replace(flow, ticket=flow.ticket + 1, trouble="", row=row)
-    return flow, (Log(job, state, reasons),)
+    return flow, (events.Log(job, state, reasons),)

@@ -116,11 +116,11 @@ class FireTimes:
         if fired_ns is None or drop.fire_tick is None:
             return None
         # Restarts of the host leave open which of its times a log entry means; the tick decides.
-        found = (
+        moments = (
             self.samples.place(drop.fire_tick, fired_ns + shift, self.hz, 0.0, _FIRED_S)
             for shift in self.time.shifts(fired_ns)
         )
-        return next((moment.at_ns * 1e-9 for moment in found if moment is not None), None)
+        return next((moment.at_ns * 1e-9 for moment in moments if moment is not None), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,14 +155,14 @@ class Calibration:
 
     def scale(self, drop: Drop) -> TimeScale:
         """Time scale of one drop; edges from another timer keep that timer's."""
-        return self._used(drop)[1]
+        return self._scale_of(drop)[1]
 
     def used(self, drop: Drop) -> dict[str, Any]:
         """Say which calibration a drop has: where from, ppm off nominal, and how well known."""
-        name, (hz, u) = self._used(drop)
+        name, (hz, u) = self._scale_of(drop)
         return {"source": name, "rate_ppm": (hz / drop.tick_hz - 1.0) * 1e6, "u_ppm": u * 1e6}
 
-    def _used(self, drop: Drop) -> tuple[str, TimeScale]:
+    def _scale_of(self, drop: Drop) -> tuple[str, TimeScale]:
         if drop.certificate is None or self.device is None:
             return "stated", TimeScale(drop.tick_hz, self.timer_u)
         if not self.sources:
@@ -172,7 +172,7 @@ class Calibration:
             (source.name, source.sometime() if when is None else source.at(when))
             for source in self.sources
         ]
-        return min(choice, key=lambda one: one[1].u)
+        return min(choice, key=lambda named: named[1].u)
 
 
 class Calibrator:
@@ -192,24 +192,24 @@ class Calibrator:
         reference_u
             Relative standard uncertainty of the 1 Hz reference, as the protocol has it.
         """
-        more = samples(session.pings(after=len(self._pings)))
-        self._pings = np.concatenate([self._pings, more])
+        latest = samples(session.pings(after=len(self._pings)))
+        self._pings = np.concatenate([self._pings, latest])
         return _calibration(session, self._pings, reference_u)
 
 
 def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calibration:
     identities = session.identities()
-    nominal = next((one["tick_hz"] for _, one in identities if "tick_hz" in one), None)
-    u = next((one["clock_u"] for _, one in identities if "clock_u" in one), _UNKNOWN)
+    nominal = next((board["tick_hz"] for _, board in identities if "tick_hz" in board), None)
+    u = next((board["clock_u"] for _, board in identities if "clock_u" in board), _UNKNOWN)
     if nominal is None:
         words = "times as the file gives them"
-        given: dict[str, Any] = {"source": "stated", "rate_ppm": 0.0, "u_ppm": u * 1e6}
+        stated: dict[str, Any] = {"source": "stated", "rate_ppm": 0.0, "u_ppm": u * 1e6}
         details = {"source": words, "relative_u": u}
-        return Calibration(None, words, details, given | {"notes": []}, u)
+        return Calibration(None, words, details, stated | {"notes": []}, u)
     breaks = session.host_breaks()
     axis = one_axis(pings, [ns for ns, _ in identities], breaks)
-    found = epochs(axis.pings, nominal, axis.cuts_ns)
-    by_host = Source("pings", ping_rate(found), 0.0 if session.simulated else HOST_U)
+    split = epochs(axis.pings, nominal, axis.cuts_ns)
+    by_host = Source("pings", ping_rate(split), 0.0 if session.simulated else HOST_U)
     sources = [by_host] if by_host.rate.n else []
     if pulses := session.pulses():
         shifted = [
@@ -219,18 +219,18 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
             for pulse in pulses
             for shift in axis.shifts(pulse.host_send_ns)
         ]
-        rate = pulse_rate(found, shifted, by_host.rate)
+        rate = pulse_rate(split, shifted, by_host.rate)
         if rate.n:
             sources.append(Source("reference", rate, reference_u))
     sources.sort(key=lambda source: source.mean().u)
     scale = sources[0].mean() if sources else TimeScale(nominal, _UNKNOWN)
-    said: dict[str, Any] = _said(sources, scale, nominal) | {
-        "epochs": len(found.pings),
+    said: dict[str, Any] = _record(sources, scale, nominal) | {
+        "epochs": len(split.pings),
         "host_breaks": len(breaks),
         "notes": _notes(sources, len(breaks)),
     }
     words = _words(sources)
-    shown = sources[0].rate if sources else by_host.rate
+    best = sources[0].rate if sources else by_host.rate
     return Calibration(
         scale,
         words,
@@ -240,18 +240,18 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
             "nominal_tick_hz": nominal,
             "error_ppm": said["rate_ppm"],
             "u_ppm": said["u_ppm"],
-            "samples": shown.n,
-            "span_s": shown.span_s,
+            "samples": best.n,
+            "span_s": best.span_s,
         },
         said,
         u,
         tuple(sources),
-        FireTimes(found, scale.hz, axis, session.fired_ns()),
+        FireTimes(split, scale.hz, axis, session.fired_ns()),
     )
 
 
-def _said(sources: list[Source], scale: TimeScale, nominal: int) -> dict[str, Any]:
-    found: dict[str, Any] = {
+def _record(sources: list[Source], scale: TimeScale, nominal: int) -> dict[str, Any]:
+    record: dict[str, Any] = {
         "source": sources[0].name if sources else "stated",
         "rate_ppm": (scale.hz / nominal - 1.0) * 1e6,
         "u_ppm": scale.u * 1e6,
@@ -259,15 +259,15 @@ def _said(sources: list[Source], scale: TimeScale, nominal: int) -> dict[str, An
     }
     if sources:
         best = sources[0]
-        found |= {"clock_u_ppm": best.u * 1e6, "span_s": best.rate.span_s}
+        record |= {"clock_u_ppm": best.u * 1e6, "span_s": best.rate.span_s}
         if best.rate.track is not None:
-            found["wander_ppm_sqrt_h"] = best.rate.track.wander * 60.0 * 1e6
+            record["wander_ppm_sqrt_h"] = best.rate.track.wander * 60.0 * 1e6
     rates = {source.name: source.rate for source in sources}
     if "pings" in rates:
-        found |= {"pings": rates["pings"].n, "outliers": rates["pings"].outliers}
+        record |= {"pings": rates["pings"].n, "outliers": rates["pings"].outliers}
     if "reference" in rates:
-        found["pulses"] = rates["reference"].n
-    return found
+        record["pulses"] = rates["reference"].n
+    return record
 
 
 def _words(sources: list[Source]) -> str:
@@ -296,9 +296,9 @@ def _notes(sources: list[Source], breaks: int) -> list[str]:
             "each drop has the rate of its own time"
         )
     if len(sources) > 1:
-        one, other = (source.mean() for source in sources)
-        apart = one.hz / other.hz - 1.0
-        if abs(apart) > 2.0 * hypot(one.u, other.u):
+        first, second = (source.mean() for source in sources)
+        apart = first.hz / second.hz - 1.0
+        if abs(apart) > 2.0 * hypot(first.u, second.u):
             notes.append(
                 f"host clock and 1 Hz reference are {abs(apart) * 1e6:.0f} ppm apart, more than "
                 "both allow: is the reference what the protocol says?"

@@ -115,28 +115,28 @@ def epochs(
         Host times over which nothing is bridged. A counter that began anew, or a host clock that
         stood still, is found without them too, when the tick jumps out of tolerance.
     """
-    found = samples(pings)
-    if not found.size:
+    columns = samples(pings)
+    if not columns.size:
         return Epochs(nominal_hz, ())
-    found = found[np.lexsort(found.T[::-1])]  # as tuples are sorted
+    columns = columns[np.lexsort(columns.T[::-1])]  # as tuples are sorted
     cuts = np.sort(np.array(cuts_ns, np.int64))
-    steps = _steps(found, nominal_hz)
-    first_cut = np.searchsorted(cuts, found[:-1, RECV], "left")
-    steps[first_cut < np.searchsorted(cuts, found[1:, SEND], "right")] = _BROKEN
+    steps = _steps(columns, nominal_hz)
+    first_cut = np.searchsorted(cuts, columns[:-1, RECV], "left")
+    steps[first_cut < np.searchsorted(cuts, columns[1:, SEND], "right")] = _BROKEN
     begins = np.flatnonzero(steps == _BROKEN) + 1
-    pieces = np.split(found, begins)
+    pieces = np.split(columns, begins)
     for piece, counted in zip(pieces, np.split(np.append(0, steps), begins), strict=True):
         counted[0] = piece[0, TICK]
         piece[:, TICK] = np.cumsum(counted)
     return Epochs(nominal_hz, tuple(pieces))
 
 
-def _steps(found: Samples, nominal_hz: int) -> NDArray[np.int64]:
+def _steps(columns: Samples, nominal_hz: int) -> NDArray[np.int64]:
     """Count ticks from each sample to the next; `_BROKEN` when they cannot be of one count."""
-    trips_ns = found[:, RECV] - found[:, SEND]
-    expected = np.diff(middles_ns(found)) * 1e-9 * nominal_hz
+    trips_ns = columns[:, RECV] - columns[:, SEND]
+    expected = np.diff(middles_ns(columns)) * 1e-9 * nominal_hz
     slack = np.abs(expected) * _SEARCH + (trips_ns[1:] + trips_ns[:-1]) * 1e-9 * nominal_hz / 2 + 2
-    whole = np.rint(expected).astype(np.int64)
+    rounded = np.rint(expected).astype(np.int64)
     # Nearest to the expectation among the values that agree with the 32 bits seen.
-    off = (np.diff(found[:, TICK]) - whole + WRAP // 2) % WRAP - WRAP // 2
-    return np.where((slack < WRAP / 2) & (np.abs(off) <= slack), whole + off, _BROKEN)
+    off = (np.diff(columns[:, TICK]) - rounded + WRAP // 2) % WRAP - WRAP // 2
+    return np.where((slack < WRAP / 2) & (np.abs(off) <= slack), rounded + off, _BROKEN)

@@ -22,11 +22,9 @@ class Clock(Protocol):
 
     def now_ns(self) -> int:
         """Monotonic host time."""
-        ...
 
     def sleep(self, seconds: float) -> None:
         """Let time pass."""
-        ...
 
 
 class SystemClock:
@@ -95,16 +93,16 @@ class HostWatch:
 
     def look(self) -> HostBreak | None:
         """Return what happened since the last look, `None` when nothing did."""
-        last, now = self._last, self._read()
-        awake_ns = passed_ns = now.monotonic - last.monotonic
-        if now.boottime is not None and last.boottime is not None:
-            passed_ns = now.boottime - last.boottime
+        last, clocks = self._last, self._read()
+        awake_ns = passed_ns = clocks.monotonic - last.monotonic
+        if clocks.boottime is not None and last.boottime is not None:
+            passed_ns = clocks.boottime - last.boottime
         slept_ns = _large(passed_ns - awake_ns)
-        stepped_ns = _large(now.wall - last.wall - passed_ns)
+        stepped_ns = _large(clocks.wall - last.wall - passed_ns)
         if not slept_ns and not stepped_ns:
             return None  # what is too small to tell stays in the comparison, and may add up
-        self._last = now
-        return HostBreak(now.monotonic, slept_ns, stepped_ns)
+        self._last = clocks
+        return HostBreak(clocks.monotonic, slept_ns, stepped_ns)
 
 
 def _large(difference_ns: int) -> int:

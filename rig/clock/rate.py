@@ -94,7 +94,7 @@ def tick_rate(
     return ping_rate(epochs(pings, nominal_hz, cuts_ns))
 
 
-def ping_rate(found: Epochs) -> TickRate:
+def ping_rate(split: Epochs) -> TickRate:
     """Measure the tick rate by the host's clock.
 
     A line through (host time in the middle of the round trip, tick): one slope for all samples,
@@ -105,7 +105,7 @@ def ping_rate(found: Epochs) -> TickRate:
 
     Parameters
     ----------
-    found
+    split
         Clock samples by epoch.
 
     Returns
@@ -113,17 +113,17 @@ def ping_rate(found: Epochs) -> TickRate:
     TickRate
         The rate; the nominal one with u = 0.5 %/√3 when the samples say no more than that.
     """
-    pieces = [_ping_piece(pings, found.nominal_hz) for pings in found.pings if len(pings) > 1]
-    rate = _fitted(pieces, found.nominal_hz)
-    return replace(rate, outliers=sum(map(len, found.pings)) - rate.n)
+    pieces = [_ping_piece(pings, split.nominal_hz) for pings in split.pings if len(pings) > 1]
+    rate = _fit_track(pieces, split.nominal_hz)
+    return replace(rate, outliers=sum(map(len, split.pings)) - rate.n)
 
 
-def pulse_rate(found: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickRate:
+def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickRate:
     """Measure the tick rate by the seconds of a reference.
 
     Parameters
     ----------
-    found
+    split
         Clock samples by epoch: they say which second of the host a pulse belongs to.
     pulses
         What the device said of its reference, in any order.
@@ -141,7 +141,7 @@ def pulse_rate(found: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
     began_ns, epoch = 0, -1
     for pulse in sorted(pulses):
         host_ns = (pulse.host_send_ns + pulse.host_recv_ns) // 2
-        moment = found.place(pulse.tick, host_ns, pings.hz, _STALE_S, 0.0)
+        moment = split.place(pulse.tick, host_ns, pings.hz, _STALE_S, 0.0)
         if moment is None:
             continue
         if stretch and moment.epoch == epoch:
@@ -154,11 +154,11 @@ def pulse_rate(found: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
             if abs(seconds - counted) < _ODD_S + _ODD * counted:
                 stretch.append((count + counted, moment.tick))
                 continue
-        pieces.append(_pulse_piece(stretch, began_ns, found.nominal_hz))
+        pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
         stretch = [(pulse.number, moment.tick)]
         began_ns, epoch = moment.at_ns, moment.epoch
-    pieces.append(_pulse_piece(stretch, began_ns, found.nominal_hz))
-    return _fitted([piece for piece in pieces if len(piece.at) > 1], found.nominal_hz)
+    pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
+    return _fit_track([piece for piece in pieces if len(piece.at) > 1], split.nominal_hz)
 
 
 class _Piece(NamedTuple):
@@ -181,8 +181,8 @@ def _ping_piece(pings: Samples, nominal_hz: int) -> _Piece:
         sigma_ns = trip_ns / sqrt(12)  # nothing to compare with: anywhere in the trip
     middle_ns2 = pings[:, SEND] + pings[:, RECV] - 2 * begin_ns
     # Whole seconds in integers: a day's ticks and nanoseconds leave a float too few bits.
-    whole, rest_ns2 = np.divmod(middle_ns2, 2_000_000_000)
-    excess = pings[:, TICK] - pings[0, TICK] - nominal_hz * whole
+    seconds, rest_ns2 = np.divmod(middle_ns2, 2_000_000_000)
+    excess = pings[:, TICK] - pings[0, TICK] - nominal_hz * seconds
     at = begin_ns * 1e-9 + middle_ns2 / 2e9
     sigma: Array = np.sqrt(sigma_ns**2 * 1e-18 + 1 / (12 * nominal_hz**2))
     return _Piece(at, excess / nominal_hz - rest_ns2 * 0.5e-9, sigma)
@@ -203,10 +203,10 @@ def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: 
     )
 
 
-def _fitted(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
+def _fit_track(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
     """Fit a track, leave out what is far off even for its own scatter, and fit again."""
     at, phase, sigma = (np.concatenate([[], *(piece[n] for piece in pieces)]) for n in range(3))
-    given = Readings(
+    everything = Readings(
         at,
         phase,
         sigma,
@@ -215,24 +215,24 @@ def _fitted(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
     nominal = TickRate(*_least(nominal_hz), 0, 0.0, nominal_hz=nominal_hz)
     # A walk can follow stray samples, and a steady rate takes a walk's ends for stray: what
     # little strays from a steady rate is left out first, and the rest asked whether it wanders.
-    kept, track = _gated(given, steady=True)
+    readings, track = _reject_outliers(everything, steady=True)
     if track is not None:
         track.search()
-        if track.seen or kept.at.size < _MOSTLY * given.at.size:
-            kept, track = _gated(given, steady=False)
+        if track.seen or readings.at.size < _MOSTLY * everything.at.size:
+            readings, track = _reject_outliers(everything, steady=False)
     if track is None:
         return nominal
     hz, u_hz = _least(nominal_hz, track.mean())
     if hz == nominal.hz and u_hz == nominal.u_hz:
         return nominal
-    ends = np.flatnonzero(np.diff(kept.epoch, append=-1))
-    starts = np.flatnonzero(np.diff(kept.epoch, prepend=-1))
-    span = float((kept.at[ends] - kept.at[starts]).sum())
-    n = kept.at.size
-    return TickRate(hz, u_hz, n, span, given.at.size - n, nominal_hz, track)
+    ends = np.flatnonzero(np.diff(readings.epoch, append=-1))
+    starts = np.flatnonzero(np.diff(readings.epoch, prepend=-1))
+    span = float((readings.at[ends] - readings.at[starts]).sum())
+    n = readings.at.size
+    return TickRate(hz, u_hz, n, span, everything.at.size - n, nominal_hz, track)
 
 
-def _gated(readings: Readings, *, steady: bool) -> tuple[Readings, Track | None]:
+def _reject_outliers(readings: Readings, *, steady: bool) -> tuple[Readings, Track | None]:
     """Leave out what is far off, a few passes long; no track where too little is left."""
     for number in range(_PASSES):
         if readings.at.size < 2 or readings.at[-1] <= readings.at[0]:

@@ -29,9 +29,9 @@ def samples(pings: Iterable[ClockSample] | Samples) -> Samples:
     return np.asarray(rows, np.int64).reshape(-1, 3)
 
 
-def middles_ns(given: Samples) -> NDArray[np.int64]:
+def middles_ns(columns: Samples) -> NDArray[np.int64]:
     """Host time in the middle of each round trip."""
-    middle: NDArray[np.int64] = (given[:, SEND] + given[:, RECV]) // 2
+    middle: NDArray[np.int64] = (columns[:, SEND] + columns[:, RECV]) // 2
     return middle
 
 
@@ -85,11 +85,11 @@ def one_axis(
     breaks
         When the host slept or its clock was set.
     """
-    found = samples(pings).copy()
-    befores, afters = found[:-1, RECV].copy(), found[1:, SEND].copy()
+    columns = samples(pings).copy()
+    befores, afters = columns[:-1, RECV].copy(), columns[1:, SEND].copy()
     odd = afters < befores
-    for one in breaks:
-        odd |= (befores <= one.host_ns) & (one.host_ns <= afters)
+    for pause in breaks:
+        odd |= (befores <= pause.host_ns) & (pause.host_ns <= afters)
     shift = 0
     lives = [[Stretch(0, 0)]]
     cuts: list[int] = []
@@ -100,15 +100,15 @@ def one_axis(
             shift += before + _APART_NS - after
             lives.append([Stretch(0, shift)])
         else:
-            for one in breaks:
-                if before <= one.host_ns <= after:
-                    shift += one.slept_ns
-                    lives[-1].append(Stretch(one.host_ns, shift))
-        found[gap + 1 :, : RECV + 1] += shift - shifted
-    moments = [*boots_ns, *(one.host_ns for one in breaks)]
+            for pause in breaks:
+                if before <= pause.host_ns <= after:
+                    shift += pause.slept_ns
+                    lives[-1].append(Stretch(pause.host_ns, shift))
+        columns[gap + 1 :, : RECV + 1] += shift - shifted
+    moments = [*boots_ns, *(pause.host_ns for pause in breaks)]
     cuts += [moment + _shift(life, moment) for life in lives for moment in moments]
-    return HostTime(found, tuple(sorted(cuts)), tuple(map(tuple, lives)))
+    return HostTime(columns, tuple(sorted(cuts)), tuple(map(tuple, lives)))
 
 
 def _shift(life: Sequence[Stretch], host_ns: int) -> int:
-    return max((one for one in life if one.begin_ns <= host_ns), default=life[0]).shift_ns
+    return max((part for part in life if part.begin_ns <= host_ns), default=life[0]).shift_ns

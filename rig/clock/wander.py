@@ -75,7 +75,7 @@ class Track:
     """
 
     def __init__(self, readings: Readings) -> None:
-        points = _condensed(readings)
+        points = _condense(readings)
         self.begin = float(readings.at[0])
         self.span = float(readings.at[-1]) - self.begin
         self._x = (points.at - self.begin) / self.span
@@ -139,8 +139,8 @@ class Track:
         weights = self._g * (self._phase - self._design @ self._beta)
         walk = self._ratio * self._kernel @ ((self._turn @ weights) / self._sigma)
         course = self._beta[-1] * x + np.interp(x, self._x, walk)
-        left: Array = (readings.phase - self._beta[readings.epoch] - course) / readings.sigma
-        return left
+        residuals: Array = (readings.phase - self._beta[readings.epoch] - course) / readings.sigma
+        return residuals
 
     def _solve(self, ratio: float) -> float:
         """Solve for one size of the walk and return its log likelihood."""
@@ -162,12 +162,12 @@ class Track:
         direct = -self._design.T @ (self._g * c)
         direct[-1] += 1.0
         value = float(self._beta[-1] + c @ (self._g * rest))
-        left = self._ratio * variance - float(c @ (self._g * c))
-        u2 = self._scale2 * (max(0.0, left) + float(direct @ self._covariance @ direct))
+        unseen = self._ratio * variance - float(c @ (self._g * c))
+        u2 = self._scale2 * (max(0.0, unseen) + float(direct @ self._covariance @ direct))
         return value / self.span, sqrt(u2) / self.span
 
 
-def _condensed(readings: Readings) -> Readings:
+def _condense(readings: Readings) -> Readings:
     """Take neighbours in time together, so that the work does not grow with the session."""
     n = readings.at.size
     if n <= _POINTS:
@@ -175,9 +175,9 @@ def _condensed(readings: Readings) -> Readings:
     first = np.flatnonzero(np.diff(readings.epoch, prepend=-1))
     begin, end = readings.at[first], readings.at[np.append(first[1:], n) - 1]
     spans = end - begin
-    wanted = np.maximum(_LEAST, np.round(_POINTS * spans / max(spans.sum(), 1e-300)))
+    counts = np.maximum(_LEAST, np.round(_POINTS * spans / max(spans.sum(), 1e-300)))
     along = (readings.at - begin[readings.epoch]) / np.maximum(spans, 1e-300)[readings.epoch]
-    bins = np.minimum(along * wanted[readings.epoch], wanted[readings.epoch] - 1.0).astype(np.intp)
+    bins = np.minimum(along * counts[readings.epoch], counts[readings.epoch] - 1.0).astype(np.intp)
     number = np.cumsum(np.diff(readings.epoch * (n + _LEAST) + bins, prepend=-1) != 0) - 1
     weight = readings.sigma**-2.0
     total = np.bincount(number, weight)

@@ -3,63 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-import threading
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
-from rig.daemon import rpc
-from rig.daemon.client_protocol import (
-    HELLO_PATIENCE_S,
-    ClientProtocol,
-    Replica,
-    gone,
-    hello,
-    silent,
-    turned_away,
-)
-from rig.daemon.socket_path import reach
-from rig.errors import DeviceError
+from rig.daemon.client import Line
+from rig.daemon.replica import Replica
 
 if TYPE_CHECKING:
-    import socket
     from collections.abc import Callable
     from pathlib import Path
-
-    from rig.errors import RigError
-
-_CHUNK = 1 << 16
-_HUNG_UP = "it hung up"
-
-
-async def _reached(path: Path) -> tuple[socket.socket, str]:
-    """Connect in a thread; who is cancelled meanwhile leaves no open socket behind."""
-    given_up = threading.Event()
-    found: list[tuple[socket.socket, str]] = []
-
-    def hang_up() -> None:
-        for line, _ in found:
-            line.close()
-
-    def connect() -> tuple[socket.socket, str]:
-        found.append(reach(path))
-        if given_up.is_set():
-            hang_up()
-        return found[0]
-
-    try:
-        return await asyncio.to_thread(connect)
-    except asyncio.CancelledError:
-        given_up.set()
-        hang_up()
-        raise
 
 
 class AsyncClient:
     """One connection; `replica` follows the daemon's state once it is subscribed.
-
-    Parameters
-    ----------
-    reader, writer
-        Of the connection; `connect` makes them.
 
     Attributes
     ----------
@@ -71,15 +27,13 @@ class AsyncClient:
         Set when the connection has ended.
     """
 
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    _line: Line
+
+    def __init__(self) -> None:
         self.replica = Replica()
         self.changed: Callable[[], None] = lambda: None
         self.lost = asyncio.Event()
-        self._writer = writer
-        self._protocol = ClientProtocol()
-        self._turned_away: dict[str, Any] | None = None
-        self._open: dict[int, asyncio.Future[Any]] = {}
-        self._listening = asyncio.get_running_loop().create_task(self._listen(reader))
+        self._loop = asyncio.get_running_loop()
 
     @classmethod
     async def connect(cls, path: Path, name: str) -> Self:
@@ -87,29 +41,22 @@ class AsyncClient:
 
         Parameters
         ----------
-        path
-            The daemon's Unix socket; beside it the file that stands for TCP.
-        name
-            What others are told of this client.
-
-        Raises
-        ------
-        DeviceError
-            No daemon there.
-        VersionError
-            It speaks another version.
+        path, name
+            As for `rig.daemon.client.Line`, which says what is raised.
         """
-        line, token = await _reached(path)
-        line.setblocking(False)
-        client = cls(*await asyncio.open_connection(sock=line))
+        client = cls()
+
+        def notify(method: str, params: dict[str, Any]) -> None:
+            client._soon(client._follow, method, params)
+
+        def end() -> None:
+            client._soon(client._end)
+
+        line = client._loop.run_in_executor(None, Line, path, name, notify, end)
         try:
-            async with asyncio.timeout(HELLO_PATIENCE_S):
-                await client.call("hello", **hello(name, token))
-        except TimeoutError:
-            await client.close()
-            raise silent(path) from None
-        except BaseException:
-            await client.close()
+            client._line = await asyncio.shield(line)
+        except asyncio.CancelledError:
+            line.add_done_callback(_hang_up)  # no connection stays open that nobody waits for
             raise
         return client
 
@@ -121,63 +68,31 @@ class AsyncClient:
         RigError
             As the daemon raised it, or it is gone.
         """
-        if self.lost.is_set():
-            raise gone(_HUNG_UP)
-        number, line = self._protocol.ask(method, params)
-        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._open[number] = answer
-        self._writer.write(line)
-        return await answer
+        return await asyncio.wrap_future(self._line.ask(method, **params))
 
     async def subscribe(self) -> None:
         """Follow the state."""
-        # The answer is taken in `_listen`: changes may be in the same packet behind it.
         await self.call("subscribe")
 
     async def close(self) -> None:
         """Hang up."""
-        self._writer.close()
-        self._listening.cancel()
-        await asyncio.gather(self._listening, return_exceptions=True)
+        self._line.close()
         self._end()
 
-    async def _listen(self, reader: asyncio.StreamReader) -> None:
-        try:
-            while True:
-                for message in self._protocol.feed(await reader.read(_CHUNK)):
-                    if "method" in message:
-                        self.replica.notified(message["method"], message["params"])
-                        self.changed()
-                    else:
-                        self._answered(message)
-        except (OSError, DeviceError):
-            pass  # gone
-        finally:
-            self._end()
+    def _soon(self, what: Callable[..., None], *values: object) -> None:
+        """Have something done in the loop, in the order in which it came."""
+        with suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(what, *values)
 
-    def _answered(self, message: dict[str, Any]) -> None:
-        if turned_away(message):
-            self._turned_away = message
-            raise gone(_HUNG_UP)
-        answer = self._open.pop(message["id"], None)
-        result = message.get("result")
-        if isinstance(result, dict) and "state" in result:
-            self.replica.snapshot(result)
-            self.changed()
-        if answer is None or answer.done():
-            return
-        try:
-            answer.set_result(rpc.result_of(message))
-        except Exception as error:
-            answer.set_exception(error)
+    def _follow(self, method: str, params: dict[str, Any]) -> None:
+        self.replica.follow(method, params)
+        self.changed()
 
     def _end(self) -> None:
         self.lost.set()
-        why: RigError = gone(_HUNG_UP)
-        if self._turned_away is not None:
-            why = rpc.error_of(self._turned_away)
-        for answer in self._open.values():
-            if not answer.done():
-                answer.set_exception(why)
-        self._open.clear()
         self.changed()
+
+
+def _hang_up(connecting: asyncio.Future[Line]) -> None:
+    if not connecting.cancelled() and connecting.exception() is None:
+        connecting.result().close()

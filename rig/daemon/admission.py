@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import TYPE_CHECKING
 
 from rig.daemon.rpc import BusyError
@@ -19,38 +20,38 @@ STRANGERS = 64
 CLIENTS = 128
 RESERVE = 8
 """Connections beyond those, for `stop` alone, and no longer than `HELLO_S`."""
+Standing = Enum("Standing", ["STRANGER", "CLIENT", "RESERVE"])
 
 
 class Admission:
-    """Counts connections from their first moment to their last."""
+    """Knows how each connection stands from its first moment to its last."""
 
     def __init__(self) -> None:
-        self._strangers: dict[Connection, None] = {}  # in the order in which they came
-        self._clients: set[Connection] = set()
-        self._reserve: set[Connection] = set()
+        self._standings: dict[Connection, Standing] = {}  # in the order in which they came
 
     def __iter__(self) -> Iterator[Connection]:
         """Give every connection there is."""
-        return iter([*self._strangers, *self._clients, *self._reserve])
+        return iter([*self._standings])
 
-    def arrived(self, connection: Connection) -> None:
+    def register(self, connection: Connection) -> None:
         """Count a connection of which nothing is known yet."""
-        if len(self._strangers) >= STRANGERS:
+        if self._count(Standing.STRANGER) >= STRANGERS:
             self.make_room()
-        self._strangers[connection] = None
+        self._standings[connection] = Standing.STRANGER
 
     def make_room(self) -> bool:
         """Send the oldest away that has said nothing; `False` when there is none."""
-        # Who said hello and waits for the answer has done what there is to do.
-        oldest = next((one for one in self._strangers if not one.spoke), None)
-        if oldest is not None:
-            del self._strangers[oldest]
-            oldest.turn_away(make_error(BusyError, "connections_silent"))
-        return oldest is not None
+        for connection, standing in self._standings.items():
+            # Who said hello and waits for the answer has done what there is to do.
+            if standing is Standing.STRANGER and not connection.spoke:
+                self.forget(connection)
+                connection.turn_away(make_error(BusyError, "connections_silent"))
+                return True
+        return False
 
     def late(self, connection: Connection) -> bool:
         """Whether a connection that came `HELLO_S` ago has had its time."""
-        return connection in self._strangers or connection in self._reserve
+        return self._standings.get(connection, Standing.CLIENT) is not Standing.CLIENT
 
     def welcome(self, connection: Connection) -> None:
         """Let a client in that has said hello.
@@ -60,14 +61,11 @@ class Admission:
         BusyError
             There is not even room in the reserve.
         """
-        if len(self._clients) < CLIENTS:
-            room = self._clients
-        elif len(self._reserve) < RESERVE:
-            room = self._reserve
-        else:
-            raise make_error(BusyError, "clients_full", clients=CLIENTS)
-        self._strangers.pop(connection, None)
-        room.add(connection)
+        for standing, room in ((Standing.CLIENT, CLIENTS), (Standing.RESERVE, RESERVE)):
+            if self._count(standing) < room:
+                self._standings[connection] = standing
+                return
+        raise make_error(BusyError, "clients_full", clients=CLIENTS)
 
     def check(self, connection: Connection, method: str) -> None:
         """Let a client in the reserve do nothing but stop.
@@ -77,11 +75,12 @@ class Admission:
         BusyError
             It wants something else.
         """
-        if connection in self._reserve and method != "stop":
+        if self._standings.get(connection) is Standing.RESERVE and method != "stop":
             raise make_error(BusyError, "clients_only_stop", clients=CLIENTS)
 
-    def left(self, connection: Connection) -> None:
+    def forget(self, connection: Connection) -> None:
         """Forget a connection."""
-        self._strangers.pop(connection, None)
-        self._clients.discard(connection)
-        self._reserve.discard(connection)
+        self._standings.pop(connection, None)
+
+    def _count(self, standing: Standing) -> int:
+        return sum(each is standing for each in self._standings.values())

@@ -1,41 +1,74 @@
-"""A blocking client of the daemon, for the runner and for scripts; without asyncio."""
+"""Clients of the daemon: the line that each has, and a blocking one for the runner and for scripts.
+
+`rig.daemon.aclient` has one for asyncio. Nothing here loads asyncio.
+"""
 
 from __future__ import annotations
 
+import itertools
+import json
+import socket
 import threading
-import time
+from concurrent.futures import Future, wait
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.daemon import rpc
-from rig.daemon.client_protocol import (
-    HELLO_PATIENCE_S,
-    ClientProtocol,
-    gone,
-    hello,
-    silent,
-    turned_away,
-)
 from rig.daemon.lease import LEASE_S, ControlError
 from rig.daemon.socket_path import reach
-from rig.errors import DeviceError, DeviceTimeoutError
+from rig.errors import DeviceError, DeviceTimeoutError, RigError
 from rig.reasons import make_error
 from rig.recorder.interrupts import Interrupts
 from rig.session.store import Session
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.reading import Reader
     from rig.session.schema import RunState
 
-_LOOK_S = 0.1  # a signal waits no longer than this
+HELLO_S = 10.0
+"""How long a client waits for the answer to `hello`."""
 _ANSWER_S = 100.0  # everything but waiting is over by then, a recording too, or the daemon hangs
+_BEAT_S = LEASE_S / 4
 
 
-class Client:
-    """One connection to a daemon, for one thread, with the methods of a `Controller`.
+class MessageReader:
+    """Finds messages in the bytes that come from a daemon, however they were cut."""
+
+    def __init__(self) -> None:
+        self._rest = bytearray()  # of a line that has not ended yet
+
+    def feed(self, data: bytes) -> Iterator[dict[str, Any]]:
+        """Take the next bytes, none for the end, and give the messages that are whole.
+
+        Raises
+        ------
+        DeviceError
+            It hung up, or is no daemon of this rig.
+        """
+        if not data:
+            raise _gone("it hung up")
+        self._rest += data
+        if b"\n" in data:
+            *lines, self._rest = self._rest.split(b"\n")
+            for line in lines:
+                try:
+                    message = json.loads(line)
+                except ValueError:
+                    message = None
+                if not isinstance(message, dict):
+                    raise make_error(DeviceError, "not_a_daemon")
+                yield message
+        if len(self._rest) > rpc.MESSAGE_LIMIT:
+            raise make_error(DeviceError, "not_a_daemon")
+
+
+class Line:
+    """One connection: requests from any thread, each answer a future.
 
     Parameters
     ----------
@@ -43,37 +76,137 @@ class Client:
         The daemon's Unix socket; beside it the file that stands for TCP.
     name
         What others are told of this client.
-    interrupts
-        Let through while the daemon works, and kept waiting inside a message.
+    notify
+        Called in the line's own thread with the name and parameters of each notification; the
+        answer to ``subscribe`` comes as a ``snapshot`` before what changed since.
+    end
+        Called there when the connection has ended.
+    beat
+        Called there whenever nothing has come for a while.
+
+    Attributes
+    ----------
+    daemon
+        What the daemon said to `hello`.
 
     Raises
     ------
     DeviceError
-        No daemon there.
+        No daemon there, or no answer from it.
     VersionError
         It speaks another version.
     """
 
+    def __init__(
+        self,
+        path: Path,
+        name: str,
+        notify: Callable[[str, dict[str, Any]], None] = lambda _method, _params: None,
+        end: Callable[[], None] = lambda: None,
+        beat: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._notify, self._end, self._beat = notify, end, beat
+        self._guard = threading.Lock()  # one line after the other, and none after the end
+        self._numbers = itertools.count(1)
+        self._open: dict[int, Future[Any]] = {}
+        self._over: RigError | None = None
+        self._socket, token = reach(path)
+        self._socket.settimeout(_BEAT_S)
+        self._thread = threading.Thread(target=self._read, name="rig client", daemon=True)
+        self._thread.start()
+        try:
+            hello = {"api": rpc.API, "client": name} | ({"token": token} if token else {})
+            silent = make_error(DeviceTimeoutError, "daemon_silent", path=path, patience_s=HELLO_S)
+            self.daemon: dict[str, Any] = _result(self.ask("hello", **hello), HELLO_S, silent)
+        except BaseException:
+            self.close()
+            raise
+
+    def ask(self, method: str, **params: Any) -> Future[Any]:
+        """Send a request, see API.md; what the daemon raises is the future's exception."""
+        answer: Future[Any] = Future()
+        with self._guard:
+            if self._over is not None:
+                answer.set_exception(self._over)
+                return answer
+            number = next(self._numbers)
+            self._open[number] = answer
+            try:
+                self._socket.sendall(rpc.request(method, params, number))
+            except OSError:  # the thread that reads knows more of it
+                self._hang_up()
+        return answer
+
+    def close(self) -> None:
+        """Hang up; what is not answered never will be."""
+        self._hang_up()
+        self._thread.join()
+        self._socket.close()
+
+    def _hang_up(self) -> None:
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+
+    def _read(self) -> None:
+        reader, over = MessageReader(), _gone("it failed")
+        try:
+            while True:
+                try:
+                    data = self._socket.recv(1 << 16)
+                except TimeoutError:
+                    self._beat()
+                else:
+                    for message in reader.feed(data):
+                        self._take(message)
+        except RigError as error:
+            over = error
+        except OSError as error:
+            over = _gone(error)
+        finally:
+            with self._guard:
+                self._over, unanswered = over, [*self._open.values()]
+                self._open.clear()
+            for answer in unanswered:
+                if answer.set_running_or_notify_cancel():
+                    answer.set_exception(over)
+            self._hang_up()
+            self._end()
+
+    def _take(self, message: dict[str, Any]) -> None:
+        if "method" in message:
+            self._notify(message["method"], message["params"])
+            return
+        if "error" in message and message.get("id") is None:  # it hangs up after this
+            raise rpc.error_of(message)
+        answer = self._open.pop(message["id"], None)
+        result = message.get("result")
+        if isinstance(result, dict) and "state" in result:
+            self._notify("snapshot", result)
+        if answer is None or not answer.set_running_or_notify_cancel():
+            return
+        if message.get("error") is not None:
+            answer.set_exception(rpc.error_of(message))
+        else:
+            answer.set_result(result)
+
+
+class Client:
+    """One connection to a daemon, for one thread, with the methods of a `Controller`.
+
+    Parameters
+    ----------
+    path, name
+        As for `Line`, which says what is raised.
+    interrupts
+        Let through while the daemon works, and kept waiting inside a message.
+    """
+
     def __init__(self, path: Path, name: str, interrupts: Interrupts | None = None) -> None:
         self._interrupts = Interrupts() if interrupts is None else interrupts
-        self._protocol = ClientProtocol()
-        self._writing = threading.Lock()
         self._session: Session | None = None
-        self._armed = False
-        self._over = threading.Event()
-        self._beat: threading.Thread | None = None
-        self._socket, token = reach(path)
-        self._socket.settimeout(_LOOK_S)
-        try:
-            self.daemon: dict[str, Any] = self.call(
-                "hello", patience=HELLO_PATIENCE_S, **hello(name, token)
-            )
-        except DeviceTimeoutError:
-            self._socket.close()
-            raise silent(path) from None
-        except BaseException:
-            self._socket.close()
-            raise
+        self._in_control = self._armed = False
+        self.line = Line(path, name, beat=self._renew)
+        self.daemon = self.line.daemon
 
     def call(self, method: str, *, patience: float = _ANSWER_S, **params: Any) -> Any:
         """Ask for anything in the interface, see API.md.
@@ -90,18 +223,10 @@ class Client:
         RigError
             As the daemon raised it, or it is gone.
         """
-        number, line = self._protocol.ask(method, params)
         with self._interrupts.held():
-            self._send(line)
-        until = time.monotonic() + patience
-        while True:
-            with self._interrupts.held():
-                for message in self._receive():
-                    ours = message.get("id") == number and "method" not in message
-                    if ours or turned_away(message):
-                        return rpc.result_of(message)
-            if time.monotonic() > until:
-                raise make_error(DeviceTimeoutError, "daemon_no_answer", method=method)
+            answer = self.line.ask(method, **params)
+        silent = make_error(DeviceTimeoutError, "daemon_no_answer", method=method)
+        return _result(answer, patience, silent)
 
     def take_control(self) -> None:
         """Take control and keep it until `close`.
@@ -112,9 +237,12 @@ class Client:
             Another client has it.
         """
         self.call("take_control")
-        if self._beat is None:
-            self._beat = threading.Thread(target=self._renew, name="sign of life", daemon=True)
-            self._beat.start()
+        self._in_control = True
+
+    def _renew(self) -> None:
+        # Armed, the thread's sign of life is not enough: this client must be at it.
+        if self._in_control and not self._armed:
+            self.line.ask("renew")
 
     # ------------------------------------------------------------------ what a rig does
 
@@ -129,12 +257,9 @@ class Client:
         self, protocol: str, session: str, seed: int | None = None
     ) -> tuple[int, int] | None:
         """Have a session opened, and open it for reading here."""
-        path = Path(session).resolve()
-        opened = self.call(
-            "open_session", protocol=str(Path(protocol).resolve()), session=str(path), seed=seed
-        )
-        self._session = Session.open(path, readonly=True)
-        fetched = opened["fetched"]
+        source, path = str(Path(protocol).resolve()), Path(session).resolve()
+        opened = self.call("open_session", protocol=source, session=str(path), seed=seed)
+        self._session, fetched = Session.open(path, readonly=True), opened["fetched"]
         return None if fetched is None else (fetched[0], fetched[1])
 
     def close_session(self) -> None:
@@ -148,7 +273,6 @@ class Client:
 
     def arm(self, run: int, attempt: int) -> int:
         """Arm; give the token."""
-        # Armed, the thread's sign of life is not enough: this client must be at it.
         self._armed = True
         try:
             token: int = self.call("arm", run=run, attempt=attempt)["token"]
@@ -186,39 +310,20 @@ class Client:
 
     def close(self) -> None:
         """Hang up; a drop that fell is recorded all the same."""
-        self._over.set()
         self._let_go()
-        self._socket.close()
-        if self._beat is not None:
-            self._beat.join()
-
-    # ------------------------------------------------------------------ the line
+        self.line.close()
 
     def _let_go(self) -> None:
         if self._session is not None:
             self._session.close()
             self._session = None
 
-    def _renew(self) -> None:
-        line = rpc.request("renew", {}, None)
-        while not self._over.wait(LEASE_S / 4):
-            if not self._armed:
-                with suppress(DeviceError):
-                    self._send(line)
 
-    def _send(self, line: bytes) -> None:
-        try:
-            with self._writing:
-                self._socket.sendall(line)
-        except OSError as error:
-            raise gone(error) from error
+def _result(answer: Future[Any], patience_s: float, silent: DeviceError) -> Any:
+    if wait([answer], patience_s).not_done:
+        raise silent
+    return answer.result()
 
-    def _receive(self) -> list[dict[str, Any]]:
-        """Take what has come within `_LOOK_S`."""
-        try:
-            data = self._socket.recv(1 << 16)
-        except TimeoutError:
-            return []
-        except OSError as error:
-            raise gone(error) from error
-        return self._protocol.feed(data)
+
+def _gone(why: object) -> RigError:
+    return make_error(DeviceError, "daemon_gone", text=why)

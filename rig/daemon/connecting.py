@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from rig.daemon.socket_path import default_socket, token_file
 from rig.errors import DeviceError, RigError
@@ -47,24 +47,25 @@ def connect(
     RigError
         The daemon that was named is not there or has another port; another client is in control.
     """
-    place = default_socket() if socket is None else socket
-    if socket is None and not place.exists() and not token_file(place).exists():
+    path = default_socket() if socket is None else socket
+    if socket is None and not path.exists() and not token_file(path).exists():
         return Controller(url, interrupts)
     from rig.daemon.client import Client  # noqa: PLC0415 - most runs have no daemon
 
     try:
-        client = Client(place, f"rig run {os.getpid()}", interrupts)
+        client = Client(path, f"rig run {os.getpid()}", interrupts)
     except RigError:
         if socket is not None:
             raise
         return Controller(url, interrupts)  # what a killed daemon left, or one of another version
     try:
         # A board that was plugged in again may have another path than the daemon was told.
-        if not any(_same(client.daemon.get(name, ""), url) for name in ("port", "path")):
+        if not any(_is_same(client.daemon.get(name, ""), url) for name in ("port", "path")):
             if socket is None:
                 client.close()
                 return Controller(url, interrupts)
-            _refuse(client.daemon["port"], url)
+            wrong = make_error(DeviceError, "daemon_port", port=client.daemon["port"], wanted=url)
+            raise wrong  # noqa: TRY301 - it is closed below
         client.take_control()
     except BaseException:
         client.close()
@@ -73,12 +74,8 @@ def connect(
     return client
 
 
-def _same(one: str, other: str) -> bool:
+def _is_same(port: str, url: str) -> bool:
     """Whether two names are of one port: a board has several in /dev."""
-    if "://" in one + other:
-        return one == other
-    return Path(one).resolve() == Path(other).resolve()
-
-
-def _refuse(port: str, wanted: str) -> NoReturn:
-    raise make_error(DeviceError, "daemon_port", port=port, wanted=wanted)
+    if "://" in port + url:
+        return port == url
+    return Path(port).resolve() == Path(url).resolve()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rig.daemon import rpc
 from rig.reasons import make_error
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rig.errors import RigError
 
-    _Reply: TypeAlias = Callable[[bytes | None], None]
+    _Message: TypeAlias = rpc.Request | rpc.RpcError
 
 
 class Turns:
@@ -98,7 +98,7 @@ class Connection:
         """Answer until the client goes."""
         # One request is answered after the other. A stop and the sign of life go past the one
         # that is being worked on, so lines are read all the time.
-        waiting: asyncio.Queue[_Asked] = asyncio.Queue(rpc.BATCH_LIMIT)
+        waiting: asyncio.Queue[tuple[_Message, _Replies]] = asyncio.Queue(rpc.BATCH_LIMIT)
         answering = asyncio.get_running_loop().create_task(self._answer_all(waiting))
         try:
             await self._read(waiting)
@@ -109,93 +109,81 @@ class Connection:
             for task in self._urgent:
                 task.cancel()
 
-    async def _read(self, waiting: asyncio.Queue[_Asked]) -> None:
+    async def _read(self, waiting: asyncio.Queue[tuple[_Message, _Replies]]) -> None:
         while line := await self._reader.readline():
             self.spoke = True
             self._heard(self)
             if self.waiting() > rpc.UNREAD_LIMIT:
                 await self._writer.drain()
-            found = rpc.read_line(line)
-            if isinstance(found, list):
-                reply = _Together(self.send, len(found)).add
-                for one in found:
-                    self._take(one, reply, waiting)
-            else:
-                self._take(found, self._send_any, waiting)
+            messages = rpc.read_line(line)
+            replies = _Replies(self.send, messages)
+            for message in messages if isinstance(messages, list) else [messages]:
+                self._take(message, replies, waiting)
             await asyncio.sleep(0)  # many lines are there already: others' are read between them
 
     def _take(
-        self, one: rpc.Request | rpc.RpcError, reply: _Reply, waiting: asyncio.Queue[_Asked]
+        self,
+        message: _Message,
+        replies: _Replies,
+        waiting: asyncio.Queue[tuple[_Message, _Replies]],
     ) -> None:
         """Have one message answered in its turn, or at once where it overtakes."""
-        asked = _Asked(one, reply)
-        method = one.method if isinstance(one, rpc.Request) else ""
+        method = message.method if isinstance(message, rpc.Request) else ""
         if method in {"stop", "renew"} and self.name and len(self._urgent) < 8:
-            task = asyncio.get_running_loop().create_task(self._answer(asked))
+            task = asyncio.get_running_loop().create_task(self._answer(message, replies))
             self._urgent.add(task)
             task.add_done_callback(self._urgent.discard)
-        elif waiting.full() and isinstance(one, rpc.Request):
+        elif waiting.full():
             # Refused, not kept back: a stop behind it must be read.
             busy = make_error(rpc.BusyError, "requests_full", requests=rpc.BATCH_LIMIT)
-            reply(None if one.notification else rpc.failure(one.id, busy))
-        elif waiting.full():
-            reply(None)
+            silent = isinstance(message, rpc.RpcError) or message.silent
+            replies.add(None if silent else rpc.failure(message.id, busy))
         else:
-            waiting.put_nowait(asked)
+            waiting.put_nowait((message, replies))
 
-    async def _answer_all(self, waiting: asyncio.Queue[_Asked]) -> None:
+    async def _answer_all(self, waiting: asyncio.Queue[tuple[_Message, _Replies]]) -> None:
         while True:
-            asked = await waiting.get()
+            message, replies = await waiting.get()
             await self._turns.come()
-            await self._answer(asked)
+            await self._answer(message, replies)
             await self._writer.drain()
             if not self.name:
                 self.close()
                 return
 
-    async def _answer(self, asked: _Asked) -> None:
-        one, reply = asked
-        if isinstance(one, rpc.RpcError):
-            reply(None if one.silent else rpc.failure(one.request_id, one))
-            return
-        try:
-            line = rpc.answer(one.id, await self._do(self, one))
-        except Exception as error:
-            line = rpc.failure(one.id, error)
-        reply(None if one.notification else line)
-
-    def _send_any(self, line: bytes | None) -> None:
-        if line is not None:
-            self.send(line)
+    async def _answer(self, message: _Message, replies: _Replies) -> None:
+        if isinstance(message, rpc.RpcError):
+            line = rpc.failure(message.id, message)
+        else:
+            try:
+                line = rpc.answer(message.id, await self._do(self, message))
+            except Exception as error:
+                line = rpc.failure(message.id, error)
+        replies.add(None if message.silent else line)
 
 
-class _Asked(NamedTuple):
-    """What a client sent, and where its answer goes: `None` for none."""
-
-    message: rpc.Request | rpc.RpcError
-    reply: _Reply
-
-
-class _Together:
-    """The answers to a batch, sent when all are there.
+class _Replies:
+    """The answers to one line: one message's at once, a batch's when all are there.
 
     Parameters
     ----------
     send
         Takes the line.
-    count
-        How many messages the batch has.
+    messages
+        What a client sent.
     """
 
-    def __init__(self, send: Callable[[bytes], None], count: int) -> None:
+    def __init__(self, send: Callable[[bytes], None], messages: _Message | list[_Message]) -> None:
         self._send = send
-        self._left = count
+        self._batch = isinstance(messages, list)
+        self._open = len(messages) if isinstance(messages, list) else 1
         self._answers: list[bytes] = []
 
     def add(self, line: bytes | None) -> None:
-        """Take the answer to one of them, `None` for a notification."""
-        self._left -= 1
+        """Take the answer to one message, `None` for a notification."""
+        self._open -= 1
         if line is not None:
             self._answers.append(line.rstrip(b"\n"))
-        if not self._left and self._answers:
-            self._send(b"[" + b",".join(self._answers) + b"]\n")
+        if not self._open and self._answers:
+            answers = b",".join(self._answers)
+            self._send((b"[%b]\n" if self._batch else b"%b\n") % answers)

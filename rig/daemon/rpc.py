@@ -43,28 +43,21 @@ class RpcError(Exception):
     """A line that is no proper request, with JSON-RPC's own code."""
 
     def __init__(
-        self, code: int, message: str, request_id: object = None, *, silent: bool = False
+        self, code: int, message: str, request_id: RequestId = None, *, silent: bool = False
     ) -> None:
         super().__init__(message)
         self.code = code
-        self.request_id = request_id
+        self.id = request_id
         self.silent = silent  # of a notification, which is never answered
 
 
 _KINDS: dict[str, type[RigError]] = {
     kind.__name__: kind
     for kind in (
-        RigError,
-        InputError,
-        SessionError,
-        DeviceError,
-        DeviceTimeoutError,
-        BusyError,
-        ControlError,
-        StoppedError,
-        VersionError,
+        RigError, InputError, SessionError, DeviceError, DeviceTimeoutError, BusyError,
+        ControlError, StoppedError, VersionError,
     )
-}
+}  # fmt: skip
 
 
 RequestId: TypeAlias = "int | float | str | None"
@@ -72,12 +65,12 @@ RequestId: TypeAlias = "int | float | str | None"
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request, or a notification, which gets no answer."""
+    """A request; a notification is `silent`: it gets no answer."""
 
     method: str
     params: dict[str, Any]
     id: RequestId
-    notification: bool = False
+    silent: bool = False
 
 
 def read_line(line: bytes) -> Request | RpcError | list[Request | RpcError]:
@@ -87,13 +80,13 @@ def read_line(line: bytes) -> Request | RpcError | list[Request | RpcError]:
     except (ValueError, RecursionError):
         return RpcError(PARSE, "not JSON")
     if not isinstance(message, list):
-        return _read_one(message)
+        return _read_message(message)
     if not 0 < len(message) <= BATCH_LIMIT:
         return RpcError(INVALID, f"a batch has 1 to {BATCH_LIMIT} requests")
-    return [_read_one(one) for one in message]
+    return [*map(_read_message, message)]
 
 
-def _read_one(message: Any) -> Request | RpcError:
+def _read_message(message: Any) -> Request | RpcError:
     if not isinstance(message, dict):
         return RpcError(INVALID, "not a request")
     number, method, params = message.get("id"), message.get("method"), message.get("params", {})
@@ -101,10 +94,10 @@ def _read_one(message: Any) -> Request | RpcError:
         return RpcError(INVALID, "an id is a number or a text")
     if message.get("jsonrpc") != "2.0" or not isinstance(method, str):
         return RpcError(INVALID, "not a request of JSON-RPC 2.0", number)
-    notification = "id" not in message
+    silent = "id" not in message
     if not isinstance(params, dict):
-        return RpcError(BAD_PARAMS, "parameters have names here", number, silent=notification)
-    return Request(method, params, number, notification)
+        return RpcError(BAD_PARAMS, "parameters have names here", number, silent=silent)
+    return Request(method, params, number, silent)
 
 
 def _no_number(text: str) -> NoReturn:
@@ -125,24 +118,11 @@ def answer(number: object, result: object) -> bytes:
 def failure(number: object, error: Exception) -> bytes:
     """Write that a request failed, whatever the reason."""
     if isinstance(error, RpcError):
-        told: dict[str, Any] = {"code": error.code, "message": str(error)}
+        data: dict[str, Any] = {"code": error.code, "message": str(error)}
     else:
-        failed = known(error)
-        told = {"code": FAILURE, "message": failed.message, "data": error_to_data(failed)}
-    return _line({"jsonrpc": "2.0", "id": number, "error": told})
-
-
-def result_of(message: dict[str, Any]) -> Any:
-    """Take the result out of an answer.
-
-    Raises
-    ------
-    RigError
-        What the daemon raised.
-    """
-    if message.get("error") is None:
-        return message.get("result")
-    raise error_of(message)
+        failed = in_words(error)
+        data = {"code": FAILURE, "message": failed.message, "data": error_to_data(failed)}
+    return _line({"jsonrpc": "2.0", "id": number, "error": data})
 
 
 def error_of(message: dict[str, Any]) -> RigError:
@@ -153,7 +133,7 @@ def error_of(message: dict[str, Any]) -> RigError:
     return make_error(RigError, "not_understood", text=str(error.get("message")))
 
 
-def known(error: Exception) -> RigError:
+def in_words(error: Exception) -> RigError:
     """Put any failure into words."""
     if isinstance(error, RigError):
         return error

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from rig import __version__
 from rig.daemon import rpc
-from rig.daemon.admission import HELLO_S, Admission
+from rig.daemon.admission import HELLO_S
 from rig.daemon.connection import Connection, Turns
 from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import Door, listen
@@ -73,10 +73,8 @@ class Server:
         self._token = secrets.token_hex(32) if tcp else ""
         self._lease = Lease()
         self._worker = Worker(url, self.published, self._lease)
-        self._admission = Admission()
-        self._service = Service(
-            url, self._token, self._worker, self._lease, self.publisher, self._admission
-        )
+        self._service = Service(self._token, self._worker, self._lease, self.publisher)
+        self._admission = self._service.admission
         self._turns = Turns()
         self._idle_s = idle_s
         self._left_at = 0.0  # when the last client went
@@ -122,7 +120,7 @@ class Server:
             parts.append(self._watch_clients(self._idle_s))
         tasks = [loop.create_task(part) for part in parts]
         for task in tasks:
-            task.add_done_callback(self._ended)
+            task.add_done_callback(self._on_end)
 
         def died(error: BaseException) -> None:
             loop.call_soon_threadsafe(self._fail, error)
@@ -152,7 +150,7 @@ class Server:
         """End as a signal would."""
         self._over.set()
 
-    def _ended(self, task: asyncio.Task[None]) -> None:
+    def _on_end(self, task: asyncio.Task[None]) -> None:
         """See that no part of the daemon dies in silence."""
         if not task.cancelled() and (error := task.exception()) is not None:
             self._fail(error)
@@ -185,14 +183,14 @@ class Server:
             return
         reader, writer = await asyncio.open_connection(sock=line, limit=rpc.REQUEST_LIMIT)
         connection = Connection(reader, writer, self._service.do, self._lease.heard, self._turns)
-        self._admission.arrived(connection)
+        self._admission.register(connection)
         late = loop.call_later(HELLO_S, self._hurry, connection)
         try:
             await connection.serve()
         finally:
             late.cancel()
             self._left_at = loop.time()
-            self._service.left(connection)
+            self._service.forget(connection)
             connection.close()
 
     def _hurry(self, connection: Connection) -> None:
@@ -204,26 +202,26 @@ class Server:
         while True:
             await asyncio.sleep(LEASE_S / 10)
             if self.published.get("control") is not None and self._lease.holder is None:
-                self._worker.lost()
+                self._worker.wake()
             self._service.show_control()
 
     async def _watch_worker(self) -> None:
         """Tell every client when nothing is known any more, and when it is again."""
-        told, before = None, "idle"
+        data, before = None, "idle"
         while True:
             await asyncio.sleep(STALL_S / 10)
-            stalled = self._worker.stalled()
+            stalled = self._worker.stall()
             if stalled is not None:
-                if told is None:
+                if data is None:
                     log.warning("%s (%s)", stalled.message, stalled.hint)
                     before = self.published.get("phase")
-                told = error_to_data(stalled)
-                self.published.set(error=told, phase="trouble")
-            elif told is not None:
-                if self.published.get("error") == told:  # the worker has no trouble of its own
+                data = error_to_data(stalled)
+                self.published.set(error=data, phase="trouble")
+            elif data is not None:
+                if self.published.get("error") == data:  # the worker has no trouble of its own
                     phase = self.published.get("phase")
                     self.published.set(error=None, phase=before if phase == "trouble" else phase)
-                told = None
+                data = None
 
     async def _watch_door(self, door: Door) -> None:
         """End when no client is there and none can come; what is said then goes into a log too."""

@@ -19,7 +19,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.daemon.lease import ControlError
-from rig.daemon.rpc import error_to_data, known
+from rig.daemon.rpc import error_to_data, in_words
 from rig.daemon.stopper import Stopper
 from rig.errors import InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
@@ -27,9 +27,10 @@ from rig.ports import is_simulated
 from rig.reasons import make_error, make_reason, remedies
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
+from rig.recorder.published import link_state
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rig.daemon.lease import Lease
     from rig.reasons import Reason
@@ -51,6 +52,11 @@ _WAITING = make_reason("records_waiting")
 class _Job(NamedTuple):
     work: Callable[[], Any]
     outcome: Future[Any]
+
+
+class _Stop(NamedTuple):
+    reason: str
+    outcome: Future[None]
 
 
 class Worker:
@@ -78,21 +84,21 @@ class Worker:
         self._url = url
         self._lease = lease
         self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
-        self._stop = ""  # why everything shall be off
-        self._stops: list[Future[None]] = []
-        self._guard = threading.Lock()  # of the two above
+        self._stops: list[_Stop] = []  # why everything shall be off
         self._holder: object = None  # who armed
         self._at_work = False  # for a client
         self._ending = False
         self._due_s = math.inf  # not begun
         self._uneven = random.Random()
+        self._ping_s = 0.0  # until the next clock sample
         self._pause_s = _FIRST_PAUSE_S
         self._trouble: RigError | None = None
-        self._troubled: object = None  # the session that was open then
-        self._retry_at = 0.0
-        self._looked_at = self._next_ping = self._next_commit = self._next_statistics = 0.0
+        self._trouble_session: object = None  # that was open then
+        self._begun: dict[str, float] = {}  # when each duty was done last
         self.died: Callable[[BaseException], None] = lambda _: None
-        self.controller = Controller(url, published=published, halted=self._halted, keep_port=True)
+        self.controller = Controller(
+            url, published=published, halted=self._is_halted, keep_port=True
+        )
         self._stopper = Stopper(self.controller.stop_past)
         self._thread = threading.Thread(target=self._run, name="rig worker")
 
@@ -117,30 +123,31 @@ class Worker:
         writes
             Whether it makes no sense while the session file cannot be written.
         """
-        outcome: Future[Any] = Future()
 
-        def controlled() -> Any:
+        def in_control() -> Any:
             self._lease.require(holder)
             self._holder = holder
             if writes and isinstance(self._trouble, SessionError):
                 raise self._trouble
             return work(self.controller)
 
-        self._jobs.put(_Job(controlled, outcome))
+        return self._put(in_control)
+
+    def _put(self, work: Callable[[], Any]) -> Future[Any]:
+        outcome: Future[Any] = Future()
+        self._jobs.put(_Job(work, outcome))
         return outcome
 
     def stop(self, reason: str) -> Future[None]:
         """Have everything switched off, before anything else is done."""
         outcome: Future[None] = Future()
-        with self._guard:
-            self._stop = self._stop or reason
-            self._stops.append(outcome)
+        self._stops.append(_Stop(reason, outcome))
         self._stopper.ask()
-        self._jobs.put(None)
+        self.wake()
         return outcome
 
-    def lost(self) -> None:
-        """Note that the client in control is gone: look at once whether a drop is armed."""
+    def wake(self) -> None:
+        """Look at once whether something is to be switched off: whoever armed it may be gone."""
         self._jobs.put(None)
 
     def disk_s(self) -> float:
@@ -149,7 +156,7 @@ class Worker:
             return self.controller.session.write_s
         return 0.0
 
-    def stalled(self) -> RigError | None:
+    def stall(self) -> RigError | None:
         """Say that nothing is known of the board, when the worker has been held up for long."""
         late_s, recorder = time.monotonic() - self._due_s, self.controller.recorder
         disk = self.disk_s() > 0.0
@@ -157,21 +164,17 @@ class Worker:
         watched = disk or (recorder is not None and not is_simulated(self._url))
         if late_s < STALL_S or not watched:
             return None
-        is_armed = recorder is not None and recorder.armed is not None
-        disk_codes, worker_codes = ("disk_slow", "disk_slow_armed"), ("held_up", "held_up_armed")
-        code = (disk_codes if disk else worker_codes)[is_armed]
+        code = ("disk_slow" if disk else "held_up") + ("_armed" if self.controller.armed else "")
         return make_error(SessionError, code, late_s=late_s)
 
     def at_rest(self) -> Future[bool]:
         """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
-        outcome: Future[bool] = Future()
-        self._jobs.put(_Job(lambda: not self.controller.unsaved(), outcome))
-        return outcome
+        return self._put(lambda: not self.controller.has_unsaved())
 
     def end(self) -> None:
         """Finish: what is armed is disarmed, what is being recorded is recorded to its end."""
         self._ending = True
-        self._jobs.put(None)
+        self.wake()
 
     def join(self) -> None:
         """Wait for the end."""
@@ -180,15 +183,13 @@ class Worker:
 
     # ------------------------------------------------------------------ the thread
 
-    def _halted(self) -> bool:
+    def _is_halted(self) -> bool:
         """Whether what is under way shall end: asked by the recorder, many times a second."""
         self._beat()
-        if self._stop:
+        if self._stops:
             return True
-        recorder = self.controller.recorder
-        armed = recorder is not None and recorder.armed is not None
         asked = self._at_work and not self.controller.due
-        return (self._ending or not self._held) and (armed or asked)
+        return (self._ending or not self._held) and (asked or self.controller.armed is not None)
 
     def _beat(self, patience_s: float = 0.0) -> None:
         """Note that the thread goes on, and when it will at the latest have gone on again."""
@@ -202,7 +203,7 @@ class Worker:
         try:
             self._work()
         except BaseException as error:
-            self._drain(known(RuntimeError("the worker died")))
+            self._drain(in_words(RuntimeError("the worker died")))
             self.died(error)
 
     def _work(self) -> None:
@@ -216,7 +217,7 @@ class Worker:
                 job = self._jobs.get(timeout=patience_s)
             self._beat()
             self._turn(job)
-        self._stop = self._stop or "the daemon ended"
+        self._stops.append(_Stop("the daemon ended", Future()))
         self._attend()
         self._drain(make_error(StoppedError, "daemon_ends"))
         self._trying(self.controller.close)
@@ -233,19 +234,19 @@ class Worker:
     def _do(self, job: _Job | None) -> None:
         if job is None or not job.outcome.set_running_or_notify_cancel():
             return  # somebody only wants to be heard, or nobody waits any more
-        if self._stop:
-            job.outcome.set_exception(self._stopped())
+        if self._stops:
+            job.outcome.set_exception(self._stop_error())
             return
         self._at_work = True
         try:
             result = job.work()
         except Exception as error:
-            failure = known(error)
+            failure = in_words(error)
             # First what follows for the link, so that a client sees it before its answer.
             if self._trouble is None:
                 self._weigh(failure)
-            stopped = isinstance(error, StoppedError | DeviceRefusedError) and self._stop
-            job.outcome.set_exception(self._stopped() if stopped else failure)
+            is_stopped = isinstance(error, StoppedError | DeviceRefusedError) and self._stops
+            job.outcome.set_exception(self._stop_error() if is_stopped else failure)
         else:
             if self._trouble is not None and self._over():
                 self._well()
@@ -256,15 +257,15 @@ class Worker:
     def _over(self) -> bool:
         """Whether what was asked for has ended the trouble, by the way."""
         if isinstance(self._trouble, SessionError):
-            return self._troubled is not self._open_session
+            return self._trouble_session is not self._open_session
         return self.controller.recorder is not None
 
     @property
     def _open_session(self) -> object:
         return self.controller.session if self.controller.recording else None
 
-    def _stopped(self) -> StoppedError:
-        return make_error(StoppedError, "stopped", text=self._stop)
+    def _stop_error(self) -> StoppedError:
+        return make_error(StoppedError, "stopped", text=self._stops[0].reason)
 
     def _drain(self, error: RigError) -> None:
         with suppress(queue.Empty):
@@ -275,75 +276,64 @@ class Worker:
 
     def _attend(self) -> None:
         """Switch off what must not stay on."""
-        recorder = self.controller.recorder
-        armed = recorder is not None and recorder.armed is not None
         self._beat()
-        with self._guard:
-            reason, stops = self._stop, [*self._stops]  # one that comes from here on is not lost
-        why: Reason | str = reason
-        if reason:
-            self._drain(make_error(StoppedError, "stopped", text=reason))
-        elif armed and not self._held:
+        stops = [*self._stops]  # one that comes from here on is not lost
+        why: Reason | str = ""
+        if stops:
+            why = stops[0].reason
+            self._drain(self._stop_error())
+        elif self.controller.armed is not None and not self._held:
             silence = self._lease.silence(self._holder)
             client = {"client": self._lease.name, "silence_s": silence} if silence else {}
             why = make_reason("client_silent" if silence else "client_lost", **client)
         if why:
             self._stopper.taken_over()
             self._trying(partial(self.controller.stop, why))
-        with self._guard:
-            self._stops = [one for one in self._stops if one not in stops]
-            if not self._stops:
-                self._stop = ""
-        for outcome in stops:
-            outcome.set_result(None)
+        del self._stops[: len(stops)]
+        for stop in stops:
+            stop.outcome.set_result(None)
 
     # ------------------------------------------------------------------ between requests
 
+    def _duties(self) -> Iterator[tuple[Callable[[], object], float]]:
+        """List what is to be done again and again as things stand, and how often, s."""
+        controller, recorder = self.controller, self.controller.recorder
+        watched = self.published.watched
+        if self._trouble is not None:
+            yield self._recover, self._pause_s
+        elif recorder is not None:
+            is_armed = recorder.armed is not None
+            yield recorder.look, _ARMED_S if is_armed else _WATCHED_S if watched else _ALONE_S
+            if controller.recording and not is_armed:
+                yield self._ping, self._ping_s
+                yield controller.session.commit, _COMMIT_S
+            if watched:
+                yield self._statistics, _STATISTICS_S
+        elif not is_simulated(self._url):
+            yield controller.connect, _ALONE_S
+
+    def _due_at(self, duty: Callable[[], object], period_s: float) -> float:
+        return self._begun.get(duty.__name__, 0.0) + period_s
+
     def _patience(self) -> float:
         """How long nothing needs to be done, s."""
-        if self._stop:
+        if self._stops:
             return 0.0
-        moments = [time.monotonic() + _ALONE_S]
-        if self._trouble is not None:
-            moments.append(self._retry_at)
-        elif self.controller.recorder is not None:
-            moments.append(self._looked_at + self._look_s)
-            if self.controller.recording:
-                moments.append(self._next_ping)
-            if self.published.watched:
-                moments.append(self._next_statistics)
-        return max(0.0, min(moments) - time.monotonic())
+        now = time.monotonic()
+        moments = [self._due_at(*duty) for duty in self._duties()]
+        return max(0.0, min([now + _ALONE_S, *moments]) - now)
 
     def _idle(self) -> None:
         now = time.monotonic()
-        recorder = self.controller.recorder
-        if self._trouble is not None:
-            if now >= self._retry_at:
-                self._trying(self._recover)
-            return
-        if recorder is None:
-            if not is_simulated(self._url):
-                self._trying(self.controller.connect)
-            return
-        if now >= self._looked_at + self._look_s:
-            self._looked_at = now
-            self._trying(recorder.look)
-        if self.controller.recording and recorder.armed is None and now >= self._next_ping:
-            self._next_ping = now + _PING_S * self._uneven.uniform(0.5, 1.5)
-            self._trying(recorder.ping)
-        if self.controller.recording and recorder.armed is None and now >= self._next_commit:
-            self._next_commit = now + _COMMIT_S
-            self._trying(self.controller.session.commit)
-        if self.published.watched and now >= self._next_statistics:
-            self._next_statistics = now + _STATISTICS_S
-            self._trying(self._statistics)
+        for duty, period_s in [*self._duties()]:
+            if now >= self._due_at(duty, period_s):
+                self._begun[duty.__name__] = now
+                self._trying(duty)
 
-    @property
-    def _look_s(self) -> float:
-        """Time between two looks at the device."""
-        if self.controller.recorder is not None and self.controller.recorder.armed is not None:
-            return _ARMED_S
-        return _WATCHED_S if self.published.watched else _ALONE_S
+    def _ping(self) -> None:
+        self._ping_s = _PING_S * self._uneven.uniform(0.5, 1.5)
+        if self.controller.recorder is not None:
+            self.controller.recorder.ping()
 
     def _statistics(self) -> None:
         recorder = self.controller.recorder
@@ -362,48 +352,37 @@ class Worker:
         try:
             work()
         except Exception as error:
-            self._weigh(known(error))
+            self._weigh(in_words(error))
 
     def _weigh(self, error: RigError) -> None:
         """Decide what an error means for the link."""
-        if isinstance(error, SessionError) and self.controller.recording:
-            waiting = self.controller.session.pending
-            if waiting and _WAITING not in error.reasons:
-                error.reasons += (_WAITING,)
-                error.hint = "; ".join(remedies(error.reasons))
+        controller = self.controller
         if isinstance(error, DeviceRefusedError | StoppedError | ControlError | InputError):
             return
         if isinstance(error, SessionError):
-            if not self.controller.recording:
+            if not controller.recording:
                 return  # of a file that is not, or no longer, open
-            recorder = self.controller.recorder
-            if recorder is not None and recorder.armed is not None:
+            if controller.session.pending and _WAITING not in error.reasons:
+                error.reasons += (_WAITING,)
+                error.hint = "; ".join(remedies(error.reasons))
+            if controller.recorder is not None and controller.armed is not None:
                 with suppress(RigError):
-                    recorder.abort()
+                    controller.recorder.abort()
         else:
             with suppress(RigError):
-                self.controller.disconnect()
-            if is_simulated(self._url) and not self.controller.recording:
+                controller.disconnect()
+            if is_simulated(self._url) and not controller.recording:
                 return  # there is no scene, so there is no port to come back to
-        if self._trouble is None:
-            self._pause_s = _FIRST_PAUSE_S
+        longer_s = min(self._pause_s * _GROWTH, _LONGEST_PAUSE_S)
+        self._pause_s = _FIRST_PAUSE_S if self._trouble is None else longer_s
+        self._begun[self._recover.__name__] = time.monotonic()
         if str(self._trouble) != str(error):  # said once, however often it is tried again
             what = "trouble" if isinstance(error, SessionError) else "down"
             log.warning("%s: %s%s", what, error.message, f" ({error.hint})" if error.hint else "")
-        self._trouble, self._troubled = error, self._open_session
-        self._retry_at = time.monotonic() + self._pause_s
-        up = self.controller.recorder is not None
-        self.published.set(
-            link={
-                "state": "up" if up else "down",
-                "error": None if up else error_to_data(error),
-                "retry_s": self._pause_s,
-            },
-            phase="trouble",
-            error=error_to_data(error),
-            statistics=None,
-        )
-        self._pause_s = min(self._pause_s * _GROWTH, _LONGEST_PAUSE_S)
+        self._trouble, self._trouble_session = error, self._open_session
+        is_up, data = controller.recorder is not None, error_to_data(error)
+        link = link_state("up" if is_up else "down", None if is_up else data, self._pause_s)
+        self.published.set(link=link, phase="trouble", error=data, statistics=None)
 
     def _recover(self) -> None:
         if self.controller.recording:
@@ -414,5 +393,5 @@ class Worker:
         self._well()
 
     def _well(self) -> None:
-        self._trouble = self._troubled = None
+        self._trouble = self._trouble_session = None
         self.published.set(error=None, phase="idle")

@@ -57,12 +57,12 @@ class Assembly:
         self.reset = False
         self.first_kept = 0
         self._raw = bytearray()  # the events' records, each at its number's place
-        self._known = bytearray()  # 1 where there is one
+        self._mask = bytearray()  # 1 where there is one
 
     @property
     def begun(self) -> bool:
         """Whether anything of the drop itself was seen."""
-        return 1 in self._known or self.fire_tick is not None or self.certificate is not None
+        return 1 in self._mask or self.fire_tick is not None or self.certificate is not None
 
     def add(self, frame: EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
@@ -70,7 +70,7 @@ class Assembly:
         end = first + len(frame.events)
         self._reserve(end)
         self._raw[first * EVENTS.size : end * EVENTS.size] = raw
-        self._known[first:end] = b"\1" * (end - first)
+        self._mask[first:end] = b"\1" * (end - first)
 
     def missing(
         self, at_most: int = EVENTS_PER_FRAME, *, readable: bool = False
@@ -104,8 +104,8 @@ class Assembly:
 
     def forget_events(self, latest: int | None = None) -> None:
         """Drop the events, to read them again; only the latest so many, when said."""
-        first = max(0, self._known.count(1) - latest) if latest is not None else 0
-        del self._known[first:], self._raw[first * EVENTS.size :]
+        first = max(0, self._mask.count(1) - latest) if latest is not None else 0
+        del self._mask[first:], self._raw[first * EVENTS.size :]
 
     def drop(self, tick_hz: int) -> Drop:
         """Make the raw record of what is known now.
@@ -139,21 +139,21 @@ class Assembly:
     @property
     def _end(self) -> int:
         """One more than the last number an event can have."""
-        return self.certificate.events if self.certificate else len(self._known)
+        return self.certificate.events if self.certificate else len(self._mask)
 
     def _reserve(self, end: int) -> None:
         """Make room for the events before a number."""
-        more = max(0, end - len(self._known))
-        self._known += bytes(more)
-        self._raw += bytes(more * EVENTS.size)
+        lacking = max(0, end - len(self._mask))
+        self._mask += bytes(lacking)
+        self._raw += bytes(lacking * EVENTS.size)
 
-    def _stretches(self, known: int, first: int, end: int) -> Iterator[tuple[int, int]]:
-        """List from where to where events are known (1) or not (0)."""
-        first = self._known.find(known, first, end)
+    def _stretches(self, value: int, first: int, end: int) -> Iterator[tuple[int, int]]:
+        """List from where to where events are there (1) or not (0)."""
+        first = self._mask.find(value, first, end)
         while first >= 0:
-            other = self._known.find(1 - known, first, end)
-            yield first, end if other < 0 else other
-            first = self._known.find(known, other, end) if other >= 0 else -1
+            stop = self._mask.find(1 - value, first, end)
+            yield first, end if stop < 0 else stop
+            first = self._mask.find(value, stop, end) if stop >= 0 else -1
 
     def _crc(self) -> int:
         """CRC-32 over all events; none is missing."""
@@ -163,16 +163,16 @@ class Assembly:
         if fire_tick is None:
             return ()
         gates = self.certificate.gates if self.certificate else self.gates
-        found: list[tuple[int, int, bool]] = []
-        for first, end in self._stretches(1, 0, min(self._end, len(self._known))):
+        rows: list[tuple[int, int, bool]] = []
+        for first, end in self._stretches(1, 0, min(self._end, len(self._mask))):
             raw = self._raw[first * EVENTS.size : end * EVENTS.size]
             events, state = EVENTS.layout.iter_unpack(raw), initial
             if first:
                 # Behind a gap it is not known when the gates changed: no edge is better than a
                 # wrong one.
                 _, state = next(events)
-            found += edges(events, state, gates, fire_tick)
-        return tuple(map(Edge._make, found))
+            rows += edges(events, state, gates, fire_tick)
+        return tuple(map(Edge._make, rows))
 
     def _faults(self, tick_hz: int) -> Iterator[Reason]:
         if not tick_hz:
@@ -227,16 +227,15 @@ def edges(
     list of (int, int, bool)
         As `rig.records.Edge` has them; of one snapshot, by channel.
     """
-    found: list[tuple[int, int, bool]] = []
-    for tick, now in events:
-        changed = (state ^ now) & gates
-        state = now
+    rows: list[tuple[int, int, bool]] = []
+    for tick, gates_state in events:
+        changed = (state ^ gates_state) & gates
+        state, since = gates_state, ticks_since(fire_tick, tick)
         while changed:
             lowest = changed & -changed
             changed ^= lowest
-            since = (tick - fire_tick + _HALF) % _WRAP - _HALF
-            found.append((since, lowest.bit_length() - 1, now & lowest != 0))
-    return found
+            rows.append((since, lowest.bit_length() - 1, state & lowest != 0))
+    return rows
 
 
 def ticks_since(fire_tick: int, tick: int) -> int:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rig.link.assembly import Assembly
     from rig.link.exchange import OnRecord, Tap
     from rig.link.port import Port
-    from rig.link.transcript import Record, Transcript
+    from rig.link.transcript import Record
     from rig.records import Drop
 
 BOOT_WAIT_S = 2.0
@@ -40,7 +40,7 @@ def _is_boot(got: Received) -> bool:
     return isinstance(got.message, wire.Boot)
 
 
-class Device:
+class Device(Exchange):
     """A device on an open port. Not for use from several threads at once.
 
     Parameters
@@ -70,28 +70,21 @@ class Device:
         tries: int = 8,
         give_way: Callable[[], None] = lambda: None,
     ) -> None:
-        self._samples: list[ClockSample] = []
+        super().__init__(port, clock, tap, on_record, tries)
+        self.give_way = give_way
+        self._sample: ClockSample | None = None
         self._record_ms: dict[int, int] = {}  # of the last armed drop, by label
         self._disarmed: wire.DisarmReason | None = None  # by itself, since it was armed
 
-        def know(record: Record) -> None:
-            match record:
-                case ClockSample():
-                    self._samples.append(record)
-                case Received(message=wire.Armed()):
-                    self._disarmed = None
-                case Received(message=wire.Disarmed(reason=reason)):
-                    self._disarmed = reason
-            if on_record is not None:
-                on_record(record)
-
-        self._line = Exchange(port, clock, tap, know, tries)
-        self._line.give_way = give_way
-
-    @property
-    def transcript(self) -> Transcript:
-        """The machine all bytes go through."""
-        return self._line.transcript
+    def _note(self, record: Record) -> None:
+        match record:
+            case ClockSample():
+                self._sample = record
+            case Received(message=wire.Armed()):
+                self._disarmed = None
+            case Received(message=wire.Disarmed(reason=reason)):
+                self._disarmed = reason
+        super()._note(record)
 
     def connect(self, boot_wait_s: float = BOOT_WAIT_S) -> wire.Identity:
         """Find out who is there.
@@ -112,19 +105,18 @@ class Device:
         DeviceError
             Protocol versions differ, or nobody answers.
         """
-        line = self._line
-        line.expect_boot = True
+        self.expect_boot = True
         try:
-            line.write(DELIMITER)  # ends whatever junk the line has seen so far
-            booted = line.wait(boot_wait_s, _is_boot)
+            self.write(DELIMITER)  # ends whatever junk the line has seen so far
+            booted = self.wait_for(boot_wait_s, _is_boot)
             try:
-                identity = line.request(wire.Identify(), wire.Identity)
+                identity = self.request(wire.Identify(), wire.Identity)
             except DeviceTimeoutError:
-                if booted is not None or line.wait(LOADER_WAIT_S, _is_boot) is None:
+                if booted is not None or self.wait_for(LOADER_WAIT_S, _is_boot) is None:
                     raise
-                identity = line.request(wire.Identify(), wire.Identity)
+                identity = self.request(wire.Identify(), wire.Identity)
         finally:
-            line.expect_boot = False
+            self.expect_boot = False
         if identity.protocol_version != wire.PROTOCOL_VERSION:
             raise DeviceRefusedError(wire.RefusalReason.VERSION, identity.protocol_version)
         return identity
@@ -137,17 +129,13 @@ class Device:
         dict
             By the names of the daemon's interface (rig/daemon/API.md).
         """
-        line, read = self._line, self.transcript
+        counts = ("requests", "repeats", "rx_bytes", "tx_bytes")
         return {
-            "rx_frames": read.good_frames,
-            "rx_bad": read.bad_frames,
-            "rx_unreadable": read.unreadable,
-            "requests": line.requests,
-            "repeats": line.repeats,
-            "rx_bytes": line.rx_bytes,
-            "tx_bytes": line.tx_bytes,
-            "port_waiting": line.waiting(),
-        }
+            "rx_frames": self.transcript.rx.good,
+            "rx_bad": self.transcript.rx.bad,
+            "rx_unreadable": self.transcript.unreadable,
+            "port_waiting": self.waiting(),
+        } | {name: getattr(self, name) for name in counts}
 
     def ping(self) -> ClockSample | None:
         """Take a clock sample.
@@ -157,17 +145,17 @@ class Device:
         ClockSample or None
             `None` when the request had to be repeated: such a sample would be ambiguous.
         """
-        self._samples.clear()
-        self._line.request(wire.Ping(), wire.Pong)
-        return self._samples.pop() if self._samples else None
+        self._sample = None
+        self.request(wire.Ping(), wire.Pong)
+        return self._sample
 
     def status(self) -> wire.State:
         """Ask what the device is doing."""
-        return self._line.request(wire.Status(), wire.State)
+        return self.request(wire.Status(), wire.State)
 
     def reference(self) -> wire.ReferencePulse:
         """Ask for the latest pulse of the 1 Hz reference; its count is 0 when none is wired."""
-        return self._line.request(wire.Reference(), wire.ReferencePulse)
+        return self.request(wire.Reference(), wire.ReferencePulse)
 
     def arm(
         self,
@@ -196,7 +184,7 @@ class Device:
             of range, the emergency stop is open.
         """
         request = wire.Arm(label, gates, release, pulse_us, timeout_ms, record_ms)
-        token = self._line.request(request, wire.Armed).token
+        token = self.request(request, wire.Armed).token
         self._record_ms = {label: record_ms}
         return token
 
@@ -220,7 +208,7 @@ class Device:
             was released.
         """
         try:
-            tick = self._line.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
+            tick = self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
         except DeviceRefusedError as refused:
             if refused.reason is not wire.RefusalReason.NOT_ARMED:
                 raise
@@ -229,21 +217,7 @@ class Device:
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""
-        self._line.request(wire.Abort(), wire.Done, wait=_ABORT_WAIT_S)
-
-    def abort_past(self) -> None:
-        """Send ABORT from any thread, whatever is under way; nobody waits for its answer.
-
-        Raises
-        ------
-        OSError
-            The connection broke.
-        """
-        self._line.write_past(wire.Abort())
-
-    def finish(self) -> None:
-        """Give the tap what it has not been given yet: nothing more is sent or read."""
-        self._line.log_past()
+        self.request(wire.Abort(), wire.Done, wait=_ABORT_WAIT_S)
 
     def acknowledge(self, label: int, crc32: int) -> None:
         """Let the device forget a drop: call it when the drop is safe on disk, not before.
@@ -258,7 +232,7 @@ class Device:
         DeviceRefusedError
             The device holds no such drop, or holds other data.
         """
-        self._line.request(wire.Acknowledge(label, crc32), wire.Done)
+        self.request(wire.Acknowledge(label, crc32), wire.Done)
 
     def collect(
         self, label: int, timeout: float | None = None, stop: Callable[[], bool] | None = None
@@ -289,22 +263,22 @@ class Device:
         if timeout is None:
             timeout = self._record_ms.get(label, 0) / 1000 + _LATE_S
         drop = self.transcript.assembly(label)
-        now = self._line.clock.now_ns
-        hopeless = now() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)
-        ask = now() + round(timeout * 1e9)
+        now_ns = self.clock.now_ns
+        hopeless = now_ns() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)
+        ask = now_ns() + round(timeout * 1e9)
         while drop.certificate is None:
-            self._line.receive()
+            self.receive()
             if stop is not None and stop():
                 stop = None
                 self.abort()
-                ask = now() + round(_LATE_S * 1e9)
-            elif now() >= ask and drop.certificate is None:
+                ask = now_ns() + round(_LATE_S * 1e9)
+            elif now_ns() >= ask and drop.certificate is None:
                 state = self.status()
                 if (state.phase, state.label) != (wire.Phase.RECORDING, label):
                     break  # the certificate was lost on the way, or the drop is gone
-                if now() >= hopeless:
+                if now_ns() >= hopeless:
                     raise make_error(DeviceTimeoutError, "device_endless")
-                ask = now() + round(_LATE_S * 1e9)
+                ask = now_ns() + round(_LATE_S * 1e9)
         return self.fetch(label)
 
     def fetch(self, label: int) -> Drop:
@@ -327,24 +301,14 @@ class Device:
         """
         drop = self.transcript.assembly(label)
         if drop.certificate is None:
-            self._line.request(wire.Read(label, 0, 0), wire.DropCertificate)
+            self.request(wire.Read(label, 0, 0), wire.DropCertificate)
         self._read_missing(drop)
         if not drop.missing() and not drop.sound():
             # Two CRC-16 collisions in one drop are all but impossible: once more is enough.
-            known = self.transcript.identity
-            drop.forget_events(known.capacity if known else None)
+            identity = self.transcript.identity
+            drop.forget_events(identity.capacity if identity else None)
             self._read_missing(drop)
         return self.transcript.pending(label)
-
-    def poll(self) -> list[Record]:
-        """Take what the device has sent of its own accord (it may have disarmed itself).
-
-        Returns
-        -------
-        list of Record
-            What became known, perhaps nothing; waits no longer than the port's time-out.
-        """
-        return self._line.receive()
 
     def _read_missing(self, drop: Assembly) -> None:
         """Ask for missing events in ever smaller pieces: on a bad line short frames get through."""
@@ -353,14 +317,14 @@ class Device:
         while missing := drop.missing(at_most=size, readable=True):
             first, count = missing[0]
             try:
-                self._line.request(wire.Read(drop.label, first, count), wire.EventsFrame, tries=2)
+                self.request(wire.Read(drop.label, first, count), wire.EventsFrame, tries=2)
             except DeviceRefusedError as refused:
                 # What it does not keep any more stays missing, and makes the drop faulty.
                 if refused.reason is not wire.RefusalReason.NOT_KEPT or refused.detail <= first:
                     raise
             except DeviceTimeoutError:
                 failures += 1
-                if failures > self._line.tries:
+                if failures > self.tries:
                     raise
                 size = max(_SMALLEST_READ, size // 2)
             else:

@@ -32,6 +32,8 @@ _LONGEST_WAIT_S = 0.5
 _BACK_OFF = 1.5
 _PAST_SEQ = 255
 """Of what goes past a request that is under way, whose answer it must not be taken for."""
+# The delimiter ends what another thread may be in the middle of: that is sent again.
+_ABORT = DELIMITER + encode(Frame(wire.CODES[wire.Abort], _PAST_SEQ, 0, b""))
 STRANGE_BYTES = 1 << 20
 """Read and kept at most of somebody who has not said who he is."""
 _AT_ONCE = 1 << 16
@@ -82,7 +84,7 @@ class Exchange:
         self._on_record = on_record
         self._seq = 0
         self._part = b""  # of a frame that has not ended yet
-        self._past: deque[tuple[int, bytes]] = deque()  # what `write_past` sent, for the tap
+        self._past: deque[tuple[int, bytes]] = deque()  # what `abort_past` sent, for the tap
 
     def request(
         self,
@@ -126,7 +128,7 @@ class Exchange:
         for number in range(tries or self.tries):
             self.repeats += number > 0
             self.write(data)
-            answer = self.wait(wait, lambda got: got.ack == seq)
+            answer = self.wait_for(wait, lambda got: got.ack == seq)
             wait = min(wait * _BACK_OFF, _LONGEST_WAIT_S)
             if isinstance(answer, expected):
                 return answer
@@ -137,8 +139,8 @@ class Exchange:
                 raise make_error(DeviceError, "device_confused", **names)
         raise make_error(DeviceTimeoutError, "device_silent", request=type(message).__name__)
 
-    def wait(self, seconds: float, wanted: Callable[[Received], bool]) -> wire.Message | None:
-        """Read until a wanted message comes or the time is over.
+    def wait_for(self, seconds: float, wanted: Callable[[Received], bool]) -> wire.Message | None:
+        """Read until a message comes that is waited for, or the time is over.
 
         Parameters
         ----------
@@ -150,7 +152,7 @@ class Exchange:
         Returns
         -------
         Message or None
-            The first that was wanted.
+            The first of them.
         """
         until = self.clock.now_ns() + round(seconds * 1e9)
         while self.clock.now_ns() < until:
@@ -179,14 +181,14 @@ class Exchange:
             raise _lost(error) from error
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
-            raise _strange(self.rx_bytes, self.transcript.good_frames)
+            raise _strange(self.rx_bytes, self.transcript.rx.good)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE
         records = self._take() if ended else []
         restarts = (record for record in records if isinstance(record, Restart))
         if not self.expect_boot and (restart := next(restarts, None)):
-            raise _restarted(restart)
+            raise _restart_error(restart)
         return records
 
     def write(self, data: bytes) -> None:
@@ -205,14 +207,14 @@ class Exchange:
         if self._part:
             self._take()
         self.tx_bytes += len(data)
-        self._chunk("tx", data)
+        self._log("tx", data)
         try:
             self._port.write(data)
         except OSError as error:
             raise _lost(error) from error
 
-    def write_past(self, message: wire.HostMessage) -> None:
-        """Send a request at once, from any thread, past one that is under way.
+    def abort_past(self) -> None:
+        """Send ABORT at once, from any thread, past a request that is under way.
 
         Nobody waits for its answer. The tap is given it before whatever comes next.
 
@@ -221,11 +223,8 @@ class Exchange:
         OSError
             The connection broke.
         """
-        # The delimiter ends what another thread may be in the middle of: that is sent again.
-        code, payload = wire.pack(message)
-        data = DELIMITER + encode(Frame(code, _PAST_SEQ, 0, payload))
-        self._past.append((self.clock.now_ns(), data))
-        self._port.write(data)
+        self._past.append((self.clock.now_ns(), _ABORT))
+        self._port.write(_ABORT)
 
     def waiting(self) -> int:
         """Count the bytes that have arrived and were not read yet.
@@ -242,28 +241,32 @@ class Exchange:
 
     def _take(self) -> list[Record]:
         part, self._part = self._part, b""
-        return self._chunk("rx", part)
-
-    def _chunk(self, direction: Direction, data: bytes) -> list[Record]:
-        self.log_past()
-        return self._log(direction, self.clock.now_ns(), data)
+        return self._log("rx", part)
 
     def log_past(self) -> None:
         """Give the tap what other threads have sent, before anything else or at the end."""
         while self._past:
-            self._log("tx", *self._past.popleft())
+            self._feed("tx", *self._past.popleft())
 
-    def _log(self, direction: Direction, now_ns: int, data: bytes) -> list[Record]:
+    def _log(self, direction: Direction, data: bytes) -> list[Record]:
+        self.log_past()
+        return self._feed(direction, self.clock.now_ns(), data)
+
+    def _feed(self, direction: Direction, now_ns: int, data: bytes) -> list[Record]:
         if self._tap is not None:
             self._tap(direction, now_ns, data)
         records = self.transcript.feed(direction, now_ns, data)
-        if self._on_record is not None:
-            for record in records:
-                self._on_record(record)
+        for record in records:
+            self._note(record)
         return records
 
+    def _note(self, record: Record) -> None:
+        """Take note of what became known."""
+        if self._on_record is not None:
+            self._on_record(record)
 
-def _restarted(restart: Restart) -> DeviceError:
+
+def _restart_error(restart: Restart) -> DeviceError:
     if restart.label is None:
         return make_error(DeviceError, "board_restarted")
     return make_error(DeviceError, "board_restarted_in_drop", moment=restart.when)

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
 from rig.boards import Capabilities
 from rig.link.frames import PAYLOAD_LIMIT
@@ -43,50 +43,10 @@ from rig.link.wiretypes import (
     write_field,
 )
 
-__all__ = [
-    "CODES",
-    "EVENTS_PER_FRAME",
-    "FIELDS",
-    "HOST_SILENCE_MS",
-    "PROTOCOL_VERSION",
-    "TABLE",
-    "TEST_RUN",
-    "Abort",
-    "Acknowledge",
-    "Arm",
-    "Armed",
-    "Boot",
-    "DeviceMessage",
-    "DisarmReason",
-    "Disarmed",
-    "Done",
-    "DropCertificate",
-    "DropCertificate2",
-    "Event",
-    "EventsFrame",
-    "Fire",
-    "Fired",
-    "HostMessage",
-    "Identify",
-    "Identity",
-    "Message",
-    "MessageError",
-    "Phase",
-    "Ping",
-    "Pong",
-    "PulseEnd",
-    "Read",
-    "Reference",
-    "ReferencePulse",
-    "RefusalReason",
-    "Refused",
-    "State",
-    "Status",
-    "pack",
-    "pack_label",
-    "unpack",
-    "unpack_label",
-]
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+__all__ = ["Event", "MessageError"]  # besides what is defined here
 
 PROTOCOL_VERSION = 2
 EVENTS_PER_FRAME = (PAYLOAD_LIMIT - 6) // 6
@@ -142,25 +102,54 @@ class PulseEnd(IntEnum):
     DEVICE = 3  # the device, to be safe: its main loop stood still, or the pin did not obey
 
 
-@dataclass(frozen=True, slots=True)
-class Identify:
+class HostMessage:
+    """A request."""
+
+    __slots__ = ()
+
+
+class DeviceMessage:
+    """An answer, or what the device says of its own accord."""
+
+    __slots__ = ()
+
+
+Message: TypeAlias = HostMessage | DeviceMessage
+TABLE: dict[int, type[Message]] = {}
+"""Every message by its code."""
+_Kind = TypeVar("_Kind", bound=type[Any])
+
+
+@dataclass_transform(frozen_default=True)
+def _message(code: int) -> Callable[[_Kind], _Kind]:
+    """Enter a message into the table."""
+
+    def enter(kind: _Kind) -> _Kind:
+        TABLE[code] = dataclass(frozen=True, slots=True)(kind)
+        return TABLE[code]  # type: ignore[return-value]
+
+    return enter
+
+
+@_message(0x01)
+class Identify(HostMessage):
     """Ask who is there; the first request on a line."""
 
     protocol_version: U8 = PROTOCOL_VERSION
 
 
-@dataclass(frozen=True, slots=True)
-class Ping:
+@_message(0x02)
+class Ping(HostMessage):
     """Ask for the device's tick."""
 
 
-@dataclass(frozen=True, slots=True)
-class Status:
+@_message(0x03)
+class Status(HostMessage):
     """Ask what the device is doing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Arm:
+@_message(0x04)
+class Arm(HostMessage):
     """Prepare a drop.
 
     Attributes
@@ -187,20 +176,20 @@ class Arm:
     record_ms: U16
 
 
-@dataclass(frozen=True, slots=True)
-class Fire:
+@_message(0x05)
+class Fire(HostMessage):
     """Let go; `token` is from ARMED, so that no stray frame can fire."""
 
     token: U32
 
 
-@dataclass(frozen=True, slots=True)
-class Abort:
+@_message(0x06)
+class Abort(HostMessage):
     """Switch the release off; disarm; end a recording now. A held drop may then be re-armed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Read:
+@_message(0x07)
+class Read(HostMessage):
     """Ask for events again (answer EVENTS, perhaps fewer); count 0 asks for the CERTIFICATE."""
 
     label: U32
@@ -208,21 +197,21 @@ class Read:
     count: U8
 
 
-@dataclass(frozen=True, slots=True)
-class Acknowledge:
+@_message(0x08)
+class Acknowledge(HostMessage):
     """The drop is safe with the host: the device may forget it."""
 
     label: U32
     crc32: U32
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+@_message(0x09)
+class Reference(HostMessage):
     """Ask for the latest pulse of the 1 Hz reference."""
 
 
-@dataclass(frozen=True, slots=True)
-class Identity:
+@_message(0x81)
+class Identity(DeviceMessage):
     """Who the device is and what it can do.
 
     Attributes
@@ -258,15 +247,15 @@ class Identity:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Pong:
+@_message(0x82)
+class Pong(DeviceMessage):
     """The tick when PING was executed."""
 
     tick: U32
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+@_message(0x83)
+class State(DeviceMessage):
     """What the device is doing; `label` 0 and `events` 0 when idle."""
 
     phase: Annotated[Phase, BYTE_ENUM]
@@ -275,35 +264,35 @@ class State:
     events: U16
 
 
-@dataclass(frozen=True, slots=True)
-class Armed:
+@_message(0x84)
+class Armed(DeviceMessage):
     """Answer to ARM."""
 
     token: U32
 
 
-@dataclass(frozen=True, slots=True)
-class Fired:
+@_message(0x85)
+class Fired(DeviceMessage):
     """Answer to FIRE: the tick of the release."""
 
     tick: U32
 
 
-@dataclass(frozen=True, slots=True)
-class Refused:
+@_message(0x86)
+class Refused(DeviceMessage):
     """The request was understood and not executed."""
 
     reason: Annotated[RefusalReason, BYTE_ENUM]
     detail: U16
 
 
-@dataclass(frozen=True, slots=True)
-class Done:
+@_message(0x87)
+class Done(DeviceMessage):
     """ABORT or ACKNOWLEDGE was executed."""
 
 
-@dataclass(frozen=True, slots=True)
-class EventsFrame:
+@_message(0x88)
+class EventsFrame(DeviceMessage):
     """Events number `first` and on. Stamps are already corrected for the board's mean latency.
 
     An event with the state of the one before it is a glitch: a pulse over before it was looked at.
@@ -314,8 +303,8 @@ class EventsFrame:
     events: EventList
 
 
-@dataclass(frozen=True, slots=True)
-class DropCertificate:
+@_message(0x89)
+class DropCertificate(DeviceMessage):
     """The device's own account of a drop, as version 1 sent it.
 
     Attributes
@@ -343,7 +332,33 @@ class DropCertificate:
     sense_tick: U32
 
 
-@dataclass(frozen=True, slots=True)
+@_message(0x8A)
+class Disarmed(DeviceMessage):
+    """The device disarmed by itself."""
+
+    label: U32
+    reason: Annotated[DisarmReason, BYTE_ENUM]
+
+
+@_message(0x8B)
+class Boot(DeviceMessage):
+    """The device has (re)started; `cause` has the AVR's MCUSR bits.
+
+    A delimiter goes before it, since the reset may have cut another frame short.
+    """
+
+    cause: U8
+
+
+@_message(0x8C)
+class ReferencePulse(DeviceMessage):
+    """Answer to REFERENCE: how many pulses there were, and the tick of the latest."""
+
+    count: U16
+    tick: U32
+
+
+@_message(0x8D)
 class DropCertificate2(DropCertificate):
     """The device's own account of a drop.
 
@@ -366,76 +381,6 @@ class DropCertificate2(DropCertificate):
     lowest_mv: U16
 
 
-@dataclass(frozen=True, slots=True)
-class Disarmed:
-    """The device disarmed by itself."""
-
-    label: U32
-    reason: Annotated[DisarmReason, BYTE_ENUM]
-
-
-@dataclass(frozen=True, slots=True)
-class Boot:
-    """The device has (re)started; `cause` has the AVR's MCUSR bits.
-
-    A delimiter goes before it, since the reset may have cut another frame short.
-    """
-
-    cause: U8
-
-
-@dataclass(frozen=True, slots=True)
-class ReferencePulse:
-    """Answer to REFERENCE: how many pulses there were, and the tick of the latest."""
-
-    count: U16
-    tick: U32
-
-
-HostMessage: TypeAlias = (
-    Identify | Ping | Status | Arm | Fire | Abort | Read | Acknowledge | Reference
-)
-DeviceMessage: TypeAlias = (
-    Identity
-    | Pong
-    | State
-    | Armed
-    | Fired
-    | Refused
-    | Done
-    | EventsFrame
-    | DropCertificate
-    | Disarmed
-    | Boot
-    | ReferencePulse
-    | DropCertificate2
-)
-Message: TypeAlias = HostMessage | DeviceMessage
-
-TABLE: dict[int, type[Message]] = {
-    0x01: Identify,
-    0x02: Ping,
-    0x03: Status,
-    0x04: Arm,
-    0x05: Fire,
-    0x06: Abort,
-    0x07: Read,
-    0x08: Acknowledge,
-    0x09: Reference,
-    0x81: Identity,
-    0x82: Pong,
-    0x83: State,
-    0x84: Armed,
-    0x85: Fired,
-    0x86: Refused,
-    0x87: Done,
-    0x88: EventsFrame,
-    0x89: DropCertificate,
-    0x8A: Disarmed,
-    0x8B: Boot,
-    0x8C: ReferencePulse,
-    0x8D: DropCertificate2,
-}
 CODES = {message: code for code, message in TABLE.items()}
 FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}
 _READERS = {kind: payload_reader(fields) for kind, fields in FIELDS.items()}

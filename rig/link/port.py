@@ -39,19 +39,15 @@ class Port(Protocol):
     @property
     def in_waiting(self) -> int:
         """Bytes that can be read at once."""
-        ...
 
     def read(self, size: int = ..., /) -> bytes:
         """Read up to `size` bytes, waiting no longer than the port's time-out."""
-        ...
 
     def write(self, data: bytes, /) -> int | None:
         """Write bytes."""
-        ...
 
     def close(self) -> None:
         """Close the port."""
-        ...
 
 
 def open_port(url: str, baudrate: int = BAUDRATE) -> Port:

@@ -46,6 +46,8 @@ class Transcript:
     ----------
     identity
         The device's last IDENTITY, or `None`.
+    rx
+        What is read of the device's bytes, and how much of it was good.
     unreadable
         Frames with a good CRC whose payload was no message.
     """
@@ -54,7 +56,7 @@ class Transcript:
         self.identity: Identity | None = None
         self.unreadable = 0
         self._tx = Decoder()
-        self._rx = Decoder()
+        self.rx = Decoder()
         self._request: tuple[int, Message] = (0, wire.Status())
         self._answered = False
         self._sample_sent: tuple[int, int] | None = None  # seq and host time of the open sample
@@ -64,16 +66,6 @@ class Transcript:
         self._opened_ns: int | None = None  # until it has booted, or said who it is
         self._start_up_s: float | None = None
         self._fired: tuple[int, int] | None = None  # label and host time, until the certificate
-
-    @property
-    def good_frames(self) -> int:
-        """Frames that were read, from the device."""
-        return self._rx.good
-
-    @property
-    def bad_frames(self) -> int:
-        """Stretches between two delimiters that were no frame, from the device."""
-        return self._rx.bad
 
     def feed(self, direction: Direction, host_ns: int, data: bytes) -> list[Record]:
         """Take the next bytes of one direction.
@@ -95,10 +87,10 @@ class Transcript:
         if direction == "tx" and data == DELIMITER:
             # A client begins a connection with this. Half a frame from the connection before
             # must not swallow the first of this one: live, each connection starts afresh.
-            self._rx.feed(DELIMITER)
+            self.rx.feed(DELIMITER)
             self._sample_sent = self._fired = None
             self._opened_ns = host_ns
-        decoder, take = (self._tx, self._sent) if direction == "tx" else (self._rx, self._got)
+        decoder, take = (self._tx, self._sent) if direction == "tx" else (self.rx, self._got)
         records: list[Record] = []
         for frame in decoder.feed(data):
             try:
@@ -196,7 +188,7 @@ class Transcript:
                 records.append(Pulse(self._sample_sent[1], host_ns, count, tick))
                 self._sample_sent = None
             case wire.Armed(token=token) if isinstance(asked, wire.Arm):
-                self._armed(token, asked)
+                self._begin_drop(token, asked)
             case wire.Fired(tick=tick) if isinstance(asked, wire.Fire):
                 label = self._tokens.get(asked.token)
                 if label in self._drops:
@@ -213,10 +205,10 @@ class Transcript:
                 self._sample_sent = None
                 for drop in self._drops.values():
                     drop.reset = True
-                records += self._booted(host_ns, cause)
+                records += self._restart_records(host_ns, cause)
         return records
 
-    def _booted(self, host_ns: int, cause: int) -> list[Record]:
+    def _restart_records(self, host_ns: int, cause: int) -> list[Record]:
         opened_ns, fired = self._opened_ns, self._fired
         self._opened_ns = self._fired = None
         if opened_ns is not None:
@@ -227,7 +219,7 @@ class Transcript:
         label, fired_ns = fired
         return [Restart(host_ns, cause, label, (host_ns - fired_ns) * 1e-9, self._start_up_s)]
 
-    def _armed(self, token: int, request: wire.Arm) -> None:
+    def _begin_drop(self, token: int, request: wire.Arm) -> None:
         self._tokens = {token: request.label}
         self._given.discard(request.label)
         drop = self._drops[request.label] = Assembly(request.label)

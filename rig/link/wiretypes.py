@@ -23,15 +23,22 @@ class MessageError(DeviceError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Unsigned:
-    """An unsigned little-endian integer: its `struct` code and its C type."""
+    """An unsigned little-endian integer by its `struct` code."""
 
     code: str
-    c_type: str
 
     @property
     def size(self) -> int:
         """Bytes on the wire."""
         return struct.calcsize("<" + self.code)
+
+    def pack(self, value: int) -> bytes:
+        """Write a value."""
+        return struct.pack("<" + self.code, value)
+
+    def unpack(self, payload: bytes, at: int) -> tuple[int, int]:
+        """Read a value; give where the next one starts, too."""
+        return struct.unpack_from("<" + self.code, payload, at)[0], at + self.size
 
 
 def layout(scalars: Iterable[Unsigned]) -> struct.Struct:
@@ -73,6 +80,10 @@ class Tail:
         if isinstance(events, Events):
             return events.raw
         return b"".join([self.layout.pack(*event) for event in events])
+
+    def unpack(self, payload: bytes, at: int) -> tuple[Events, int]:
+        """Read all that is left."""
+        return Events(self, payload[at:]), len(payload)
 
     def rows(self, events: Sequence[Event]) -> Iterable[tuple[int, int]]:
         """Give ticks and states, which is much faster than single `Event`."""
@@ -129,25 +140,48 @@ class Events(Sequence[Event]):
 
 
 @dataclass(frozen=True, slots=True)
-class Chars:
-    """UTF-8 behind a length byte, at most `limit` bytes."""
-
-    limit: int
-
-
-@dataclass(frozen=True, slots=True)
 class Raw:
     """Exactly `size` bytes."""
 
     size: int
 
+    def pack(self, value: bytes) -> bytes:
+        """Write a value."""
+        if len(value) != self.size:
+            raise ValueError(f"{len(value)} bytes, not {self.size}")
+        return bytes(value)
+
+    def unpack(self, payload: bytes, at: int) -> tuple[bytes, int]:
+        """Read a value."""
+        if at + self.size > len(payload):
+            raise ValueError("the payload ends within it")
+        return payload[at : at + self.size], at + self.size
+
+
+@dataclass(frozen=True, slots=True)
+class Chars:
+    """UTF-8 behind a length byte, at most `limit` bytes."""
+
+    limit: int
+
+    def pack(self, value: str) -> bytes:
+        """Write a value."""
+        if len(text := value.encode()) > self.limit:
+            raise ValueError(f"{len(text)} bytes, at most {self.limit} fit")
+        return bytes((len(text),)) + text
+
+    def unpack(self, payload: bytes, at: int) -> tuple[str, int]:
+        """Read a value."""
+        text, end = Raw(payload[at]).unpack(payload, at + 1)
+        return text.decode(), end
+
 
 Wire: TypeAlias = Unsigned | Chars | Raw | Tail
 
 
-_BYTE = Unsigned("B", "uint8_t")
-_WORD = Unsigned("H", "uint16_t")
-_LONG = Unsigned("I", "uint32_t")
+_BYTE = Unsigned("B")
+_WORD = Unsigned("H")
+_LONG = Unsigned("I")
 
 U8: TypeAlias = Annotated[int, _BYTE]
 U16: TypeAlias = Annotated[int, _WORD]
@@ -185,11 +219,9 @@ def wire_fields(message: type) -> tuple[Field, ...]:
         In the order of definition.
     """
     hints = typing.get_type_hints(message, include_extras=True)
-    found = []
-    for field in fields(message):
-        python, wire = typing.get_args(hints[field.name])[:2]
-        found.append(Field(field.name, python, wire))
-    return tuple(found)
+    return tuple(
+        Field(field.name, *typing.get_args(hints[field.name])[:2]) for field in fields(message)
+    )
 
 
 def write_field(field: Field, value: Any) -> bytes:
@@ -213,19 +245,9 @@ def write_field(field: Field, value: Any) -> bytes:
         When the value does not fit.
     """
     try:
-        match field.wire:
-            case Unsigned(code=code):
-                return struct.pack("<" + code, value)
-            case Raw(size=size) if len(value) == size:
-                return bytes(value)
-            case Chars(limit=limit) if len(value.encode()) <= limit:
-                text: bytes = value.encode()
-                return bytes((len(text),)) + text
-            case Tail() as tail:
-                return tail.pack(value)
-    except struct.error as error:
+        return field.wire.pack(value)
+    except (struct.error, ValueError) as error:
         raise MessageError(f"{field.name}={value!r} does not fit: {error}") from error
-    raise MessageError(f"{field.name}={value!r} does not fit")
 
 
 def read_field(field: Field, payload: bytes, at: int) -> tuple[Any, int]:
@@ -251,24 +273,10 @@ def read_field(field: Field, payload: bytes, at: int) -> tuple[Any, int]:
         When the payload ends too soon or the value is not one of the field's.
     """
     try:
-        match field.wire:
-            case Unsigned(code=code, size=size):
-                (number,) = struct.unpack_from("<" + code, payload, at)
-                return (field.python(number) if field.python is not int else number), at + size
-            case Raw(size=size):
-                end = at + size
-                value: Any = payload[at:end]
-            case Chars():
-                end = at + 1 + payload[at]
-                value = payload[at + 1 : end].decode()
-            case Tail() as tail:
-                end = len(payload)
-                value = Events(tail, payload[at:])
+        value, end = field.wire.unpack(payload, at)
+        return field.python(value) if isinstance(field.wire, Unsigned) else value, end
     except (struct.error, IndexError, ValueError) as error:
         raise MessageError(f"bad {field.name}: {error}") from error
-    if end > len(payload):
-        raise MessageError(f"payload ends within {field.name}")
-    return value, end
 
 
 def payload_reader(fields: Sequence[Field]) -> Callable[[bytes], list[Any]]:

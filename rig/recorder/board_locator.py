@@ -29,7 +29,7 @@ class BoardLocator:
 
     Attributes
     ----------
-    now
+    path
         Where the board is: the port's name until the board comes back at another one.
     serial_number
         Its USB serial number; `None` while unknown, of boards without one and of URLs.
@@ -39,7 +39,7 @@ class BoardLocator:
 
     def __init__(self, url: str) -> None:
         self.url = url
-        self.now = url
+        self.path = url
         self.serial_number: str | None = None
         self.bound = False
         self._unique_id: bytes | None = None
@@ -57,18 +57,18 @@ class BoardLocator:
         DeviceError
             Another board is at the port that was named, or several have this serial number.
         """
-        self.now = self.url
+        self.path = self.url
         if self.serial_number is None:
-            return self.now
+            return self.path
         ports = serial_ports()
-        there = serial_number_at(self.url, ports)
-        if there == self.serial_number:
-            return self.now
-        if (found := path_of(self.serial_number, ports)) is not None:
-            self.now = found
-        elif there is not None and self.bound:
-            raise _stranger(f"serial number {there}, not {self.serial_number}", self.url)
-        return self.now
+        serial_number = serial_number_at(self.url, ports)
+        if serial_number == self.serial_number:
+            return self.path
+        if (path := path_of(self.serial_number, ports)) is not None:
+            self.path = path
+        elif serial_number is not None and self.bound:
+            raise _stranger(f"serial number {serial_number}, not {self.serial_number}", self.url)
+        return self.path
 
     def seek(self, serial_number: str | None) -> None:
         """Look for a board that was met in another life, unless something is where the user said.
@@ -82,7 +82,7 @@ class BoardLocator:
             self.serial_number = serial_number
 
     def meet(self, identity: Identity) -> dict[str, str]:
-        """Take note of who answers at `now`.
+        """Take note of who answers at `path`.
 
         Returns
         -------
@@ -96,12 +96,12 @@ class BoardLocator:
         """
         if self.bound and self._unique_id not in {None, identity.unique_id}:
             raise _stranger(
-                f"id {identity.unique_id.hex()}, not {(self._unique_id or b'').hex()}", self.now
+                f"id {identity.unique_id.hex()}, not {(self._unique_id or b'').hex()}", self.path
             )
         before, same = self.serial_number, self._unique_id == identity.unique_id
         self._unique_id = identity.unique_id
-        if "://" not in self.now:
-            self.serial_number = serial_number_at(self.now)
+        if "://" not in self.path:
+            self.serial_number = serial_number_at(self.path)
         if same and None not in {before, self.serial_number} and before != self.serial_number:
             log.warning(
                 "two boards have the id %s (USB serial numbers %s and %s): erase the EEPROM of one",

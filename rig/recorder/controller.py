@@ -21,8 +21,8 @@ from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts, StoppedError
-from rig.recorder.opening import known_before, open_for, shown
-from rig.recorder.published import PublishedState
+from rig.recorder.opening import describe_session, latest_board, open_for
+from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
 from rig.session.schema import RunState
@@ -105,6 +105,11 @@ class Controller:
         return self._session
 
     @property
+    def armed(self) -> tuple[int, int] | None:
+        """Run and attempt of the drop that waits for `fire`."""
+        return None if self.recorder is None else self.recorder.armed
+
+    @property
     def recording(self) -> bool:
         """Whether a session is open."""
         return self._session is not None
@@ -138,10 +143,10 @@ class Controller:
         check_gates(scene)
         fresh = completed(self.url, source, path, seed)
         self.close_session()
-        made = not path.exists()
+        is_new = not path.exists()
         opened = open_for(scene, source, fresh, path)
         try:
-            before = known_before(opened)
+            before = latest_board(opened)
             self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
             self._locator.seek(before.get(SERIAL_NUMBER))
             self._session, self._protocol = opened, scene
@@ -151,14 +156,14 @@ class Controller:
         except BaseException as error:
             # With other input it would be another protocol's, or of another kind of port: in the
             # way of the next try, and where no byte went over the line there is nothing in it.
-            empty = made and (isinstance(error, InputError) or not any(opened.byte_log()))
+            empty = is_new and (isinstance(error, InputError) or not any(opened.byte_log()))
             try:
                 self._part_with(opened)
             finally:
                 if empty:
                     path.unlink(missing_ok=True)
             raise
-        about, plan = shown(opened, scene)
+        about, plan = describe_session(opened, scene)
         log.info("session: %s", path)
         self.published.plan(plan)
         self.published.set(session=about, drop=None, release_test=None)
@@ -178,7 +183,7 @@ class Controller:
         assert protocol is not None
         with self.interrupts.held():
             session.unblind()
-        self.published.set(session=shown(session, protocol)[0])
+        self.published.set(session=describe_session(session, protocol)[0])
 
     def close_session(self) -> None:
         """Make safe and close the file, whole; nothing when none is open."""
@@ -202,9 +207,7 @@ class Controller:
         finally:
             session.close()
             self.published.plan(())
-            self.published.set(
-                session=None, drop=None, link={"state": "closed", "error": None, "retry_s": None}
-            )
+            self.published.set(session=None, drop=None, link=link_state("closed"))
             if port is not None:
                 self.connect(port)
 
@@ -225,20 +228,20 @@ class Controller:
                 self.recorder.close()
         sink = NullSink() if self._session is None else self._session
         self.recorder = None
-        self.published.set(link={"state": "opening", "error": None, "retry_s": None})
+        self.published.set(link=link_state("opening"))
         url = self._line_url
         if not is_simulated(url):
-            url = self._locator.now if port is not None else self._locator.look()
+            url = self._locator.path if port is not None else self._locator.look()
         recorder = Recorder(
             sink, url, self.interrupts, feed=StateFeed(self.published), halted=self._halted,
             meet=self._locator.meet,
         )  # fmt: skip
         identity = recorder.connect(port)
         self.published.set(
-            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.now}
+            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path}
         )
         self.recorder = recorder
-        self.published.set(link={"state": "up", "error": None, "retry_s": None}, phase="idle")
+        self.published.set(link=link_state("up"), phase="idle")
         if port is None:
             log.info("up: %s, id %s", identity.board, identity.unique_id.hex())
         return identity
@@ -262,7 +265,7 @@ class Controller:
         DeviceError
             The device holds a drop of another session, or is in trouble.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         held = recorder.held()
         if held is not None and held[0] == TEST_RUN:
             release_test.forget(recorder)
@@ -284,7 +287,7 @@ class Controller:
 
     # ------------------------------------------------------------------ drops
 
-    def unsaved(self) -> bool:
+    def has_unsaved(self) -> bool:
         """Ask whether a drop is armed or falls, or fell and is in no file yet.
 
         Raises
@@ -315,7 +318,7 @@ class Controller:
 
     def wait(self, seconds: float) -> None:
         """Let time pass, see `Recorder.wait`."""
-        self._connected().wait(seconds)
+        self._require_recorder().wait(seconds)
 
     def arm(self, run: int, attempt: int) -> int:
         """Prepare a drop.
@@ -332,11 +335,11 @@ class Controller:
         DeviceRefusedError
             As for `Recorder.arm`.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         if self._protocol is None or recorder.armed or self.due:
             raise make_error(InputError, "not_now", act="arm")
         last = self.session.latest_state(run)
-        planned = self.published.planned(run)
+        planned = self.published.has_run(run)
         if not planned or attempt != (last.attempt if last else 0) + 1:
             raise make_error(InputError, "not_next", run=run, attempt=attempt)
         self.session.require_presence()
@@ -360,7 +363,7 @@ class Controller:
         DeviceRefusedError
             As for `Recorder.fire`.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         armed = recorder.armed
         if armed is None:
             raise self._unarmed or make_error(InputError, "nothing_armed")
@@ -382,7 +385,7 @@ class Controller:
             return
         due = self.due
         try:
-            self._connected().collect(*due)
+            self._require_recorder().collect(*due)
         except RigError as error:
             self._lost[due] = error
             raise
@@ -412,13 +415,13 @@ class Controller:
         InputError
             No session is open, or a drop is under way.
         """
-        recorder = self._connected()
+        recorder = self._require_recorder()
         if self._protocol is None or recorder.armed or self.due:
             raise make_error(InputError, "not_now", act="test the release")
         self.published.set(release_test=None)
-        found = release_test.drive(recorder, self._protocol, self._halted)
-        self.published.set(release_test=found)
-        return found
+        result = release_test.drive(recorder, self._protocol, self._halted)
+        self.published.set(release_test=result)
+        return result
 
     def log_state(
         self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
@@ -440,7 +443,7 @@ class Controller:
             which = {"run": run, "attempt": attempt, "state": state}
             raise make_error(InputError, "cannot_judge", **which)
         if (last.state, last.reasons) != (state, reasons):
-            self._connected().state(run, attempt, state, reasons)
+            self._require_recorder().state(run, attempt, state, reasons)
             self.session.settle()
 
     def stop(self, reason: Reason | str) -> None:
@@ -482,7 +485,7 @@ class Controller:
         finally:
             self.disconnect()
 
-    def _connected(self) -> Recorder:
+    def _require_recorder(self) -> Recorder:
         if self.recorder is None:
             raise make_error(DeviceError, "no_connection")
         return self.recorder

@@ -76,19 +76,19 @@ class StateFeed:
         """Take a line of the log of run states."""
         self._published.run(run, attempt=attempt, state=str(state), **published_reasons(reasons))
         if state is RunState.ARMED:
-            self._armed(run, attempt)
+            self._show_armed(run, attempt)
         elif state is RunState.INTERRUPTED and self._label == wire.pack_label(run, attempt):
             self._drop("interrupted")
             self._label = 0
 
-    def _armed(self, run: int, attempt: int) -> None:
+    def _show_armed(self, run: int, attempt: int) -> None:
         self._label = wire.pack_label(run, attempt)
         self._fire_tick, self._state, self._next = None, 0, 0
         self._published.replace_edges(())
         self._drop("armed")
         self._published.set(phase="armed")
 
-    def recorded(self, drop: Drop) -> None:
+    def show_drop(self, drop: Drop) -> None:
         """Show a drop as it was stored."""
         self._label = wire.pack_label(drop.run, drop.attempt)
         self._fire_tick = drop.fire_tick

@@ -35,7 +35,7 @@ class Interrupts:
     def caught(self) -> Iterator[None]:
         """Take both signals for the time of a block; only in the main thread."""
         before = {
-            number: signal.signal(number, self._arrived)
+            number: signal.signal(number, self._note)
             for number in (signal.SIGINT, signal.SIGTERM)
             # A shell starts what runs in the background with Ctrl-C ignored, and means it.
             if signal.getsignal(number) is not signal.SIG_IGN
@@ -69,7 +69,7 @@ class Interrupts:
             self._asked = 0
             raise KeyboardInterrupt
 
-    def _arrived(self, *_: object) -> None:
+    def _note(self, *_: object) -> None:
         self._asked += 1
         if not self._held or self._asked >= _PATIENCE:
             self.check()

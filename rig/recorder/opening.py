@@ -45,13 +45,15 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
     return session
 
 
-def known_before(session: Reader) -> dict[str, str]:
+def latest_board(session: Reader) -> dict[str, str]:
     """Say what is known of the board and port where the session was recorded at last."""
-    known = [identity for _, identity in session.identities() if "port" in identity]
-    return {name: str(value) for name, value in known[-1].items()} if known else {}
+    boards = [identity for _, identity in session.identities() if "port" in identity]
+    return {name: str(value) for name, value in boards[-1].items()} if boards else {}
 
 
-def shown(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def describe_session(
+    session: Reader, protocol: Protocol
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Describe a session and its plan as the sections ``session`` and ``runs`` of the state do."""
     latest = {entry.run: entry for entry in session.states()}
     plan = []

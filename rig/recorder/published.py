@@ -16,10 +16,17 @@ if TYPE_CHECKING:
 
 EDGES_LIMIT = 1 << 16
 """Edges shown of one drop; all of them are in the session file."""
+
+
+def link_state(state: str, error: object = None, retry_s: float | None = None) -> dict[str, Any]:
+    """Describe the link: closed, opening, up, down."""
+    return {"state": state, "error": error, "retry_s": retry_s}
+
+
 _FIRST: dict[str, Any] = {
     "daemon": None,
     "port": None,
-    "link": {"state": "closed", "error": None, "retry_s": None},
+    "link": link_state("closed"),
     "device": None,
     "statistics": None,
     "gates": None,
@@ -57,7 +64,7 @@ class PublishedState:
         self._n = 0
         self._dirty: set[str] = set()
         self._dirty_runs: set[int] = set()
-        self._told = 0  # edges that went out
+        self._sent = 0  # edges that went out
 
     def set(self, **sections: Any) -> None:
         """Give sections new values; equal ones are no change."""
@@ -90,10 +97,10 @@ class PublishedState:
         """Show these edges instead."""
         with self._changing():
             self._edges = list(edges)[:EDGES_LIMIT]
-            self._told = len(self._edges)
+            self._sent = len(self._edges)
             self._dirty.add("edges")
 
-    def planned(self, number: int) -> bool:
+    def has_run(self, number: int) -> bool:
         """Whether the plan has this run."""
         with self._guard:
             return number in self._runs
@@ -121,10 +128,10 @@ class PublishedState:
             if self._dirty_runs and "runs" not in self._dirty:
                 change["runs"] = [self._runs[number] for number in sorted(self._dirty_runs)]
             if "edges" in self._dirty:
-                self._told = len(self._edges)
-            elif self._told < len(self._edges):
-                change["edges"] = self._edges[self._told :]
-                self._told = len(self._edges)
+                self._sent = len(self._edges)
+            elif self._sent < len(self._edges):
+                change["edges"] = self._edges[self._sent :]
+                self._sent = len(self._edges)
             self._dirty.clear()
             self._dirty_runs.clear()
             return change
@@ -141,7 +148,7 @@ class PublishedState:
 
     @property
     def _clean(self) -> bool:
-        return not self._dirty and not self._dirty_runs and self._told >= len(self._edges)
+        return not self._dirty and not self._dirty_runs and self._sent >= len(self._edges)
 
     def _state(self, *, edges: bool = True) -> dict[str, Any]:
         state = self._sections | {"runs": list(self._runs.values())}

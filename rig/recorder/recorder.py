@@ -65,6 +65,8 @@ class Recorder:
 
     Attributes
     ----------
+    armed
+        Run and attempt of the drop that waits for `fire`.
     lapsed
         Why the device disarmed itself since `arm`, as far as it has said so.
     """
@@ -88,7 +90,7 @@ class Recorder:
         self._port: Port | None = None
         self._device: Device | None = None
         self._uneven = random.Random(0)
-        self._armed: tuple[int, int] | None = None
+        self.armed: tuple[int, int] | None = None
         self.lapsed: DisarmReason | None = None
         self._sample: ClockSample | None = None  # the latest
         self._host: HostWatch | None = None
@@ -127,9 +129,9 @@ class Recorder:
                     give_way=self._give_way,
                 )  # fmt: skip
                 identity = self._device.connect(BOOT_WAIT_S if port is None else 0.0)
-                known = asdict(identity) | {"unique_id": identity.unique_id.hex()}
-                known |= {"port": told(self.url)} | self._meet(identity)
-                self.session.add_identity(known, self.clock.now_ns())
+                record = asdict(identity) | {"unique_id": identity.unique_id.hex()}
+                record |= {"port": told(self.url)} | self._meet(identity)
+                self.session.add_identity(record, self.clock.now_ns())
                 self.session.commit()
             except BaseException:
                 self.close()
@@ -143,7 +145,7 @@ class Recorder:
         with self.interrupts.held():
             try:
                 with suppress(DeviceError):
-                    if self._armed is not None:
+                    if self.armed is not None:
                         self.abort()
             finally:
                 port, self._port = self._port, None
@@ -154,7 +156,7 @@ class Recorder:
     def give_up(self) -> Port | None:
         """Make safe and let go of the port without closing it; `None` when there is none."""
         with self.interrupts.held():
-            if self._armed is not None:
+            if self.armed is not None:
                 self.abort()
             port, self._port = self._port, None
             self._log_rest()
@@ -164,12 +166,7 @@ class Recorder:
         """Log what STOP sent past everything, and no request has followed."""
         if self._device is not None:
             with suppress(SessionError):  # it waits in memory
-                self._device.finish()
-
-    @property
-    def armed(self) -> tuple[int, int] | None:
-        """Run and attempt of the drop that waits for `fire`."""
-        return self._armed
+                self._device.log_past()
 
     @property
     def device(self) -> Device:
@@ -191,12 +188,12 @@ class Recorder:
         """
         until = self.clock.now_ns() + round(seconds * 1e9)
         while not self._halted():
-            left = (until - self.clock.now_ns()) * 1e-9
-            if left <= 0.0:
+            rest_s = (until - self.clock.now_ns()) * 1e-9
+            if rest_s <= 0.0:
                 break
             longest = _PING_S * self._uneven.uniform(0.5, 1.5)
-            self.clock.sleep(min(left, longest if self._armed is None else _ARMED_S))
-            self.ping() if self._armed is None else self.look()
+            self.clock.sleep(min(rest_s, longest if self.armed is None else _ARMED_S))
+            self.ping() if self.armed is None else self.look()
         with self.interrupts.held():
             self.session.commit()
 
@@ -208,8 +205,8 @@ class Recorder:
     def ping(self) -> None:
         """Take one clock sample, now and then one of the 1 Hz reference; not while armed."""
         with self.interrupts.held():
-            if self._host is not None and (found := self._host.look()) is not None:
-                self.session.add_host_break(found)
+            if self._host is not None and (gap := self._host.look()) is not None:
+                self.session.add_host_break(gap)
             with self._unless(self.interrupts.check, self._go_on):
                 self._sample = self.device.ping()
                 if self.clock.now_ns() >= self._reference_ns:
@@ -259,7 +256,7 @@ class Recorder:
             except (StoppedError, KeyboardInterrupt):
                 self.abort()  # the device may have heard what it did not answer
                 raise
-            self._armed, self.lapsed = (run, attempt), None
+            self.armed, self.lapsed = (run, attempt), None
             self.state(run, attempt, RunState.ARMED)
             return token
 
@@ -271,7 +268,7 @@ class Recorder:
         DeviceRefusedError
             Nothing was let go: a beam was disturbed, or the device has disarmed itself.
         """
-        run, attempt = self._armed or (0, 0)
+        run, attempt = self.armed or (0, 0)
         with self.interrupts.held():
             with self._unless(self.interrupts.check, self._go_on):
                 self.device.status()  # a slow disk may take most of the silence allowed, twice
@@ -286,9 +283,9 @@ class Recorder:
                 if isinstance(ended, StoppedError) or self._halted():
                     self.abort()
                     if self.held() == (run, attempt):
-                        self._armed = None  # it had heard: what fell is collected
+                        self.armed = None  # it had heard: what fell is collected
                 raise
-            self._armed = None  # from here on there is a recording, which `close` leaves alone
+            self.armed = None  # from here on there is a recording, which `close` leaves alone
 
     def collect(self, run: int, attempt: int) -> Drop:
         """Read the drop whole, store it, and only then let the device forget it."""
@@ -305,10 +302,10 @@ class Recorder:
         """
         with self.interrupts.held():
             drop = self.device.collect(pack_label(run, attempt), timeout=0.0)
-            known = self.session.drop(run, attempt)
-            if known is None:
+            stored = self.session.drop(run, attempt)
+            if stored is None:
                 return self._keep(drop)
-            if known.certificate != drop.certificate or known.fire_tick != drop.fire_tick:
+            if stored.certificate != drop.certificate or stored.fire_tick != drop.fire_tick:
                 raise make_error(DeviceError, "drop_differs", run=run, attempt=attempt)
             self._acknowledge(drop)
             return None
@@ -319,7 +316,7 @@ class Recorder:
             self._disk_must_not_matter = True
             try:
                 self.device.abort()
-                self._armed = None
+                self.armed = None
             finally:
                 self._disk_must_not_matter = False
 
@@ -358,7 +355,7 @@ class Recorder:
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
         log.info("run %d, attempt %d: recorded, %d edges", drop.run, drop.attempt, len(drop.edges))
         if self._feed is not None:
-            self._feed.recorded(drop)
+            self._feed.show_drop(drop)
         self._acknowledge(drop)
         return drop
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Mapping
     from pathlib import Path
 
-    from rig.daemon.client_protocol import Replica
+    from rig.daemon.replica import Replica
 
 _AGAIN_S = 0.5
 _BEAT_S = 0.15  # between two signs of life

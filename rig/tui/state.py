@@ -1,6 +1,6 @@
 """The daemon's state as the screens see it: typed, and never changed under them.
 
-See rig/daemon/API.md for the sections; `rig.daemon.client_protocol` applies the changes.
+See rig/daemon/API.md for the sections; `rig.daemon.replica` applies the changes.
 """
 
 from __future__ import annotations

@@ -8,31 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.campaign.events import (
-    Again,
-    Answered,
-    ArmRelease,
-    Closed,
-    Collect,
-    EffectFailed,
-    FireRelease,
-    Found,
-    GiveUp,
-    GoOn,
-    Judge,
-    Judged,
-    Log,
-    Lost,
-    Note,
-    Opened,
-    Reject,
-    Restore,
-    Stage,
-    Stop,
-    Stopped,
-    Tick,
-    Wait,
-)
+from rig.campaign import events as on
+from rig.campaign.events import Stage
 from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, step
 from rig.link.messages import RefusalReason
 from rig.reasons import make_reason, plain_reason
@@ -45,7 +22,7 @@ NEXT = Job(2, 1)
 
 def ticketed(flow, event):
     """Give an answer that has no ticket the current one."""
-    if isinstance(event, (Answered, Judged, EffectFailed)) and event.ticket < 0:
+    if isinstance(event, (on.Answered, on.Judged, on.EffectFailed)) and event.ticket < 0:
         return event._replace(ticket=flow.ticket)
     return event
 
@@ -59,11 +36,11 @@ def through(flow, *events):
     return flow, effects
 
 
-DONE = Answered(-1)
+DONE = on.Answered(-1)
 WARM = plain_reason("warm", NOTE)
 TO_RESULT = (
-    Opened(), GoOn(JOB), GoOn(JOB, 5.0), DONE, Answered(-1, 99), Tick(3.1), DONE, DONE,
-    Judged(-1, "accepted", ()),
+    on.Opened(), on.GoOn(JOB), on.GoOn(JOB, 5.0), DONE, on.Answered(-1, 99), on.Tick(3.1), DONE,
+    DONE, on.Judged(-1, "accepted", ()),
 )  # fmt: skip
 
 
@@ -71,136 +48,141 @@ def test_a_run_goes_from_the_protocol_to_its_verdict():
     flow, effects = through(Flow(), *TO_RESULT)
     assert flow.stage is Stage.RESULT
     assert effects == [
-        Wait(5.0), ArmRelease(JOB), FireRelease(99), Collect(JOB), Judge(JOB),
-        Log(JOB, "accepted", ()),
+        on.Wait(5.0), on.ArmRelease(JOB), on.FireRelease(99), on.Collect(JOB), on.Judge(JOB),
+        on.Log(JOB, "accepted", ()),
     ]  # fmt: skip
 
 
 def test_a_run_takes_two_keys():
     flow, _ = through(Flow(), *TO_RESULT, DONE)
-    flow, effects = through(flow, GoOn(NEXT), GoOn(NEXT, 5.0))
-    assert effects == [Wait(5.0)]
+    flow, effects = through(flow, on.GoOn(NEXT), on.GoOn(NEXT, 5.0))
+    assert effects == [on.Wait(5.0)]
     assert flow.job == NEXT
 
 
 def test_a_verdict_stays_until_it_is_in_the_file_and_acknowledged():
     flow, _ = through(Flow(), *TO_RESULT)
-    assert step(flow, GoOn(NEXT))[0].stage is Stage.RESULT
-    flow, _ = through(flow, DONE, Tick(1e9), Opened(), Found(NEXT))
+    assert step(flow, on.GoOn(NEXT))[0].stage is Stage.RESULT
+    flow, _ = through(flow, DONE, on.Tick(1e9), on.Opened(), on.Found(NEXT))
     assert flow.stage is Stage.RESULT
-    assert step(flow, GoOn(NEXT))[0].stage is Stage.PREPARE
-    assert step(flow, GoOn(None))[0].stage is Stage.DONE
+    assert step(flow, on.GoOn(NEXT))[0].stage is Stage.PREPARE
+    assert step(flow, on.GoOn(None))[0].stage is Stage.DONE
 
 
 def test_a_rejection_keeps_notes_and_can_be_taken_back():
     flow, _ = through(Flow(), *TO_RESULT, DONE)
-    noted, effects = through(flow, Note("warm"))
-    assert effects == [Log(JOB, "accepted", (WARM,))]
-    rejected, effects = through(noted, Reject(" a cough "), Reject("a sneeze"), Note("cold"))
-    assert effects[0] == Log(JOB, "rejected", (plain_reason("a cough", OPERATOR), WARM))
-    restored, effects = through(rejected, Restore())
+    noted, effects = through(flow, on.Note("warm"))
+    assert effects == [on.Log(JOB, "accepted", (WARM,))]
+    rejected, effects = through(
+        noted, on.Reject(" a cough "), on.Reject("a sneeze"), on.Note("cold")
+    )
+    assert effects[0] == on.Log(JOB, "rejected", (plain_reason("a cough", OPERATOR), WARM))
+    restored, effects = through(rejected, on.Restore())
     assert effects == [
-        Log(JOB, "accepted", (plain_reason("cold", NOTE),))
+        on.Log(JOB, "accepted", (plain_reason("cold", NOTE),))
     ]  # a later note is instead of it
-    assert step(restored, Restore()) == (restored, ())
-    assert step(restored, Note("cold")) == (restored, ())
-    assert through(restored, Note(" "))[1] == [Log(JOB, "accepted", ())]
+    assert step(restored, on.Restore()) == (restored, ())
+    assert step(restored, on.Note("cold")) == (restored, ())
+    assert through(restored, on.Note(" "))[1] == [on.Log(JOB, "accepted", ())]
 
 
 def test_no_cause_no_rejection():
     flow, _ = through(Flow(), *TO_RESULT, DONE)
-    assert step(flow, Reject("  ")) == (flow, ())
+    assert step(flow, on.Reject("  ")) == (flow, ())
 
 
 def test_arming_that_comes_after_stop_is_undone():
     flow, _ = through(Flow(), *TO_RESULT[:4])
     assert flow.stage is Stage.ARMING
     late = flow.ticket
-    flow, effects = through(flow, Stopped(), Answered(late, 99))
+    flow, effects = through(flow, on.Stopped(), on.Answered(late, 99))
     assert flow.stage is Stage.PREPARE
-    assert effects == [Stop(), Stop()]
+    assert effects == [on.Stop(), on.Stop()]
 
 
 @pytest.mark.parametrize("stage", list(Stage))
 def test_stop_is_carried_out_at_every_stage(stage):
-    flow, effects = step(Flow(stage=stage, job=JOB), Stopped())
-    assert effects == (Stop(),)
+    flow, effects = step(Flow(stage=stage, job=JOB), on.Stopped())
+    assert effects == (on.Stop(),)
     assert flow.stage is (Stage.PREPARE if stage in BEFORE_RELEASE else stage)
 
 
 @pytest.mark.parametrize("stage", [Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.LIVE])
 def test_what_fails_says_why_and_can_be_tried_again(stage):
-    flow, _ = through(Flow(stage=stage, job=JOB), EffectFailed(-1, "a gate is blocked\nclear it"))
+    flow, _ = through(
+        Flow(stage=stage, job=JOB), on.EffectFailed(-1, "a gate is blocked\nclear it")
+    )
     assert (flow.stage, flow.trouble) == (Stage.PREPARE, "a gate is blocked\nclear it")
-    flow, _ = through(flow, GoOn(JOB))
+    flow, _ = through(flow, on.GoOn(JOB))
     assert flow.trouble == ""
 
 
 def test_a_drop_that_nobody_judged_is_judged():
-    flow, effects = through(Flow(stage=Stage.PREPARE, job=NEXT), Found(JOB))
-    assert effects == [Judge(JOB)]
+    flow, effects = through(Flow(stage=Stage.PREPARE, job=NEXT), on.Found(JOB))
+    assert effects == [on.Judge(JOB)]
     assert flow.job == JOB
 
 
 tickets = st.integers(-1, 12)
 jobs = st.builds(Job, st.integers(1, 3), st.integers(1, 3))
-events = st.one_of(
-    st.just(Opened()), st.just(Closed()), st.just(Stopped()), st.builds(GoOn, st.none() | jobs),
-    st.builds(Answered, tickets, st.none() | st.integers(0, 5)),
-    st.builds(Judged, tickets, st.sampled_from(["accepted", "void"]), st.just(())),
-    st.builds(EffectFailed, tickets, st.just("no"), st.sampled_from(RefusalReason)),
-    st.builds(Tick, st.floats(0.0, 2.0)),
-    st.just(Lost("gone")), st.builds(Found, jobs), st.builds(Reject, st.just("x")),
-    st.builds(Note, st.just("y")), st.builds(Again, jobs),
+happenings = st.one_of(
+    st.just(on.Opened()), st.just(on.Closed()), st.just(on.Stopped()),
+    st.builds(on.GoOn, st.none() | jobs),
+    st.builds(on.Answered, tickets, st.none() | st.integers(0, 5)),
+    st.builds(on.Judged, tickets, st.sampled_from(["accepted", "void"]), st.just(())),
+    st.builds(on.EffectFailed, tickets, st.just("no"), st.sampled_from(RefusalReason)),
+    st.builds(on.Tick, st.floats(0.0, 2.0)),
+    st.just(on.Lost("gone")), st.builds(on.Found, jobs), st.builds(on.Reject, st.just("x")),
+    st.builds(on.Note, st.just("y")), st.builds(on.Again, jobs),
 )  # fmt: skip
 
 
-@given(st.lists(events, max_size=60), st.booleans())
+@given(st.lists(happenings, max_size=60), st.booleans())
 def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening, attended):
     flow = Flow(attended=attended)
     armed, waited = None, 0.0
     for event in happening:
         before = flow
         flow, effects = step(flow, ticketed(flow, event))
-        if isinstance(event, (Stopped, Lost)):
+        if isinstance(event, (on.Stopped, on.Lost)):
             armed = None
         if flow.stage is Stage.COUNTDOWN and before.stage is not Stage.COUNTDOWN:
             armed, waited = event.token or 0, 0.0
-        if before.stage is Stage.COUNTDOWN and isinstance(event, Tick):
+        if before.stage is Stage.COUNTDOWN and isinstance(event, on.Tick):
             waited += event.seconds
         for effect in effects:
-            if isinstance(effect, ArmRelease) and attended:
-                assert isinstance(event, Answered), "nothing is armed by itself"
-            if isinstance(effect, FireRelease):
+            if isinstance(effect, on.ArmRelease) and attended:
+                assert isinstance(event, on.Answered), "nothing is armed by itself"
+            if isinstance(effect, on.FireRelease):
                 assert effect.token == armed
                 assert waited >= flow.countdown_s - 1e-9
                 armed = None
-        if isinstance(event, Stopped):
-            assert Stop() in effects
+        if isinstance(event, on.Stopped):
+            assert on.Stop() in effects
             assert flow.stage not in BEFORE_RELEASE
         assert flow.ticket >= before.ticket
 
 
 def test_the_countdown_is_as_long_as_it_was_set():
     flow = replace(Flow(stage=Stage.ARMING, job=JOB), countdown_s=0.5)
-    flow, effects = through(flow, Answered(0, 7), Tick(0.4))
+    flow, effects = through(flow, on.Answered(0, 7), on.Tick(0.4))
     assert effects == []
-    assert step(flow, Tick(0.11))[1] == (FireRelease(7),)
+    assert step(flow, on.Tick(0.11))[1] == (on.FireRelease(7),)
 
 
 PASSING = (RefusalReason.COOLING, RefusalReason.GATE_BLOCKED, RefusalReason.STOPPED)
 
 
 def arming(**more):
-    return through(Flow(stage=Stage.PREPARE, **more), GoOn(JOB, 5.0), DONE)[0]
+    return through(Flow(stage=Stage.PREPARE, **more), on.GoOn(JOB, 5.0), DONE)[0]
 
 
 @pytest.mark.parametrize("reason", [None, *RefusalReason])
 def test_whoever_is_there_begins_every_arming(reason):
-    flow, effects = through(arming(), EffectFailed(-1, "no\ndo this", reason, 100))
+    flow, effects = through(arming(), on.EffectFailed(-1, "no\ndo this", reason, 100))
     assert (flow.stage, flow.trouble, flow.job) == (Stage.PREPARE, "no\ndo this", JOB)
-    assert effects == ([] if reason in PASSING else [GiveUp()])
-    assert through(flow, DONE, Tick(9.0), Opened()) == (flow, [])
+    assert effects == ([] if reason in PASSING else [on.GiveUp()])
+    assert through(flow, DONE, on.Tick(9.0), on.Opened()) == (flow, [])
 
 
 @pytest.mark.parametrize("reason", PASSING)
@@ -208,10 +190,10 @@ def test_alone_what_passes_is_waited_for_a_few_times(reason):
     flow = arming(attended=False)
     pause = 0.7 if reason is RefusalReason.COOLING else LOOK_S
     for _ in range(LOOKS - 1):
-        flow, effects = through(flow, EffectFailed(-1, "no", reason, 700), DONE)
-        assert effects == [Wait(pause), ArmRelease(JOB)]
-    flow, effects = through(flow, EffectFailed(-1, "no", reason, 700))
-    assert (flow.stage, effects) == (Stage.PREPARE, [GiveUp()])
+        flow, effects = through(flow, on.EffectFailed(-1, "no", reason, 700), DONE)
+        assert effects == [on.Wait(pause), on.ArmRelease(JOB)]
+    flow, effects = through(flow, on.EffectFailed(-1, "no", reason, 700))
+    assert (flow.stage, effects) == (Stage.PREPARE, [on.GiveUp()])
 
 
 @pytest.mark.parametrize("attended", [True, False])
@@ -221,13 +203,13 @@ def test_what_is_not_let_go_is_switched_off_first(reason, attended):
     for number in range(1, LOOKS + 1):
         flow, effects = through(
             flow,
-            GoOn(JOB),
+            on.GoOn(JOB),
             DONE,
-            Answered(-1, 7),
-            Tick(9.0),
-            EffectFailed(-1, "a gate moved\nhint", reason),
+            on.Answered(-1, 7),
+            on.Tick(9.0),
+            on.EffectFailed(-1, "a gate moved\nhint", reason),
         )
-        assert (flow.stage, effects[3]) == (Stage.PREPARE, Stop("a gate moved"))
+        assert (flow.stage, effects[3]) == (Stage.PREPARE, on.Stop("a gate moved"))
         again = {
             RefusalReason.GATE_BLOCKED,
             RefusalReason.GATE_UNSTEADY,
@@ -235,7 +217,7 @@ def test_what_is_not_let_go_is_switched_off_first(reason, attended):
             RefusalReason.STOPPED,
         }
         over = reason not in again or (number == LOOKS and not attended)
-        assert effects[4:] == ([GiveUp()] if over else [])
+        assert effects[4:] == ([on.GiveUp()] if over else [])
 
 
 SKEW = "release_skew"
@@ -250,8 +232,8 @@ def void(number, reason=SKEW):
     """ArmRelease and judge one drop, which is void."""
     job = Job(1, number)
     return (
-        *(GoOn(job), GoOn(job), DONE, Answered(-1, 7), Tick(9.0), DONE, DONE),
-        *(Judged(-1, "void", (skewed(number, reason),)), DONE),
+        *(on.GoOn(job), on.GoOn(job), DONE, on.Answered(-1, 7), on.Tick(9.0), DONE, DONE),
+        *(on.Judged(-1, "void", (skewed(number, reason),)), DONE),
     )
 
 
@@ -264,18 +246,18 @@ def voids(*reasons, **more):
 
 @pytest.mark.parametrize("attended", [True, False])
 def test_three_voids_of_a_kind_halt_it(attended):
-    flow, effects = through(voids(SKEW, SKEW, SKEW, attended=attended), GoOn(NEXT))
+    flow, effects = through(voids(SKEW, SKEW, SKEW, attended=attended), on.GoOn(NEXT))
     assert (flow.stage, effects) == (Stage.HALTED, [])
     assert "the last 3 drops are void for the same reason: release skew" in flow.trouble
     assert "run 1 is tried again" in flow.trouble
-    assert through(flow, DONE, Tick(9.0), Opened()) == (flow, []), "it waits"
-    flow, effects = through(flow, GoOn(NEXT))
+    assert through(flow, DONE, on.Tick(9.0), on.Opened()) == (flow, []), "it waits"
+    flow, effects = through(flow, on.GoOn(NEXT))
     assert (flow.stage, flow.job, flow.trouble, effects) == (Stage.PREPARE, Job(1, 4), "", [])
-    flow, _ = through(flow, *void(4)[1:], GoOn(NEXT))
+    flow, _ = through(flow, *void(4)[1:], on.GoOn(NEXT))
     assert (flow.stage, flow.job) == (Stage.PREPARE, NEXT), "the count begins anew"
 
 
-@pytest.mark.parametrize("onward", [GoOn(None), Again(Job(1, 4))])
+@pytest.mark.parametrize("onward", [on.GoOn(None), on.Again(Job(1, 4))])
 def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
     flow, effects = through(voids(SKEW, SKEW, SKEW), onward)
     assert (flow.stage, effects) == (Stage.HALTED, [])
@@ -283,17 +265,17 @@ def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
 
 def test_two_of_a_kind_or_three_of_others_do_not():
     for reasons in ((SKEW, SKEW), (SKEW, "late_stamps", SKEW)):
-        assert through(voids(*reasons), GoOn(NEXT))[0].stage is Stage.PREPARE
-    flow, _ = through(voids(SKEW, SKEW, SKEW), Reject("I moved a gate"), DONE, GoOn(NEXT))
+        assert through(voids(*reasons), on.GoOn(NEXT))[0].stage is Stage.PREPARE
+    flow, _ = through(voids(SKEW, SKEW, SKEW), on.Reject("I moved a gate"), DONE, on.GoOn(NEXT))
     assert flow.stage is Stage.PREPARE, "the operator knows why"
 
 
 def test_voids_that_others_logged_count_too():
     row = voids(SKEW, SKEW).row
-    judged = Judged(-1, "void", (skewed(9),), row)
-    flow, _ = through(Flow(stage=Stage.PREPARE), Found(Job(1, 3)), judged, DONE, GoOn(NEXT))
+    judged = on.Judged(-1, "void", (skewed(9),), row)
+    flow, _ = through(Flow(stage=Stage.PREPARE), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
     assert flow.stage is Stage.HALTED
     judged = judged._replace(row=())
     flow = voids(SKEW, SKEW)
-    flow, _ = through(flow, GoOn(NEXT), Found(Job(1, 3)), judged, DONE, GoOn(NEXT))
+    flow, _ = through(flow, on.GoOn(NEXT), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
     assert flow.stage is Stage.PREPARE

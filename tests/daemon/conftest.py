@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING
 
 import pytest
 
 from bench.process_fixture import ProcessFixture
+from rig.daemon.server import Server
+from tests.waiting import PATIENCE_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -43,3 +46,27 @@ def driver(processes, client):
     one.take_control()
     one.open_session(str(processes.protocol), str(processes.session))
     return one
+
+
+@pytest.fixture
+def door(tmp_path):
+    """Run a test inside the daemon's own loop: a daemon whose simulated port is still closed."""
+
+    def within(test, *, tcp=False):
+        async def run():
+            path = tmp_path / "door" / "rig.sock"
+            server, ready = Server("sim://", path, tcp=tcp), asyncio.Event()
+            server.serving = asyncio.create_task(server.run(ready.set))
+            await asyncio.wait_for(ready.wait(), PATIENCE_S)
+            try:
+                await asyncio.wait_for(test(server, path), PATIENCE_S)
+                failed = server.serving.done()
+            finally:
+                server.end()
+                await asyncio.gather(server.serving, return_exceptions=True)
+            assert failed or server.serving.exception() is None
+            assert not path.exists()
+
+        asyncio.run(run())
+
+    return within

@@ -10,7 +10,7 @@ import pytest
 
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
-from rig.daemon.lease import ControlError, Lease
+from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, InputError
 from rig.link.client import Device
 from rig.link.frames import Decoder
@@ -94,7 +94,7 @@ def test_what_comes_next_is_the_daemons_to_know(processes, armed):
 def test_a_client_that_is_lost_while_armed_disarms(processes, armed):
     one, _ = armed
     processes.await_phase(Phase.ARMED)
-    one._socket.close()
+    one.line.close()
     processes.await_phase(Phase.IDLE)
     gone_on_with(processes)
     assert (1, 1, "interrupted") in states(processes)
@@ -112,21 +112,6 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     one, token = armed
     with pytest.raises(StoppedError, match=reason.text):
         one.fire(token)
-
-
-def test_who_was_silent_too_long_is_told_that_another_has_control():
-    now = [0.0]
-    lease = Lease(lambda: now[0])
-    lease.take("runner", "rig run 1")
-    now[0] = 5.0
-    lease.take("other", "a tui")
-    now[0] = 7.5
-    lease.heard("runner")
-    with pytest.raises(ControlError, match=r"nothing was heard .* for 7\.5 s, and a tui has it"):
-        lease.require("runner")
-    lease.release("other")
-    lease.take("runner", "rig run 1")
-    lease.require("runner")
 
 
 def test_a_device_that_disarms_itself_is_noticed(processes, armed):
@@ -217,7 +202,7 @@ def test_a_stop_ends_a_wait(processes, client):
     one, two = client("one"), client("two")
     one.take_control()
     one.open_session(str(processes.protocol), str(processes.session))
-    one._send(b'{"jsonrpc":"2.0","id":99,"method":"wait","params":{"seconds":600}}\n')
+    one.line.ask("wait", seconds=600)
     two.stop("no need")
     assert one.arm(1, 1)
 
@@ -225,7 +210,7 @@ def test_a_stop_ends_a_wait(processes, client):
 def test_a_client_that_leaves_after_the_release_leaves_a_recorded_drop(processes, armed):
     one, token = armed
     one.fire(token)
-    one._socket.close()
+    one.line.close()
     processes.await_phase(Phase.HOLDING)
     processes.await_phase(Phase.IDLE)
     assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]

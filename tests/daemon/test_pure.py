@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.admission import CLIENTS, Admission
-from rig.daemon.client_protocol import Replica
+from rig.daemon.client import MessageReader
 from rig.daemon.lease import LEASE_S, ControlError, Lease
 from rig.daemon.listener import Door
+from rig.daemon.replica import Replica
 from rig.daemon.stopper import Stopper
 from rig.errors import (
     DeviceError,
@@ -26,7 +27,7 @@ from rig.errors import (
     SessionError,
 )
 from rig.files import identity_of
-from rig.link.messages import DisarmReason, RefusalReason
+from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
 from rig.recorder.controller import Controller
@@ -47,17 +48,17 @@ ERRORS = [
     rpc.VersionError("old"),
 ]
 
+MESSAGES = st.lists(st.dictionaries(st.text(max_size=4), st.text(max_size=9), max_size=3))
+
 
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
 def test_an_error_comes_out_as_it_went_in(error):
     line = rpc.failure(7, error)
-    with pytest.raises(type(error)) as again:
-        rpc.result_of(json.loads(line))
-    assert type(again.value) is type(error)
-    assert str(again.value) == str(error)
-    assert again.value.exit_code == error.exit_code
-    for name in ("reason", "detail", "disarmed", "reasons"):
-        assert getattr(again.value, name, None) == getattr(error, name, None)
+    again = rpc.error_of(json.loads(line))
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    for name in ("exit_code", "reason", "detail", "disarmed", "reasons"):
+        assert getattr(again, name, None) == getattr(error, name, None)
 
 
 def test_a_refusal_has_its_code_and_values_as_results_have_them():
@@ -108,6 +109,33 @@ def test_a_request_is_read_as_it_was_written():
     assert line.count(b"\n") == 1
 
 
+@given(MESSAGES, st.data())
+def test_any_cut_gives_the_same_messages(messages, data):
+    stream = b"".join(json.dumps(one).encode() + b"\n" for one in messages)
+    cuts = data.draw(st.lists(st.integers(1, max(1, len(stream))), max_size=9, unique=True))
+    ends = sorted({*cuts, len(stream)} - {0})
+    dialogue, found = MessageReader(), []
+    for begin, end in zip([0, *ends], ends, strict=False):
+        if part := stream[begin:end]:
+            found += dialogue.feed(part)
+    assert found == messages
+    with pytest.raises(DeviceError, match="hung up"):
+        list(dialogue.feed(b""))
+
+
+@pytest.mark.parametrize("line", [b"HTTP/1.1 400 Bad Request\n", b"\xff\xfe\n", b"[1]\n", b"\n"])
+def test_who_is_no_daemon_is_told_so(line):
+    with pytest.raises(DeviceError, match="not a daemon of this rig"):
+        list(MessageReader().feed(line))
+
+
+def test_a_line_without_an_end_is_no_daemons():
+    dialogue = MessageReader()
+    assert list(dialogue.feed(b"x" * rpc.MESSAGE_LIMIT)) == []
+    with pytest.raises(DeviceError, match="not a daemon of this rig"):
+        list(dialogue.feed(b"x"))
+
+
 class Time:
     """A clock that is set by hand."""
 
@@ -144,18 +172,23 @@ def test_one_client_has_control_until_it_is_not_heard():
     assert lease.holder is None
 
 
-def test_who_gives_control_up_is_not_told_later_that_it_was_lost():
+def test_who_was_silent_too_long_is_told_so_until_it_gives_control_up_or_has_it_again():
     time = Time()
     lease = Lease(time)
     lease.take("one", "rig run 1")
-    time.now = LEASE_S
-    lease.take("two", "tui 2")
+    time.now = 5.0
+    lease.take("two", "a tui")
+    time.now = 7.5
     lease.heard("one")
-    with pytest.raises(ControlError, match="control was lost"):
+    lost = r"control was lost: nothing was heard .* for 7\.5 s, and a tui has it"
+    with pytest.raises(ControlError, match=lost):
         lease.require("one")
     assert not lease.release("one")
     with pytest.raises(ControlError, match="take control first"):
         lease.require("one")
+    lease.release("two")
+    lease.take("one", "rig run 1")
+    lease.require("one")
 
 
 def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch):
@@ -176,7 +209,7 @@ def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch)
 def test_a_client_in_the_reserve_has_no_more_time_than_a_stranger():
     admission, *clients = Admission(), *(Mock() for _ in range(CLIENTS + 1))
     for client in clients:
-        admission.arrived(client)
+        admission.register(client)
         assert admission.late(client)
         admission.welcome(client)
     assert [client for client in clients if admission.late(client)] == clients[-1:]
@@ -209,9 +242,9 @@ def test_a_replica_shows_what_is_published_whenever_it_is_looked_at():
                     change = published.take()
                     if replica is None:
                         replica = Replica()
-                        replica.snapshot(json.loads(json.dumps(published.snapshot())))
+                        replica.follow("snapshot", json.loads(json.dumps(published.snapshot())))
                     elif change is not None:
-                        replica.change(json.loads(json.dumps(change)))
+                        replica.follow("change", json.loads(json.dumps(change)))
                     assert replica.n == published.snapshot()["n"]
                     assert json.loads(json.dumps(published.snapshot()["state"])) == replica.state
 
@@ -239,27 +272,29 @@ def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
 
 def test_a_replica_does_not_swallow_a_gap():
     replica = Replica()
-    replica.snapshot({"n": 3, "state": {"edges": []}})
+    replica.follow("snapshot", {"n": 3, "state": {"edges": []}})
     with pytest.raises(ValueError, match="change 5 behind 3"):
-        replica.change({"n": 5})
+        replica.follow("change", {"n": 5})
 
 
 @pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])
-def test_stop_is_sent_five_times_unless_the_worker_takes_over(worker_comes, times):
-    sent = []
+def test_stop_is_sent_five_times_unless_the_worker_takes_over(monkeypatch, worker_comes, times):
+    sent, paused = [], []
 
     def send():
         sent.append(1)
         stopper._ending = True  # behind what is asked for now
         stopper._asked.set()
-        if worker_comes:
-            stopper.taken_over()
         return True
 
     stopper = Stopper(send)  # never started: this thread is its thread
+    pause = lambda seconds: paused.append(seconds) or worker_comes  # noqa: E731
+    monkeypatch.setattr(stopper._taken_over, "wait", pause)
     stopper.ask()
     stopper._run()
     assert len(sent) == times
+    # The board switches itself off by then, and a later one could end what somebody armed anew.
+    assert 0.0 < sum(paused) < HOST_SILENCE_MS * 1e-3
 
 
 def test_who_asks_for_stop_again_waits_until_that_one_has_left_too():

@@ -110,7 +110,7 @@ def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(tmp_path, monkeypatch):
 def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeypatch):
     box = Box(tmp_path, monkeypatch)
     box.arm()
-    assert box.worker.controller.unsaved()
+    assert box.worker.controller.has_unsaved()
     box.worker.controller.close()
     assert box.phase is Phase.IDLE
     box.kill()
@@ -122,13 +122,13 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeyp
     assert box.phase is Phase.HOLDING
     another = Controller("a port")
     another.connect()
-    assert another.unsaved()
+    assert another.has_unsaved()
     another.close()
     assert box.phase is Phase.HOLDING
     box.ends_well()
     recorder = box.worker.controller.recorder
     monkeypatch.setattr(recorder, "held", lambda: box.fell[-1])  # acknowledged in vain
-    assert not box.worker.controller.unsaved()
+    assert not box.worker.controller.has_unsaved()
     box.kill()
 
 
@@ -140,7 +140,7 @@ def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(tmp_path
     device.fire(device.arm(label=label, **order))
     box.clock.sleep(1.0)
     assert box.phase is Phase.HOLDING
-    assert not box.worker.controller.unsaved()
+    assert not box.worker.controller.has_unsaved()
     box.kill()
     box.resume()
     assert box.phase is Phase.IDLE

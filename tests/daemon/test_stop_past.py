@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sqlite3
-import threading
 from contextlib import closing, suppress
+from types import SimpleNamespace
 
-from rig.daemon.stopper import Stopper
+from rig.daemon.lease import Lease
+from rig.daemon.worker import Worker
 from rig.errors import DeviceTimeoutError
 from rig.link.frames import Decoder
-from rig.link.messages import CODES, HOST_SILENCE_MS, Abort, Done, Phase
+from rig.link.messages import CODES, Abort, Done, Phase
+from rig.recorder.published import PublishedState
 from rig.session.store import Session
 from tests.waiting import PATIENCE_S, until
 
@@ -22,20 +24,6 @@ def frames(session, direction):
         if chunk.direction == direction
         for frame in decoder.feed(chunk.data)
     ]
-
-
-def test_without_a_worker_all_five_leave_before_the_board_switches_itself_off(monkeypatch):
-    """It would by then, and a later one could only end what somebody armed anew."""
-    paused, sent = [], threading.Semaphore(0)
-    stopper = Stopper(lambda: sent.release() or True)
-    monkeypatch.setattr(stopper._taken_over, "wait", paused.append)
-    stopper.start()
-    stopper.ask()
-    for _ in range(5):
-        assert sent.acquire(timeout=PATIENCE_S)
-    until(lambda: len(paused) == 5)
-    stopper.end()
-    assert 0.0 < sum(paused) < HOST_SILENCE_MS * 1e-3
 
 
 def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
@@ -65,3 +53,23 @@ def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
         until(lambda: any(f.seq == 255 and f.type == CODES[Abort] for f in frames(session, "tx")))
         until(lambda: any(f.ack == 255 and f.type == CODES[Done] for f in frames(session, "rx")))
         assert session.drop(1, 1) is None
+
+
+def test_a_stop_between_the_look_and_the_answer_is_kept(monkeypatch):
+    worker = Worker("sim://", PublishedState(), Lease())  # never started: this thread is its thread
+    worker.controller.recorder = SimpleNamespace(armed=(1, 1))
+    late = []
+
+    def held(self):
+        if not late:
+            late.append(self.stop("a second client"))
+        return True
+
+    monkeypatch.setattr(Worker, "_held", property(held))
+    worker._attend()
+    assert not late[0].done()
+    stopped = []
+    monkeypatch.setattr(worker.controller, "stop", stopped.append)
+    worker._attend()
+    assert stopped == ["a second client"]
+    assert late[0].done()

@@ -80,7 +80,7 @@ class Suite:
         """Listen in silence to what the device says of its own accord."""
         end, messages = bench.clock().now_ns() + seconds * 1e9, []
         while bench.clock().now_ns() < end:
-            messages += [r.message for r in device.poll() if isinstance(r, Received)]
+            messages += [r.message for r in device.receive() if isinstance(r, Received)]
         return messages
 
     def restart(self, bench: Bench, device: Device) -> None:

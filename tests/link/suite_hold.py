@@ -82,7 +82,7 @@ class HoldSuite(Suite):
     def test_a_reset_within_a_drop_is_seen_and_loses_it(self, bench, device):
         device.fire(arm(device, record_ms=2000))
         for _ in range(4):
-            device.poll()
+            device.receive()
         bench.reset()
         said = r"restarted about \d+ ms after FIRE: is its supply shared with the magnets\?"
         with pytest.raises(DeviceError, match=said):

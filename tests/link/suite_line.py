@@ -79,7 +79,7 @@ class LineSuite(Suite):
             drop = self.drop(device, pack_label(run, 1))
             self.check(bench, drop, device.transcript.identity)
             self.release(device, drop)
-        assert device.transcript.bad_frames > 0
+        assert device.transcript.rx.bad > 0
         assert bench.lab.drops == [pack_label(run, 1) for run in range(3)]
 
     def test_a_silent_device_is_a_time_out(self, bench):

@@ -24,7 +24,7 @@ from rig.link.refusals import DeviceRefusedError
 from rig.link.restarts import Restart
 from rig.link.transcript import Received, Transcript
 from rig.reasons import make_reason
-from rig.records import ClockSample, Drop
+from rig.records import ClockSample
 from tests.link.strategies import MESSAGES
 
 SMALL = st.integers(0, 3)
@@ -76,12 +76,8 @@ def clock() -> FakeClock:
     return FakeClock()
 
 
-def device_at(port: FakePort, **options) -> Device:
-    return Device(port, port.clock, **options)
-
-
-def device(clock: FakeClock, answers: dict, **options) -> Device:
-    return device_at(FakePort(clock, answers), **options)
+def device(clock: FakeClock, answers: dict) -> Device:
+    return Device(FakePort(clock, answers), clock)
 
 
 IDENTITY = wire.Identity(
@@ -136,7 +132,7 @@ def test_repeats_have_the_same_seq_and_back_off(clock):
 
 def test_what_is_asked_and_asked_again_is_counted(clock):
     port = FakePort(clock, {wire.Ping: [wire.Pong(1)]})
-    one = device_at(port, tries=3)
+    one = Device(port, clock, tries=3)
     one.ping()
     with pytest.raises(DeviceTimeoutError):
         one.status()
@@ -146,14 +142,17 @@ def test_what_is_asked_and_asked_again_is_counted(clock):
     assert counted["rx_bytes"] == len(encode(Frame(wire.CODES[wire.Pong], 1, 1, bytes(4))))
 
 
-def test_five_aborts_leave_before_an_armed_board_switches_itself_off(clock):
-    port = FakePort(clock, {})
-    begun = []
-    port.write = lambda data: begun.append(clock.ns)
+@pytest.mark.parametrize(
+    ("ask", "times", "within"), [(Device.abort, 5, 1.0), (lambda board: board.fire(1), 3, 0.8)]
+)
+def test_enough_leave_before_an_armed_board_switches_itself_off(clock, ask, times, within):
+    port, sent = FakePort(clock, {}), []
+    port.write = lambda data: sent.append((clock.ns, data))
     port.read = lambda size=1: clock.sleep(0.001) or b""
     with pytest.raises(DeviceTimeoutError):
-        device_at(port).abort()
-    assert sum(at < wire.HOST_SILENCE_MS * 1e6 for at in begun) >= 5
+        ask(Device(port, clock))
+    assert sent[times - 1][0] < within * wire.HOST_SILENCE_MS * 1e6
+    assert len({data for _, data in sent}) == 1
 
 
 @pytest.mark.parametrize("noise", [b"\x55" * 4096, bytes(range(256)) * 16, b"\0" * 4096])
@@ -162,7 +161,7 @@ def test_a_flood_from_who_knows_whom_is_ended_after_a_mebibyte(clock, noise):
     port.read = lambda size: clock.sleep(1e-4) or noise[:size]
     port.out = noise  # what waits
     with pytest.raises(DeviceError, match=r"1\.\d MB of bytes that are no frames"):
-        device_at(port, tap=lambda _way, _ns, data: kept.append(len(data))).connect()
+        Device(port, clock, tap=lambda _way, _ns, data: kept.append(len(data))).connect()
     assert sum(kept) <= STRANGE_BYTES + 2 * len(noise)
 
 
@@ -186,26 +185,17 @@ def test_nonsense_is_said_to_be_nonsense(clock):
         device(clock, {wire.Status: [wire.Pong(1)]}).status()
 
 
-def test_a_broken_cable_is_a_lost_connection(clock):
-    with pytest.raises(DeviceError, match="connection lost") as caught:
-        device(clock, {wire.Status: None}).status()
-    assert not isinstance(caught.value, DeviceTimeoutError)
-
-
-def test_reading_from_a_closed_port_is_a_lost_connection(clock):
-    port = FakePort(clock, {})
-    port.read = lambda size=1: (_ for _ in ()).throw(serial.PortNotOpenError())
-    with pytest.raises(DeviceError, match="connection lost"):
-        Device(port, clock).poll()
-
-
-def test_counting_on_a_closed_port_is_a_lost_connection(clock, monkeypatch):
+@pytest.mark.parametrize("ask", [Device.status, Device.receive, Device.statistics])
+def test_a_broken_cable_is_a_lost_connection(clock, monkeypatch, ask):
     def closed(_port):
         raise serial.PortNotOpenError
 
-    monkeypatch.setattr(FakePort, "in_waiting", property(closed))
-    with pytest.raises(DeviceError, match="connection lost"):
-        device(clock, {}).statistics()
+    port = FakePort(clock, {wire.Status: None})
+    if ask is not Device.status:
+        monkeypatch.setattr(FakePort, "in_waiting", property(closed))
+    with pytest.raises(DeviceError, match="connection lost") as caught:
+        ask(Device(port, clock))
+    assert not isinstance(caught.value, DeviceTimeoutError)
 
 
 def test_what_a_board_can_do_is_in_seconds():
@@ -230,33 +220,30 @@ def certificate(label: int, events: int, crc32: int = 0) -> wire.DropCertificate
     return wire.DropCertificate(label, 100, 0xFFFF, 0, events, crc32, 0, 0, 0, 0, 0)
 
 
+class Liar(FakePort):
+    """Says how many events it holds, and gives others."""
+
+    def __init__(self, clock, held, *events):
+        super().__init__(clock, {wire.Identify: [IDENTITY]})
+        self.held, self.events = held, wire.EventsFrame(1, 0, events)
+
+    def write(self, data):
+        (frame,) = Decoder().feed(data)
+        count = wire.unpack(frame.type, frame.payload).count
+        self.answers[wire.Read] = [self.events if count else certificate(1, self.held, 77)]
+        return super().write(data)
+
+
 def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
-    events = wire.EventsFrame(1, 0, (wire.Event(150, 1),))
-
-    class Liar(FakePort):
-        def write(self, data):
-            (frame,) = Decoder().feed(data)
-            count = wire.unpack(frame.type, frame.payload).count
-            self.answers[wire.Read] = [events] if count else [certificate(1, 1, 77)]
-            return super().write(data)
-
-    port = Liar(clock, {wire.Identify: [IDENTITY]})
+    port = Liar(clock, 1, wire.Event(150, 1))
     drop = Device(port, clock).fetch(1)
     assert len(port.written) == 3  # certificate, events, events once more
     assert make_reason("crc_mismatch") in drop.faults
 
 
 def test_a_device_that_never_gives_the_events_is_faulty(clock):
-    class Liar(FakePort):
-        def write(self, data):
-            (frame,) = Decoder().feed(data)
-            count = wire.unpack(frame.type, frame.payload).count
-            empty = wire.EventsFrame(1, 0, ())
-            self.answers[wire.Read] = [empty] if count else [certificate(1, 5)]
-            return super().write(data)
-
     with pytest.raises(DeviceError, match="did not send the events"):
-        Device(Liar(clock, {}), clock).fetch(1)
+        Device(Liar(clock, 5), clock).fetch(1)
 
 
 class Forgetful(FakePort):
@@ -277,33 +264,24 @@ class Forgetful(FakePort):
 
 
 def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
-    port = Forgetful(clock, {wire.Identify: [IDENTITY]})
-    one = Device(port, clock)
-    one.connect(boot_wait_s=0)
-    faults = one.fetch(1).faults
-    assert faults == (make_reason("events_overwritten", missing=3, events=5, first=0),)
+    port, chunks, offline = Forgetful(clock, {wire.Identify: [IDENTITY]}), [], Transcript()
+    board = Device(port, clock, lambda *chunk: chunks.append(chunk))
+    board.connect(boot_wait_s=0)
+    drop = board.fetch(1)
+    assert drop.faults == (make_reason("events_overwritten", missing=3, events=5, first=0),)
     assert len(port.written) == 2 + 4  # delimiter and IDENTIFY; certificate, 0, 3, 4
-
-
-def test_the_replay_knows_what_was_no_longer_kept(clock):
-    chunks = []
-    port = Forgetful(clock, {wire.Identify: [IDENTITY]})
-    one = Device(port, clock, lambda *chunk: chunks.append(chunk))
-    one.connect(boot_wait_s=0)
-    drop = one.fetch(1)
-    offline = Transcript()
     for chunk in chunks:
         offline.feed(*chunk)
-    assert offline.unfinished() == [drop]
+    assert offline.unfinished() == [drop], "the replay knows it, too"
 
 
 def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(clock):
-    class Liar(Forgetful):
+    class Denier(Forgetful):
         def refusal(self):
             return wire.Refused(wire.RefusalReason.NOT_KEPT, 0)
 
     with pytest.raises(DeviceRefusedError) as caught:
-        device_at(Liar(clock, {})).fetch(1)
+        Device(Denier(clock, {}), clock).fetch(1)
     assert caught.value.reason is wire.RefusalReason.NOT_KEPT
 
 
@@ -316,7 +294,7 @@ def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(cl
         code, payload = wire.pack(wire.EventsFrame(1, n, (wire.Event(100 + n, n % 2),)))
         port.out += encode(Frame(code, 1, 0, payload))
     while port.out:
-        one.poll()
+        one.receive()
     drop = one.fetch(1)
     assert drop.faults == (make_reason("crc_mismatch"),)
     assert [edge.tick for edge in drop.edges] == [1, 2, 3]  # event 4 as it was read: no change
@@ -331,7 +309,7 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
             wire.Fire: [wire.Refused(wire.RefusalReason.NOT_ARMED, 0)],
         },
     )
-    one = device_at(port)
+    one = Device(port, clock)
     token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
     with pytest.raises(DeviceRefusedError, match="disarmed itself") as caught:
         one.fire(token)
@@ -343,21 +321,6 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
         one.fire(token)
 
 
-def test_three_fires_reach_an_armed_device_before_it_takes_the_host_for_gone(clock):
-    sent = []
-
-    class Deaf(FakePort):
-        def write(self, data):
-            sent.append(self.clock.ns)
-            return super().write(data)
-
-    port = Deaf(clock, {})
-    with pytest.raises(DeviceTimeoutError):
-        device_at(port).fire(1)
-    assert sent[2] * 1e-6 < 0.8 * wire.HOST_SILENCE_MS
-    assert len(set(port.written)) == 1
-
-
 def test_the_reference_is_told(clock):
     pulse = wire.ReferencePulse(3, 70)
     assert device(clock, {wire.Reference: [pulse]}).reference() == pulse
@@ -366,7 +329,7 @@ def test_the_reference_is_told(clock):
 def test_a_recording_without_end_is_a_time_out(clock):
     port = FakePort(clock, {wire.Status: [wire.State(wire.Phase.RECORDING, 0, 1, 3)]})
     with pytest.raises(DeviceTimeoutError, match="never ends"):
-        device_at(port).collect(1, timeout=10)
+        Device(port, clock).collect(1, timeout=10)
     assert clock.ns * 1e-9 == pytest.approx(LONGEST_RECORD_MS * 1e-3 + 10, abs=0.5)
     each_s = LONGEST_RECORD_MS * 1e-3 / len(port.written)
     assert 0.25 <= each_s < 0.4, "it is asked now and then, and not all the time"
@@ -391,12 +354,21 @@ def say(transcript: Transcript, direction, message, *, seq=0, ack=0, ns=0) -> li
     return transcript.feed(direction, ns, encode(Frame(code, seq, ack, payload)))
 
 
-def test_a_gap_in_the_events_invents_no_edge():
+def heard(*messages) -> Transcript:
     transcript = Transcript()
-    say(transcript, "rx", IDENTITY)
-    say(transcript, "rx", wire.EventsFrame(1, 0, (wire.Event(110, 1),)))
-    say(transcript, "rx", wire.EventsFrame(1, 3, (wire.Event(140, 2), wire.Event(150, 3))))
-    say(transcript, "rx", certificate(1, 5))
+    for message in messages:
+        say(transcript, "rx", message)
+    return transcript
+
+
+def frame(first, *events) -> wire.EventsFrame:
+    return wire.EventsFrame(1, first, tuple(wire.Event(*event) for event in events))
+
+
+def test_a_gap_in_the_events_invents_no_edge():
+    transcript = heard(
+        IDENTITY, frame(0, (110, 1)), frame(3, (140, 2), (150, 3)), certificate(1, 5)
+    )
     drop = transcript.pending(1)
     assert drop.edges == ((10, 0, True), (50, 0, True))
     assert drop.faults == (make_reason("events_missing", missing=2, events=5, first=1),)
@@ -404,9 +376,7 @@ def test_a_gap_in_the_events_invents_no_edge():
 
 
 def test_a_drop_is_given_out_once_when_acknowledged():
-    transcript = Transcript()
-    say(transcript, "rx", IDENTITY)
-    say(transcript, "rx", certificate(1, 0))
+    transcript = heard(IDENTITY, certificate(1, 0))
     pending = transcript.pending(1)
     assert transcript.unfinished() == [pending]
     assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == [pending]
@@ -418,9 +388,7 @@ def test_a_drop_is_given_out_once_when_acknowledged():
 
 
 def test_a_drop_fetched_again_by_another_session_is_given_out_again():
-    transcript = Transcript()
-    say(transcript, "rx", IDENTITY)
-    say(transcript, "rx", certificate(1, 0))
+    transcript = heard(IDENTITY, certificate(1, 0))
     (drop,) = say(transcript, "tx", wire.Acknowledge(1, 0), seq=4)
     say(transcript, "tx", wire.Read(1, 0, 0), seq=5)
     say(transcript, "rx", certificate(1, 0), ack=5)
@@ -448,38 +416,28 @@ def test_half_a_frame_before_a_reconnect_swallows_nothing():
     assert say(transcript, "rx", IDENTITY, ack=1) == [Received(0, 1, IDENTITY)]
 
 
-def test_a_glitch_is_no_edge():
-    transcript = Transcript()
-    events = (wire.Event(110, 0), wire.Event(120, 1), wire.Event(130, 1), wire.Event(140, 0))
-    say(transcript, "rx", wire.EventsFrame(1, 0, events))
-    say(transcript, "rx", certificate(1, 4))
-    assert transcript.pending(1).edges == ((20, 0, True), (40, 0, False))
+@pytest.mark.parametrize(
+    ("events", "edges"),
+    [
+        ([(110, 0), (120, 1), (130, 1), (140, 0)], [(20, 0, True), (40, 0, False)]),  # glitches
+        ([(2**32 - 50, 1), (90, 0), (200, 4)], [(-150, 0, True), (-10, 0, False), (100, 2, True)]),
+    ],
+)
+def test_snapshots_become_edges_since_the_fire_stamp(events, edges):
+    transcript = heard(frame(0, *events), certificate(1, len(events)))
+    assert list(transcript.pending(1).edges) == edges
 
 
 @pytest.mark.parametrize(("tick", "sense"), [(350, 250), (20, -80), (2**31 + 99, 2**31 - 1)])
 def test_the_release_sense_counts_from_the_fire_stamp(tick, sense):
-    transcript = Transcript()
-    say(transcript, "rx", replace(certificate(1, 0), sensed=1, sense_tick=tick))
-    assert transcript.pending(1).certificate.release_sense == sense
-    say(transcript, "rx", replace(certificate(1, 0), sensed=0, sense_tick=tick))
-    assert transcript.pending(1).certificate.release_sense is None
-
-
-def test_edges_before_the_fire_stamp_are_negative():
-    transcript = Transcript()
-    events = (wire.Event(2**32 - 50, 1), wire.Event(90, 0), wire.Event(200, 4))
-    say(transcript, "rx", wire.EventsFrame(1, 0, events))
-    say(transcript, "rx", certificate(1, 3))
-    assert [edge.tick for edge in transcript.pending(1).edges] == [-150, -10, 100]
+    for sensed, expected in ((1, sense), (0, None)):
+        transcript = heard(replace(certificate(1, 0), sensed=sensed, sense_tick=tick))
+        assert transcript.pending(1).certificate.release_sense == expected
 
 
 def test_without_identity_or_certificate_the_drop_says_so():
-    transcript = Transcript()
-    say(transcript, "rx", wire.EventsFrame(1, 0, (wire.Event(110, 1),)))
-    drop = transcript.pending(1)
-    assert isinstance(drop, Drop)
-    assert drop.edges == ()
-    assert len(drop.faults) == 2
+    drop = heard(frame(0, (110, 1))).pending(1)
+    assert (drop.edges, len(drop.faults)) == ((), 2)
 
 
 def test_what_is_no_message_is_counted():

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.campaign.machine import Flow, Stage
-from rig.daemon.client_protocol import Replica
+from rig.daemon.replica import Replica
 from rig.tui.client import ReconnectingClient
 from rig.tui.follow import _back
 from rig.tui.indicators import Indicators
@@ -42,12 +42,12 @@ changes = st.fixed_dictionaries(
 @given(st.lists(changes, max_size=8))
 def test_a_state_once_taken_never_changes(steps):
     replica = Replica()
-    replica.snapshot(copy.deepcopy({"n": 7, "state": STATE}))
+    replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
     taken = []
     for n, change in enumerate(steps, start=8):
         state = typed(replica.n, replica.state)
         taken.append((state, copy.deepcopy(state)))
-        replica.change({"n": n} | change)
+        replica.follow("change", {"n": n} | change)
     assert all(state == as_it_was for state, as_it_was in taken)
 
 
@@ -103,12 +103,14 @@ def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
 
     line, replica = ReconnectingClient("sim://", Path("rig.sock"), connected), Replica()
     error = {"message": "the board restarted", "hint": "check its supply"}
-    replica.snapshot({"n": 1, "state": {"link": {"state": "down"}, "error": error, "edges": []}})
+    replica.follow(
+        "snapshot", {"n": 1, "state": {"link": {"state": "down"}, "error": error, "edges": []}}
+    )
     line._note(replica)
-    replica.change({"n": 2, "set": {"link": {"state": "up"}}})
+    replica.follow("change", {"n": 2, "set": {"link": {"state": "up"}}})
     line._note(replica)
     assert not [*_back(line, typed(replica.n, replica.state))]  # not all is well yet
-    replica.change({"n": 3, "set": {"error": None}})
+    replica.follow("change", {"n": 3, "set": {"error": None}})
     line._note(replica)
     back = typed(replica.n, replica.state)
     (said,) = _back(line, back)
