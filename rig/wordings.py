@@ -348,6 +348,8 @@ WORDINGS: dict[str, Wording] = {
     "too_large": _doubt(
         "{size_mb:.0f} MB is more than {limit_mb:.0f} MB",
         "is it the right file? otherwise split it by runs"),
+    "too_many_events": _doubt(
+        "more than {limit:edge}, as of an input that flickers", "is it the right file?"),
     "no_edges": _doubt("no edges in this file"),
     "nothing_passes": _doubt("nothing passes in this file{notes}"),
     "unreadable": _doubt("cannot read this file: {text}"),

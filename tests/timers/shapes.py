@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -112,20 +113,37 @@ def vcd(edges: Truth) -> str:
     return f"{head}{wires}$upscope $end\n$enddefinitions $end\n{zero}{changes}"
 
 
-def rows(form, runs=1, gap=10.0, mark=None, shift=True):
-    """Write an edge a line, runs one after the other by one clock, or each by its own."""
-    out = []
-    for n, edges in enumerate(RUNS[:runs]):
-        if mark:
-            out.append(mark.format(n + 1) + "\n")
-        out += [form(t + (gap * n if shift else 0.0), c, d) for t, c, d in edges]
-    return "".join(out)
+ROWS = json.loads(Path(__file__).with_name("rows.json").read_text("utf-8"))
+"""What stands above, a row, words for blocked and clear, how many runs, what is below, marks."""
+
+
+def write(form: str, words: str = "", runs=RUNS[:1], mark: str = "") -> str:
+    """Write a row for each edge, below a mark of each run; capitals have decimal commas."""
+    blocked, clear = words.split() or ("1", "0")
+    rows, k = [], 0
+    for n, edges in enumerate(runs, 1):
+        rows.append(mark.format(n))
+        for t, c, dark in edges:
+            s, ms, k = f"{t:.6f}", f"{t * 1e3:.3f}", k + 1
+            values = {"s": s, "ms": ms, "S": s.replace(".", ","), "MS": ms.replace(".", ",")}
+            values |= {"us": round(t * 1e6), "coarse": f"{t * 1e3:.0f}", "d": int(dark)}
+            values |= {"no": int(not dark), "w": blocked if dark else clear}
+            rows.append(form.format(n=n, k=k, c=c, **values))
+    return "".join(rows)
+
+
+def from_rows(group: str) -> dict[str, Shape]:
+    """Return the files of a group of `ROWS`."""
+    return {
+        name: text(head + write(form, words, RUNS[:runs], mark) + tail, runs)
+        for name, (head, form, words, runs, tail, mark) in ROWS[group].items()
+    }
 
 
 def shapes() -> dict[str, Shape]:
     """Return every shape by its name."""
-    word = {True: "Blocked", False: "Unblocked"}
-    found = {}
+    found = from_rows("shapes")
+    found["cp1252"] = text(found["cp1252"].content.decode(), encoding="cp1252")
 
     def states(n):
         return ",".join([f"Run {n}: Time (s)", *(f"Run {n}: Gate {g} State ()" for g in HEIGHTS)])
@@ -157,28 +175,10 @@ def shapes() -> dict[str, Shape]:
         )
         for n, edges in enumerate(RUNS, 1)), 3)  # fmt: skip
 
-    def arduino(t, c, d):
-        return f"{c},{t * 1e6:.0f},{int(d)}\n"
-
-    found["Arduino with marks"] = text(
-        "Gate,Micros,State\n" + rows(arduino, 3, mark="--- Run {} ---"), 3
-    )
-    found["Arduino without marks"] = text("Gate,Micros,State\n" + rows(arduino, 3), 3)
-    found["Arduino monitor"] = text(
-        rows(lambda t, c, d: f"10:01:02.345 -> gate={c} t_us={t * 1e6:.0f} state={int(d)}\n")
-    )
-    found["Sentences"] = text(
-        "ready\n"
-        + rows(lambda t, c, d: f"Gate {c} {'blocked' if d else 'unblocked'} at {t * 1e6:.0f} us\n")
-    )
-    found["JSON lines"] = text(
-        rows(
-            lambda t, c, d: (
-                f'{{"t_us": {t * 1e6:.0f}, "gate": {c}, '
-                f'"state": "{"blocked" if d else "clear"}"}}\n'
-            )
-        )
-    )
+    by_one_clock = [[(t + 10 * n, c, d) for t, c, d in edges] for n, edges in enumerate(RUNS)]
+    for name, mark in (("with", "--- Run {} ---\n"), ("without", "")):
+        lines = write("{c},{us},{d}\n", runs=by_one_clock, mark=mark)
+        found[f"Arduino {name} marks"] = text("Gate,Micros,State\n" + lines, 3)
     found["Serial plotter"] = text("".join(
         f"time_us:{t * 1e6:.0f} "
         + " ".join(f"gate{g}:{v}" for g, v in enumerate(levels(RUNS[0], t)))
@@ -266,21 +266,6 @@ def shapes() -> dict[str, Shape]:
         + "".join(",".join(map(str, levels(RUNS[0], t))) + "\n" for t in times)).encode(),
         RUNS[:1], sampled=STEP, bare=True)  # fmt: skip
     found["VCD"] = text(vcd(RUNS[0]))
-    for name, heading, no in (
-        ("German", ("Zeit in ms", "Lichtschranke", "Zustand"), ("unterbrochen", "frei")),
-        ("French", ("Temps (ms)", "porte", "état"), ("bloqué", "libre")),
-        ("Italian", ("Tempo (ms)", "fotocellula", "stato"), ("interrotto", "libero")),
-        ("Spanish", ("Tiempo (ms)", "puerta", "estado"), ("bloqueado", "libre")),
-    ):
-        found[name] = text(
-            ";".join(heading)
-            + "\n"
-            + rows(
-                lambda t, c, d, no=no: (
-                    f"{t * 1e3:.3f}".replace(".", ",") + f";{c};{no[0] if d else no[1]}\n"
-                )
-            )
-        )
     found["Time at each gate"] = Shape(
         (
             ",".join(f"Time at gate {g} (s)" for g in HEIGHTS)
@@ -300,39 +285,6 @@ def shapes() -> dict[str, Shape]:
     found["Gates below each other"] = text("".join(
         f"Gate {g}\nTime (s)\n" + "".join(f"{t:.6f}\n" for t, _, _ in edges)
         for g, edges in by_gate(RUNS[0]).items()))  # fmt: skip
-    found["Plain numbers of passing gates"] = text(rows(lambda t, c, d: f"{t:.6f}\n"))
-    found["Pin, edge, time"] = text(rows(lambda t, c, d: f"{c}, {int(d)}, {t:.6f}\n"))
-    found["baldaquin"] = text("# baldaquin version: 0.4.0\n# Pin number, Edge type, Time [s]\n"
-        + rows(lambda t, c, d: f"{c}, {int(d)}, {t:.6f}\n"))  # fmt: skip
-    found["Table of events"] = text(
-        "Event\tGate\tTime (ms)\tTime (us)\tState\n"
-        + "".join(
-            f"{n}\t{c}\t{t * 1e3:.0f}\t{t * 1e6:.0f}\t{word[d]}\n"
-            for n, (t, c, d) in enumerate(RUNS[0])
-        )
-    )
-    found["Trial column"] = text(
-        "Trial,Pin,Time (s),State\n"
-        + "".join(
-            f"{n},{c},{t:.6f},{word[d]}\n" for n, edges in enumerate(RUNS, 1) for t, c, d in edges
-        ),
-        3,
-    )
-    found["Milliseconds without a unit"] = text("Gate,Time,State\n"
-        + rows(lambda t, c, d: f"{c},{t * 1e6:.0f},{word[d]}\n"))  # fmt: skip
-    found["Rising and falling"] = text(
-        "pin   micros   edge\n"
-        + rows(lambda t, c, d: f" {c}  {t * 1e6:9.0f}  {'RISING' if d else 'FALLING'}\n")
-    )
-    found["cp1252"] = text(
-        "t (µs);Kanal;Zustand\n" + rows(lambda t, c, d: f"{t * 1e6:.0f};{c};{int(d)}\n"),
-        encoding="cp1252",
-    )
-    found["Run below run, own clocks"] = text(
-        "Time (s),Gate,Blocked\n"
-        + rows(lambda t, c, d: f"{t:.6f},{c},{word[d]}\n", 3, shift=False),
-        3,
-    )
     tds = ["Record Length,4e+03,,", "Sample Interval,2e-04,,", "Trigger Point,0,,",
            "Source,CH1,,",
            "Vertical Units,V,,", "Horizontal Units,s,,"]  # fmt: skip
