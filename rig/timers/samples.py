@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from array import array
 from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.reasons import make_reason
-from rig.timers.events import TICK_HZ, Event, moment
+from rig.timers.events import TICK_HZ, Event, Part, moment
 from rig.timers.vocabulary import find_label, is_number, state_of
 
 if TYPE_CHECKING:
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.reasons import Reason
     from rig.timers.columns import TimerColumn
     from rig.timers.problems import ProblemList
     from rig.timers.table import Row
+    from rig.timers.timer_file import TimerFile
 
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
@@ -42,40 +42,19 @@ _AT_ONCE = 10_000
 """Rows turned into numbers together."""
 
 
-class Samples(NamedTuple):
-    """What samples say.
-
-    Attributes
-    ----------
-    events
-        Of all inputs.
-    begins
-        The level that each input begins with: ``high`` or ``low``.
-    notes
-        What was seen of inputs in volts.
-    step_s
-        Between samples; 0 where they are not at regular times.
-    rows
-        How many there are.
-    """
-
-    events: list[Event]
-    begins: dict[str, str]
-    notes: list[Reason]
-    step_s: float
-    rows: int
-
-
 def read_samples(
+    file: TimerFile,
     rows: Iterator[Row],
     columns: Sequence[TimerColumn],
     base: tuple[float, float] | None,
     problems: ProblemList,
-) -> Samples:
+) -> None:
     """Read the inputs that stand beside each other, and find where they change.
 
     Parameters
     ----------
+    file
+        What is known of the file, to which events, levels, rows and notes are added.
     base
         Of samples without times: when the first was taken, and the time between them, s.
     """
@@ -102,16 +81,21 @@ def read_samples(
     scale, start = (1.0, origin or 0) if base is None else (base[1], round(TICK_HZ * base[0]))
     is_regular = not clock or longest < 1.5 * usual
     step_s = scale * (usual / TICK_HZ if clock else 1.0) if is_regular else 0.0
-    samples = Samples([], {}, [], step_s, len(lines))
+    file.period_s = step_s or None
+    file.parts.append(Part())
     names = [column.name for column in columns]
     for column, cells in zip(inputs, values, strict=True):
         plain = names.count(column.name) > 1 or not find_label(column.name, "gate")
         label = column.gate if plain and column.gate else column.name
-        for k, share, high in _find_changes(samples, label, np.asarray(cells)):
+        for k, share, high in _find_changes(file, label, np.asarray(cells)):
             now, before = (stamps[k], stamps[k - 1]) if clock else (k * TICK_HZ, (k - 1) * TICK_HZ)
             tick = start + round(scale * (now - share * (now - before)))
-            samples.events.append(Event(tick, label, "high" if high else "low", lines[k]))
-    return samples
+            event = Event(tick, label, "high" if high else "low", lines[k])
+            file.parts[-1].events.append(event)
+    changing = {event.line for event in file.parts[-1].events}
+    file.sampled |= changing
+    file.rows += len(lines)
+    file.silent += len(lines) - len(changing)
 
 
 def _read_column(rows: Sequence[Row], column: TimerColumn, problems: ProblemList) -> list[Any]:
@@ -136,14 +120,14 @@ def _read_column(rows: Sequence[Row], column: TimerColumn, problems: ProblemList
 
 
 def _find_changes(
-    samples: Samples, label: str, values: NDArray[Any]
+    file: TimerFile, label: str, values: NDArray[Any]
 ) -> Iterator[tuple[int, float, bool]]:
     """Yield each change: the first sample after it, how far before that it is, and whether up."""
     is_level = values.dtype == np.int8
     middle = (0.5, 0.0) if is_level else find_middle(values)
     if middle is None:
         low, high = float(values.min()), float(values.max())
-        samples.notes.append(make_reason("no_passage", input=label, low=low, high=high))
+        file.notes.append(make_reason("no_passage", input=label, low=low, high=high))
         return
     centre, half = middle
     last, count = np.zeros(0, np.intp), 0
@@ -153,7 +137,7 @@ def _find_changes(
         firm = np.concatenate([last, begin + np.flatnonzero(near)])
         above = values[firm] > centre
         if firm.size:
-            samples.begins.setdefault(label, "high" if above[0] else "low")
+            file.begins.setdefault(label, "high" if above[0] else "low")
         for n in (np.flatnonzero(np.diff(above)) + 1).tolist():
             k, share, high = int(firm[n]), 0.0, bool(above[n])
             if not is_level:  # back to where it crossed the middle
@@ -165,7 +149,7 @@ def _find_changes(
             yield k, share, high
         last = firm[-1:]
     if not is_level:
-        samples.notes.append(make_reason("crossings", input=label, crossings=count, level=centre))
+        file.notes.append(make_reason("crossings", input=label, crossings=count, level=centre))
 
 
 def find_middle(volts: NDArray[np.float32]) -> tuple[float, float] | None:

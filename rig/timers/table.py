@@ -45,7 +45,8 @@ _SENTENCE = re.compile(
     re.IGNORECASE,
 )
 """What a board may say to whoever reads along: ``Gate 1 blocked at 402345 us``."""
-_REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)')
+_REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)|FRAME-(?:BEGIN|END)')
+"""A line that is marked as a remark, or parts what sigrok captured."""
 _QUANTITY = re.compile(
     r"([+-]?[0-9][0-9.,]{0,30}(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))", re.IGNORECASE
 )

@@ -159,15 +159,7 @@ def _read_table(file: TimerFile, table: Table, unit: str | None, problems: Probl
             base = None if is_timed else find_time_base([*table.remarks, *block.headings])
             if base is None and not is_timed:
                 problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
-            samples = read_samples(itertools.chain(sample, rows), columns, base, problems)
-            file.parts.append(Part(events=samples.events))
-            file.begins |= samples.begins
-            file.period_s = samples.step_s or None
-            file.notes += samples.notes
-            file.rows += samples.rows
-            changing = {event.line for event in samples.events}
-            file.sampled |= changing
-            file.silent += samples.rows - len(changing)
+            read_samples(file, itertools.chain(sample, rows), columns, base, problems)
         elif "time" in roles:
             _add_rows(file, block, sample, rows, columns, table, problems)
         else:
