@@ -196,14 +196,14 @@ def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter((event.line, event.tick) for part in file.parts for event in part.events)
     line = next((line for (line, _), count in changes.items() if count > 1), 0)
-    if line and not file.sampled:
+    if line and not (file.sampled and file.period_s):  # regular samples see changes together
         raise refusal(place, "at_once", line=line)
 
 
 def _account(file: TimerFile, reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
-    said = {event.line for part in file.parts for event in part.events}
-    unused = sorted(said.union(file.unread) - reading.lines - file.sampled)
+    lines = {event.line for part in file.parts for event in part.events}
+    unused = sorted(lines.union(file.unread) - reading.lines - file.sampled)
     edges = sum(len(drop.edges) for drop in reading.drops)
     counts = {"runs": len(reading.drops), "rows": file.rows, "edges": edges}
     silent = file.silent + len(file.sampled - reading.lines)
@@ -211,10 +211,10 @@ def _account(file: TimerFile, reading: FileReading, options: Namespace) -> Reaso
     if not missing:
         return make_reason("rows_used", silent=silent, **counts)
     listed = ", ".join(map(str, unused[:8])) + (" …" if len(unused) > 8 else "")
-    left = {"unused": missing, "lines": listed}
+    rest = {"unused": missing, "lines": listed}
     if not options.allow_unused:
-        raise refusal(options.events, "rows_unused", **counts, **left)
-    return make_reason("rows_left_out", **counts, **left)
+        raise refusal(options.events, "rows_unused", **counts, **rest)
+    return make_reason("rows_left_out", **counts, **rest)
 
 
 def _assumptions(file: TimerFile, reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:

@@ -64,17 +64,17 @@ def read_samples(
     values = [array("b" if column.role == "level" else "f") for column in inputs]
     origin: int | None = None
     longest = usual = 0.0
-    while some := list(islice(rows, _AT_ONCE)):
-        lines.extend(row.line for row in some)
+    while batch := list(islice(rows, _AT_ONCE)):
+        lines.extend(row.line for row in batch)
         for column, cells in zip(inputs, values, strict=True):
-            cells.extend(_read_column(some, column, problems))
+            cells.extend(_read_column(batch, column, problems))
         if clock is not None:
-            ticks = _read_column(some, clock, problems)
+            ticks = _read_column(batch, clock, problems)
             origin = ticks[0] if origin is None else origin
             before = stamps[-1] if stamps else 0.0
             stamps.extend(tick - origin for tick in ticks)
             steps = np.diff(stamps[-len(ticks) :], prepend=before)
-            for row in (some[n] for n in np.flatnonzero(steps < 0.0).tolist()):
+            for row in (batch[n] for n in np.flatnonzero(steps < 0.0).tolist()):
                 place, text = row.column(clock.at), row.cell(clock.at)
                 problems.add(row.line, place, "time", "backwards", text=text)
             longest, usual = max(longest, float(steps.max())), usual or float(np.median(steps))
@@ -88,8 +88,10 @@ def read_samples(
         plain = names.count(column.name) > 1 or not find_label(column.name, "gate")
         label = column.gate if plain and column.gate else column.name
         for k, share, high in _find_changes(file, label, np.asarray(cells)):
-            now, before = (stamps[k], stamps[k - 1]) if clock else (k * TICK_HZ, (k - 1) * TICK_HZ)
-            tick = start + round(scale * (now - share * (now - before)))
+            after, before = (
+                (stamps[k], stamps[k - 1]) if clock else (k * TICK_HZ, (k - 1) * TICK_HZ)
+            )
+            tick = start + round(scale * (after - share * (after - before)))
             event = Event(tick, label, "high" if high else "low", lines[k])
             file.parts[-1].events.append(event)
     changing = {event.line for event in file.parts[-1].events}

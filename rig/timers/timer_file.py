@@ -203,13 +203,13 @@ def _add_rows(
             problems.refuse(sample[0].line, 1, "regular_samples", columns=", ".join(unused))
         in_order = len(set(lines)) == len(lines)
         parts = [part] if reader.has_runs else split_at_jumps(part, in_order=in_order)
-        short = [k for k, each in enumerate(parts) if len(each.events) < 2]
+        short = [k for k, piece in enumerate(parts) if len(piece.events) < 2]
         if len(parts) > 1 and short:
             event = parts[max(1, short[-1])].events[0]
             problems.add(event.line, 1, "time", "backwards", text=f"{event.tick / TICK_HZ:.9g}")
         mark = " ".join(block.headings[0].texts) if block.headings and not part.name else ""
-        for each in parts:
-            each.name = each.name or mark
+        for piece in parts:
+            piece.name = piece.name or mark
         file.parts += parts
     if unused:
         file.notes.append(make_reason("columns_unused", columns=", ".join(unused)))
