@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.records import Drop
+from rig.timers import events, vcd
 from rig.timers.events import TICK_HZ
 from rig.timers.layouts import find_layouts, read_drops
 from rig.timers.lines import read_lines
@@ -313,3 +314,16 @@ def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, t
         assert said in ([""] * len(times), ["blocked", "clear"] * (len(times) // 2)) or set(
             said
         ) == {"high", "low"}
+
+
+@pytest.mark.parametrize("content", ["time (s),state\n0.1,1\n0.2,0\n0.3,1\n",
+    "$timescale 1 us $end\n$var wire 1 ! D0 $end\n$enddefinitions $end\n"
+    "#0 0!\n#1 1!\n#2 0!\n#3 1!\n"])  # fmt: skip
+def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
+    monkeypatch.setattr(events, "MAX_EVENTS", 2)
+    monkeypatch.setattr(vcd, "MAX_EVENTS", 2)
+    assert faults(tmp_path, content)
+
+
+def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
+    assert faults(tmp_path, "time (s),state\n0.1,1\n" + "1" * 20_001 + "\n") == [(3, 1, "")]
