@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from rig.timers.problems import ProblemList
-    from rig.timers.table import Block, Table
+    from rig.timers.table import RowBlock, Table
 
 _MEANINGS = {
     "state": "states, blocked or clear",
@@ -102,7 +102,7 @@ def _find_role(facts: set[str]) -> str:
 
 
 def columns_of(
-    block: Block, rows: Sequence[Row], table: Table, unit: str | None, problems: ProblemList
+    block: RowBlock, rows: Sequence[Row], table: Table, unit: str | None, problems: ProblemList
 ) -> list[TimerColumn]:
     """Find out what the columns of a block are.
 
@@ -145,7 +145,7 @@ def columns_of(
     return columns
 
 
-def _name_levels(facts: Sequence[set[str]], block: Block, table: Table) -> list[Row]:
+def _name_levels(facts: Sequence[set[str]], block: RowBlock, table: Table) -> list[Row]:
     """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
     last = block.headings[-1].texts if block.headings else []
     named = {text.casefold() for text in last} - {"logic", "analog"}
@@ -160,7 +160,7 @@ def _name_levels(facts: Sequence[set[str]], block: Block, table: Table) -> list[
     return [Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])]
 
 
-def _find_heading(block: Block, filled: Collection[int]) -> Row | None:
+def _find_heading(block: RowBlock, filled: Collection[int]) -> Row | None:
     """Return the row with most cells that are known; above and below may stand symbols, units."""
     rows = [
         row
@@ -172,7 +172,7 @@ def _find_heading(block: Block, filled: Collection[int]) -> Row | None:
     return max(rows, key=lambda row: (count_known(row), len("".join(row.texts))), default=None)
 
 
-def _read_heading(block: Block, heading: Row, n: int, facts: set[str]) -> TimerColumn:
+def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> TimerColumn:
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
     name, beside = heading.cell(n), [r.cell(n) for r in block.headings if r.line != heading.line]
     prefix, colon, rest = name.partition(":")
@@ -235,7 +235,7 @@ def _check(
 
 
 def _read_bare(
-    block: Block, facts: dict[int, set[str]], first: Row, problems: ProblemList
+    block: RowBlock, facts: dict[int, set[str]], first: Row, problems: ProblemList
 ) -> list[TimerColumn]:
     """Without a heading: a column of times, and others that can be nothing else."""
     for row in block.headings:  # one that says nothing

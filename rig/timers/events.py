@@ -48,7 +48,7 @@ _STATES = {
 """What a word means in a column of states, or of edges of a signal, and what is accepted there."""
 
 
-class Event(NamedTuple):
+class TimerEvent(NamedTuple):
     """One change at one input.
 
     Attributes
@@ -71,7 +71,7 @@ class Event(NamedTuple):
 
 
 @dataclass(slots=True)
-class Part:
+class FilePart:
     """Events that stand together: those of a run, or of a gate.
 
     Attributes
@@ -84,7 +84,7 @@ class Part:
 
     name: str = ""
     number: int = 0
-    events: list[Event] = field(default_factory=list)
+    events: list[TimerEvent] = field(default_factory=list)
 
 
 class _Stream(NamedTuple):
@@ -151,13 +151,13 @@ class RowReader:
         *,
         is_own: bool,
     ) -> None:
-        self.parts: dict[object, Part] = {}
+        self.parts: dict[object, FilePart] = {}
         self.rows = self.silent = self._events = 0
         self.unread: list[int] = []
         self._columns = {column.role: column for column in columns}
         self._streams = list(_streams_of(columns))
         self._is_own, self._problems = is_own, problems
-        self._last: dict[tuple[int, str], Event] = {}
+        self._last: dict[tuple[int, str], TimerEvent] = {}
         self._states: dict[tuple[int, str], str] = {}
         self._several = len(self._streams) > 1 and any(s.state for s in self._streams)
         self._row_is_run = self._is_row_a_run(sample)
@@ -223,10 +223,10 @@ class RowReader:
                 label = label or (name if stream.time.numbered and name[:1] in "tTZ" else "")
             elif not label and not stream.run:
                 key = (number, at)
-            part = Part(stream.run, number or number_of(stream.run) or 0)
+            part = FilePart(stream.run, number or number_of(stream.run) or 0)
             self._add(row, stream, text, label, self.parts.setdefault(key, part))
 
-    def _add(self, row: Row, stream: _Stream, text: str, label: str, part: Part) -> None:
+    def _add(self, row: Row, stream: _Stream, text: str, label: str, part: FilePart) -> None:
         column, key = stream.time, (id(part), label)
         time = moment(text, column.power or 0)
         state = "" if column.blocked is None else "blocked" if column.blocked else "clear"
@@ -251,14 +251,14 @@ class RowReader:
                 self.silent += 1
                 return
             self._states[key] = state
-        event = Event(time, label, state, row.line)
+        event = TimerEvent(time, label, state, row.line)
         if self._is_in_time(row, column, event, part, self._last.get(key, event)):
             self._last[key] = event
             part.events.append(event)
             self._events += 1
 
     def _is_in_time(
-        self, row: Row, column: TimerColumn, event: Event, part: Part, last: Event
+        self, row: Row, column: TimerColumn, event: TimerEvent, part: FilePart, last: TimerEvent
     ) -> bool:
         """Whether a time can be of its run; within a numbered one, those of an input go on."""
         code, values = "", dict[str, object]()
@@ -331,7 +331,7 @@ def seconds(tick: int, rate: Fraction) -> str:
     return f"{sign}{integer}.{part:012d}".rstrip("0").rstrip(".")
 
 
-def split_at_jumps(part: Part, *, in_order: bool) -> list[Part]:
+def split_at_jumps(part: FilePart, *, in_order: bool) -> list[FilePart]:
     """Divide what stands one below the other where the times of an input do not go on.
 
     Parameters
@@ -340,11 +340,11 @@ def split_at_jumps(part: Part, *, in_order: bool) -> list[Part]:
         Whether each row has a single time, so that a time before any above it begins anew; gates
         may stand one after the other all the same.
     """
-    parts, last = [Part(part.name, part.number)], dict[str, int]()
+    parts, last = [FilePart(part.name, part.number)], dict[str, int]()
     for event in part.events:
         latest = max(last.values(), default=0) if in_order else last.get(event.label, 0)
         if event.label in last and event.tick < latest:
-            parts.append(Part(part.name))
+            parts.append(FilePart(part.name))
             last = {}
         last[event.label] = event.tick
         parts[-1].events.append(event)

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.records import Drop, Edge
-from rig.timers.events import TICK_HZ, Event, widest_pause
+from rig.timers.events import TICK_HZ, TimerEvent, widest_pause
 from rig.timers.vocabulary import POWERS, number_of
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class FileLayout:
         """Whether it contradicts what the file says."""
         return self.dark == "inverted"
 
-    def is_dark(self, event: Event, n: int) -> bool:
+    def is_dark(self, event: TimerEvent, n: int) -> bool:
         """Whether an event, the n-th of its input, begins a blocked beam."""
         if event.state in {"blocked", "clear"}:
             return (event.state == "blocked") is not self.is_contrary
@@ -103,7 +103,7 @@ class FileReading(NamedTuple):
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    runs: dict[int, list[Event]] = {}
+    runs: dict[int, list[TimerEvent]] = {}
     for run, number in _runs(file, layout):
         free = number and number not in runs
         runs[number if free else max(runs, default=0) + 1] = run
@@ -135,7 +135,7 @@ def _drop_of(run: int, edges: list[Edge]) -> Drop:
     )
 
 
-def _runs(file: TimerFile, layout: FileLayout) -> Iterator[tuple[list[Event], int]]:
+def _runs(file: TimerFile, layout: FileLayout) -> Iterator[tuple[list[TimerEvent], int]]:
     """Yield the events of each run in order, with its number where the file says it."""
     parts = [(part.events, part.number) for part in file.parts]
     if layout.groups == "gates":

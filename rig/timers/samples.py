@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.reasons import make_reason
-from rig.timers.events import TICK_HZ, Event, Part, moment
+from rig.timers.events import TICK_HZ, FilePart, TimerEvent, moment
 from rig.timers.vocabulary import find_label, is_number, state_of
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def read_samples(
     is_regular = not clock or longest < 1.5 * usual
     step_s = scale * (usual / TICK_HZ if clock else 1.0) if is_regular else 0.0
     file.period_s = step_s or None
-    file.parts.append(Part())
+    file.parts.append(FilePart())
     names = [column.name for column in columns]
     for column, cells in zip(inputs, values, strict=True):
         plain = names.count(column.name) > 1 or not find_label(column.name, "gate")
@@ -92,7 +92,7 @@ def read_samples(
                 (stamps[k], stamps[k - 1]) if clock else (k * TICK_HZ, (k - 1) * TICK_HZ)
             )
             tick = start + round(scale * (after - share * (after - before)))
-            event = Event(tick, label, "high" if high else "low", lines[k])
+            event = TimerEvent(tick, label, "high" if high else "low", lines[k])
             file.parts[-1].events.append(event)
     changing = {event.line for event in file.parts[-1].events}
     file.sampled |= changing

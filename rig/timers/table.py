@@ -79,7 +79,7 @@ class Row(NamedTuple):
 
 
 @dataclass(eq=False, slots=True)
-class Block:
+class RowBlock:
     """Rows that stand together: what stands above them, and how many cells the first one has."""
 
     headings: list[Row] = field(default_factory=list)
@@ -127,7 +127,7 @@ class Table:
         is_beside = count > max(_FEWEST_BESIDE, 0.9 * shapes.total())
         self._margin = margin if margin > 1 and is_beside else 0
 
-    def blocks(self) -> Iterator[tuple[Block, Iterator[Row]]]:
+    def blocks(self) -> Iterator[tuple[RowBlock, Iterator[Row]]]:
         """Yield blocks of rows; the rows of each are to be taken before the next."""
         for block, pairs in itertools.groupby(self._rows(), key=lambda pair: pair[0]):
             yield block, (row for _, row in pairs)
@@ -151,9 +151,9 @@ class Table:
             cells = [t.replace(",", ".") if _DECIMAL.fullmatch(t[:LONGEST]) else t for t in cells]
         return cells
 
-    def _rows(self) -> Iterator[tuple[Block, Row]]:
+    def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
-        block = Block([Row(0, self._names)] if self._names else [])
+        block = RowBlock([Row(0, self._names)] if self._names else [])
         remark: Row | None = None
         for number, line in enumerate(self._lines, 1):
             if not line or line.isspace():
@@ -164,11 +164,11 @@ class Table:
                 remark = Row(number, self.split(line[mark.end() :].rstrip('" ')), line)
                 self.remarks += [remark] * (number <= _SAMPLE)
                 if _is_mark(remark) and not self.is_own:
-                    block = Block([remark])
+                    block = RowBlock([remark])
             else:
                 row = self._without_settings(number, line, block)
                 if block.width and self._begins_block(row, block):
-                    block = Block([row])
+                    block = RowBlock([row])
                 elif self._is_row(row, block):
                     if not block.width and not block.headings and remark is not None:
                         # A heading that is marked as a remark has a name for each cell.
@@ -179,7 +179,7 @@ class Table:
                 elif not self._put_aside(row, block):
                     return
 
-    def _without_settings(self, number: int, line: str, block: Block) -> Row:
+    def _without_settings(self, number: int, line: str, block: RowBlock) -> Row:
         """Return a row; settings that stand to the left of its samples go to the headings."""
         row, n = Row(number, self.split(line), line, self.separator), self._margin
         if n and any(row.texts[:n]) and self._is_data(row.texts[n:]):
@@ -187,7 +187,7 @@ class Table:
             row = row._replace(texts=[""] * n + row.texts[n:])
         return row
 
-    def _put_aside(self, row: Row, block: Block) -> bool:
+    def _put_aside(self, row: Row, block: RowBlock) -> bool:
         """Take a line that is no row for a heading, or a stray; false after too many of them."""
         if block.width and any(row.texts):
             self.stray_count += 1
@@ -196,7 +196,7 @@ class Table:
             block.headings.append(row)
         return block.width > 0 or len(block.headings) <= _SAMPLE
 
-    def _begins_block(self, row: Row, block: Block) -> bool:
+    def _begins_block(self, row: Row, block: RowBlock) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
         if self.is_own or any(map(is_number, row.texts)):
             return _is_mark(row) and not self.is_own
@@ -205,7 +205,7 @@ class Table:
         known = count_known(row)
         return again or _is_mark(row) or 0 < len(texts) <= 2 * known
 
-    def _is_row(self, row: Row, block: Block) -> bool:
+    def _is_row(self, row: Row, block: RowBlock) -> bool:
         if self.is_own:
             return len(block.headings) > 0
         texts = row.texts

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 from rig.reasons import make_reason
 from rig.timers.columns import columns_of
-from rig.timers.events import TICK_HZ, Part, RowReader, split_at_jumps
+from rig.timers.events import TICK_HZ, FilePart, RowReader, split_at_jumps
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
 from rig.timers.samples import read_samples
-from rig.timers.table import HEADER, Block, Table, find_time_base
+from rig.timers.table import HEADER, RowBlock, Table, find_time_base
 from rig.timers.vcd import is_vcd, read_vcd
 from rig.timers.vocabulary import number_of, recognise_format
 
@@ -76,7 +76,7 @@ class TimerFile:
     kind: str = "a value change dump"
     is_own: bool = False
     columns: dict[str, str] = field(default_factory=dict)
-    parts: list[Part] = field(default_factory=list)
+    parts: list[FilePart] = field(default_factory=list)
     begins: dict[str, str] = field(default_factory=dict)
     period_s: float | None = None
     has_unit: bool = True
@@ -114,7 +114,7 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
     lines = itertools.chain(head, lines)
     if is_vcd(head):
         events, file.begins, scale = read_vcd(lines, problems)
-        file.period_s, file.parts = scale / TICK_HZ, [Part(events=events)]
+        file.period_s, file.parts = scale / TICK_HZ, [FilePart(events=events)]
         file.rows = len({event.line for event in events})
     else:
         _read_table(file, Table(lines), unit, problems)
@@ -134,7 +134,7 @@ def _read_table(file: TimerFile, table: Table, unit: str | None, problems: Probl
     if file.is_own:  # its faults are told each
         problems.hint = ""
         file.kind = f"the project's own format: {','.join(HEADER)}"
-    above = Block()
+    above = RowBlock()
     for block, rows in table.blocks():
         sample = list(itertools.islice(rows, _SAMPLE))
         width = max(len(row.texts) for row in sample)
@@ -173,7 +173,7 @@ def _read_table(file: TimerFile, table: Table, unit: str | None, problems: Probl
 
 def _add_rows(
     file: TimerFile,
-    block: Block,
+    block: RowBlock,
     sample: Sequence[Row],
     rows: Iterator[Row],
     columns: Sequence[TimerColumn],

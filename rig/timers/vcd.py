@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from rig.timers.events import MAX_EVENTS, Event
+from rig.timers.events import MAX_EVENTS, TimerEvent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,12 +29,12 @@ def is_vcd(head: list[str]) -> bool:
 
 def read_vcd(
     lines: Iterator[str], problems: ProblemList
-) -> tuple[list[Event], dict[str, str], int]:
+) -> tuple[list[TimerEvent], dict[str, str], int]:
     """Read the changes of all wires of one bit.
 
     Returns
     -------
-    list of Event, dict, int
+    list of TimerEvent, dict, int
         Changes, the level that each wire begins with, and the unit of time in ps.
     """
     numbered, head = enumerate(lines, 1), ""
@@ -45,7 +45,7 @@ def read_vcd(
     names, unit, time, stamp = dict(_WIRE.findall(head)), _read_scale(head, problems), 0, 0
     first: dict[str, str] = {}
     current: dict[str, tuple[str, int]] = {}
-    events: list[Event] = []
+    events: list[TimerEvent] = []
     for number, line in numbered:
         for word in line.split() if not line.startswith("$comment") else ():
             if word[0] == "#" and word[1:].isdecimal():
@@ -59,7 +59,7 @@ def read_vcd(
                 name, state = names[word[1:]], "high" if word[0] == "1" else "low"
                 before, since = current.get(name, (state, -1))
                 if before != state:
-                    events.append(Event(time, name, state, stamp))
+                    events.append(TimerEvent(time, name, state, stamp))
                     if since == time:
                         accepted = "a change: this wire has another value at this time already"
                         problems.reject(number, 1, name, word, accepted)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
-from rig.timers.table import Block, Table
+from rig.timers.table import RowBlock, Table
 from rig.timers.vocabulary import is_number
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), _HINT)
-    block, rows = next(Table(read_lines(path)).blocks(), (Block(), iter(())))
+    block, rows = next(Table(read_lines(path)).blocks(), (RowBlock(), iter(())))
     first = next(rows, None)
     heading = next(filter(_has_columns, reversed(block.headings)), None)
     if first is None or heading is None:
