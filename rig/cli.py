@@ -33,7 +33,7 @@ class _ListFormats(argparse.Action):
     """Print the formats of timers' files that are known, and stop."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        rows = import_module("rig.timers.vocabulary").formats()
+        rows = import_module("rig.timers.vocabulary").read_rows("formats.txt", "|")
         sys.stdout.writelines(f"{name}: {how}; {example}\n" for name, _, how, example in rows)
         parser.exit()
 

@@ -1,33 +1,40 @@
-"""What each column of a timer's table is: by its heading, by its unit, and by its values."""
+"""What each column of a timer's table is: by its heading, by its unit, and by its values.
+
+Facts are collected of each column, and the first rule of `columns.txt` that they fulfil says what
+it is. The project's own format has columns that are known beforehand.
+"""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from rig.timers.table import count_known, is_number, is_value
+from rig.timers.table import HEADER, Row, count_known, find_time_base
 from rig.timers.vocabulary import (
     POWERS,
     SYMBOLS,
+    find_label,
     has_role,
+    is_number,
+    is_value,
     normal,
     number_of,
+    read_rows,
     state_of,
     unit_of,
-    without_accents,
     words,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from rig.timers.problems import ProblemList
-    from rig.timers.table import Row, RowBlock, Table
+    from rig.timers.table import RowBlock, Table
 
-_LOOKED_AT = 200  # rows
 _MEANINGS = {
     "state": "states, blocked or clear",
     "duration": "durations, not used",
@@ -81,104 +88,122 @@ class TimerColumn:
 
 
 @cache
-def _numbered(role: str) -> re.Pattern[str]:
-    listed = "|".join(sorted(map(re.escape, words()[role]), key=len, reverse=True))
-    return re.compile(
-        rf"(?<![^\W\d_])(?:{listed})[\s#:_-]{{0,3}}(?:nr\.?|no\.?)?\s?(?:[0-9]{{1,4}}|[a-d])(?![^\W_])",
-        re.IGNORECASE,
-    )
+def _rules() -> list[tuple[str, set[str], set[str]]]:
+    rows = [(role, facts.split()) for role, facts in read_rows("columns.txt", ":")]
+    return [
+        (role, {f for f in facts if f[0] != "-"}, {f[1:] for f in facts if f[0] == "-"})
+        for role, facts in rows
+    ]
 
 
-def find_label(name: str, role: str) -> str:
-    """Return the part of a heading that names an input, or a run, with its number."""
-    match = _numbered(role).search(without_accents(name[:200]))
-    return match[0] if match else ""
+def _find_role(facts: set[str]) -> str:
+    fitting = (role for role, needed, barred in _rules() if needed <= facts and not barred & facts)
+    return next(fitting, "other")
 
 
 def columns_of(
-    block: RowBlock, table: Table, unit: str | None, problems: ProblemList
+    block: RowBlock, rows: Sequence[Row], table: Table, unit: str | None, problems: ProblemList
 ) -> list[TimerColumn]:
     """Find out what the columns of a block are.
 
     Parameters
     ----------
+    rows
+        The first ones.
     unit
         Of the times where the file does not say, a key of `POWERS`.
     problems
         Where it is noted, at its place, if that cannot be found out.
     """
-    rows = [table.row(line) for line in block.rows[:_LOOKED_AT]]
+    if table.is_own:
+        roles = ("run", "gate", "time", "state")
+        return [TimerColumn(n, name, roles[n]) for n, name in enumerate(HEADER)]
     width = max(len(row.texts) for row in rows)
-    values = [[text for row in rows if (text := row.cell(n))] for n in range(width)]
-    heading = _find_heading(block, values)
+    cells = [[text for row in rows if (text := row.cell(n))] for n in range(width)]
+    facts = {n: _facts_of_values(texts) for n, texts in enumerate(cells) if texts}
+    if all(len(texts) == len(rows) for texts in cells):
+        block.headings += _name_levels(list(facts.values()), block, table)
+    heading = _find_heading(block, facts)
     if heading is None:
-        columns = _by_values(block, values, table, problems)
+        columns = _read_bare(block, facts, rows[0], problems)
     else:
-        columns = [
-            _by_heading(block, heading, n, texts, table) for n, texts in enumerate(values) if texts
-        ]
-        _check(columns, heading, values, table, problems)
+        columns = [_read_heading(block, heading, n, facts[n]) for n in facts]
     for column in columns:
+        texts = cells[column.at]
+        if column.role == "level" and len(texts) < len(rows):
+            column.role = "state"  # of samples, each row has every level
         if column.role == "time" and column.power is None:
-            column.power = POWERS[unit] if unit else _plain_power(values[column.at])
-    _leave_out_coarser(columns)
+            column.power = POWERS[unit] if unit else _plain_power(texts)
+        _check(column, columns, heading, facts[column.at], problems)
+    # Of columns that say the same times in other units, the finest is kept.
+    finest: dict[tuple[str, str, bool | None], TimerColumn] = {}
+    times = [column for column in columns if column.role == "time" and not column.numbered]
+    for column in sorted(times, key=lambda column: -(column.power or 0)):
+        other = finest.setdefault((column.gate, column.run, column.blocked), column)
+        if column.power != other.power and None not in {column.power, other.power}:
+            column.role = "coarse"
     return columns
 
 
-def _find_heading(block: RowBlock, values: Sequence[list[str]]) -> Row | None:
+def _name_levels(facts: Sequence[set[str]], block: RowBlock, table: Table) -> list[Row]:
+    """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
+    last = block.headings[-1].texts if block.headings else []
+    named = {text.casefold() for text in last} - {"logic", "analog"}
+    has_rate = find_time_base([*table.remarks, *block.headings]) is not None
+    if named or not has_rate or not all("levels" in each for each in facts):
+        return []
+    lists = [row.raw.partition(":")[2].split(",") for row in table.remarks
+             if "channels" in row.raw.lower()]  # fmt: skip
+    numbered = [f"D{n}" for n in range(len(facts))]
+    names = next((names for names in lists if len(names) == len(facts)), numbered)
+    texts = (text.strip() for text in names)
+    return [Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])]
+
+
+def _find_heading(block: RowBlock, filled: Collection[int]) -> Row | None:
     """Return the row with most cells that are known; above and below may stand symbols, units."""
     rows = [
         row
         for row in block.headings
         if count_known(row)
-        and (len(row.texts) > 1 or len(values) == 1)
-        and any(
-            text and not is_number(text) and n < len(values) and values[n]
-            for n, text in enumerate(row.texts)
-        )
+        and (len(row.texts) > 1 or len(filled) == 1)
+        and any(text and not is_number(text) and n in filled for n, text in enumerate(row.texts))
     ]
     return max(rows, key=lambda row: (count_known(row), len("".join(row.texts))), default=None)
 
 
-def _by_heading(
-    block: RowBlock, heading: Row, n: int, texts: Sequence[str], table: Table
-) -> TimerColumn:
-    full = heading.cell(n)
-    prefix, colon, rest = full.partition(":")
-    run = find_label(full, "run")
-    name = full.replace(run, " ") if run else full
+def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> TimerColumn:
+    """Find out what a column is by its heading; the other rows above it may say unit or gate."""
+    name, beside = heading.cell(n), [r.cell(n) for r in block.headings if r.line != heading.line]
+    prefix, colon, rest = name.partition(":")
+    column = TimerColumn(n, name, "", run=find_label(name, "run"))
+    name = name.replace(column.run, " ") if column.run else name
     if colon and rest.strip() and not find_label(prefix, "gate"):
-        run, name = run or prefix.strip(), rest
-    beside = [row.cell(n) for row in block.headings if row.line != heading.line]
-    unit = unit_of(name)
-    if unit not in {*POWERS, "v"}:
-        rows = [row for row in block.headings if _has_units(row)]
-        stated = (unit_of(row.cell(n).strip("()[] ")) for row in rows)
-        unit = next((word for word in stated if word in {*POWERS, "v"}), unit)
-    gate = next(filter(None, map(_find_gate, [name, *beside])), "")
-    role = _role(name, unit, gate, texts, table)
-    if role == "level" and len(texts) < min(len(block.rows), _LOOKED_AT):
-        role = "state"  # of samples, each row has every level
-    column = TimerColumn(n, full, role, gate=gate, run=run)
-    if role == "time":
-        column.power = POWERS.get(unit)
-        if not unit and "_" not in name and normal(name) in POWERS:
-            column.power = POWERS[normal(name)]
-        clear = has_role(name, "clear")
-        if clear or has_role(name, "blocked"):
-            column.blocked = not clear
+        column.run, name = column.run or prefix.strip(), rest
+    below = [row.cell(n).strip("()[] ") for row in block.headings if _has_units(row)]
+    units = [unit_of(text) for text in (name, *below)]
+    unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
+    column.gate = next(filter(None, map(_find_gate, [name, *beside])), "")
+    facts = facts | {role for role in words() if has_role(name, role)}
+    facts |= {"timed"} if unit in POWERS else {"volt"} if unit == "v" else set()
+    facts |= {"labelled"} if column.gate else set()
+    if unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]:
+        facts |= {"time"}
+    column.role = _find_role(facts)
+    if column.role == "time":
+        column.power = POWERS.get(unit if unit or "_" in name else normal(name))
+        column.blocked = False if "clear" in facts else True if "blocked" in facts else None
         counted = re.search(r"^\D{1,12}[0-9]{1,3}(?![0-9])", name.strip())
-        column.numbered = counted is not None or has_role(name, "moment")
+        column.numbered = counted is not None or "moment" in facts
     return column
 
 
 def _has_units(row: Row) -> bool:
     """Whether a row has units only, perhaps behind their name: ``Y_Unit_Label``."""
-    texts = [normal(text.strip("()[] ")) for text in row.texts if text]
+    texts = [normal(text.strip("()[] ")) for text in row.texts if text.strip("-")]
     units = set().union(*(listed for role, listed in words().items() if role.startswith("unit")))
-    return len(texts) > 0 and all(
-        text in units or (not n and "unit" in text) for n, text in enumerate(texts)
-    )
+    is_unit = [text in units or (not n and "unit" in text) for n, text in enumerate(texts)]
+    return len(texts) > 0 and all(is_unit)
 
 
 def _find_gate(text: str) -> str:
@@ -186,130 +211,56 @@ def _find_gate(text: str) -> str:
     return text.strip() if bare else find_label(text, "gate")
 
 
-def _role(name: str, unit: str, gate: str, texts: Sequence[str], table: Table) -> str:
-    """Return what a column is, by its heading, its unit and its values."""
-    levels, timed = has_levels(texts), unit in POWERS
-    fractions = any("." in text or "," in text for text in texts)
-    darkens = has_role(name, "blocked") or has_role(name, "clear")
-    is_time = has_role(name, "time") or (
-        timed and normal(name).strip("()[] ") in words()[f"unit {unit}"]
-    )
-    rules = (
-        ("index", has_role(name, "index") and counts(texts)),
-        ("time", timed and not levels and (darkens or has_role(name, "moment"))),
-        ("state", has_role(name, "state") and not timed),
-        ("duration", has_role(name, "duration")),
-        ("time", is_time and not levels and unit != "v"),
-        ("time", timed and has_role(name, "gate") and not levels and rises(texts, table)),
-        ("time", is_time and len(texts) < 3),
-        ("edge", has_role(name, "edge") and levels and not gate),
-        ("volts", unit == "v" or (has_role(name, "volts") and not (levels and gate))),
-        ("volts", bool(gate) and fractions and not levels),
-        (
-            "level",
-            bool(gate) and levels and not {state_of(t) for t in texts} & {"blocked", "clear"},
-        ),
-        ("state", bool(gate) and levels),
-        ("run", has_role(name, "run") and not fractions),
-        ("gate", has_role(name, "gate") and not fractions),
-        ("index", has_role(name, "index") or counts(texts)),
-        ("state", levels and darkens),
-    )
-    return next((role for role, fits in rules if fits), "other")
-
-
 def _check(
+    column: TimerColumn,
     columns: Sequence[TimerColumn],
-    heading: Row,
-    values: Sequence[list[str]],
-    table: Table,
+    heading: Row | None,
+    facts: set[str],
     problems: ProblemList,
 ) -> None:
-    """Refuse what may be this or that, and a table without times."""
-    stated = any(column.role in {"edge", "state"} for column in columns)
-    for column in columns:
-        texts = values[column.at]
-        place = heading.line, table.column(heading.line, column.at), column.name
-        readings = ""
-        if column.role == "gate" and not stated and set(texts) <= {"0", "1"}:
-            readings = "a gate's number or its state"
-        elif column.role == "other" and not has_role(column.name, "derived") and _is_few(texts):
-            readings = "the gate or the run of a row, or its state"
-        if readings:
-            problems.add(*place, "ambiguous", column=column.name, readings=readings)
-        named = unit_of(column.name)
-        if column.role == "time" and named not in {*POWERS, ""} and not find_label(named, "gate"):
-            problems.reject(*place[:2], "time", named, "a unit of time: s, ms, µs or ns")
+    """Refuse what may be this or that, and times in another unit."""
+    if heading is None:
+        return
+    readings, place = "", (heading.line, heading.column(column.at))
+    stated = any(other.role in {"edge", "state"} for other in columns)
+    if column.role == "gate" and not stated and "binary" in facts:
+        readings = "a gate's number or its state"
+    elif column.role == "other" and "few" in facts and not has_role(column.name, "derived"):
+        readings = "the gate or the run of a row, or its state"
+    if readings:
+        problems.add(*place, column.name, "ambiguous", column=column.name, readings=readings)
+    unit = unit_of(column.name)
+    if column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
+        problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
 
 
-def _by_values(
-    block: RowBlock, values: Sequence[list[str]], table: Table, problems: ProblemList
+def _read_bare(
+    block: RowBlock, facts: dict[int, set[str]], first: Row, problems: ProblemList
 ) -> list[TimerColumn]:
     """Without a heading: a column of times, and others that can be nothing else."""
-    first = block.rows[0]
-    filled = [n for n, texts in enumerate(values) if texts]
     for row in block.headings:  # one that says nothing
         named = [n for n, text in enumerate(row.texts) if text and not is_value(text)]
-        if named == filled and len(named) > 1:
-            problems.add(row.line, table.column(row.line, 0), "", "no_time_column")
+        if named == list(facts) and len(named) > 1:
+            problems.add(row.line, row.column(0), "", "no_time_column")
             return []
-    rest = [n for n in filled if not counts(values[n]) or len(filled) == 1]
-    times = [n for n in rest if not has_levels(values[n]) and rises(values[n], table)]
-    fractional = [n for n in times if any(set(text) & set(".,") for text in values[n])]
-    times = fractional if len(fractional) == 1 else times
-    if len(filled) == 1 or (len(filled) == 2 and not times):
-        times = filled[:1]  # whatever is wrong with it is said where it is read
-    columns = [TimerColumn(n, f"column {n + 1}", _plain_role(n, values, times)) for n in filled]
-    if len(filled) == 2 and len(block.rows) < 4 and times:
-        for column in columns:
-            column.role = "time" if column.at in times else "state"
-    roles = [column.role for column in columns]
-    if (
-        "other" in roles
-        or [roles.count(r) > 1 for r in ("time", "state", "gate")] != [False] * 3
-        or ("time" not in roles)
-    ):
-        at = filled[min(2, len(filled) - 1)]
-        problems.add(first, table.column(first, at), "", "no_heading", columns=len(filled))
+    facts = {n: each | {"bare"} for n, each in facts.items()}
+    rival = any(_find_role(each) == "time" and "fractions" in each for each in facts.values())
+    for each in facts.values():
+        each.update({"single"} if len(facts) == 1 else set())
+        each.update({"rival"} if rival and "fractions" not in each else set())
+    roles = {n: _find_role(each) for n, each in facts.items()}
+    counts = Counter(roles.values())
+    repeated = any(counts[role] > 1 for role in ("state", "edge", "gate"))
+    if repeated or counts["other"] or counts["time"] != 1:
+        at = list(facts)[min(2, len(facts) - 1)]
+        problems.add(first.line, first.column(at), "", "no_heading", columns=len(facts))
     labels = [find_label(text, "gate") for row in block.headings for text in row.texts]
+    label = next(filter(None, labels), "")
+    columns = [TimerColumn(n, f"column {n + 1}", role) for n, role in roles.items()]
     for column in columns:
         column.power = None if column.role == "time" else 0
-        if column.role == "volts":
-            column.gate = next(filter(None, labels), "")
-        # 0 and 1 beside a gate's number are levels: which of them is dark is not said.
-        digits = {state_of(text) for text in values[column.at]} <= {"one", "zero", "high", "low"}
-        if column.role == "state" and "gate" in roles and digits:
-            column.role = "edge"
+        column.gate = label if column.role == "volts" else ""
     return columns
-
-
-def _plain_role(n: int, values: Sequence[list[str]], times: Sequence[int]) -> str:
-    texts = values[n]
-    rules = (
-        ("time", n in times),
-        ("index", counts(texts)),
-        ("state", has_levels(texts)),
-        ("gate", _is_few(texts) or not any(map(is_number, texts))),
-        ("volts", len(texts) > 30),
-    )
-    return next((role for role, fits in rules if fits), "other")
-
-
-def _leave_out_coarser(columns: Sequence[TimerColumn]) -> None:
-    """Of columns that say the same times in other units, keep the finest."""
-    finest: dict[tuple[str, str, bool | None], TimerColumn] = {}
-    for column in (c for c in columns if c.role == "time" and not c.numbered):
-        key = column.gate, column.run, column.blocked
-        other = finest.setdefault(key, column)
-        coarse = other if (column.power or 0) > (other.power or 0) else column
-        if column.power != other.power and None not in {column.power, other.power}:
-            coarse.role = "coarse"
-            finest[key] = column if coarse is other else other
-
-
-def as_float(text: str, table: Table) -> float:
-    """Return a number."""
-    return float(table.with_point(text))
 
 
 def _plain_power(texts: Sequence[str]) -> int | None:
@@ -319,28 +270,23 @@ def _plain_power(texts: Sequence[str]) -> int | None:
     return 0 if abs(int(texts[-1]) - int(texts[0])) <= 100 else None
 
 
-def has_levels(texts: Sequence[str]) -> bool:
-    """Whether a column holds two states, or levels, and nothing else."""
-    return bool(texts) and all(state_of(text) or text.casefold() in {"x", "z"} for text in texts)
-
-
-def _is_few(texts: Sequence[str]) -> bool:
-    """Whether a column holds few different whole numbers, or names, again and again."""
+def _facts_of_values(texts: Sequence[str]) -> set[str]:
+    states = [state_of(text) or text.casefold() in {"x", "z"} for text in texts]
+    numbers = [float(text) for text in texts if is_number(text)]
     whole = [text for text in texts if number_of(text) is not None and not set(text) & set(".,+-")]
-    return bool(texts) and len(whole) == len(texts) >= 2 * len(set(texts))
-
-
-def counts(texts: Sequence[str]) -> bool:
-    """Whether a column counts its rows."""
-    if len(texts) < 2 or not all(re.fullmatch("[0-9]{1,9}", text) for text in texts):
-        return False
-    numbers = [int(text) for text in texts]
-    return numbers[0] in {0, 1} and all(b - a == 1 for a, b in pairwise(numbers))
-
-
-def rises(texts: Sequence[str], table: Table) -> bool:
-    """Whether a column is of numbers of which none is below that before."""
-    if not texts or not all(map(table.is_number, texts)):
-        return False
-    numbers = [as_float(text, table) for text in texts]
-    return all(a <= b for a, b in pairwise(numbers))
+    steps = {b - a for a, b in pairwise(numbers)}
+    is_numeric = len(numbers) == len(texts)
+    facts = {
+        "levels": len(texts) > 0 and all(states),
+        "plain": not {"blocked", "clear"} & set(states),
+        "fractions": any("." in text or "," in text for text in texts),
+        "rises": is_numeric and all(step >= 0 for step in steps),
+        "counts": is_numeric and len(whole) == len(texts) > 1 and numbers[0] in {0, 1}
+        and steps == {1.0},
+        "few": len(whole) == len(texts) >= 2 * len(set(texts)),
+        "binary": set(texts) <= {"0", "1"},
+        "words": not numbers,
+        "short": len(texts) < 3,
+        "many": len(texts) > 30,
+    }  # fmt: skip
+    return {fact for fact, holds in facts.items() if holds}

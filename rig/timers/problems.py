@@ -31,7 +31,7 @@ class ProblemList:
 
     def __init__(self, file: str, hint: str = "") -> None:
         self.file = file
-        self._hint = hint
+        self.hint = hint
         self._problems: list[Problem] = []
         self._more = 0
 
@@ -67,4 +67,4 @@ class ProblemList:
         if self._more:
             message += f"\n{self.file}: and {self._more} more problems"
         hint = "; ".join(remedies(problem.reason for problem in self._problems))
-        raise InputError(message, hint or self._hint, problems=self._problems)
+        raise InputError(message, hint or self.hint, problems=self._problems)

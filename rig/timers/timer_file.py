@@ -1,8 +1,9 @@
-"""Any other timer's file: its passages, and what it leaves open.
+"""A timer's file: its events, and what it leaves open.
 
 Loggers of photogates (tables of times, or of times and states), boards that print pin, edge and
-time, logic analysers (a column an input, or value change dumps) and oscilloscopes (volts). What a
-file does not say (which gate, which level is dark, which unit) is left to `rig.timers.layouts`.
+time, logic analysers (a column an input, or value change dumps), oscilloscopes (volts), and the
+project's own format, which leaves nothing open. What a file does not say (which gate, which level
+is dark, which unit) is left to `rig.timers.layouts`.
 """
 
 from __future__ import annotations
@@ -13,29 +14,31 @@ from typing import TYPE_CHECKING
 
 from rig.reasons import make_reason
 from rig.timers.columns import columns_of
-from rig.timers.edges_csv import HEADER, TICK_HZ
-from rig.timers.passages import Group, RowReader, split_at_jumps
+from rig.timers.events import TICK_HZ, FilePart, RowReader, split_at_jumps
+from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
-from rig.timers.samples import SampleReader, name_levels
-from rig.timers.table import read_lines, read_table
+from rig.timers.samples import read_samples
+from rig.timers.table import HEADER, RowBlock, Table, find_time_base
 from rig.timers.vcd import is_vcd, read_vcd
 from rig.timers.vocabulary import number_of, recognise_format
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.reasons import Reason
     from rig.timers.columns import TimerColumn
-    from rig.timers.table import RowBlock, Table
+    from rig.timers.table import Row
 
 MAX_COLUMNS = 200
+_SAMPLE = 200
+"""Rows that show what columns are."""
 _HINT = (
     "accepted are run,channel,time_s,state; tables with a heading such as time (s), gate, state; "
     "samples of inputs (0 and 1, or volts) with times; and value change dumps; see "
     "rig import --list-formats"
 )
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks", "|": "bars"}
 
 
 @dataclass(slots=True)
@@ -46,10 +49,12 @@ class TimerFile:
     ----------
     kind
         In words.
+    is_own
+        Whether it has the project's own format.
     columns
         What each column was taken for, by its heading.
-    groups
-        Passages of each run, or of each gate where these stand one below the other.
+    parts
+        Events of each run, or of each gate where these stand one below the other.
     begins
         The level that each input begins with, where samples say.
     period_s
@@ -57,35 +62,35 @@ class TimerFile:
     has_unit
         Whether the file says the unit of its times; without it they are read as seconds.
     rows
-        Numbers of the lines of data.
+        How many lines of data there are.
     silent
-        Of them, those that only say that nothing changes: samples, and states as they were.
+        Of them, how many only say that nothing changes: samples, and states as they were.
+    sampled
+        Lines of samples that have a change, of an input that may be no gate.
+    unread
+        Lines of data that say nothing, the first of them.
     notes
         What is to be said, a reason each.
     """
 
-    kind: str
+    kind: str = "a value change dump"
+    is_own: bool = False
     columns: dict[str, str] = field(default_factory=dict)
-    groups: list[Group] = field(default_factory=list)
-    begins: dict[str, bool] = field(default_factory=dict)
+    parts: list[FilePart] = field(default_factory=list)
+    begins: dict[str, str] = field(default_factory=dict)
     period_s: float | None = None
     has_unit: bool = True
-    rows: list[int] = field(default_factory=list)
-    silent: set[int] = field(default_factory=set)
+    rows: int = 0
+    silent: int = 0
+    sampled: set[int] = field(default_factory=set)
+    unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
 
     @property
     def labels(self) -> tuple[str, ...]:
         """What the file calls its inputs, in order; none where it does not say."""
-        labels = {passage.label for group in self.groups for passage in group.passages} - {""}
+        labels = {event.label for part in self.parts for event in part.events} - {""}
         return tuple(sorted(labels, key=lambda label: (number_of(label) or 0, label)))
-
-
-def is_edge_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a file has the heading of the project's own format, be it with faults."""
-    lines = read_lines(path)
-    first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
-    return first[:200].lower().replace(" ", "").startswith(",".join(HEADER[:2]))
 
 
 def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> TimerFile:
@@ -104,106 +109,107 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
         Every fault of the file at its line and column.
     """
     problems = ProblemList(str(path), _HINT)
-    lines = read_lines(path)
-    if is_vcd(lines):
-        passages, begins, scale = read_vcd(lines, problems)
-        problems.raise_if_any()
-        file = TimerFile("a value change dump", begins=begins, period_s=scale / TICK_HZ)
-        file.groups = [Group(passages=passages)]
-        file.rows = sorted({passage.line for passage in passages})
+    file, lines = TimerFile(), read_lines(path)
+    head = list(itertools.islice(lines, 50))
+    lines = itertools.chain(head, lines)
+    if is_vcd(head):
+        events, file.begins, scale = read_vcd(lines, problems)
+        file.period_s, file.parts = scale / TICK_HZ, [FilePart(events=events)]
+        file.rows = len({event.line for event in events})
     else:
-        table = read_table(lines)
-        if not table.blocks:
-            problems.refuse(1, 1, "no_edges")
-        name = recognise_format(lines)
-        file = TimerFile(
-            f"a table, its cells separated by {_SEPARATORS[table.separator]}"
-            + (f"; it looks like {name}" if name else "")
-        )
-        _read_blocks(file, table, unit, problems)
+        _read_table(file, Table(lines), unit, problems)
     problems.raise_if_any()
-    file.groups = [group for group in file.groups if group.passages]
-    if not file.groups:
+    file.parts = [part for part in file.parts if part.events]
+    if not file.parts:
         notes = "".join(f"; {note}" for note in file.notes)
-        problems.refuse(1, 1, "nothing_passes", notes=notes)
+        problems.refuse(1, 1, "nothing_passes" if file.rows else "no_edges", notes=notes)
     return file
 
 
-def _read_blocks(file: TimerFile, table: Table, unit: str | None, problems: ProblemList) -> None:
-    above: RowBlock | None = None
-    for block in table.blocks:
-        width = max(len(table.row(line).texts) for line in block.rows[:50])
+def _read_table(file: TimerFile, table: Table, unit: str | None, problems: ProblemList) -> None:
+    name = recognise_format(table.head[:40])
+    file.kind = f"a table, its cells separated by {_SEPARATORS[table.separator]}"
+    file.kind += f"; it looks like {name}" if name else ""
+    file.is_own = table.is_own
+    if file.is_own:  # its faults are told each
+        problems.hint = ""
+        file.kind = f"the project's own format: {','.join(HEADER)}"
+    above = RowBlock()
+    for block, rows in table.blocks():
+        sample = list(itertools.islice(rows, _SAMPLE))
+        width = max(len(row.texts) for row in sample)
         if width > MAX_COLUMNS:
-            line = block.rows[0]
-            problems.refuse(line, 1, "too_many_columns", columns=width, limit=MAX_COLUMNS)
+            values = {"columns": width, "limit": MAX_COLUMNS}
+            problems.refuse(sample[0].line, 1, "too_many_columns", **values)
         own = block.headings
         if not any(len(row.texts) > 1 or width == 1 for row in own) or (
-            above is not None and not any(len(row.texts) == width for row in own)
+            above.headings and not any(len(row.texts) == width for row in own)
         ):
-            block.headings = [*own, *(above.headings if above else ())]
+            block.headings = [*own, *above.headings]
         above = block
-        block.headings += name_levels(block, table)
-        columns = columns_of(block, table, unit, problems)
+        if table.is_own and tuple(text.lower() for text in own[0].texts) != HEADER:
+            problems.refuse(own[0].line, 1, "wrong_header", header=",".join(HEADER))
+        columns = columns_of(block, sample, table, unit, problems)
         problems.raise_if_any()
         file.columns |= {column.name: column.meaning for column in columns}
-        roles = {column.role for column in columns}
         file.has_unit &= all(column.power is not None for column in columns)
-        file.rows += block.rows
+        roles = {column.role for column in columns}
         if roles & {"level", "volts"}:
-            _add_samples(file, SampleReader(block, columns, table, problems), block)
+            is_timed = "time" in roles
+            base = None if is_timed else find_time_base([*table.remarks, *block.headings])
+            if base is None and not is_timed:
+                problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
+            read_samples(file, itertools.chain(sample, rows), columns, base, problems)
         elif "time" in roles:
-            _add_rows(file, block, columns, table, problems)
+            _add_rows(file, block, sample, rows, columns, table, problems)
         else:
             durations = [repr(column.name) for column in columns if column.role == "duration"]
-            heading = block.headings[0].line if block.headings else block.rows[0]
+            heading = block.headings[0].line if block.headings else sample[0].line
             code = "durations" if durations else "no_time_column"
             problems.refuse(heading, 1, code, numbers=", ".join(durations))
-    file.rows = sorted([*file.rows, *table.strays])
+    file.rows += table.stray_count
+    file.unread += table.strays
 
 
 def _add_rows(
     file: TimerFile,
     block: RowBlock,
+    sample: Sequence[Row],
+    rows: Iterator[Row],
     columns: Sequence[TimerColumn],
     table: Table,
     problems: ProblemList,
 ) -> None:
-    reader = RowReader(block, columns, table, problems)
+    reader = RowReader(columns, sample, problems, is_own=table.is_own)
+    reader.read(itertools.chain(sample, rows))
     problems.raise_if_any()
-    file.silent |= reader.silent
-    stated = {"edge", "state", "gate", "run"} & {column.role for column in columns}
-    for group in reader.groups.values():
-        lines = [passage.line for passage in group.passages]
+    file.rows += reader.rows
+    file.silent += reader.silent
+    file.unread += reader.unread
+    roles = {column.role for column in columns}
+    stated = {"edge", "state", "gate", "run"} & roles
+    unused = [column.name for column in columns if column.role in {"other", "duration"}]
+    for part in reader.parts.values():
+        lines = [event.line for event in part.events]
         if len(set(lines)) == 1:  # columns of a row may stand in any order
-            group.passages.sort(key=lambda passage: passage.tick)
-        parts = split_at_jumps(group, in_order=len(set(lines)) == len(lines))
-        ticks = [passage.tick for passage in group.passages]
-        backwards = sum(b < a for a, b in itertools.pairwise(ticks))
+            part.events.sort(key=lambda event: event.tick)
+        ticks = [event.tick for event in part.events]
+        steps = [b - a for a, b in itertools.pairwise(ticks)]
+        backwards = sum(step < 0 for step in steps)
         if not stated and backwards > 1 and backwards * 4 > len(ticks):
             numbers = "these numbers go up and down: they"
-            problems.refuse(block.rows[0], 1, "durations", numbers=numbers)
-        short = next((p for p in parts[1:] if len(p.passages) < 2), parts[-1])
-        if len(parts) > 1 and (len(short.passages) < 2 or len(parts[0].passages) < 2):
-            line = (short if short is not parts[0] else parts[1]).passages[0].line
-            at = next(column.at for column in columns if column.role == "time")
-            text = table.row(line).cell(at)
-            problems.add(line, table.column(line, at), "time", "backwards", text=text)
-        derived = [column.name for column in columns if column.role == "other"]
-        steps = [b - a for a, b in itertools.pairwise(ticks)]
-        if derived and not stated and len(steps) > 3 and max(steps) < 1.5 * min(steps):
-            problems.refuse(block.rows[0], 1, "regular_samples", columns=", ".join(derived))
-        mark = " ".join(block.headings[0].texts) if block.headings and not group.name else ""
-        for part in parts:
-            part.name = part.name or mark
-        file.groups += parts
-    unused = [column.name for column in columns if column.role in {"other", "duration"}]
+            problems.refuse(sample[0].line, 1, "durations", numbers=numbers)
+        if "other" in roles and not stated and len(steps) > 3 and max(steps) < 1.5 * min(steps):
+            problems.refuse(sample[0].line, 1, "regular_samples", columns=", ".join(unused))
+        in_order = len(set(lines)) == len(lines)
+        parts = [part] if reader.has_runs else split_at_jumps(part, in_order=in_order)
+        short = [k for k, piece in enumerate(parts) if len(piece.events) < 2]
+        if len(parts) > 1 and short:
+            event = parts[max(1, short[-1])].events[0]
+            problems.add(event.line, 1, "time", "backwards", text=f"{event.tick / TICK_HZ:.9g}")
+        mark = " ".join(block.headings[0].texts) if block.headings and not part.name else ""
+        for piece in parts:
+            piece.name = piece.name or mark
+        file.parts += parts
     if unused:
         file.notes.append(make_reason("columns_unused", columns=", ".join(unused)))
-
-
-def _add_samples(file: TimerFile, reader: SampleReader, block: RowBlock) -> None:
-    file.groups.append(Group(passages=reader.passages))
-    file.silent |= set(block.rows)
-    file.begins |= reader.begins
-    file.period_s = reader.step_s or None
-    file.notes += reader.notes

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.timers.columns import as_float
+from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
-from rig.timers.table import read_lines, read_table
+from rig.timers.table import RowBlock, Table
+from rig.timers.vocabulary import is_number
 
 if TYPE_CHECKING:
     import os
 
     from numpy.typing import NDArray
 
-    from rig.timers.table import Row, Table
+    from rig.timers.table import Row
 
     Array = NDArray[np.float64]
 
@@ -47,24 +49,23 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), _HINT)
-    table = read_table(read_lines(path))
-    block = next(iter(table.blocks), None)
-    heading = None if block is None else next(filter(_has_columns, reversed(block.headings)), None)
-    if block is None or heading is None:
+    block, rows = next(Table(read_lines(path)).blocks(), (RowBlock(), iter(())))
+    first = next(rows, None)
+    heading = next(filter(_has_columns, reversed(block.headings)), None)
+    if first is None or heading is None:
         problems.refuse(1, 1, "no_track")
     at = {name: _column(heading, name) for name in _NAMES}
-    scales = {name: _scale(heading, n, table, problems) for name, n in at.items()}
+    scales = {name: _scale(heading, n, problems) for name, n in at.items()}
     frames: list[list[float]] = []
-    for row in map(table.row, block.rows):
+    for row in itertools.chain([first], rows):
         texts = {name: row.cell(n) for name, n in at.items()}
-        if any(text.lower() in {"", "nan"} for text in texts.values()):
+        if not all(texts.values()):
             continue
-        wrong = next((name for name, text in texts.items() if not table.is_number(text)), None)
-        if wrong is not None:
-            place = table.column(row.line, at[wrong])
-            problems.reject(row.line, place, wrong, texts[wrong], "a number")
-            continue
-        frames.append([scales[name] * as_float(text, table) for name, text in texts.items()])
+        wrong = [name for name, text in texts.items() if not is_number(text)]
+        for name in wrong[:1]:
+            problems.reject(row.line, row.column(at[name]), name, texts[name], "a number")
+        if not wrong:
+            frames.append([scales[name] * float(text) for name, text in texts.items()])
     problems.raise_if_any()
     track = VideoTrack(*np.array(frames, dtype=float).reshape(-1, 3).T)
     if track.times.size < FEWEST or not np.all(np.diff(track.times) > 0):
@@ -80,7 +81,7 @@ def _column(heading: Row, name: str) -> int:
     return next(n for n, text in enumerate(heading.texts) if _NAMES[name].search(text))
 
 
-def _scale(heading: Row, at: int, table: Table, problems: ProblemList) -> float:
+def _scale(heading: Row, at: int, problems: ProblemList) -> float:
     text = heading.texts[at]
     match = re.search(r"[(\[/_]\s*([^\W\d_]+)", text)
     if match is None:
@@ -88,7 +89,6 @@ def _scale(heading: Row, at: int, table: Table, problems: ProblemList) -> float:
     is_time = text[0].lower() == "t"
     if match[1] not in _SCALES or (match[1] in {"s", "ms"}) is not is_time:
         accepted = "a unit of this column: s, ms; m, cm, mm"
-        place = table.column(heading.line, at)
-        problems.reject(heading.line, place, text, match[1], accepted)
+        problems.reject(heading.line, heading.column(at), text, match[1], accepted)
         return 1.0
     return _SCALES[match[1]]

@@ -6,19 +6,38 @@ import re
 import unicodedata
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
 """Decimal power from seconds, by the unit's name."""
 SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns"}
+LONGEST = 200
+"""Characters: no cell, and no line of named values, is longer."""
+CLOCK = re.compile(
+    r"(?:([0-9]{1,4})([-./])([0-9]{1,2})[-./]([0-9]{1,4})[T ]+)?"
+    r"(?:([0-9]{1,2}):)?([0-9]{1,3}):([0-9]{1,2}(?:[.,][0-9]{1,15})?)(?:Z|[+-][0-9:]{4,6})?"
+)
+"""A time of day, perhaps with its date."""
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,2})?")
+_NAME = re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}")
 _BRACKETED = re.compile(r"[\[({]\s*([^\W\d_]{1,20})\s*[\])}]")
 _LAST = re.compile(r"(?:^|[\W_])([^\W\d_]{1,20})\W*$")
+
+
+def read_rows(name: str, mark: str) -> list[list[str]]:
+    """Return the rows of a table beside this module, their cells parted by a mark."""
+    text = Path(__file__).with_name(name).read_text("utf-8")
+    rows = [line for line in text.splitlines() if line and line[0] != "#"]
+    return [[cell.strip() for cell in row.split(mark)] for row in rows]
 
 
 @cache
 def words() -> dict[str, frozenset[str]]:
     """Return the words of each role in `vocabulary.txt`."""
-    text = Path(__file__).with_name("vocabulary.txt").read_text("utf-8")
-    rows = (line.split(":", 1) for line in text.splitlines() if line and line[0] != "#")
+    rows = read_rows("vocabulary.txt", ":")
     return {role: frozenset(map(str.strip, listed.split(","))) for role, listed in rows}
 
 
@@ -28,13 +47,19 @@ def _pattern(role: str) -> re.Pattern[str]:
     return re.compile(rf"(?<![^\W\d_])(?:{listed})(?![^\W\d_])")
 
 
+@cache
+def _numbered(role: str) -> re.Pattern[str]:
+    ending = r"[\s#:_-]{0,3}(?:nr\.?|no\.?)?\s?(?:[0-9]{1,4}|[a-d])(?![^\W_])"
+    return re.compile(_pattern(role).pattern.removesuffix(r"(?![^\W\d_])") + ending, re.IGNORECASE)
+
+
 def without_accents(text: str) -> str:
     """Return a text in which accents are left out and compatible letters are the same."""
     parts = unicodedata.normalize("NFKD", text)
     return "".join(part for part in parts if not unicodedata.combining(part))
 
 
-@cache
+@lru_cache(10_000)
 def normal(heading: str) -> str:
     """Return a heading in lower case, its words apart, without accents."""
     text = re.sub(
@@ -43,12 +68,19 @@ def normal(heading: str) -> str:
     return " ".join(text.replace("_", " ").casefold().split())
 
 
+@lru_cache(10_000)
 def has_role(heading: str, role: str) -> bool:
     """Whether a heading has a word of a role."""
     return _pattern(role).search(normal(heading)) is not None
 
 
-@cache
+def find_label(name: str, role: str) -> str:
+    """Return the part of a heading that names an input, or a run, with its number."""
+    match = _numbered(role).search(without_accents(name[:200]))
+    return match[0] if match else ""
+
+
+@lru_cache(10_000)
 def unit_of(heading: str) -> str:
     """Return the unit that a heading ends with or has in brackets; nothing where it has none.
 
@@ -81,23 +113,34 @@ def state_of(text: str) -> str:
     return next((role for role in roles if word in words()[role]), "")
 
 
+def is_number(text: str) -> bool:
+    """Whether a text is a number with a decimal point."""
+    return len(text) <= LONGEST and _NUMBER.fullmatch(text) is not None
+
+
+def is_value(text: str) -> bool:
+    """Whether a word is a number, a date, a state or the name of an input."""
+    if is_number(text.replace(",", ".", 1)) or state_of(text):
+        return True
+    if len(text) > LONGEST or has_role(text, "start"):
+        return False
+    unknown = text.casefold() in {"x", "z", *words()["missing"]}
+    return unknown or bool(_NAME.fullmatch(text) or CLOCK.fullmatch(text))
+
+
 def number_of(label: str) -> int | None:
     """Return the number in an input's name: 3 of D3, of ``Channel 3 (V)`` and of 3."""
-    match = re.search(r"([0-9]{1,6})$", re.sub(r"[\[(].*", "", label).strip())
+    match = re.search(r"([0-9]{1,9})$", re.sub(r"[\[(].*", "", label).strip())
     return int(match[1]) if match else None
 
 
-def formats() -> list[list[str]]:
-    """Return the rows of `formats.txt`: name, what it is recognised by, what differs, example."""
-    text = Path(__file__).with_name("formats.txt").read_text("utf-8")
-    rows = [line for line in text.splitlines() if line and line[0] != "#"]
-    return [[cell.strip() for cell in row.split("|")] for row in rows]
+def recognise_format(lines: Iterable[str]) -> str:
+    """Return the name of the maker's format that the first lines are like; nothing if of none.
 
-
-def recognise_format(lines: list[str]) -> str:
-    """Return the name of the maker's format that the first lines are like; nothing if of none."""
-    head = "\n".join(line[:200] for line in lines[:40]).casefold()
-    for name, marks, *_ in formats():
+    The rows of `formats.txt`: name, what it is recognised by, what differs, its example.
+    """
+    head = "\n".join(lines).casefold()
+    for name, marks, *_ in read_rows("formats.txt", "|"):
         if marks and all(mark.strip().casefold() in head for mark in marks.split("+")):
             return name
     return ""

@@ -63,6 +63,15 @@ def test_more_edges_than_the_object_makes_are_refused(look):
     assert look(content, "--as-read").code == 0
 
 
+def test_two_wires_at_one_stamp_of_a_dump_are_refused(look):
+    first, second = (f"#{round(time * 1e6)}\n" for time, _, _ in RUNS[0][1:3])
+    content = shapes()["VCD"].content.decode()
+    done = look(content.replace(second, ""))
+    assert first in content
+    assert done.code == 2
+    assert "two inputs change at the same time" in done.err
+
+
 def test_what_no_fall_decides_is_asked_with_the_line_to_add(look):
     content = "time (s)\n0.1\n0.2\n0.35\n0.9\n"
     done = look(content)

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError, Problem
 from rig.records import Drop, Edge
-from rig.timers import table
-from rig.timers.edges_csv import TICK_HZ, edges_text, read_edges
+from rig.timers import lines
+from rig.timers.edges_csv import edges_text, read_edges
+from rig.timers.events import TICK_HZ
 
 HEADER = "run,channel,time_s,state\n"
 
@@ -88,14 +89,13 @@ def test_channels_one_after_another_are_merged_stably(tmp_path: Path) -> None:
         ("1,0,1e999,1", 5, "time_s"),
         ("1,0,1e30,1", 5, "time_s"),
         ("1,0,0x1,1", 5, "time_s"),
-        ('1,0,"1,5",1', 5, "time_s"),
+        ('1,0,"1,5",1', 6, "time_s"),
         ("1,0,0,2", 7, "state"),
         ('1,"0",0, blocked', 10, "state"),
         ("1,0,0", 1, ""),
         ("1,0,0,1,5", 1, ""),
         ("1;0;0;1", 1, ""),
         ('1,0,"0,1', 1, ""),
-        ('1,0,"0\n",1', 1, ""),
         ("1,0,3601.5,1", 5, "time_s"),
         ("1,7,0.9,1", 5, "time_s"),
     ],
@@ -123,7 +123,7 @@ def test_a_fault_has_a_code_with_values(tmp_path: Path) -> None:
     early, channel = caught.value.problems
     assert early.reason.json() == {
         "code": "before_last",
-        "values": {"text": "0.1", "last": "0.2", "channel": 3, "run": 1},
+        "values": {"text": "0.1", "last": "0.2", "channel": "3", "run": 1},
     }
     assert str(channel) == f"{path}:4:3: channel: '99' is not a channel: 0 to 15"
     assert channel.reason.code == "not_accepted"
@@ -157,7 +157,7 @@ def test_other_files(tmp_path: Path, content: str | bytes) -> None:
 
 
 def test_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "MAX_BYTES", 10)
+    monkeypatch.setattr(lines, "MAX_BYTES", 10)
     assert faults(tmp_path, HEADER + "1,0,0,1\n") == [(1, 1, "")]
 
 

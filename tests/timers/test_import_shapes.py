@@ -6,15 +6,16 @@ from argparse import Namespace
 
 import pytest
 
-from rig.commands.import_edges import read_with_protocol
+from rig.commands.import_edges import import_with_protocol
 from rig.errors import InputError
 from rig.protocol import reader
-from rig.timers.edges_csv import TICK_HZ
+from rig.timers.events import TICK_HZ
 from tests.timers.mutations import mutate
 from tests.timers.shapes import PROTOCOL, Shape, shapes
 from tests.timers.strangers import NOT_READ, REFUSED, strangers
 
 SHAPES = shapes()
+PARSED = reader.read(str(PROTOCOL))
 STRANGERS = strangers()
 
 
@@ -29,7 +30,7 @@ def options(path, *more: str) -> Namespace:
 def read(path, content: bytes, shape: Shape):
     """Return the edges of each run."""
     path.write_bytes(content)
-    drops, *_ = read_with_protocol(reader.read(str(PROTOCOL)), options(path, *shape.options))
+    drops = import_with_protocol(PARSED, options(path, *shape.options)).drops
     return [[(edge.tick / TICK_HZ, edge.channel, edge.blocked) for edge in drop.edges]
             for drop in drops]  # fmt: skip
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,10 +11,12 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.records import Drop
-from rig.timers.edges_csv import TICK_HZ
+from rig.timers import events, vcd
+from rig.timers.events import TICK_HZ
 from rig.timers.layouts import find_layouts, read_drops
-from rig.timers.timer_file import is_edge_file, read_timer_file
-from rig.timers.vocabulary import number_of as label_number
+from rig.timers.lines import read_lines
+from rig.timers.table import Table
+from rig.timers.timer_file import read_timer_file
 from tests.examples import examples
 
 VERNIER = (
@@ -79,11 +80,6 @@ def test_what_programs_write(tmp_path, text):
     assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
 
 
-def test_utf_16_as_some_programs_on_windows_write_it(tmp_path):
-    (drop,) = read(tmp_path, PASCO.replace("Run #2", "Run #1").encode("utf-16"))[:1]
-    assert told(drop)[0] == (0.25, True)
-
-
 @pytest.mark.parametrize(
     "text", ["0.25\n0.26\n0.275\n", "0,25\n0,26\n0,275\n", "Time (s)\n0.25\n0.26\n0.275\n"]
 )
@@ -110,7 +106,7 @@ def faults(tmp_path: Path, content: str) -> list[tuple[int, int, str]]:
         ("Time,State\n0.1,1\n0.2,maybe\n", (3, 5, "state")),
         ("Time,State\n0.1,1\nx,0\n", (3, 1, "time")),
         ("Time,State\n0.1,x\n0.2,0\n", (2, 5, "state")),
-        ("0.1,x\n0.2,0\n", (1, 5, "state")),
+        ("0.1,x\n0.2,0\n", (1, 5, "edge")),
         ("Time,State\n0.2,1\n0.1,0\n", (3, 1, "time")),
         ("Time,State\n0.2,1\n  1e9 ,0\n", (3, 3, "time")),
         ("Time,State\n0.2,1\n0.3\n", (3, 1, "state")),
@@ -131,6 +127,10 @@ def test_a_missing_file_is_said(tmp_path):
         read_timer_file(tmp_path / "none")
 
 
+def is_own(path):
+    return Table(read_lines(path)).is_own
+
+
 def test_own_files_are_told_from_others(tmp_path):
     path = tmp_path / "f"
     for text, ours in [
@@ -143,7 +143,7 @@ def test_own_files_are_told_from_others(tmp_path):
         ("0.1,1\n", False),
     ]:
         path.write_text(text)
-        assert is_edge_file(path) is ours, text
+        assert is_own(path) is ours, text
 
 
 SHAPES = st.sampled_from(["\t", ";", ","]), st.booleans(), st.integers(1, 4)
@@ -189,101 +189,6 @@ def test_any_file_is_read_or_refused_with_a_reason(tmp_path, content):
     assert drops or refused
 
 
-# ------------------------------------------------------- one drop, as other programs write it
-
-DROP = ((0.25, 2, True), (0.251, 5, True), (0.26, 2, False), (0.2625, 5, False), (0.275, 2, True),
-        (0.28, 2, False))  # fmt: skip
-"""Time in seconds, channel, whether the beam gets dark."""
-
-
-def levels(time: float) -> list[int]:
-    """Levels of D2 and D5 from a time on, high where dark."""
-    seen = {2: 0, 5: 0}
-    for at, channel, dark in DROP:
-        if at <= time + 1e-9:
-            seen[channel] = int(dark)
-    return [seen[2], seen[5]]
-
-
-def samples(step: float, end: float = 0.3) -> list[float]:
-    return [n * step for n in range(round(end / step))]
-
-
-def vcd() -> str:
-    marks = {2: "!", 5: '"'}
-    changes = "".join(f"#{round(t * 1e6)}\n{int(dark)}{marks[c]}\n" for t, c, dark in DROP)
-    return (
-        "$date today $end\n$version some program $end\n$timescale 1 us $end\n"
-        '$scope module m $end\n$var wire 1 ! D2 $end\n$var wire 1 " D5 $end\n$upscope $end\n'
-        f'$enddefinitions $end\n#0\n0!\n0"\n{changes}'
-    )
-
-
-def smooth(time: float, channel: int) -> float:
-    """Volts of a gate that takes 0.2 ms to change, 4.6 V where clear, and some hum."""
-    volts = 4.6
-    for at, one, dark in DROP:
-        if one == channel:
-            share = min(max((time - at) / 0.2e-3 + 0.5, 0.0), 1.0)
-            volts += (-4.4 if dark else 4.4) * share
-    return volts + 0.05 * math.sin(300.0 * time)
-
-
-FORMS = {
-    "pin, edge and time under a remark": "# made by a board\n# Pin number, Edge type, Time [s]\n"
-    + "".join(f"{c}, {int(dark)}, {t:.6f}\n" for t, c, dark in DROP),
-    "the same without a heading": "".join(f"{c},{int(dark)},{t:.6f}\n" for t, c, dark in DROP),
-    "a column Gate, and µs beside ms": "Event\tGate\tTime (ms)\tTime (us)\tState\n"
-    + "".join(
-        f"{n}\t{c}\t{t * 1e3:.0f}\t{t * 1e6:.0f}\t{'Blocked' if dark else 'Clear'}\n"
-        for n, (t, c, dark) in enumerate(DROP)
-    ),
-    "the gate's name before the time": "".join(
-        f"GATE{c} {t * 1e6:.0f} {'BLOCKED' if dark else 'CLEAR'}\n" for t, c, dark in DROP
-    ),
-    "a row of units in words": "Channel;Time;Status\n;milliseconds;\n"
-    + "".join(f"{c};{t * 1e3:.3f};{int(dark)}\n".replace(".", ",") for t, c, dark in DROP),
-    "blanks between": "pin   micros   edge\n"
-    + "".join(f" {c}  {t * 1e6:9.0f}  {'RISING' if dark else 'FALLING'}\n" for t, c, dark in DROP),
-    "a logic analyser's changes": "Time [s],Channel 2,Channel 5\n0.000000000,0,0\n"
-    + "".join(f"{t:.9f},{','.join(map(str, levels(t)))}\n" for t, _, _ in DROP),
-    "a logic analyser's samples": "; CSV, generated by some library\n"
-    "; Channels (2/8): D2, D5\n; Samplerate: 10 kHz\n"
-    + "".join(f"{','.join(map(str, levels(t)))}\n" for t in samples(1e-4)),
-    "the same with a heading": "; CSV, generated by some library\n; Channels (2/8): D2, D5\n"
-    "; Samplerate: 10 kHz\nlogic,logic\n"
-    + "".join(f"{','.join(map(str, levels(t)))}\n" for t in samples(1e-4)),
-    "another analyser's": "; Sample rate: 1 MHz\n; Sample count: 3 M Samples\nTime(s), D2, D5\n"
-    "0,0,0\n" + "".join(f"{t},{','.join(map(str, levels(t)))}\n" for t, _, _ in DROP),
-    "a value change dump": vcd(),
-    "an oscilloscope's volts": "#Date Time: 2024-01-01 15:37:18.124\n#Sample rate: 20000Hz\n\n"
-    "Time (s),Channel 2 (V),Channel 5 (V)\n"
-    + "".join(f"{t:.6f},{smooth(t, 2):.5f},{smooth(t, 5):.5f}\n" for t in samples(5e-5)),
-    "volts with decimal commas": "Zeit (ms)\tKanal 2 (V)\tKanal 5 (V)\n"
-    + "".join(
-        f"{t * 1e3:.3f}\t{smooth(t, 2):.5f}\t{smooth(t, 5):.5f}\n".replace(".", ",")
-        for t in samples(5e-5)
-    ),
-}
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_one_drop_in_every_form(tmp_path, form):
-    path = tmp_path / "export"
-    path.write_text(FORMS[form], "utf-8")
-    found = read_timer_file(path, "us" if "the gate's name" in form else None)
-    assert sorted(filter(None, map(label_number, found.labels))) == [2, 5]
-    dark = "low" if "volts" in form else None  # a clear beam lets current flow
-    (drop,) = drops_of(found, {one: label_number(one) for one in found.labels}, 8, dark)
-    first = drop.edges[0].tick
-    within = 0.1e-3 if "volts" in form else 1e-9
-    for edge, (time, channel, blocked) in zip(drop.edges, DROP, strict=True):
-        assert (edge.channel, edge.blocked) == (channel, blocked)
-        assert (edge.tick - first) / TICK_HZ == pytest.approx(time - DROP[0][0], abs=within)
-    if form not in {"pin, edge and time under a remark", "the same without a heading"}:
-        assert drops_of(found, {one: label_number(one) for one in found.labels}, 8) == [drop]
-
-
 def test_stacked_runs_are_runs_of_their_own(tmp_path):
     lower = VERNIER.replace("Run 1", "Run 2").replace("0.25\t", "0.24\t")
     for text in (VERNIER + lower, VERNIER + "Run 2\n0.24\t1\n0.26\t0\n0.275\t1\n"):
@@ -299,24 +204,6 @@ def test_a_column_a_gate(tmp_path):
     (drop,) = drops_of(read_timer_file(path), {"Photogate 1 (ms)": 4, "Photogate 2 (ms)": 3}, 8)
     seen = [(edge.tick // 10**9, edge.channel) for edge in drop.edges]
     assert seen == [(100, 4), (101, 3), (110, 4), (112, 3), (115, 3)]
-
-
-def test_runs_have_their_numbers_from_a_column(tmp_path):
-    path = tmp_path / "export"
-    path.write_text("Trial,Pin,Time (s),State\n3,2,0.1,1\n3,2,0.2,0\n1,2,0.1,1\n1,2,0.3,0\n")
-    drops = drops_of(read_timer_file(path), {"2": 0}, 8)
-    assert [(drop.run, len(drop.edges)) for drop in drops] == [(1, 2), (3, 2)]
-
-
-def test_drops_one_after_the_other_are_parted_by_the_pauses_between(tmp_path):
-    rows = [(at + n * 0.01) for at in (1.0, 31.0, 75.0) for n in range(6)]
-    drops = read(tmp_path, "time (s)\n" + "".join(f"{t:.3f}\n" for t in rows))
-    assert [len(drop.edges) for drop in drops] == [6, 6, 6]
-
-
-def test_old_windows_writes_micro_in_one_byte(tmp_path):
-    (drop,) = read(tmp_path, "t (µs);state\n250000;1\n260000;0\n".encode("cp1252"))
-    assert [edge.tick for edge in drop.edges] == [250_000_000_000, 260_000_000_000]
 
 
 @pytest.mark.parametrize(
@@ -416,37 +303,27 @@ def _row(times, separator=","):
 def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, passed):
     path = tmp_path / "table.csv"
     path.write_text(text, "utf-8")
-    run = read_timer_file(path).groups[0].passages
+    run = read_timer_file(path).parts[0].events
     origin = min(one.tick for one in run) - round(FALL[0] * TICK_HZ)  # of a date it is far away
     found = {}
     for one in run:
         found.setdefault(one.label, []).append((one.tick - origin) / TICK_HZ)
     assert {label: pytest.approx(times) for label, times in passed.items()} == found
     for label, times in passed.items():
-        said = [one.blocked for one in run if one.label == label]
-        assert said in ([None] * len(times), [True, False] * (len(times) // 2))
+        said = [one.state for one in run if one.label == label]
+        assert said in ([""] * len(times), ["blocked", "clear"] * (len(times) // 2)) or set(
+            said
+        ) == {"high", "low"}
 
 
-@pytest.mark.parametrize(
-    "heading",
-    [
-        "Source,CH1,CH2\nSecond,Volt,Volt",
-        "x-axis,1,2\nsecond,Volt,Volt",
-        "Time,Channel A,Channel B\n(s),(V),(V)",
-        "TIME,CH1,CH2",
-        "t (s),Illuminance 1 (lx),Illuminance 2 (lx)",
-    ],
-)
-def test_what_oscilloscopes_write_is_read_input_by_input(tmp_path, heading):
-    dark = (range(241, 290), range(411, 440))
-    rows = [",".join([f"{k * 1e-3:.4f}", *("0.100" if k in one else "4.900" for one in dark)])
-            for k in range(500)]  # fmt: skip
-    path = tmp_path / "scope.csv"
-    path.write_text("\n".join([heading, *rows]), "utf-8")
-    found = read_timer_file(path)
-    times = {label: [one.tick / TICK_HZ for one in found.groups[0].passages if one.label == label]
-             for label in found.labels}  # fmt: skip
-    assert len(times) == 2
-    assert sorted(times.values()) == [
-        pytest.approx([0.2405, 0.2895]), pytest.approx([0.4105, 0.4395])
-    ]  # fmt: skip
+@pytest.mark.parametrize("content", ["time (s),state\n0.1,1\n0.2,0\n0.3,1\n",
+    "$timescale 1 us $end\n$var wire 1 ! D0 $end\n$enddefinitions $end\n"
+    "#0 0!\n#1 1!\n#2 0!\n#3 1!\n"])  # fmt: skip
+def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
+    monkeypatch.setattr(events, "MAX_EVENTS", 2)
+    monkeypatch.setattr(vcd, "MAX_EVENTS", 2)
+    assert faults(tmp_path, content)
+
+
+def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
+    assert faults(tmp_path, "time (s),state\n0.1,1\n" + "1" * 20_001 + "\n") == [(3, 1, "")]

@@ -1,0 +1,295 @@
+"""Which way of reading a file its own edges bear out, and what became of every row.
+
+Each way is compared with falls of the protocol; the best is taken with its evidence, what no fall
+decides is asked, and rows of which no edge is made are refused.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rig.boards import GATES
+from rig.reasons import make_reason
+from rig.timers.layouts import (
+    SETTINGS,
+    FileLayout,
+    FileReading,
+    find_layouts,
+    part_names,
+    read_drops,
+)
+from rig.timers.problems import refusal
+from rig.timers.timer_file import TimerFile, read_timer_file
+from rig.timers.vocabulary import POWERS
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from rig.reasons import Reason
+    from rig.records import Drop
+
+_GOOD = 0.75
+"""Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
+_CLOSE = 0.1
+_DECISIVE = 7.0
+"""Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
+_FINALISTS = 6
+_EXCESS = 4
+"""Edges for each bar, twice as many as it has, beyond which several gates are on one wire: a beam
+that flickers makes a few more than two."""
+_CHANNELS = set(map(str, range(GATES)))
+
+
+class FallMatch(NamedTuple):
+    """How well drops are like falls of the protocol.
+
+    Attributes
+    ----------
+    share
+        Edges near a fall's, of all that came or were due, from 0 to 1.
+    evidence
+        Logarithm of the marginal likelihood; 0 if not asked for.
+    text
+        What a user can check.
+    """
+
+    share: float
+    evidence: float = 0.0
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Import:
+    """What is imported.
+
+    Attributes
+    ----------
+    drops
+        A run each.
+    channels
+        Of each input; of the project's own format none, for its inputs are channels.
+    lines
+        How the file was read, in words.
+    notes
+        What was assumed, a reason each.
+    """
+
+    drops: list[Drop]
+    channels: Mapping[str, int]
+    lines: list[str]
+    notes: list[Reason]
+
+
+def import_drops(
+    gates: Sequence[int],
+    bars: int,
+    options: Namespace,
+    fit: Callable[[Sequence[Drop], bool], FallMatch],
+) -> Import:
+    """Read the drops of any timer's file.
+
+    Parameters
+    ----------
+    gates
+        Channels, in the order in which the gates are passed.
+    bars
+        Parts of the object that darken a beam, at most.
+    options
+        Those of ``rig import``.
+    fit
+        Compares drops with falls; roughly, or with the evidence that weighs readings.
+
+    Raises
+    ------
+    InputError
+        Every fault of the file; several readings that are as good, or none that is credible; rows
+        of which no edge is made.
+    """
+    place = options.events
+    file = read_timer_file(place, options.unit)
+    if file.is_own:
+        return Import(read_drops(file, FileLayout.own(file)).drops, {}, [file.kind], [])
+    stated = _read_stated(options, file, gates)
+    layouts = find_layouts(file, gates, bars, stated)[: 1 if options.as_read else None]
+    if not layouts:
+        pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
+        values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
+        raise refusal(place, "inputs_unclear", **values, pairs=pairs)
+    readings = [read_drops(file, layout) for layout in layouts]
+    reading, match = readings[0], FallMatch(0.0)
+    if not options.as_read:
+        reading, match = _choose(readings, place, fit, is_stated="channels" in stated)
+    layout = reading.layout
+    if layout.groups == "passing" and file.labels and "groups" not in stated:
+        raise refusal(place, "one_wire", option=str(layout))
+    if not options.as_read:
+        _refuse_excess(file, reading, bars, place)
+    notes = [*file.notes, _account(file, reading, options)]
+    is_open = len([other for other in readings if not other.layout.is_contrary]) > 1
+    if is_open or (match.share < _GOOD and not options.as_read):
+        notes.append(make_reason("reading_chosen", option=str(layout), fit=match.text))
+    notes += _assumptions(file, reading, gates)
+    if options.map_file is not None and not Path(options.map_file).exists():
+        text = json.dumps(asdict(layout), indent=2, ensure_ascii=False)
+        Path(options.map_file).write_text(text + "\n", "utf-8")
+    lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
+    lines += [f"input {x} is the gate at channel {n}" for x, n in layout.channels.items() if x]
+    lines += [str(layout), *([match.text] if match.text else [])]
+    return Import(reading.drops, layout.channels, lines, notes)
+
+
+def _choose(
+    readings: Sequence[FileReading],
+    place: str,
+    fit: Callable[[Sequence[Drop], bool], FallMatch],
+    *,
+    is_stated: bool,
+) -> tuple[FileReading, FallMatch]:
+    """Return the reading that a fall of the protocol bears out, and how well.
+
+    Where the user said which input is which gate, that reading, if there is no other, is taken
+    whatever falls say.
+    """
+    readings = [reading for reading in readings if reading.is_whole] or readings
+    distinct = {repr(reading.drops): reading for reading in reversed(readings) if reading.drops}
+    candidates = list(reversed(distinct.values()))
+    if is_stated and len(candidates) == 1:
+        return candidates[0], fit(candidates[0].drops, True)
+    rough = [(fit(reading.drops, False).share, reading) for reading in candidates]
+    rough.sort(key=lambda row: -row[0])
+    near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
+    # What the file says comes first: the contrary may be proposed, and is never taken.
+    ranked = [(match, reading) for reading in near if not reading.layout.is_contrary
+              and (match := fit(reading.drops, True)).share >= _GOOD]  # fmt: skip
+    ranked.sort(key=lambda row: -row[0].evidence)
+    if not ranked:
+        share = max(share for share, reading in rough if not reading.layout.is_contrary)
+        open_ = [row for row in rough if row[1].layout.dark not in {"states", "inverted"}]
+        good = [row for row in rough if row[0] >= _GOOD] or open_
+        options = [*(str(reading.layout) for _, reading in good[:3]), "--as-read"]
+        raise refusal(place, "no_reading_fits", share=100 * share, options="; ".join(options))
+    (match, reading), *rest = ranked
+    if rest and match.evidence - rest[0][0].evidence < _DECISIVE:
+        options = [str(row[1].layout) for row in ranked[:2]]
+        raise refusal(place, "several_readings", options=" or ".join(options))
+    return reading, match
+
+
+def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str) -> None:
+    """Refuse what no drop does: the same again, more edges than bars, two changes at once."""
+    alike: dict[object, int] = {}
+    for drop in reading.drops:
+        other = alike.setdefault(drop.edges, drop.run)
+        if other != drop.run:
+            raise refusal(place, "same_twice", run=drop.run, other=other)
+        for channel, count in Counter(edge.channel for edge in drop.edges).items():
+            if count > _EXCESS * bars:
+                excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
+                raise refusal(place, "more_edges", **excess)
+    # Of changes alone, two in a row mean that the row of the first is missing.
+    changes = Counter((event.line, event.tick) for part in file.parts for event in part.events)
+    line = next((line for (line, _), count in changes.items() if count > 1), 0)
+    if line and not (file.sampled and file.period_s):  # regular samples see changes together
+        raise refusal(place, "at_once", line=line)
+
+
+def _account(file: TimerFile, reading: FileReading, options: Namespace) -> Reason:
+    """Say what became of every row; refuse rows that are not used."""
+    lines = {event.line for part in file.parts for event in part.events}
+    unused = sorted(lines.union(file.unread) - reading.lines - file.sampled)
+    edges = sum(len(drop.edges) for drop in reading.drops)
+    counts = {"runs": len(reading.drops), "rows": file.rows, "edges": edges}
+    silent = file.silent + len(file.sampled - reading.lines)
+    missing = file.rows - silent - len(reading.lines)
+    if not missing:
+        return make_reason("rows_used", silent=silent, **counts)
+    listed = ", ".join(map(str, unused[:8])) + (" …" if len(unused) > 8 else "")
+    rest = {"unused": missing, "lines": listed}
+    if not options.allow_unused:
+        raise refusal(options.events, "rows_unused", **counts, **rest)
+    return make_reason("rows_left_out", **counts, **rest)
+
+
+def _assumptions(file: TimerFile, reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
+    """Yield what is taken to be so, and what the file lacks."""
+    layout, channels = reading.layout, reading.layout.channels
+    if layout.pause_s:
+        drops = len(reading.drops)
+        yield make_reason("several_drops", drops=drops, pause_s=layout.pause_s)
+    if file.period_s:
+        period_us = file.period_s * 1e6 / 10 ** POWERS.get(layout.unit, 0)
+        yield make_reason("samples", period_us=period_us, u_us=period_us / math.sqrt(12.0))
+    if absent := [str(n) for n in gates if n not in channels.values()]:
+        yield make_reason("gates_absent", channels=", ".join(absent))
+    if layout.dark in {"high", "low"}:
+        other = "low" if layout.dark == "high" else "high"
+        yield make_reason("blocked_level", level=layout.dark, other=other)
+    idle = [label for label in file.labels if label not in channels]
+    if idle and layout.groups != "passing":
+        yield make_reason("inputs_unused", inputs=", ".join(idle))
+
+
+def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
+    """Return what is decided by a saved layout and by options, which come before it."""
+    stated: dict[str, Any] = {}
+    if options.map_file is not None and Path(options.map_file).exists():
+        stated = _check_settings(_read_map(options.map_file), options.map_file)
+    given = {"unit": None if file.has_unit else options.unit, "dark": options.dark}
+    stated |= {name: value for name, value in given.items() if value is not None}
+    text = options.map
+    if text is None and options.channel is not None and len(file.labels) < 2:
+        text = f"{next(iter(file.labels), 'input')}={options.channel}"
+    if text is None:
+        return stated
+    pairs = re.findall(r"\s*([^=]+?)\s*(?:=\s*([^\s,=]*)[\s,]*|$)", text) or [(text, "")]
+    names = {*SETTINGS, "pause_s"} - set(file.labels)
+    settings = {name: value for name, value in pairs if name in names}
+    stated |= _check_settings(settings, "--map")
+    labels = {
+        "gates": part_names(file),
+        "passing": [f"gate {n}" for n in range(1, len(gates) + 1)],
+    }.get(stated.get("groups", ""), list(file.labels) or ["input"])
+    channels = {}
+    for label, channel in pairs:
+        if label in settings:
+            continue
+        accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
+        wrong = None if channel in map(str, gates) else f"{label}={channel}"
+        if label not in labels:
+            wrong, accepted = label, f"an input of the file: {', '.join(labels)}"
+        if wrong is not None:
+            option = "--map" if options.map is not None else "--channel"
+            raise refusal(option, "not_accepted", text=wrong, accepted=accepted)
+        channels["" if labels == ["input"] else label] = int(channel)
+    return stated | ({"channels": channels} if channels else {})
+
+
+def _read_map(path: str) -> object:
+    try:
+        return json.loads(Path(path).read_bytes()[:1_000_000].decode("utf-8"))
+    except OSError as error:
+        raise refusal(path, "unreadable", text=error.strerror or "") from error
+    except (ValueError, RecursionError):
+        return None
+
+
+def _check_settings(content: object, place: str) -> dict[str, Any]:
+    """Return settings that a layout may have; refuse others, with what is accepted."""
+    settings = content if isinstance(content, dict) else {"content": content}
+    for name, value in settings.items():
+        good = value in SETTINGS.get(name, ())
+        if name == "channels":
+            good = isinstance(value, dict) and set(map(repr, value.values())) <= _CHANNELS
+        elif name == "pause_s" and re.fullmatch(r"[0-9]{1,9}(?:\.[0-9]{0,20})?", str(value)):
+            good = float(str(value)) <= 3600
+            settings = {**settings, name: float(str(value))}
+        if not good:
+            raise refusal(place, "layout_unclear", text=f"{name}: {value!s:.40}")
+    return settings

@@ -1,0 +1,59 @@
+"""Lines of a text file in any usual encoding, read one after the other in little memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.timers.problems import ProblemList, refusal
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterator
+
+MAX_BYTES = 200_000_000
+LONGEST_LINE = 20_000
+"""Characters: no text that people or timers write has a longer one."""
+_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+
+
+def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
+    """Yield the lines of a text file: UTF-8, UTF-16 with its mark and without, or Windows'.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, is far too large, or is not text.
+    """
+    problems = ProblemList(str(path))
+    try:
+        size = Path(path).stat().st_size
+        if size > MAX_BYTES:
+            problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
+        encoding = _find_encoding(Path(path), problems)
+        with Path(path).open(encoding=encoding, errors="replace") as stream:
+            number = 0
+            while line := stream.readline(LONGEST_LINE):
+                number += 1
+                if len(line) == LONGEST_LINE:
+                    problems.refuse(number, 1, "not_text")
+                yield line.rstrip("\n")
+    except OSError as error:
+        raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
+
+
+def _find_encoding(path: Path, problems: ProblemList) -> str:
+    with path.open("rb") as stream:
+        start = stream.read(4096)
+    zeros = [start[n::2].count(0) * 3 > len(start) for n in (0, 1)]
+    if start[:2] in _MARKS or sum(zeros) == 1:
+        return _MARKS.get(start[:2], "utf-16-be" if zeros[0] else "utf-16-le")
+    if b"\0" in start:
+        problems.refuse(1, 1, "not_text")
+    try:
+        with path.open(encoding="utf-8") as text:
+            while text.read(1 << 20):
+                pass
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8-sig"
