@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.bench.falls import Asked, falls, with_setting
+from rig.bench.falls import Asked, falls, simulation
 from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
 
@@ -38,7 +38,7 @@ gates: {{impact: [{{channel: 0, height: 25 mm}}], free: [{{channel: 8, height: 2
 plan: {{incline: [{inclines}], repeats: {repeats}, settle: 0 s}}
 """
 _HANGING = {
-    "quiet": "1", "rod_sd": "0.3 mm", "tilt_sd": "1 deg", "yaw_sd": "2 deg",
+    "dynamics": "resolved", "quiet": "1", "rod_sd": "0.3 mm", "tilt_sd": "1 deg", "yaw_sd": "2 deg",
     "aside_sd": "0.5 mm", "swing_sd": "0.01 m/s",
 }  # fmt: skip
 """Chains hang as they would, let go together and seen by a perfect rig."""
@@ -97,9 +97,7 @@ def _ensembles(rods: str, tilt: float, inclines: Sequence[float], drops: int) ->
     with TemporaryDirectory() as folder:
         path = Path(folder) / "paper.yaml"
         path.write_text(text, encoding="utf-8")
-        url = with_setting("sim://?dynamics=resolved", "protocol", str(path))
-        for dial, value in _HANGING.items():
-            url = with_setting(url, dial, value)
+        url = simulation(path, _HANGING)
         made = falls([Asked(url, range(1, len(runs) + 1), runs)])
         # Runs come in the plan's order: all of one incline, then all of the next.
         return [_ensemble([fall.truth for fall in islice(made, drops)]) for _ in inclines]

@@ -96,15 +96,6 @@ def stage(what: str) -> None:
         print(f"\r\x1b[K{what}", end="", file=sys.stderr, flush=True)
 
 
-def leave_study(
-    folder: Path, name: str, head: str, lines: Sequence[str], whole: Mapping[str, Any],
-    table: str, picture: str | None = None, *, as_json: bool,
-) -> None:  # fmt: skip
-    """Write the files of a study of simulated drops, see `write_study`, and print it."""
-    write_study(folder, name, head, lines, whole, table, picture)
-    print_found(whole, lambda: "\n".join(["SIMULATED DATA", *lines]), as_json=as_json)
-
-
 def write_study(
     folder: Path, name: str, head: str, lines: Sequence[str], whole: Mapping[str, Any],
     table: str, picture: str | None = None,

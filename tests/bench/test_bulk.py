@@ -79,7 +79,8 @@ def no_mpmath(monkeypatch):
 def test_everything_is_counted_once_a_round(monkeypatch):
     no_mpmath(monkeypatch)
     said = []
-    found = bench.bulk(40, 3, said.append)
+    monkeypatch.setattr(bench, "say", said.append)
+    found = bench.bulk(40, 3)
     assert (found["rods"], found["falls"], found["rounds"]) == (25, 40, 3)
     assert "-O2" in found["compiler"]
     ratios = "single_over_roots", "single_over_batch", "batch_over_c", "falls_per_s"
@@ -93,7 +94,7 @@ def test_the_solver_is_compared_at_rounding(monkeypatch):
     pytest.importorskip("mpmath")
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.delenv("CI", raising=False)
-    found = bench.bulk(5, 1, lambda _: None)
+    found = bench.bulk(5, 1)
     assert found["solver"]["error"] <= bench.AT_ROUNDING
     assert found["solver"]["single_error"] <= bench.AT_ROUNDING
     assert found["solver_over_single"]["median"] > 0.0
@@ -121,7 +122,8 @@ def test_without_a_compiler_the_loop_is_left_out_and_that_is_said(monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     monkeypatch.delenv("CI", raising=False)
     said = []
-    found = bench.bulk(5, 1, said.append)
+    monkeypatch.setattr(bench, "say", said.append)
+    found = bench.bulk(5, 1)
     assert "no C compiler here" in said[0]
     assert "batch_over_c" not in found
     assert "compiler" not in found

@@ -8,10 +8,10 @@ import json
 import numpy as np
 import pytest
 
-from bench import coverage as bench_coverage
 from bench.__main__ import main
 from bench.studies import coverage as study
 from bench.studies.coverage import (
+    Interval,
     Rig,
     RigResult,
     draw_rigs,
@@ -69,7 +69,7 @@ def rig_result(number: int, errors: list[float], **changes: object) -> RigResult
     result = RigResult(Rig(**parts), seconds=0.5)
     for error in errors:
         result.verdicts["accepted"] += 1
-        result.add("separation_m", Measured(1.0 + error, 0.5), 1.0)
+        result.intervals.append(Interval("separation_m", Measured(1.0 + error, 0.5), 1.0))
     return result
 
 
@@ -82,7 +82,7 @@ def test_the_worst_tenth_is_chosen_by_both_measures():
     assert held[:2] == [19, 20]
     assert error[:2] == [20, 19]
     assert far.worst is not None
-    assert far.row()["worst_ratio"] == pytest.approx(9.0 / far.worst.expanded)
+    assert far.row()["worst_ratio"] == pytest.approx(9.0 / far.worst.measured.expanded)
     assert worst_tenth([silent]) == {}
 
 
@@ -124,7 +124,7 @@ def test_coefficients_are_set_beside_what_is_stated():
 def here(monkeypatch):
     """Work in this process."""
     monkeypatch.setattr(
-        bench_coverage, "results", lambda calls, _: (call(*inputs) for call, *inputs in calls)
+        study, "results", lambda calls, _: (call(*inputs) for call, *inputs in calls)
     )
 
 
@@ -153,6 +153,6 @@ def test_a_rig_is_drawn_again_by_its_number(tmp_path, here):
 
 
 def test_a_world_without_its_engine_says_how_to_get_it(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(bench_coverage, "find_spec", lambda name: None)
+    monkeypatch.setattr(study, "find_spec", lambda name: None)
     assert main(["coverage", "-o", str(tmp_path), "--world", "mujoco"]) == 2
     assert "pip install mujoco" in capsys.readouterr().err

@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from bench import resolved as bench_resolved
 from bench.__main__ import main
+from bench.studies import resolved as bench_resolved
 from rig import cli
 from rig.bench import resolved_paper
 from rig.bench.resolved_paper import Ensemble
@@ -68,7 +68,7 @@ WORK = [
 
 
 def test_error_against_run_time_is_kept_and_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(bench_resolved, "work", lambda: WORK)
+    monkeypatch.setattr(bench_resolved, "measure", lambda module: WORK)
     assert main(["resolved", "--work", "-o", str(tmp_path)]) == 0
     assert "0.0200" in capsys.readouterr().out
     with (tmp_path / "resolved-work.csv").open(newline="") as table:
@@ -82,7 +82,7 @@ def test_what_others_published_is_kept_and_printed(tmp_path, monkeypatch, capsys
         {"what": "ahead (m)", "of": "15 rods", "mean": 0.055, "sd": 0.005, "n": 16},
         {"what": "T/T_ff", "of": "20 rods", "mean": 0.926, "sd": None, "n": 1},
     ]
-    monkeypatch.setattr(bench_resolved, "published", lambda: lines)
+    monkeypatch.setattr(bench_resolved, "measure", lambda module: lines)
     assert main(["resolved", "--published", "-o", str(tmp_path)]) == 0
     assert "0.9260" in capsys.readouterr().out
     with (tmp_path / "resolved-published.csv").open(newline="") as table:
