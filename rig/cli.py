@@ -443,7 +443,7 @@ def _sweep(sweep: Parser) -> None:
     )
     who = sweep.add_mutually_exclusive_group()
     who.add_argument(
-        "--jobs", type=_count, metavar="N", help="processes at most (default: one a core)"
+        "--jobs", type=_count, metavar="N", help="threads at most (default: one a core)"
     )
     who.add_argument(
         "--cluster",

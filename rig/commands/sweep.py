@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -15,21 +15,18 @@ from rig.files import check_place, replacing
 from rig.protocol import reader
 from rig.report.canvas import KINDS
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
-from rig.sweep.executors import Inline, cores, processes
+from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
 from rig.sweep.tables import provenance, write_csv, write_npz
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterator
-    from concurrent.futures import Executor
+    from collections.abc import Callable
 
     from rig.protocol.protocol import Protocol
 
 INTERRUPTED = 130
 _KINDS = (".csv", ".npz", *(f".{kind}" for kind in KINDS))
-# Processes take longer to start than this process to compute so many pieces.
-_FEW_CHUNKS = 20
 
 
 def main(arguments: Namespace) -> int:
@@ -52,12 +49,11 @@ def main(arguments: Namespace) -> int:
 
 def _computed(layout: Layout, jobs: int | None, address: str | None) -> Swept:
     progress = Progress(layout.grid.size, sys.stderr)
-    length = chunk_length(layout.chain.rods)
-    chunks = -(-layout.grid.size // length)
     try:
-        with _executor(jobs, address, chunks) as (executor, workers):
+        with executor(jobs, address) as (workers, count):
             # Twice as many pieces as workers, so that none waits for its next one.
-            return compute(layout, executor, 2 * workers, length, progress.show)
+            length = chunk_length(layout.chain.rods)
+            return compute(layout, workers, 2 * count, length, progress.show)
     finally:
         progress.clear()
 
@@ -75,23 +71,6 @@ def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> No
             write_npz(stream, facts, protocol.text, layout, swept)
         else:
             write_csv(stream, facts, layout, swept)
-
-
-@contextmanager
-def _executor(jobs: int | None, address: str | None, chunks: int) -> Iterator[tuple[Executor, int]]:
-    """Choose who computes, and say how many they are."""
-    if address is not None:
-        from rig.sweep.cluster import cluster  # noqa: PLC0415 - it needs Dask
-
-        with cluster(address) as found:
-            yield found
-        return
-    workers = min(cores() if jobs is None else jobs, chunks)
-    if workers == 1 or (jobs is None and chunks < _FEW_CHUNKS):
-        yield Inline(), 1
-        return
-    with processes(workers) as pool:
-        yield pool, workers
 
 
 def _drawn(output: Path) -> bool:

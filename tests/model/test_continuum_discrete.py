@@ -7,9 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from rig.model.continuum import UniformChain, end, separation_leading_order, speed
+from rig.model.continuum import UniformChain, end
 from rig.model.fall import fall
-from rig.model.impact import alpha_inclined, gamma_finite
 from tests.model.chains import even_chain
 
 LENGTH, DROP, GRAVITY = 1.165, 0.18, 9.81
@@ -53,40 +52,3 @@ def test_from_rest_small_pulls_meet_at_order_three_halves():
         errors.append(discrete.separation_m / end(continuum).separation_m - 1)
     assert orders(errors)[-1] == pytest.approx(1.5, abs=0.03)
     assert abs(errors[-1]) < 2e-6
-
-
-@pytest.mark.parametrize(
-    ("inertia", "eq_14", "eq_15", "exact"),
-    [
-        (0.01, 0.0005, -0.126, -0.0218),
-        (0.05, 0.0092, -0.080, -0.0139),
-        (1 / 3, 0.0573, -0.018, -0.0056),
-        (0.9, 0.0109, -0.076, -0.0091),
-    ],
-)
-def test_the_papers_comparison_with_the_discrete_model(inertia, eq_14, eq_15, exact):
-    """At 40° the text has both equations within 4 % over Fig. 6; neither is."""
-    alpha, gamma = alpha_inclined(0.5, 0.2, 40.0, inertia), gamma_finite(inertia)
-    continuum, discrete = both(alpha, gamma)
-    assert speed(continuum, 0.0) / discrete.speed_m_s - 1 == pytest.approx(eq_14, abs=2e-4)
-    leading = separation_leading_order(alpha, LENGTH, continuum.reach_m)
-    assert leading / discrete.separation_m - 1 == pytest.approx(eq_15, abs=1e-3)
-    assert end(continuum).separation_m / discrete.separation_m - 1 == pytest.approx(exact, abs=2e-4)
-
-
-def test_equation_14_overshoots_most_near_the_uniform_rod():
-    worst = max(
-        (speed(both(alpha, gamma)[0], 0.0) / both(alpha, gamma)[1].speed_m_s - 1, inertia)
-        for inertia in (0.05 * k for k in range(1, 20))
-        for alpha, gamma in [(alpha_inclined(0.5, 0.2, 40.0, inertia), gamma_finite(inertia))]
-    )
-    assert worst == (pytest.approx(0.0574, abs=1e-4), pytest.approx(0.35))
-
-
-@pytest.mark.parametrize("inertia", [0.01, 0.05, 0.1, 0.2, 1 / 3, 0.5, 0.7, 0.9, 0.99])
-def test_half_a_spacing_mends_equation_14(inertia):
-    """A blow stands for the pull half a spacing to either side, so the pull ends at z = s/2."""
-    alpha, gamma = alpha_inclined(0.5, 0.2, 40.0, inertia), gamma_finite(inertia)
-    continuum, discrete = both(alpha, gamma)
-    mended = math.sqrt(speed(continuum, SPACING / 2) ** 2 + GRAVITY * SPACING)
-    assert mended / discrete.speed_m_s == pytest.approx(1.0, abs=0.007)

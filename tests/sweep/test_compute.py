@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,6 @@ from rig.model.surface import Surface
 from rig.predictions import predictions
 from rig.protocol import reader
 from rig.sweep.compute import ABOVE_HALF, NO_ANSWER, NOT_SLIDING, PILE, compute
-from rig.sweep.executors import Inline
 from rig.sweep.layout import MOST_POINTS, lay_out
 from rig.units import Quantity
 from tests.cli.lab import PROTOCOLS
@@ -25,7 +25,8 @@ from tests.sweep.conftest import SCENE, VARY
 def points(protocol, vary, length=7):
     """Lay a sweep out and give every point: its parameters and results."""
     layout = lay_out(protocol, vary)
-    swept = compute(layout, Inline(), 1, length)
+    with ThreadPoolExecutor(1) as pool:
+        swept = compute(layout, pool, 1, length)
     assert swept.notes.shape == layout.grid.shape
     names = [axis.name for axis in layout.grid.axes]
     rows = zip(
