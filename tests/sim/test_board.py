@@ -88,11 +88,6 @@ def test_a_board_of_another_version_is_refused_with_advice():
     assert "rig flash" in caught.value.hint
 
 
-def test_the_port_brings_its_clock():
-    port = SimulatedSerial(board=VirtualBoard(ScriptedLab()))
-    assert port_clock(port) is port.clock
-
-
 def test_a_read_waits_in_virtual_time_only():
     port = SimulatedSerial("test", board=VirtualBoard(ScriptedLab()), timeout=0.2)
     assert port.read(1) == b""
@@ -100,16 +95,6 @@ def test_a_read_waits_in_virtual_time_only():
     port.timeout = 1
     assert len(port.read(8)) == 8  # BOOT begins to arrive
     assert 0.3e9 < port.clock.now_ns() < 0.32e9
-
-
-def test_bytes_arrive_at_line_rate():
-    board = VirtualBoard(ScriptedLab(), baudrate=9600)
-    board.reset(0)
-    board.advance(300_000_000)
-    first = board.line.next_arrival_ns()
-    assert first == 300_000_000 + 10 * 10**9 // 9600
-    assert len(board.line.arrived(first)) == 1
-    assert len(board.line.arrived(first + 3 * board.line.byte_ns)) == 3
 
 
 def test_a_paced_clock_takes_real_time(monkeypatch):
