@@ -66,13 +66,3 @@ def test_recursion_has_no_bound(program):
 def test_a_frame_of_unknown_size_has_no_bound(program):
     with pytest.raises(ValueError, match="dynamic"):
         measure(program('char b[n]; __asm__ volatile("" :: "r"(b) : "memory");'))
-
-
-def test_make_size_prints_it():
-    need("avr-objdump")
-    make("size")
-    done = subprocess.run(
-        ["make", "-s", "-C", FIRMWARE, "size"], capture_output=True, text=True, check=True
-    )
-    for word in (*BOARDS.values(), "flash", "memory", "stack", "main > "):
-        assert word in done.stdout
