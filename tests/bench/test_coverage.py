@@ -15,7 +15,6 @@ from bench.studies.coverage import (
     Rig,
     RigResult,
     draw_rigs,
-    groups,
     measure,
     summarize,
     worst_tenth,
@@ -96,15 +95,6 @@ def test_shares_are_from_rig_to_rig_and_leave_out_what_must_be_void():
     assert found["quantities"]["separation_m"]["coverage_se"] >= 0.25
 
 
-def test_each_rig_is_in_one_group_of_each_kind():
-    found = [rig_result(n, [0.1], drops=drops, incline_deg=40.0 + n)
-             for n, drops in enumerate((1, 4, 12, 4))]  # fmt: skip
-    sizes = {name: len(rigs) for name, rigs in groups(found).items()}
-    assert sum(sizes.values()) == 4 * len(found)
-    assert sizes["drops a session: 4"] == 2
-    assert sizes["incline 35 to 50°"] == 4
-
-
 def test_a_rig_s_drops_are_set_beside_the_truth():
     (rig,) = [one for one in draw_rigs(FOLDER, "model", 12, seed=1) if one.number == 2]
     (found,) = measure([rig])
@@ -113,11 +103,6 @@ def test_a_rig_s_drops_are_set_beside_the_truth():
     assert {"separation_m", "speed_strike_m_s", "release_skew_s"} <= names
     assert {"mean separation_m", "gravity_m_s2"} <= {one.quantity for one in found.session}
     assert all(one.ratio < 3.0 for one in [*found.intervals, *found.session])
-
-
-def test_coefficients_are_set_beside_what_is_stated():
-    (found,) = measure(draw_rigs(FOLDER, "coefficients", 1, seed=1))
-    assert {"restitution", "friction"} <= {one.quantity for one in found.session}
 
 
 @pytest.fixture

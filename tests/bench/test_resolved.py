@@ -26,12 +26,6 @@ def ensemble(incline: float) -> Ensemble:
     return Ensemble(incline, (0.1, 0.12), (6.9, 7.1), (0.01, 0.02), (track, track))
 
 
-def test_speeds_of_the_track_are_its_slopes():
-    columns = resolved_paper.figure_4(ensemble(40.0))
-    assert columns["speed2"] == pytest.approx([25.0] * 18)
-    assert columns["free_speed2"] == pytest.approx([16.0] * 18)
-
-
 @pytest.mark.parametrize("number", [3, 4])
 def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
     some = [ensemble(10.0 * n) for n in range(9)]
@@ -46,12 +40,6 @@ def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
     plain = tmp_path / "plain.svg"
     assert cli.main(["predict", "--figure", str(number), "-o", str(plain)]) == 0
     assert target.read_text() != plain.read_text()
-
-
-def test_a_figure_without_falls_says_so(tmp_path, capsys):
-    target = str(tmp_path / "figure.svg")
-    assert cli.main(["predict", "--figure", "6", "--resolved", "-o", target]) == 2
-    assert "figure 6 has no resolved falls" in capsys.readouterr().err
 
 
 WORK = [
