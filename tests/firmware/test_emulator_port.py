@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
 from itertools import pairwise
@@ -20,7 +19,6 @@ from rig.link.client import Device
 from rig.link.frames import Decoder
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
-from rig_emulator import pty
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make
 from tests.waiting import PATIENCE_S
@@ -155,49 +153,43 @@ def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):
     assert firmware_for(BOARDS["mega"]) == shipped
 
 
-class Terminal:
-    """The pty program, started as a user would."""
-
-    def __init__(self, link: Path, *arguments: str) -> None:
-        command = [sys.executable, "-m", "rig_emulator.pty", "--link", str(link), *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        self.path = self.process.stdout.readline().strip()
-
-    def end(self) -> int:
-        self.process.send_signal(signal.SIGTERM)
-        code = self.process.wait(PATIENCE_S)
-        self.process.stdout.close()
-        return code
+HANDS = [sys.executable, "-m", "rig_emulator.hands"]
 
 
 def test_the_pty_is_a_board_to_any_program(tmp_path):
     link = tmp_path / "board"
-    terminal = Terminal(link, "--protocol", str(FENCE), "quiet=1")
-    try:
-        assert str(link.readlink()) == terminal.path
+    command = [*HANDS, "--link", str(link), "--protocol", str(FENCE), "quiet=1"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, **pipes) as terminal:
+        assert terminal.stdout.readline().strip() == str(link)
         port = open_port(str(link))
         device = Device(port, port_clock(port))
         identity = device.connect(boot_wait_s=0)
         assert len(drop_from(device).edges) > 20
         port.close()
-        port = open_port(terminal.path)
+        port = open_port(str(link.readlink()))
         device = Device(port, port_clock(port))
         assert device.connect(boot_wait_s=0) == identity
-        terminal.process.send_signal(signal.SIGUSR1)
+        terminal.stdin.write("reset\n")
+        terminal.stdin.flush()
         with pytest.raises(DeviceError, match="restarted"):
             device.collect(pack_label(1, 1), timeout=10.0)
         port.close()
-    finally:
-        code = terminal.end()
-    assert code == 0
+        terminal.stdin.close()
+        assert terminal.wait(PATIENCE_S) == 0
     assert not link.is_symlink()
 
 
-def test_the_pty_says_what_is_wrong(capsys, tmp_path):
-    assert pty.main(["--elf", str(tmp_path / "nothing.elf")]) == 2
-    assert "cannot read" in capsys.readouterr().err
-    assert pty.main(["--protocol", str(FENCE), "skew=1"]) == 2
-    assert "unknown dial 'skew'" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        pty.main(["quiet"])
-    assert "NAME=VALUE" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--elf", "nothing.elf"], "cannot read"),
+        (["skew=1"], "unknown dial 'skew'"),
+        (["quiet"], "NAME=VALUE"),
+    ],
+)
+def test_the_pty_says_what_is_wrong(arguments, complaint):
+    command = [*HANDS, "--protocol", str(FENCE), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert complaint in done.stderr

@@ -86,15 +86,6 @@ def test_above_the_surface_the_chain_falls_freely():
     assert speed(chain, 2.0) == chain.strike_speed == 13.0
 
 
-def test_time_counts_from_release():
-    found = end(PAPER)
-    assert found.time_s == pytest.approx(found.lay_down_s + math.sqrt(2 * 0.18 / 9.81), rel=1e-15)
-    moving = end(replace(PAPER, initial_speed=2.0))
-    assert moving.time_s - moving.lay_down_s == pytest.approx(
-        (math.sqrt(4 + 2 * 9.81 * 0.18) - 2) / 9.81, rel=1e-14
-    )
-
-
 def test_nodes_and_panels_can_be_chosen_and_are_counted():
     fine = end(PAPER, nodes=30, panels=10)
     assert fine.evaluations == 300
@@ -127,9 +118,3 @@ def test_nodes_and_panels_can_be_chosen_and_are_counted():
 def test_says_what_is_wrong_with_a_chain(change, message):
     with pytest.raises(DomainError, match=message):
         replace(PAPER, **change)
-
-
-def test_there_is_no_speed_outside_the_fall():
-    for height in (-1e-9, 1.165 + 0.18 + 1e-9):
-        with pytest.raises(ValueError, match="outside the fall"):
-            speed(PAPER, height)

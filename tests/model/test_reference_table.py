@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from mpmath import mp
 
-from rig.model.impact import impact_on
 from rig.model.predict import predict
 from rig.protocol.reader import read
 from tests.model.reference import printed_alpha, reference_fall
@@ -79,15 +78,3 @@ def test_the_second_implementation_gives_the_table_to_its_last_digit(
         end = reference_fall([1] * 25, heights, exact, mp.mpf(4) / 3, drop, gravity, digits=50)
         for found, wanted in zip((exact, *end), (alpha, separation, speed, time), strict=True):
             assert abs(found / mp.mpf(wanted) - 1) < 1e-16
-
-
-def test_bead_chain_takes_its_alpha_as_given():
-    protocol, chain = scene("bead-chain")
-    impact = impact_on(protocol.surface, chain, 0.0)
-    assert (impact.alpha, impact.gamma, impact.basis) == (0.12, 0.0, "given")
-    found = predict(chain, protocol.surface, 0.0, protocol.drop, protocol.gravity)
-    end = reference_fall(
-        chain.masses, chain.heights, 0.12, 0, protocol.drop.value, protocol.gravity.value
-    )
-    assert found.separation == exactly(end.separation)
-    assert found.speed == exactly(end.speed)

@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -22,7 +22,6 @@ from rig.model.rods import rod_impacts
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
-from tests.model.blows import blows
 from tests.model.chains import close, decades, even_chain
 from tests.model.reference import printed_alpha
 
@@ -163,17 +162,6 @@ def test_like_rods_given_one_by_one_are_like_rods(chain, inertia, incline):
             assert replace(found, gamma=wanted.gamma) == wanted
 
 
-def test_by_hand():
-    chain = Chain((2.0, 1.0, 3.0), (0.0, 0.1, 0.2), inertias=(0.5, 0.2, 0.4))
-    bottom, middle, top = rod_impacts(SURFACE, chain, 0.0)
-    assert bottom.alpha == pytest.approx(1.5 / 4 * 0.5, rel=1e-15)
-    assert bottom.gamma == pytest.approx(0.25 * 1.5 * (1 + 1 / 0.35), rel=1e-15)
-    assert middle.alpha == pytest.approx(1.5 / 4 * 0.8, rel=1e-15)
-    assert middle.gamma == pytest.approx(0.25 * 1.2 * (1 + 1 / 0.4), rel=1e-15)
-    assert top.alpha == pytest.approx(1.5 / 4 * 0.6, rel=1e-15)
-    assert kicks(chain, [bottom.alpha, middle.alpha, top.alpha], [1.0, 1.0, 1.0])[-1] == 0.0
-
-
 def test_a_pile_is_level_and_softer_for_each_rod():
     chain = Chain((1.0,) * 3, (0.0, 0.1, 0.2), inertias=(0.3, 0.2, 0.4))
     for xi, impact in zip(chain.inertias, rod_impacts(LEVEL_PILE, chain, 20.0), strict=True):
@@ -198,17 +186,3 @@ def test_one_singular_rod_is_enough():
     with pytest.raises(DomainError, match="singular"):
         rod_impacts(slow, chain, 20.0)
     assert rod_impacts(slow, replace(chain, inertias=(0.3, 0.3, 0.4)), 20.0)
-
-
-@examples(80)
-@given(unlike_chains(mass_decades=4.0), RESTITUTIONS, FRICTIONS, INCLINES, decades(-3, 1))
-def test_unlike_rods_lose_energy_and_never_gain_any(chain, beta, mu, incline, drop):
-    impacts = rod_impacts(Surface(Quantity(beta), Quantity(mu)), chain, incline)
-    assume(all(0.0 <= one.alpha <= 0.5 for one in impacts))
-    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
-    ledger = blows(chain, gains, drop, 9.81)
-    assert all(blow.lost >= -TIGHT * blow.brought for blow in ledger)
-    potential = 9.81 * math.fsum(
-        m * (drop + z) for m, z in zip(chain.masses, chain.heights, strict=True)
-    )
-    assert math.fsum(blow.lost for blow in ledger) == pytest.approx(potential, rel=1e-12)

@@ -17,12 +17,10 @@ from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.examples import examples
-from tests.sim.chance import with_dials
 from tests.sim.falls import (
     DELAY,
     PROTOCOLS,
     UNIFORM,
-    WITHOUT_GATES,
     ByHand,
     crossings,
     free_time_down,
@@ -138,14 +136,6 @@ def test_a_drop_depends_on_seed_run_and_attempt_alone(asked, order: random.Rando
         assert other.drop(pack_label(*label)) == first[label]
 
 
-def test_other_runs_attempts_and_seeds_are_other_drops():
-    # Runs 1 and 4 hang the same chains at the same incline: only chance tells them apart.
-    late = with_dials(delay_sd=1e-3)
-    cases = ((1, 1, 1), (1, 1, 2), (1, 4, 1), (2, 1, 1))
-    assert len({drop(UNIFORM, late, *case)[0][0] for case in cases}) == len(cases)
-    assert len({drop(UNIFORM, QUIET, *case)[0][0] for case in cases}) == 1
-
-
 def test_a_run_the_plan_does_not_have_is_bad_input():
     lab = ChainLab(UNIFORM, QUIET, 1)
     for ask in (lab.drop, lab.rest):
@@ -181,8 +171,3 @@ def test_for_any_dials_levels_alternate_and_time_runs_forward(dials, seed, run):
         assert levels == [i % 2 == 0 for i in range(len(levels))]
         assert len(levels) % 2 == 0
     assert [(t, c, b) for t, c, b, _ in truth.edges] == edges
-
-
-def test_the_chains_swap_sides_and_the_truth_says_which_strikes():
-    struck = [drop(WITHOUT_GATES, run=run)[1].impact_chain for run in (1, 2, 3, 4)]
-    assert struck == ["A", "B", "B", "A"]
