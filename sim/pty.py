@@ -73,11 +73,11 @@ class GlassVirtualBoard(VirtualBoard):
         """Tell what it keeps."""
         drop = self._controller.drop
         assert drop is not None
-        found: list[tuple[int, int]] = []
-        while part := drop.part(len(found), 40).events:
-            found += [(event.tick, event.state) for event in part]
+        events: list[tuple[int, int]] = []
+        while part := drop.part(len(events), 40).events:
+            events += [(event.tick, event.state) for event in part]
         certificate = drop.certificate()
-        return {name: getattr(certificate, name) for name in HELD}, found
+        return {name: getattr(certificate, name) for name in HELD}, events
 
 
 class Bench:
@@ -125,10 +125,10 @@ class Bench:
         words = b""
         while True:
             if self.terminal.wait(_TICK_S, sys.stdin.fileno()):
-                more = os.read(sys.stdin.fileno(), _CHUNK)
-                if not more:
+                typed = os.read(sys.stdin.fileno(), _CHUNK)
+                if not typed:
                     return
-                *lines, words = (words + more).split(b"\n")
+                *lines, words = (words + typed).split(b"\n")
                 for line in lines:
                     self._obey(line.decode().split())
             if not self.terminal.is_in and time.monotonic() >= self._plug_at:

@@ -82,13 +82,13 @@ def _connect(address: str) -> Any:
             f"--cluster {address}: cannot be reached ({_first_line(error)})",
             "is its scheduler running? an address is like tcp://lab-server:8786",
         ) from error
-    other = {worker: theirs for worker, theirs in versions.items() if theirs != __version__}
-    if versions and not other:
+    unlike = {worker: theirs for worker, theirs in versions.items() if theirs != __version__}
+    if versions and not unlike:
         return client
     client.close(timeout=1.0)
     if not versions:
         raise ClusterError(f"--cluster {address}: has no workers", f"dask worker {address}")
-    worker, theirs = other.popitem()
+    worker, theirs = unlike.popitem()
     raise ClusterError(
         f"--cluster {address}: chainrig {__version__} is here, on {worker} is {theirs}",
         "install the same chainrig for the workers",
