@@ -92,13 +92,13 @@ class Terminal:
         ----------
         seconds
             At most so long.
-        others
+        descriptors
             What else may end the waiting, as file descriptors.
 
         Returns
         -------
         list of int
-            Those of `others` that have something.
+            Those of `descriptors` that have something.
         """
         # A line that nobody has open hangs up all the time, and would end each waiting at once.
         watched = (

@@ -87,7 +87,7 @@ class SingleAlphas:
     def json(self) -> dict[str, Any]:
         """``alpha`` and ``tests``."""
         tests = {"runs_share_alpha": self.runs_share_alpha, "model": self.by_model}
-        results = {name: plain(formt) for name, formt in tests.items() if formt is not None}
+        results = {name: plain(test) for name, test in tests.items() if test is not None}
         return {"alpha": attributes(self, "inclines", "runs"), "tests": results}
 
 
@@ -102,9 +102,9 @@ def single_alphas(
 
     Parameters
     ----------
-    found, outcome
+    problem, outcome
         The coefficients and their fit, where there is one.
-    forms, like
+    forms, groups
         Of each drop, and of like drops merged.
     """
 

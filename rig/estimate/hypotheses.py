@@ -36,7 +36,7 @@ def coefficients(
 
     Parameters
     ----------
-    given
+    alpha_names
         Name of the α of each chain whose α is simply given.
     """
     names = [parameter.name for parameter in parameters]
@@ -69,7 +69,7 @@ def alphas(
     ----------
     values
         Coefficients by name; others are as stated.
-    given
+    alpha_name
         Name of this chain's α, where it is simply given.
     """
     if alpha_name is not None and alpha_name in values:

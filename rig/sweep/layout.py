@@ -147,8 +147,8 @@ def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[flo
     texts
         Each ``NAME=LOW..HIGH:COUNT``, or ``NAME=VALUE`` to hold a parameter at another value than
         the protocol's. Quantities have their unit, as in a protocol.
-    known
-        Names of the parameters that the scene has.
+    names
+        Of the parameters that the scene has.
 
     Returns
     -------
