@@ -51,12 +51,6 @@ def test_time_undoes_height(path, part):
     assert path.time_at(path.height_at(time)) == pytest.approx(time, abs=1e-11)
 
 
-@given(paths())
-def test_each_hit_is_on_the_way(path):
-    for hit, height in zip(path.hits, path.hit_heights, strict=True):
-        when = path.release_s + hit.time_s
-        assert path.time_at(height) == pytest.approx(when, abs=1e-13)
-        assert path.height_at(when) == pytest.approx(height, abs=1e-12)
 
 
 @given(st.floats(0.1, 3), st.floats(0.5, 30), st.floats(1e-3, 1.0), st.floats(1e-3, 1.5))
