@@ -84,12 +84,7 @@ def disturbed(
     accept = _FULL if kind == "disk" else _DOWN
     while not tally.sessions or tally.disturbed < count:
         with ProcessFixture(
-            runs,
-            seed + tally.sessions,
-            dials,
-            board=board,
-            busy=busy,
-            small_disk=kind == "disk",
+            runs, seed + tally.sessions, dials, board=board, busy=busy, small_disk=kind == "disk"
         ) as processes:
             processes.start_daemon()
             tally.full_disk = processes.disk.how if processes.disk else ""

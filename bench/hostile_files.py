@@ -21,14 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from bench.frame import Findings
-from bench.mutants import (
-    CSV,
-    LONGEST_S,
-    MEMORY_BYTES,
-    Mutants,
-    altered_text,
-    make_session,
-)
+from bench.mutants import CSV, LONGEST_S, MEMORY_BYTES, Mutants, altered_text, make_session
 from bench.process_fixture import FENCE
 from rig.cli import main as rig
 from rig.commands.output import say

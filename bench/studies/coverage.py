@@ -94,11 +94,7 @@ _TABULATED = (
     "separation_m", "separation_raw_m", "separation_strike_m", "speed_m_s", "speed_strike_m_s",
     "release_skew_s", "fall_time_s",
 )  # fmt: skip
-_OTHER = {
-    "drag_per_m": ("κ (1/km)", 1e3),
-    "restitution": ("β", 1.0),
-    "friction": ("μ", 1.0),
-}
+_OTHER = {"drag_per_m": ("κ (1/km)", 1e3), "restitution": ("β", 1.0), "friction": ("μ", 1.0)}
 
 
 @dataclass(frozen=True, slots=True)

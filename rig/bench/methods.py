@@ -354,12 +354,7 @@ class _Landing:
 
 
 def step_by_step(
-    chain: Chain,
-    gains: Sequence[float],
-    drop: float,
-    gravity: float,
-    step: float,
-    advance: Advance,
+    chain: Chain, gains: Sequence[float], drop: float, gravity: float, step: float, advance: Advance
 ) -> Answer:
     """Fall as in a spreadsheet: a row a step, the end being the first row past the contact point.
 

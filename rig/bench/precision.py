@@ -12,12 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from rig.bench.methods import absent, methods
-from rig.bench.precision_reference import (
-    contact_truth,
-    continuum_truth,
-    discrete_truth,
-    scenes,
-)
+from rig.bench.precision_reference import contact_truth, continuum_truth, discrete_truth, scenes
 from rig.bench.stability import relative_error
 from rig.errors import RigError
 

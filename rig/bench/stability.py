@@ -56,9 +56,7 @@ class StabilityRow:
     naive: str
 
 
-def stability(
-    progress: Callable[[StabilityRow], None] | None = None,
-) -> list[StabilityRow]:
+def stability(progress: Callable[[StabilityRow], None] | None = None) -> list[StabilityRow]:
     """Try every scene of `rig.bench.extremes.extremes`.
 
     Parameters

@@ -134,11 +134,9 @@ def forecast(
     ]
     in_model, stated = _describe(protocol, drops)
     # What needs no α of a drop is common to coefficients and measurands.
-    tied = [drop for drop, describes in zip(drops, in_model, strict=True) if describes]
+    tied = [drop for drop, fits in zip(drops, in_model, strict=True) if fits]
     root = _session([drop.given_alpha() for drop in tied], np.eye(size))
-    rest = [
-        drop.given_alpha() for drop, describes in zip(drops, in_model, strict=True) if not describes
-    ]
+    rest = [drop.given_alpha() for drop, fits in zip(drops, in_model, strict=True) if not fits]
     session_root = _session([*rest, *(drop.own_alpha() for drop in drops)], root)
     # Once a layout, then asked by every measurand and incline.
     inverse = np.linalg.inv(session_root)

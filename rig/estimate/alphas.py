@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -126,15 +127,10 @@ def single_alphas(
             plain = fit(problem.forms, of.model(protocol, problem.parameters))
             by_model = LikelihoodRatio(plain.chi2 - open_.chi2, degrees)
     cases = sorted(set(map(case, groups)))
-    fewer = len(forms) - len(cases)
+    fewer, counts = len(forms) - len(cases), Counter(map(case, forms))
     return SingleAlphas(
         tuple(
-            ConditionAlpha(
-                key,
-                sum(case(form) == key for form in forms),
-                Measured(*by_case[f"α {key}"]),
-                model.get(key),
-            )
+            ConditionAlpha(key, counts[key], Measured(*by_case[f"α {key}"]), model.get(key))
             for key in cases
         ),
         tuple(

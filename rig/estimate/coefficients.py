@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.drop_model import prior_air
-from rig.estimate.hypotheses import (
-    ALPHA,
-    BETA,
-    MU,
-    PILE,
-    coefficients,
-    with_contact,
-    with_drag,
-)
+from rig.estimate.hypotheses import ALPHA, BETA, MU, PILE, coefficients, with_contact, with_drag
 from rig.estimate.hypothesis_fit import Parameter, fit
 from rig.model.impact import impact_on
 
@@ -87,9 +79,7 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
         protocol, [(form.chain, form.run.incline_deg) for form in ordered]
     )
     parameters = [Parameter(name, quantity.value) for name, quantity in stated.items()]
-    informative = tuple(
-        form for form, describes in zip(ordered, in_model, strict=True) if describes
-    )
+    informative = tuple(form for form, fits in zip(ordered, in_model, strict=True) if fits)
     problem = CoefficientProblem(informative, tuple(parameters), (), stated, tuple(left_out))
     return _hold_unknown(protocol, problem) if informative else problem
 
@@ -183,9 +173,7 @@ def _hold_unknown(protocol: Protocol, problem: CoefficientProblem) -> Coefficien
                 if parameter.name not in exact
             ),
             held=tuple(name for name in held if name not in exact),
-            stated={
-                name: parameter for name, parameter in problem.stated.items() if name not in exact
-            },
+            stated={name: size for name, size in problem.stated.items() if name not in exact},
         )
 
     def uncertainties(held: Mapping[str, float]) -> dict[str, float]:

@@ -124,9 +124,7 @@ def _squares(drop: Adjusted, heights: Array) -> Dual:
     for _ in range(2):  # what the top rod is off its chain hardly depends on the level
         levels = levels + heights - drop.top("impact", levels)
     speed = drop.squares("impact", levels).root() + drop.stretched(levels.value)[1]
-    if (
-        catching_up := drop.model.discrepancy.late_way
-    ) > 0.0:  # it comes by and by, below the lowest beam
+    if (catching_up := drop.model.discrepancy.late_way) > 0.0:  # below the lowest beam
         speed += drop.late * np.clip(1.0 - heights / catching_up, 0.0, 1.0)
     return speed * speed
 

@@ -46,11 +46,8 @@ def coefficients(
         key = form.run.incline_deg, id(form.chain), tuple(values.tolist())
         if key not in computed:
             current = dict(zip(names, values.tolist(), strict=True))
-            computed[key] = _with_extras(
-                *alphas(
-                    surface, form.chain, form.run.incline_deg, current, alpha_names.get(form.chain)
-                )
-            )
+            name, incline_deg = alpha_names.get(form.chain), form.run.incline_deg
+            computed[key] = _with_extras(*alphas(surface, form.chain, incline_deg, current, name))
         return computed[key]
 
     return Hypothesis(tuple(parameters), targets)

@@ -80,11 +80,7 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float])
 
 
 def hits(
-    chain: Chain,
-    gains: Sequence[float],
-    drop: float,
-    gravity: float,
-    initial_speed: float = 0.0,
+    chain: Chain, gains: Sequence[float], drop: float, gravity: float, initial_speed: float = 0.0
 ) -> list[Hit]:
     """Every impact of a fall, bottom rod first.
 

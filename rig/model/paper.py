@@ -7,13 +7,7 @@ from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from rig.model.chain import Chain
-from rig.model.continuum import (
-    UniformChain,
-    end,
-    separation_fast,
-    separation_leading_order,
-    speed,
-)
+from rig.model.continuum import UniformChain, end, separation_fast, separation_leading_order, speed
 from rig.model.fall import fall, free_fall_speed, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_liftoff, impact_on
 from rig.model.motion import Motion

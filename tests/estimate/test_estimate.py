@@ -150,8 +150,7 @@ def test_without_priors_the_posterior_is_the_least_squares_fit():
     """But for the curvature of α in μ, which is small over so narrow a range."""
     surface = UNIFORM.surface
     vague = replace(
-        UNIFORM,
-        surface=replace(surface, restitution=Quantity(0.5), friction=Quantity(0.2)),
+        UNIFORM, surface=replace(surface, restitution=Quantity(0.5), friction=Quantity(0.2))
     )
     found = coefficient_problem(vague, merged(forms(SURFACE)))
     centre = best(vague, found)

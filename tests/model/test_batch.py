@@ -18,16 +18,7 @@ from rig.model.impact import impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
-from tests.model.chains import (
-    ALPHAS,
-    DROPS,
-    GAMMAS,
-    GRAVITIES,
-    SPEEDS,
-    chains,
-    close,
-    even_chain,
-)
+from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, even_chain
 
 ONE_OR_MANY = st.lists(st.tuples(ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS), min_size=1, max_size=8)
 

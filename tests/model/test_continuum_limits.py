@@ -9,12 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
-from rig.model.continuum import (
-    UniformChain,
-    end,
-    separation_fast,
-    separation_leading_order,
-)
+from rig.model.continuum import UniformChain, end, separation_fast, separation_leading_order
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 

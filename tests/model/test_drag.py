@@ -23,16 +23,7 @@ from rig.model.drag import (
 )
 from rig.model.fall import fall, hits, kicks
 from tests.examples import examples
-from tests.model.chains import (
-    ALPHAS,
-    DROPS,
-    GAMMAS,
-    GRAVITIES,
-    SPEEDS,
-    chains,
-    close,
-    decades,
-)
+from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, decades
 
 TIGHT = 1e-13
 DISTANCES = decades(-4, 2)

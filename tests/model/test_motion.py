@@ -13,16 +13,7 @@ from rig.model.fall import fall, hits, kicks
 from rig.model.impact import alpha_inclined, gamma_finite
 from rig.model.motion import Motion
 from tests.examples import examples
-from tests.model.chains import (
-    ALPHAS,
-    DROPS,
-    GAMMAS,
-    GRAVITIES,
-    SPEEDS,
-    chains,
-    close,
-    even_chain,
-)
+from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, even_chain
 from tests.model.reference import reference_fall
 
 TIGHT = 1e-13

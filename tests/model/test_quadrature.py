@@ -26,8 +26,6 @@ def test_running_integrals_are_exact_for_polynomials(count):
         np.testing.assert_allclose(rule.running @ rule.nodes**degree, exact, rtol=0, atol=5e-15)
 
 
-
-
 def test_rules_are_shared_and_cannot_be_spoilt():
     assert gauss(7) is gauss(7)
     with pytest.raises(ValueError, match="read-only"):

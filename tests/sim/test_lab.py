@@ -17,14 +17,7 @@ from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.examples import examples
-from tests.sim.falls import (
-    DELAY,
-    PROTOCOLS,
-    UNIFORM,
-    ByHand,
-    crossings,
-    free_time_down,
-)
+from tests.sim.falls import DELAY, PROTOCOLS, UNIFORM, ByHand, crossings, free_time_down
 
 QUIET = Dials.quiet()
 RUN_OF = {run.incline_deg: number for number, run in ChainLab(UNIFORM, QUIET, 0).runs.items()}

@@ -51,8 +51,6 @@ def test_time_undoes_height(path, part):
     assert path.time_at(path.height_at(time)) == pytest.approx(time, abs=1e-11)
 
 
-
-
 @given(st.floats(0.1, 3), st.floats(0.5, 30), st.floats(1e-3, 1.0), st.floats(1e-3, 1.5))
 def test_a_free_fall_in_air_is_the_logarithm_of_a_cosh(start, gravity, kappa, since):
     path = Path(0.02, start, gravity, kappas=[kappa])

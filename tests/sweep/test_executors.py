@@ -75,10 +75,7 @@ def test_progress_counts_every_point_once(layout):
 
 def test_workers_with_another_version_are_refused(layout, local, monkeypatch):
     monkeypatch.setattr(module, "__version__", "0.0.other")
-    with (
-        pytest.raises(ClusterError, match=r"0\.0\.other"),
-        executor(None, local.scheduler_address),
-    ):
+    with pytest.raises(ClusterError, match=r"0\.0\.other"), executor(None, local.scheduler_address):
         pytest.fail("connected")
 
 
