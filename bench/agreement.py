@@ -5,37 +5,29 @@ from __future__ import annotations
 import csv
 from collections import defaultdict
 from dataclasses import dataclass
-from itertools import groupby
-from operator import attrgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.frame import Findings
+from bench.studies.sessions import with_repeats, without_device
 from bench.workers import results
 from rig.analysis.comparison import compare
-from rig.analysis.session import analyze
 from rig.analysis.summary import good_cases
-from rig.bench.falls import Asked, falls, time_scale
-from rig.commands.output import print_json, progress, write_page
-from rig.files import make_folder, write_atomic
+from rig.bench.falls import Asked, simulation
+from rig.commands.output import progress
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned
-from rig.text_table import csv_text, text_table
+from rig.text_table import text_table
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
-    from rig.analysis.comparison import Comparison
-    from rig.bench.falls import SimulatedDrop
-    from rig.clock.calibration import TimeScale
-    from rig.protocol.protocol import Protocol
-
-_REPEATS = "repeats: 12 "
 _SEEDS = 1000  # apart: no rig has sessions of two lengths
 _CHUNK = 5  # sessions for one process of the simulation
 _HEAD = """\
@@ -101,30 +93,20 @@ def compare_sessions(protocol: Path, drops: int, seeds: Sequence[int]) -> list[S
     seeds
         Of the rigs.
     """
-    text = protocol.read_text("utf-8")
-    assert _REPEATS in text
     with TemporaryDirectory() as folder:
-        path = Path(folder) / protocol.name
-        path.write_text(text.replace(_REPEATS, f"repeats: {drops} "), "utf-8")
+        path = with_repeats(str(protocol), drops, Path(folder))
         scene = reader.read(path)
         numbers = [run.number for run in planned(scene)]
-        url = f"sim://?stated=1&protocol={path}"
-        fallen = falls([Asked(url, seeds, [numbers] * len(seeds))])
+        asked = Asked(simulation(path, url="sim://?stated=1"), seeds, [numbers] * len(seeds))
+        sessions = zip(seeds, without_device([(scene, asked)]), strict=True)
         return [
             SessionAgreement(
                 comparison.quantity, drops, seed, comparison.chi2, comparison.degrees, comparison.p,
                 tuple(line.normalized_error or 0.0 for line in comparison.differences),
             )
-            for seed, session in groupby(fallen, key=attrgetter("seed"))
-            for comparison in _compared(scene, session, time_scale(seed))
+            for seed, session in sessions
+            for comparison in compare(scene, good_cases(scene, session.analysis.runs))
         ]  # fmt: skip
-
-
-def _compared(
-    scene: Protocol, session: Iterable[SimulatedDrop], scale: TimeScale
-) -> tuple[Comparison, ...]:
-    analysis = analyze(scene, [fall.drop for fall in session], lambda _: scale)
-    return compare(scene, good_cases(scene, analysis.runs))
 
 
 def summarize(agreements: Sequence[SessionAgreement]) -> Iterator[dict[str, Any]]:
@@ -167,15 +149,14 @@ def _table(agreements: Sequence[SessionAgreement]) -> list[str]:
     return text_table(rows, left={0}, rule=True)
 
 
-def main(arguments: Namespace) -> int:
-    """Compare sessions of each number of drops with the model; print a table.
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Compare sessions of each number of drops with the model.
 
     With ``--more`` it goes on with the sessions of the output folder's table.
     """
-    folder = make_folder(arguments.output) if arguments.output else None
-    table = folder / "agreement.csv" if folder else None
     agreements: list[SessionAgreement] = []
-    if arguments.more and table is not None and table.exists():
+    table = Path(arguments.output or "") / "agreement.csv"
+    if arguments.more and table.exists():
         with table.open(encoding="utf-8", newline="") as file:
             agreements = [SessionAgreement.from_row(row) for row in csv.DictReader(file)]
     present = {(agreement.drops, agreement.seed) for agreement in agreements}
@@ -189,18 +170,12 @@ def main(arguments: Namespace) -> int:
     for done, part in enumerate(results(calls, arguments.jobs), 1):
         agreements += part
         count(done * _CHUNK, len(calls) * _CHUNK)
-        if table is not None:
-            rows = [agreement.row() for agreement in sorted(agreements, key=_order)]
-            write_atomic(table, csv_text(_COLUMNS, rows))
-    lines = _table(agreements)
-    if folder is not None:
-        write_page(folder, "agreement", _HEAD, lines)
-    if arguments.json:
-        print_json({"agreement": [*summarize(agreements)]})
-    else:
-        print("\n".join(lines))
-    return 0
+        yield _findings(agreements)
+    if not calls:
+        yield _findings(agreements)
 
 
-def _order(agreement: SessionAgreement) -> tuple[str, int, int]:
-    return agreement.quantity, agreement.drops, agreement.seed
+def _findings(agreements: list[SessionAgreement]) -> Findings:
+    agreements.sort(key=lambda session: (session.quantity, session.drops, session.seed))
+    rows = [agreement.row() for agreement in agreements]
+    return Findings({"agreement": [*summarize(agreements)]}, _table(agreements), _HEAD, rows)

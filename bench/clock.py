@@ -7,16 +7,18 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from bench.frame import Findings
 from rig.clock.epochs import epochs
 from rig.clock.rate import ping_rate, pulse_rate
-from rig.commands.output import print_json, say
+from rig.commands.output import say
 from rig.protocol.protocol import PPS_U
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable
+    from collections.abc import Iterator
 
     from rig.clock.rate import TickRate
     from rig.records import ClockSample, Pulse
@@ -67,9 +69,7 @@ class RateError:
     held: float
 
 
-def clock(
-    protocol: str, seeds: int, tell: Callable[[str], None], durations_s: tuple[float, ...]
-) -> list[RateError]:
+def clock(protocol: str, seeds: int, durations_s: tuple[float, ...]) -> list[RateError]:
     """Compare clocks over a simulated line with 1 ms of exponential jitter.
 
     Parameters
@@ -78,8 +78,6 @@ def clock(
         Any protocol file: a simulation needs a scene.
     seeds
         Simulations 1, 2, ….
-    tell
-        Told how far it is.
     durations_s
         After which the rate is looked at.
     """
@@ -96,7 +94,7 @@ def clock(
             for (source, u), rate in zip(SOURCES.items(), rates, strict=True):
                 if rate.n:
                     found.setdefault((duration, source), []).append(_error(rate, u))
-        tell(f"seed {seed} of {seeds}")
+        say(f"seed {seed} of {seeds}")
     return [_row(duration, source, pairs) for (duration, source), pairs in found.items()]
 
 
@@ -127,14 +125,13 @@ def _row(duration: float, source: str, pairs: list[tuple[float, float]]) -> Rate
     )
 
 
-def main(arguments: Namespace) -> int:
-    """Print errors of the tick rate against the time clocks were compared for."""
-    rows = clock(arguments.protocol, arguments.seeds, say, DURATIONS_S)
-    if arguments.json:
-        print_json({"rows": [asdict(row) for row in rows]})
-        return 0
-    print(f"{'after':>7}  {'by':<9}  {'rms':>9}  {'worst':>9}  {'stated u':>9}  within 1.96 u")
-    for row in rows:
-        errors = "  ".join(f"{ppm:>5.2g} ppm" for ppm in (row.rms, row.worst, row.u))
-        print(f"{row.duration_s:>5.0f} s  {row.source:<9}  {errors}  {row.held:>13.0%}")
-    return 0
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Find errors of the tick rate against the time clocks were compared for."""
+    errors = clock(arguments.protocol, arguments.seeds, DURATIONS_S)
+    rows = [["after", "by", "rms", "worst", "stated u", "within 1.96 u"]]
+    rows += [
+        [f"{each.duration_s:.0f} s", each.source,
+         *(f"{ppm:.2g} ppm" for ppm in (each.rms, each.worst, each.u)), f"{each.held:.0%}"]
+        for each in errors
+    ]  # fmt: skip
+    yield Findings({"rows": [asdict(each) for each in errors]}, text_table(rows, left={1}))

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import re
 import socket
 import subprocess
 from contextlib import ExitStack, suppress
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.invariants import broken, longest_on
-from bench.process_fixture import ProcessFixture
+from bench.process_fixture import ProcessFixture, memory_bytes
 from bench.tally import FaultTally
 from rig.daemon import rpc
 from rig.errors import DeviceError
@@ -45,7 +42,7 @@ def raced(count: int, seed: int, board: str = "sim") -> FaultTally:
             if codes not in ([0, DeviceError.exit_code], [0, 0]) or (codes[1] and not refused):
                 tally.broken.append(f"both or none of two runners: {told}")
             tally.disturbed += bool(codes[1])
-            _look(processes, tally)
+            tally.add_session(processes)
     return tally
 
 
@@ -62,16 +59,16 @@ def deaf(count: int, seed: int, board: str = "sim") -> FaultTally:
         with ProcessFixture(_RUNS, seed + n, board=board) as processes, ExitStack() as lines:
             processes.start_daemon()
             processes.client().close()
-            before = _most_memory(processes.daemon)
+            before = memory_bytes(processes.daemon)
             for _ in range(_DEAF):
                 _ask_and_never_read(lines.enter_context(socket.socket(socket.AF_UNIX)), processes)
                 tally.disturbed += 1
             if (code := processes.run()) != 0:
                 tally.broken.append(f"a runner ended with {code}: {processes.told}")
-            tally.memory_bytes = max(tally.memory_bytes, _most_memory(processes.daemon) - before)
+            tally.memory_bytes = max(tally.memory_bytes, memory_bytes(processes.daemon) - before)
             if tally.memory_bytes > _GROWTH:
                 tally.broken.append(f"the daemon grew by {tally.memory_bytes} bytes")
-            _look(processes, tally)
+            tally.add_session(processes)
     return tally
 
 
@@ -84,27 +81,9 @@ def _ended(runner: Process) -> tuple[int, str]:
     return runner.returncode, told
 
 
-def _look(processes: ProcessFixture, tally: FaultTally) -> None:
-    happened = list(processes.happened())
-    tally.broken += broken(processes.session, happened, processes.runs)
-    tally.longest_on_s = max(tally.longest_on_s, longest_on(happened))
-    tally.sessions += 1
-    tally.runs += processes.runs
-    tally.drops += sum("drop" in seen for seen in happened)
-
-
 def _ask_and_never_read(line: socket.socket, processes: ProcessFixture) -> None:
     line.connect(str(processes.socket))
     line.sendall(rpc.request("hello", {"api": rpc.API, "client": "deaf"}, 1))
     line.settimeout(0.2)
     with suppress(TimeoutError):  # the daemon does not take more than it can answer
         line.sendall(rpc.request("subscribe", {}, 2) * _ASKED)
-
-
-def _most_memory(process: Process | None) -> int:
-    """Give the largest resident size of a process so far, bytes (proc(5), VmHWM)."""
-    assert process is not None
-    status = Path(f"/proc/{process.pid}/status").read_text("ascii")
-    found = re.search(r"VmHWM:\s+(\d+) kB", status)
-    assert found is not None
-    return int(found[1]) * 1024

@@ -11,11 +11,11 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from bench.contention import deaf, raced
-from bench.invariants import broken, longest_on
+from bench.frame import Findings
 from bench.moments import STATES, fell_upon, off_after, reach
 from bench.process_fixture import ProcessFixture
 from bench.tally import FaultTally
-from rig.commands.output import print_json, say
+from rig.commands.output import say
 from rig.errors import DeviceError, SessionError
 from rig.link.transcript import Transcript
 from rig.session.store import Session
@@ -23,7 +23,7 @@ from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable
+    from collections.abc import Iterator
 
 KINDS = ("daemon", "runner", "cable", "reset", "brownout", "disk")
 """What can be disturbed: processes killed, the cable pulled for a moment, the board reset, its
@@ -41,22 +41,12 @@ _TRIES = 40  # of a runner that finds the link down
 _TROUBLE_S = 3.0  # in which a runner sees the trouble, or is done with its work
 _DISK_FULL_S = 1.0
 _COUNTS = {
-    "sim": {
-        "daemon": 200,
-        "runner": 50,
-        "cable": 100,
-        "reset": 40,
-        "brownout": 40,
-        "disk": 40,
-        "noise": 8,
-        "busy": 4,
-        "race": 10,
-        "deaf": 4,
-    },
+    "sim": {"daemon": 200, "runner": 50, "cable": 100, "reset": 40, "brownout": 40, "disk": 40,
+            "noise": 8, "busy": 4, "race": 10, "deaf": 4},
     # The emulator takes a good part of a core for each rig.
     "emu": {"daemon": 40, "runner": 10, "cable": 20, "reset": 10, "brownout": 10, "noise": 2},
     "bought": {"daemon": 10, "cable": 10, "reset": 5, "brownout": 10, "noise": 1, "busy": 1},
-}
+}  # fmt: skip
 _DOWN = (0, DeviceError.exit_code)
 _FULL = (*_DOWN, SessionError.exit_code)
 
@@ -94,12 +84,7 @@ def disturbed(
     accept = _FULL if kind == "disk" else _DOWN
     while not tally.sessions or tally.disturbed < count:
         with ProcessFixture(
-            runs,
-            seed + tally.sessions,
-            dials,
-            board=board,
-            busy=busy,
-            small_disk=kind == "disk",
+            runs, seed + tally.sessions, dials, board=board, busy=busy, small_disk=kind == "disk"
         ) as processes:
             processes.start_daemon()
             tally.full_disk = processes.disk.how if processes.disk else ""
@@ -162,26 +147,19 @@ def _finish(processes: ProcessFixture) -> None:
 
 def _look(processes: ProcessFixture, moments: list[float], tally: FaultTally) -> None:
     """See what a finished session has, and whether every promise was kept."""
-    happened = list(processes.happened())
-    tally.broken += broken(processes.session, happened, processes.runs)
-    tally.longest_on_s = max(tally.longest_on_s, longest_on(happened))
+    happened = tally.add_session(processes)
     tally.off_after_s = max(tally.off_after_s, *(off_after(happened, at) for at in moments), 0.0)
     if tally.longest_on_s > OFF_S:
         tally.broken.append("the release was on too long")
-    tally.sessions += 1
-    tally.runs += processes.runs
     transcript = Transcript()
     with Session.open(processes.session, readonly=True) as session:
-        tally.drops += sum(1 for _ in session.drops())
         for host_ns, direction, data in session.byte_log():
             transcript.feed(direction, host_ns, data)
     tally.frames += transcript.rx.good + transcript.rx.bad
     tally.bad_frames += transcript.rx.bad
 
 
-def faults(
-    counts: dict[str, int], jobs: int, say: Callable[[str], None], board: str = "sim"
-) -> dict[str, FaultTally]:
+def faults(counts: dict[str, int], jobs: int, board: str = "sim") -> dict[str, FaultTally]:
     """Disturb everything, and make sessions on a bad line too.
 
     Parameters
@@ -190,12 +168,10 @@ def faults(
         Disturbances by kind; ``noise`` and ``busy`` count sessions.
     jobs
         Rigs side by side: most of the time they wait.
-    say
-        Narration.
     board
         As for `disturbed`.
     """
-    found: dict[str, FaultTally] = {}
+    tallies: dict[str, FaultTally] = {}
     with ThreadPoolExecutor(jobs) as pool:
         work = {
             kind: [
@@ -205,14 +181,14 @@ def faults(
             for kind, count in counts.items()
         }
         for kind, parts in work.items():
-            found[kind] = FaultTally()
+            tally = tallies[kind] = FaultTally()
             for part in parts:
-                found[kind].add(part.result())
+                tally.add(part.result())
             # Here only, where the machine has nothing else to do: the daemon may be late too.
-            if found[kind].off_after_s > OFF_S:
-                found[kind].broken.append("something stayed armed or on after a disturbance")
-            say(f"{board} {kind}: {found[kind].json()}")
-    return found
+            if tally.off_after_s > OFF_S:
+                tally.broken.append("something stayed armed or on after a disturbance")
+            say(f"{board} {kind}: {tally.json()}")
+    return tallies
 
 
 def _shares(kind: str, count: int, jobs: int) -> list[int]:
@@ -234,9 +210,9 @@ def _some(kind: str, count: int, seed: int, board: str) -> FaultTally:
         return FaultTally(broken=[f"given up: {error!r}"])
 
 
-def main(arguments: Namespace) -> int:
+def run(arguments: Namespace) -> Iterator[Findings]:
     """Kill, pull, reset, fill and garble, and count what was lost."""
-    found: dict[str, dict[str, FaultTally]] = {}
+    tallies: dict[str, dict[str, FaultTally]] = {}
     for board in arguments.boards:
         if board != "sim" and find_spec("rig_emulator") is None:
             say(f"left out: {board} (pip install ./firmware/emulator)")
@@ -246,40 +222,35 @@ def main(arguments: Namespace) -> int:
             for kind, count in _COUNTS[board].items()
             if kind in (arguments.kinds or _COUNTS[board])
         }
-        if counts:  # not every kind is done to both
-            found[board] = faults(counts, arguments.jobs, say, board)
-    if arguments.json:
-        print_json(
-            {
-                board: {kind: one.json() for kind, one in kinds.items()}
-                for board, kinds in found.items()
-            }
-        )
-    else:
-        for board, kinds in found.items():
-            _print(board, kinds)
+        if counts:  # not every kind is done to each board
+            tallies[board] = faults(counts, arguments.jobs, board)
     troubles = [
-        f"{board} {kind}: {what}"
-        for board, kinds in found.items()
+        f"{board} {kind}: {trouble}"
+        for board, kinds in tallies.items()
         for kind, tally in kinds.items()
-        for what in tally.broken
+        for trouble in tally.broken
     ]
     for trouble in troubles:
         say(trouble)
-    return 1 if troubles else 0
+    record = {
+        board: {kind: tally.json() for kind, tally in kinds.items()}
+        for board, kinds in tallies.items()
+    }
+    lines = [line for board, kinds in tallies.items() for line in _lines(board, kinds)]
+    yield Findings(record, lines, failed=bool(troubles))
 
 
-def _print(board: str, kinds: dict[str, FaultTally]) -> None:
+def _lines(board: str, kinds: dict[str, FaultTally]) -> Iterator[str]:
     names = ("times", *STATES, "sessions", "runs", "drops", "bad frames", "on ms", "off ms", "lost")
     rows = [[board, *names]]
-    for kind, one in kinds.items():
-        share = f"{one.bad_frames / max(1, one.frames):.1%}"
-        counts = (one.disturbed, *(one.fell_upon[state] for state in STATES))
-        kept = (one.sessions, one.runs, one.drops)
-        ends = (round(one.longest_on_s * 1e3), round(one.off_after_s * 1e3), len(one.broken))
-        rows.append([kind, *map(str, counts), *map(str, kept), share, *map(str, ends)])
-    print("\n".join(text_table(rows, left={0})))
+    for kind, tally in kinds.items():
+        share = f"{tally.bad_frames / max(1, tally.frames):.1%}"
+        counts = (tally.disturbed, *(tally.fell_upon[state] for state in STATES), tally.sessions,
+                  tally.runs, tally.drops)  # fmt: skip
+        ends = (round(tally.longest_on_s * 1e3), round(tally.off_after_s * 1e3), len(tally.broken))
+        rows.append([kind, *map(str, counts), share, *map(str, ends)])
+    yield from text_table(rows, left={0})
     if "disk" in kinds:
-        print(f"a full disk: {kinds['disk'].full_disk}")
+        yield f"a full disk: {kinds['disk'].full_disk}"
     if "deaf" in kinds:
-        print(f"a daemon nobody read from grew by {kinds['deaf'].memory_bytes / 1e6:.1f} MB")
+        yield f"a daemon nobody read from grew by {kinds['deaf'].memory_bytes / 1e6:.1f} MB"

@@ -6,7 +6,6 @@ file could need.
 
 from __future__ import annotations
 
-import json
 import os
 import resource
 import shutil
@@ -14,21 +13,15 @@ import signal
 import sys
 import time
 import traceback
-from collections import Counter
 from contextlib import redirect_stdout
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
-from bench.mutants import (
-    CSV,
-    LONGEST_S,
-    MEMORY_BYTES,
-    Mutants,
-    altered_text,
-    make_session,
-)
+from bench.frame import Findings
+from bench.mutants import CSV, LONGEST_S, MEMORY_BYTES, Mutants, altered_text, make_session
 from bench.process_fixture import FENCE
 from rig.cli import main as rig
 from rig.commands.output import say
@@ -36,7 +29,7 @@ from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     Reading = Callable[[int, str], None]
 
@@ -67,11 +60,10 @@ class Cost(NamedTuple):
         return "too much memory" if self.memory_bytes > MEMORY_BYTES else ""
 
 
-def main(arguments: Namespace) -> int:
-    """Alter, read, and print what it cost; 1 when anything failed."""
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Alter, read, and find what it cost; it has failed when anything did."""
     counts = {SESSION: arguments.sessions, PROTOCOL: arguments.protocols, TABLE: arguments.tables}
-    found: dict[tuple[str, str], list[Cost]] = {}
-    faults = 0
+    costs: dict[tuple[str, str], list[Cost]] = {}
     with TemporaryDirectory(prefix="rig-mutants-") as place:
         folder = Path(place)
         with redirect_stdout(StringIO()):
@@ -80,25 +72,24 @@ def main(arguments: Namespace) -> int:
             for seed in range(arguments.seed, arguments.seed + counts[kind]):
                 path = write(seed)
                 for command in COMMANDS[kind]:
-                    cost = in_process(lambda c=command, p=path: _read(c, p, folder))  # type: ignore[misc]
-                    found.setdefault((kind, command), []).append(cost)
+                    cost = in_process(partial(_read, command, path, folder))
+                    costs.setdefault((kind, command), []).append(cost)
                     if cost.fault:
-                        faults += 1
                         say(f"{kind} {seed}, rig {command}: {cost.fault}")
-    if arguments.json:
-        print(json.dumps({f"{kind} {command}": each for (kind, command), each in found.items()}))
-        return int(bool(faults))
     rows = [["file", "command", "times", "read", "refused", "longest s", "most MB", "failed"]]
-    for (kind, command), each in found.items():
-        ends = Counter("read" if one.code in {0, 1, 3} else "refused" for one in each)
-        ends["failed"] = sum(bool(one.fault) for one in each)
-        ends["refused"] -= sum(one.code not in _OWN for one in each)
-        longest = max(one.seconds for one in each)
-        most = max(one.memory_bytes for one in each) / 1e6
-        numbers = [len(each), ends["read"], ends["refused"], f"{longest:.1f}", f"{most:.0f}"]
-        rows.append([kind, command, *map(str, numbers), str(ends["failed"])])
-    print("\n".join(text_table(rows, left={0, 1}, rule=True)))
-    return int(bool(faults))
+    rows += [[kind, command, *_counted(each)] for (kind, command), each in costs.items()]
+    record = {f"{kind} {command}": each for (kind, command), each in costs.items()}
+    failed = any(cost.fault for each in costs.values() for cost in each)
+    yield Findings(record, text_table(rows, left={0, 1}, rule=True), failed=failed)
+
+
+def _counted(costs: list[Cost]) -> list[str]:
+    read = sum(cost.code in {0, 1, 3} for cost in costs)
+    refused = sum(cost.code in _OWN for cost in costs) - read
+    longest = max(cost.seconds for cost in costs)
+    most = max(cost.memory_bytes for cost in costs) / 1e6
+    failed = sum(bool(cost.fault) for cost in costs)
+    return [*map(str, (len(costs), read, refused)), f"{longest:.1f}", f"{most:.0f}", str(failed)]
 
 
 def _writers(folder: Path) -> dict[str, Callable[[int], Path]]:

@@ -20,12 +20,12 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bench.decoding import bytewise, checked, frames, speed, to_edges
-from bench.process_fixture import ProcessFixture
+from bench.frame import Findings
+from bench.process_fixture import ProcessFixture, memory_bytes, processor_s
 from bench.pty_writer import PtyWriter
 from rig.clock.host import SystemClock
-from rig.commands.output import print_json, say, write_page
+from rig.commands.output import say
 from rig.daemon.server import Server
-from rig.files import make_folder
 from rig.link.exchange import Exchange
 from rig.link.messages import EVENTS_PER_FRAME, Fired
 from rig.link.port import open_port
@@ -36,7 +36,7 @@ from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 _HEAD = """\
 # Speed of the link
@@ -50,9 +50,10 @@ _IDLE_S = 5.0
 _BEST_OF = 3
 _FLOOD = """
 import json, sys
-from bench.link import delivered, memory_mb
+from bench.link import delivered
+from bench.process_fixture import memory_bytes
 rate, _ = delivered(int(sys.argv[1]), 0.0)
-print(json.dumps([rate, memory_mb("self", "VmHWM")]))
+print(json.dumps([rate, memory_bytes(None) / 2**20]))
 """
 _WATCH = """
 import asyncio, json, sys, time
@@ -183,23 +184,11 @@ def idle() -> dict[str, float]:
             if name == "alone":
                 with_client.close()
                 time.sleep(1.5)
-            before = cpu_s(processes.daemon.pid)
+            before = processor_s(processes.daemon.pid)
             time.sleep(_IDLE_S)
-            found[f"{name}_cpu"] = (cpu_s(processes.daemon.pid) - before) / _IDLE_S
-        found["memory_mb"] = memory_mb(processes.daemon.pid)
+            found[f"{name}_cpu"] = (processor_s(processes.daemon.pid) - before) / _IDLE_S
+        found["memory_mb"] = memory_bytes(processes.daemon, "VmRSS") / 2**20
     return found
-
-
-def cpu_s(pid: int) -> float:
-    """Processor time a process has had, s."""
-    fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def memory_mb(pid: int | str, what: str = "VmRSS") -> float:
-    """Ask Linux for a process's memory, MB; with ``VmHWM`` the most it ever had."""
-    text = Path(f"/proc/{pid}/status").read_text("ascii")
-    return int(text.partition(f"{what}:")[2].split()[0]) / 1024
 
 
 def flood() -> tuple[float, float]:
@@ -227,14 +216,14 @@ def _spread(latencies: list[float]) -> dict[str, float]:
     return {"median": latencies[count // 2], "p99": latencies[count * 99 // 100]}
 
 
-def link(say: Callable[[str], None]) -> dict[str, Any]:
-    """Measure everything, in one go.
+def run(_arguments: Namespace) -> Iterator[Findings]:
+    """Measure the way from the port to a client."""
+    figures = link()
+    yield Findings(figures, [*_lines(figures)], _HEAD)
 
-    Parameters
-    ----------
-    say
-        Narration.
-    """
+
+def link() -> dict[str, Any]:
+    """Measure everything, in one go."""
     say("decoding …")
     rates = {
         "decoded": speed(checked, _FRAMES),
@@ -259,19 +248,6 @@ def link(say: Callable[[str], None]) -> dict[str, Any]:
         "load": os.getloadavg()[0],
         "cores": os.cpu_count(),
     }
-
-
-def main(arguments: Namespace) -> int:
-    """Measure the way from the port to a client."""
-    found = link(say)
-    lines = list(_lines(found))
-    if arguments.output is not None:
-        write_page(make_folder(arguments.output), "link", _HEAD, lines)
-    if arguments.json:
-        print_json(found)
-        return 0
-    print("\n".join(lines))
-    return 0
 
 
 def _lines(found: Mapping[str, Any]) -> Iterator[str]:

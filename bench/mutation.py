@@ -25,11 +25,11 @@ from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryDirectory
 from time import monotonic
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+from bench.frame import Findings
 from bench.mutation_memory import Memory
 from bench.mutation_plugin import RECORD, SELECT
-from bench.mutation_survivors import why
 from bench.mutators import c_faults, python_faults
 from rig.commands.output import say
 from rig.errors import InputError
@@ -89,6 +89,14 @@ class Outcome(NamedTuple):
     tests: int
     seconds: float
 
+    def row(self) -> dict[str, object]:
+        """Return a line of the table."""
+        room, path, fault = self.mutant
+        return {
+            "room": room, "file": path, "line": fault.line, "old": fault.old, "new": fault.new,
+            "noticed_by": self.by, "tests": self.tests,
+        }  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True)
 class Reached:
@@ -135,36 +143,40 @@ def _within_a_function(path: str, line: int) -> range:
     return min((span for span in spans if line in span), key=len)
 
 
-def main(arguments: Namespace) -> int:
-    """Put faults in and print what was noticed; 1 when less than nine of ten were."""
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Put faults in and see what is noticed; it has failed when less than nine of ten were."""
     rooms = arguments.rooms or list(ROOMS)
     mutants = list(_sampled(rooms, arguments.mutants, arguments.seed, arguments.where))
     if arguments.list:
-        print("\n".join(map(str, mutants)))
-        return 0
+        yield Findings({"faults": [*map(str, mutants)]}, [*map(str, mutants)])
+        return
     copies: SimpleQueue[Path] = SimpleQueue()
     with TemporaryDirectory(prefix="rig-mutation-") as folder:
         for number in range(arguments.jobs):
             copies.put(_copied(Path(folder) / str(number)))
         reached = {room: _reached(room, copies) for room in rooms}
         outcomes = list(_tried(mutants, reached, copies, arguments.jobs, arguments.most))
-    if arguments.output:
-        _write(Path(arguments.output) / "mutation.csv", outcomes)
     if arguments.page:
         write_atomic(arguments.page, page(outcomes, arguments.seed))
     rows = [["room", "faults", "noticed", "share", "tests each", "s each"]]
-    for room in [*rooms, "all"]:
-        some = [one for one in outcomes if room in {"all", one.mutant.room}]
-        if some:
-            rows.append([room, *_counted(some)])
-    if arguments.json:
-        print(json.dumps([[*map(str, one)] for one in outcomes]))
-    else:
-        print("\n".join(text_table(rows, left={0}, rule=True)))
-    survived = [one for one in outcomes if not one.by]
-    for one in survived:
-        say(f"not noticed: {one.mutant}")
-    return int(len(survived) > (1.0 - LEAST_KILLED) * len(outcomes))
+    rows += [[room, *_counted(group)] for room, group in _by_room(outcomes)]
+    survived = [outcome for outcome in outcomes if not outcome.by]
+    for outcome in survived:
+        say(f"not noticed: {outcome.mutant}")
+    yield Findings(
+        {"outcomes": [[*map(str, outcome)] for outcome in outcomes]},
+        text_table(rows, left={0}, rule=True),
+        rows=[outcome.row() for outcome in outcomes],
+        failed=len(survived) > (1.0 - LEAST_KILLED) * len(outcomes),
+    )
+
+
+def _by_room(outcomes: list[Outcome]) -> Iterator[tuple[str, list[Outcome]]]:
+    """Yield the outcomes of each room, then all."""
+    for room in [*ROOMS, "all"]:
+        group = [outcome for outcome in outcomes if room in {"all", outcome.mutant.room}]
+        if group:
+            yield room, group
 
 
 def page(outcomes: list[Outcome], seed: int) -> str:
@@ -178,29 +190,30 @@ def page(outcomes: list[Outcome], seed: int) -> str:
         "| room | faults | noticed | |",
         "|---|---|---|---|",
     ]
-    for room in [*ROOMS, "all"]:
-        some = [one for one in outcomes if room in {"all", one.mutant.room}]
-        if some:
-            places = ", ".join(f"`{one}`" for one in ROOMS[room].sources) if room != "all" else room
-            count, noticed, share, *_ = _counted(some)
-            lines.append(f"| {places} | {count} | {noticed} | {share} |")
+    for room, group in _by_room(outcomes):
+        sources = ", ".join(f"`{one}`" for one in ROOMS[room].sources) if room != "all" else room
+        count, noticed, share, *_ = _counted(group)
+        lines.append(f"| {sources} | {count} | {noticed} | {share} |")
     lines += ["", "Not noticed:", "", "| fault | why it may stay |", "|---|---|"]
-    for one in outcomes:
-        if not one.by:
-            told = str(one.mutant).replace("|", "&#124;")
-            lines.append(f"| {told} | {why(one.mutant.path, one.mutant.fault)} |")
+    reasons = {(row["file"], row["old"], row["new"]): row["why"] for row in _survivors()}
+    for mutant in [outcome.mutant for outcome in outcomes if not outcome.by]:
+        words = str(mutant).replace("|", "&#124;")
+        why = reasons.get((mutant.path, mutant.fault.old, mutant.fault.new), "")
+        lines.append(f"| {words} | {why} |")
     return "\n".join([*lines, ""])
+
+
+def _survivors() -> list[dict[str, str]]:
+    """Read which faults no test can or need notice, and why."""
+    text = Path(__file__).with_name("mutation_survivors.csv").read_text("utf-8")
+    return [*csv.DictReader(text.splitlines())]
 
 
 def _counted(some: list[Outcome]) -> list[str]:
     noticed = sum(bool(one.by) for one in some)
     means = [sum(values) / len(some) for values in zip(*(one[2:] for one in some), strict=True)]
-    return [
-        str(len(some)),
-        str(noticed),
-        f"{noticed / len(some):.0%}",
-        *(f"{m:.0f}" for m in means),
-    ]
+    share = f"{noticed / len(some):.0%}"
+    return [str(len(some)), str(noticed), share, *(f"{mean:.0f}" for mean in means)]
 
 
 def _sampled(rooms: list[str], count: int, seed: int, where: str) -> Iterator[Mutant]:
@@ -356,23 +369,3 @@ def _noticed_by(code: int | None, told: str) -> str:
         return ""
     failed = [line for line in told.splitlines() if line.startswith(("FAILED ", "ERROR "))]
     return failed[0].split(" ")[1] if failed else "it ends the tests"
-
-
-def _write(path: Path, outcomes: list[Outcome]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table: Any = csv.writer(file)
-        table.writerow(["room", "file", "line", "old", "new", "noticed_by", "tests"])
-        for one in outcomes:
-            fault = one.mutant.fault
-            table.writerow(
-                [
-                    one.mutant.room,
-                    one.mutant.path,
-                    fault.line,
-                    fault.old,
-                    fault.new,
-                    one.by,
-                    one.tests,
-                ]
-            )

@@ -10,6 +10,7 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from bench.frame import Findings
 from rig.campaign.events import Stage
 from rig.campaign.machine import Flow
 from rig.files import make_folder, require_file
@@ -100,14 +101,14 @@ class FakeClient(ReconnectingClient):
         return
 
 
-def main(arguments: Namespace) -> int:
-    """Draw all pages of a session; print the files."""
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Draw all pages of a session; name the files."""
     session = Path(arguments.session)
     require_file(session)
     protocols = tuple(sorted(Path("protocols").glob("*.yaml")))
-    for path in draw(session, Path(arguments.output), read_keys(None), protocols):
-        print(path)
-    return 0
+    paths = draw(session, Path(arguments.output), read_keys(None), protocols)
+    files = [*map(str, paths)]
+    yield Findings({"files": files}, files)
 
 
 class Screenshot(NamedTuple):

@@ -209,3 +209,15 @@ class ProcessFixture:
                 return float(found[count - 1])
             time.sleep(0.005)
         raise TimeoutError(f"the board was not {count} times in phase {phase}")
+
+
+def processor_s(pid: int) -> float:
+    """Processor time a process has had, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory_bytes(process: Process | None, which: str = "VmHWM") -> int:
+    """Ask Linux for the most memory a process ever had resident, with ``VmRSS`` for that it has."""
+    text = Path(f"/proc/{process.pid if process else 'self'}/status").read_text("ascii")
+    return int(text.partition(f"{which}:")[2].split()[0]) * 1024

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import resource
 import time
 from itertools import pairwise
@@ -10,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from bench.frame import Findings
 from bench.process_fixture import FENCE
 from rig.recorder.controller import Controller
 from rig.replay import replay
@@ -19,21 +19,19 @@ from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Iterator
 
 _PLANNED = 1000
 """Runs of one plan; longer soaks take sessions one after another."""
 _HOUR_S = 3600.0
 
 
-def main(arguments: Namespace) -> int:
-    """Soak and print; 1 when anything is missing or altered."""
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Soak; it has failed when anything is missing or altered."""
     with TemporaryDirectory(prefix="rig-soak-") as place:
-        found = soaked(Path(place), arguments.runs, arguments.hours)
-    if arguments.json:
-        print(json.dumps(found))
-    else:
-        print("\n".join(text_table([[name, f"{value:g}"] for name, value in found.items()])))
-    return int(found["drops"] != arguments.runs or bool(found["faults"]))
+        counts = soaked(Path(place), arguments.runs, arguments.hours)
+    lines = text_table([[name, f"{value:g}"] for name, value in counts.items()])
+    yield Findings(counts, lines, failed=counts["drops"] != arguments.runs or counts["faults"] > 0)
 
 
 def soaked(folder: Path, runs: int, hours: float) -> dict[str, float]:

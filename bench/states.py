@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from pathlib import Path
@@ -11,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bench.frame import Findings
 from rig.commands.output import say
 from rig.text_table import text_table
 from tests.daemon import test_state_space
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Iterator
 
 _SPACE: Any = test_state_space  # tests have no types
 _STEPS = {
@@ -25,11 +26,12 @@ _STEPS = {
 }
 
 
-def main(arguments: Namespace) -> int:
-    """Go through all states and print how many there are; 1 when one of them ends badly."""
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Go through all states; it has failed when one of them ends badly."""
     logging.disable()  # what is told to users of all that goes wrong
     rows = [["", "steps", "ways", "states", "s"]]
-    for name, depth in zip(_STEPS, arguments.depths, strict=True):
+    failed = False
+    for (name, steps), depth in zip(_STEPS.items(), arguments.depths, strict=True):
         begun = time.monotonic()
         ways: list[object] = []
         with (
@@ -37,13 +39,11 @@ def main(arguments: Namespace) -> int:
             pytest.MonkeyPatch.context() as patch,
         ):
             try:
-                found = _SPACE.explored(
-                    _STEPS[name], depth, Path(place) / "rig", patch, told=ways.append
-                )
+                states = _SPACE.explored(steps, depth, Path(place) / "rig", patch, told=ways.append)
             except AssertionError as error:
                 say(str(error))
-                return 1
-        told = depth, len(ways), len(found), round(time.monotonic() - begun)
-        rows.append([name, *map(str, told)])
-    print(json.dumps(rows) if arguments.json else "\n".join(text_table(rows, left={0}, rule=True)))
-    return 0
+                failed = True
+                break
+        counts = depth, len(ways), len(states), round(time.monotonic() - begun)
+        rows.append([name, *map(str, counts)])
+    yield Findings({"states": rows}, text_table(rows, left={0}, rule=True), failed=failed)

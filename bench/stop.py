@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 import statistics
 import time
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.failing_disk import FailingDisk
+from bench.frame import Findings
 from bench.process_fixture import ProcessFixture
 from rig.commands.output import say
 from rig.daemon import rpc
@@ -25,7 +25,7 @@ from rig.session.store import Session
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
-    import argparse
+    from argparse import Namespace
     from collections.abc import Callable, Iterator
 
     from rig.daemon.client import Client
@@ -36,22 +36,19 @@ LIMIT_S = 0.05
 _FROZEN_S = 3.0
 
 
-def main(arguments: argparse.Namespace) -> int:
-    """Measure and print; 1 when any took longer than it may."""
-    found = {name: measured(held, arguments.stops) for name, held in CONDITIONS.items()}
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Measure each condition; a promise is broken when any took longer than it may."""
+    times = {name: measured(held, arguments.stops) for name, held in CONDITIONS.items()}
     try:
-        found["disk frozen"] = _measured_frozen(arguments.stops)
+        times["disk frozen"] = _measured_frozen(arguments.stops)
     except InputError as error:
         say(f"left out: a frozen disk ({error.message})")
-    if arguments.json:
-        print(json.dumps(found))
-    else:
-        rows = [["", "stops", "median ms", "p99 ms", "max ms"]]
-        for name, times in found.items():
-            numbers = statistics.median(times), np.quantile(times, 0.99), max(times)
-            rows.append([name, str(len(times)), *(f"{float(one) * 1e3:.2f}" for one in numbers)])
-        print("\n".join(text_table(rows, left={0}, rule=True)))
-    return int(any(max(times) > LIMIT_S for times in found.values()))
+    rows = [["", "stops", "median ms", "p99 ms", "max ms"]]
+    for name, values in times.items():
+        figures = statistics.median(values), float(np.quantile(values, 0.99)), max(values)
+        rows.append([name, str(len(values)), *(f"{seconds * 1e3:.2f}" for seconds in figures)])
+    late = any(max(values) > LIMIT_S for values in times.values())
+    yield Findings(times, text_table(rows, left={0}, rule=True), failed=late)
 
 
 def measured(

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from bench.invariants import broken, longest_on
+
+if TYPE_CHECKING:
+    from bench.process_fixture import ProcessFixture, Seen
 
 
 @dataclass(slots=True)
@@ -54,6 +59,16 @@ class FaultTally:
         self.full_disk = self.full_disk or other.full_disk
         self.fell_upon += other.fell_upon
         self.broken += other.broken
+
+    def add_session(self, processes: ProcessFixture) -> list[Seen]:
+        """Count a finished session and every promise not kept in it; return the board's log."""
+        happened = list(processes.happened())
+        self.broken += broken(processes.session, happened, processes.runs)
+        self.longest_on_s = max(self.longest_on_s, longest_on(happened))
+        self.sessions += 1
+        self.runs += processes.runs
+        self.drops += len({seen["drop"]["label"] for seen in happened if "drop" in seen})
+        return happened
 
     def json(self) -> dict[str, Any]:
         """Counts by name."""

@@ -23,11 +23,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self
 
-from bench.link import cpu_s
-from rig.commands.output import print_json, say, write_page
+from bench.frame import Findings
+from bench.process_fixture import processor_s
+from rig.commands.output import say
 from rig.daemon.client import Client
 from rig.daemon.server import Server
-from rig.files import make_folder
 from rig.link.messages import Fired
 from rig.link.transcript import Received
 from rig.recorder.feed import StateFeed
@@ -37,7 +37,7 @@ from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
 _HEAD = """\
 # Speed of the terminal
@@ -110,7 +110,7 @@ class Terminal:
         while time.monotonic() < end:
             for at, data in list(self.written):
                 if text in data:
-                    return {"wall_s": at - self.begun, "cpu_s": cpu_s(self.process.pid)}
+                    return {"wall_s": at - self.begun, "cpu_s": processor_s(self.process.pid)}
             time.sleep(0.01)
         raise TimeoutError(f"{text!r} does not appear on the screen")
 
@@ -123,35 +123,33 @@ class Terminal:
                     return  # it has left
 
 
-def tui(protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
+def tui(protocol: str) -> dict[str, Any]:
     """Measure the first paint, a quiet screen, one with `RATE` edges a second, and a long session.
 
     Parameters
     ----------
     protocol
         File with the scene.
-    say
-        Narration.
     """
     with TemporaryDirectory(prefix="rig-") as folder:
         path = str(Path(protocol).resolve())
-        found = asyncio.run(_measure(Path(folder), path, say))
-        return found | _opened(Path(folder), path, say)
+        found = asyncio.run(_measure(Path(folder), path))
+        return found | _opened(Path(folder), path)
 
 
-async def _measure(folder: Path, protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
+async def _measure(folder: Path, protocol: str) -> dict[str, Any]:
     loop = asyncio.get_running_loop()
     server, ready = Server("sim://", folder / "door" / "rig.sock"), asyncio.Event()
     serving = loop.create_task(server.run(ready.set))
     await ready.wait()
     try:
-        return await loop.run_in_executor(None, _in_terminal, folder, protocol, server, say)
+        return await loop.run_in_executor(None, _in_terminal, folder, protocol, server)
     finally:
         server.end()
         await serving
 
 
-def _opened(folder: Path, protocol: str, say: Callable[[str], None]) -> dict[str, Any]:
+def _opened(folder: Path, protocol: str) -> dict[str, Any]:
     say("a whole session of the protocol …")
     session = folder / "whole.session"
     subprocess.run(
@@ -165,9 +163,7 @@ def _opened(folder: Path, protocol: str, say: Callable[[str], None]) -> dict[str
         return {"opened": {"runs": drops, **terminal.until(_RESULTS)}}
 
 
-def _in_terminal(
-    folder: Path, protocol: str, server: Server, say: Callable[[str], None]
-) -> dict[str, Any]:
+def _in_terminal(folder: Path, protocol: str, server: Server) -> dict[str, Any]:
     client = Client(server.path, "bench")
     client.take_control()
     client.open_session(protocol, str(folder / "bench.session"))
@@ -196,9 +192,9 @@ def _in_terminal(
 
 def _share(terminal: Terminal, work: Callable[[], object]) -> float:
     """Processor time of the screen's process over time gone by."""
-    before, begun = cpu_s(terminal.process.pid), time.monotonic()
+    before, begun = processor_s(terminal.process.pid), time.monotonic()
     work()
-    return (cpu_s(terminal.process.pid) - before) / (time.monotonic() - begun)
+    return (processor_s(terminal.process.pid) - before) / (time.monotonic() - begun)
 
 
 def _feed(server: Server, sent: list[tuple[float, int]]) -> None:
@@ -235,17 +231,10 @@ def _lateness(
     }
 
 
-def main(arguments: Namespace) -> int:
+def run(arguments: Namespace) -> Iterator[Findings]:
     """Measure what the screen costs."""
-    found = tui(arguments.protocol, say)
-    if arguments.json:
-        print_json(found)
-        return 0
-    lines = text_table(_rows(found), left={0, 1})
-    print("\n".join(lines))
-    if arguments.output is not None:
-        write_page(make_folder(arguments.output), "terminal", _HEAD, lines)
-    return 0
+    figures = tui(arguments.protocol)
+    yield Findings(figures, text_table(_rows(figures), left={0, 1}), _HEAD, name="terminal")
 
 
 def _rows(found: dict[str, Any]) -> list[list[str]]:

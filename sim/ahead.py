@@ -28,7 +28,7 @@ class Ahead(Generic[Made]):
     def __init__(self, make: Callable[[int], Made]) -> None:
         self._make = make
         self._lock = Lock()
-        self._found: dict[int, Future[Made]] = {}
+        self._futures: dict[int, Future[Made]] = {}
         self._waiting: OrderedDict[int, Future[Made]] = OrderedDict()
         self._threads = 0
 
@@ -36,22 +36,22 @@ class Ahead(Generic[Made]):
         """Begin to make things, in this order; do not wait for them."""
         with self._lock:
             for label in labels:
-                if label not in self._found:
-                    self._found[label] = self._waiting[label] = Future()
-            more = min(os.cpu_count() or 1, len(self._waiting)) - self._threads
-            self._threads += max(0, more)
-        for _ in range(more):
+                if label not in self._futures:
+                    self._futures[label] = self._waiting[label] = Future()
+            threads = min(os.cpu_count() or 1, len(self._waiting)) - self._threads
+            self._threads += max(0, threads)
+        for _ in range(threads):
             Thread(target=self._work, daemon=True).start()
 
     def get(self, label: int) -> Made:
         """Wait for a thing; one that no thread has begun is made here and now."""
         with self._lock:
-            new = label not in self._found
-            found = self._found.setdefault(label, Future())
-            mine = self._waiting.pop(label, None) is not None or new
-        if mine:
-            self._fill(found, label)
-        return found.result()
+            new = label not in self._futures
+            future = self._futures.setdefault(label, Future())
+            unclaimed = self._waiting.pop(label, None) is not None or new
+        if unclaimed:
+            self._fill(future, label)
+        return future.result()
 
     def _work(self) -> None:
         while True:
@@ -59,11 +59,11 @@ class Ahead(Generic[Made]):
                 if not self._waiting:
                     self._threads -= 1
                     return
-                label, found = self._waiting.popitem(last=False)
-            self._fill(found, label)
+                label, future = self._waiting.popitem(last=False)
+            self._fill(future, label)
 
-    def _fill(self, found: Future[Made], label: int) -> None:
+    def _fill(self, future: Future[Made], label: int) -> None:
         try:
-            found.set_result(self._make(label))
+            future.set_result(self._make(label))
         except Exception as error:  # whoever asks for it gets it
-            found.set_exception(error)
+            future.set_exception(error)

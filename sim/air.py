@@ -25,11 +25,11 @@ def air(protocol: Protocol, drag: float) -> dict[str, list[float]]:
     if stated is not None and stated.terminal_speed is not None:
         kappa = protocol.gravity.value / stated.terminal_speed.value**2 + drag
         return {name: [kappa] * rods.chain.rods for name, rods in protocol.chains.items()}
-    known = all(rods.diameters and min(rods.diameters) > 0.0 for rods in chains)
-    sized = known and not any(math.isnan(rods.rod_length) for rods in chains)
+    sizes_known = all(rods.diameters and min(rods.diameters) > 0.0 for rods in chains)
+    sized = sizes_known and not any(math.isnan(rods.rod_length) for rods in chains)
     weighed = sized and all(rods.weighed for rods in chains)
     per_mass = {
-        name: _legs(rods, known=known, sized=sized, weighed=weighed)
+        name: _legs(rods, sizes_known=sizes_known, sized=sized, weighed=weighed)
         for name, rods in protocol.chains.items()
     }
     factor = drag / next(iter(per_mass.values()))[0]
@@ -53,15 +53,15 @@ def stated_air(protocol: Protocol, rods: RodChain) -> list[float]:
     ]
 
 
-def _legs(rods: RodChain, *, known: bool, sized: bool, weighed: bool) -> list[float]:
+def _legs(rods: RodChain, *, sizes_known: bool, sized: bool, weighed: bool) -> list[float]:
     """Drag over mass of what falls on each leg, for C ρ = 1."""
-    if not known:
+    if not sizes_known:
         return [1.0] * rods.chain.rods
     length = rods.rod_length if sized else 1.0
     drags = [cylinder_drag(1.0, 1.0, d, length, rods.tilt_deg) for d in rods.diameters]
     if weighed:
         return leg_drags(rods.chain, drags)
     # Of one material: as heavy as they are large.
-    left = [sum(drags[k:]) for k in range(len(drags))]
+    falling = [sum(drags[k:]) for k in range(len(drags))]
     heavy = [sum(d * d * length for d in rods.diameters[k:]) for k in range(len(drags))]
-    return [one / other for one, other in zip(left, heavy, strict=True)]
+    return [drag_left / mass_left for drag_left, mass_left in zip(falling, heavy, strict=True)]

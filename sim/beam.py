@@ -51,12 +51,12 @@ def union(shadows: Iterable[Shadow]) -> list[tuple[Shadow, int]]:
 
 def string_shadows(rods: Sequence[Shadow], chance: float, rng: np.random.Generator) -> list[Shadow]:
     """Flickers of the string in some of the gaps between rods, which come in order of time."""
-    found: list[Shadow] = []
+    shadows: list[Shadow] = []
     for before, after in itertools.pairwise(rods):
         if rng.random() < chance and before.end < after.start:
             at = float(rng.uniform(before.end, after.start))
-            found.append(Shadow(at, at + float(rng.uniform(30e-6, 200e-6)), NOT_A_ROD))
-    return found
+            shadows.append(Shadow(at, at + float(rng.uniform(30e-6, 200e-6)), NOT_A_ROD))
+    return shadows
 
 
 def receive(

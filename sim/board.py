@@ -209,28 +209,28 @@ class VirtualBoard:
         """Find what happens next. Sending is polled: meanwhile only interrupts happen."""
         if self._boot_ns is not None:
             return self._boot_ns, self._boot
-        found: list[tuple[int, Callable[[], None]]] = []
+        upcoming: list[tuple[int, Callable[[], None]]] = []
         free_ns = self.line.free_ns
         state = self._controller
         if self._inputs.stop_turns_ns is not None:
-            found.append((self._inputs.stop_turns_ns, self._stop_turns))
+            upcoming.append((self._inputs.stop_turns_ns, self._stop_turns))
         if self._inputs.pulses_ns:
-            found.append((self._inputs.pulses_ns[0], self._reference_pulse))
+            upcoming.append((self._inputs.pulses_ns[0], self._reference_pulse))
         if state.coming:
-            found.append((state.coming[0].when_ns, self._gate_changes))
+            upcoming.append((state.coming[0].when_ns, self._gate_changes))
         if state.sense_ns is not None:
-            found.append((state.sense_ns, self._sense))
+            upcoming.append((state.sense_ns, self._sense))
         if state.end_ns is not None:
-            found.append((max(state.end_ns, free_ns), self._close))
+            upcoming.append((max(state.end_ns, free_ns), self._close))
             if state.drop is not None and state.drop.unsent:
                 full = state.drop.unsent >= _BATCH
                 due_ns = self._now_ns if full else self._oldest_ns + _OLDEST_NS
-                found.append((max(due_ns, free_ns), self._stream))
+                upcoming.append((max(due_ns, free_ns), self._stream))
         if state.order is not None:
-            found.append((max(state.lapses_ns, free_ns), self._lapse))
+            upcoming.append((max(state.lapses_ns, free_ns), self._lapse))
         if self._inbox:
-            found.append((max(self._inbox[0][0] + _EXECUTION_NS, free_ns), self._listen))
-        return min(found, key=lambda item: item[0]) if found else None
+            upcoming.append((max(self._inbox[0][0] + _EXECUTION_NS, free_ns), self._listen))
+        return min(upcoming, key=lambda item: item[0]) if upcoming else None
 
     def _boot(self) -> None:
         self._boot_ns = None

@@ -245,11 +245,7 @@ class Microcontroller:
         hz = self._counter.hz(self._now_ns)
         snapshots = take_snapshots(changes, 0, order.gates, hz)
         self.coming.extend(
-            Coming(
-                self._now_ns + round(s.ticks / hz * 1e9),
-                (tick + s.ticks) % 2**32,
-                s.state,
-            )
+            Coming(self._now_ns + round(s.ticks / hz * 1e9), (tick + s.ticks) % 2**32, s.state)
             for s in snapshots
         )
         self.drop = Recording(order, tick, self._identity)

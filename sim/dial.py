@@ -43,9 +43,9 @@ def dial(
     return field(default=default, metadata={"range": (dimension, low, high), **traits})
 
 
-def silenced(kind: Any) -> dict[str, float]:
+def silent_values(kind: Any) -> dict[str, float]:
     """Return what a quiet rig sets to zero."""
-    return {one.name: 0.0 for one in fields(kind) if not one.metadata.get("kept")}
+    return {spec.name: 0.0 for spec in fields(kind) if not spec.metadata.get("kept")}
 
 
 def read_values(kind: Any, settings: Mapping[str, str], scheme: str) -> dict[str, float]:
@@ -57,16 +57,16 @@ def read_values(kind: Any, settings: Mapping[str, str], scheme: str) -> dict[str
         A value that is not a quantity of its dimension, or out of range.
     """
     values: dict[str, float] = {}
-    for one in fields(kind):
-        if one.name not in settings:
+    for spec in fields(kind):
+        if spec.name not in settings:
             continue
-        text, (dimension, low, high) = settings[one.name], one.metadata["range"]
-        where = f"{scheme}://: {one.name}"
+        text, (dimension, low, high) = settings[spec.name], spec.metadata["range"]
+        where = f"{scheme}://: {spec.name}"
         try:
             value = parse(text, dimension).value
         except UnitError as error:
             raise InputError(f"{where}: {error}") from None
-        if one.metadata.get("switch") and value not in {0.0, 1.0}:
+        if spec.metadata.get("switch") and value not in {0.0, 1.0}:
             raise InputError(f"{where}: {text} is neither 0 nor 1")
         if not low <= value <= high:
             accepted = f"{low:g} to {high:g}" if high < math.inf else f"{low:g} or more"
@@ -74,5 +74,5 @@ def read_values(kind: Any, settings: Mapping[str, str], scheme: str) -> dict[str
                 f"{where}: {text} is outside of what is accepted",
                 accepted + _UNITS.get(dimension, ""),
             )
-        values[one.name] = value
+        values[spec.name] = value
     return values

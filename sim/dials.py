@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rig.errors import InputError
 from rig.units import Dimension
 
-from .dial import dial, read_values, silenced
+from .dial import dial, read_values, silent_values
 from .resolved_dials import NAMES as RESOLVED
 
 if TYPE_CHECKING:
@@ -127,13 +127,13 @@ class Dials:
     @classmethod
     def quiet(cls) -> Dials:
         """All disturbances off: the model itself, on a perfect rig."""
-        return cls(**silenced(cls))
+        return cls(**silent_values(cls))
 
     @classmethod
     def stated(cls) -> Dials:
         """A rig that is off by as much as its protocol says, wherever it says it."""
-        said = {one.name: math.nan for one in fields(cls) if one.metadata.get("stated")}
-        return cls(**said, drop_error=1.0, impact_error=1.0)
+        sizes = {spec.name: math.nan for spec in fields(cls) if spec.metadata.get("stated")}
+        return cls(**sizes, drop_error=1.0, impact_error=1.0)
 
     def on(self, protocol: Protocol, share: Callable[[str], float] = lambda _: 1.0) -> Dials:
         """Take what is not-a-number from a protocol, but for what differs from chain to chain.
@@ -144,7 +144,7 @@ class Dials:
             How large each size really is of what is stated where nobody has measured it.
         """
         gates, priors, contact = protocol.gates, protocol.priors, protocol.contact
-        said = {
+        sizes = {
             "hang_sd": priors.hang * share("hang"),
             "side_sd": priors.side * share("side"),
             "gate_sd": gates.height_u if gates else 0.0,
@@ -154,14 +154,16 @@ class Dials:
             "strike_sd": contact.strike.u * share("strike"),
             "jitter_sd": priors.jitter,
         }
-        return replace(self, **{name: known(getattr(self, name), u) for name, u in said.items()})
+        return replace(
+            self, **{name: or_stated(getattr(self, name), u) for name, u in sizes.items()}
+        )
 
 
 _NAMES = tuple(field.name for field in fields(Dials))
 _OF_THE_URL = ("dynamics", "pace", "seed", "series", "truth")  # no disturbances, read by the scene
 
 
-def known(dial: float, stated: float) -> float:
+def or_stated(dial: float, stated: float) -> float:
     """Return a dial, or what is stated where it is not-a-number."""
     return stated if math.isnan(dial) else dial
 

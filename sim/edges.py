@@ -59,14 +59,14 @@ def falls(asked: Iterable[Request], choose: Choose = choose_world) -> Iterator[s
         hang, settings = choose(settings)
         dials = read_dials(settings)
         for seed, numbers in zip(seeds, runs, strict=True):
-            told: list[Truth] = []
-            lab = hang(protocol, dials, seed, told.append)
+            truths: list[Truth] = []
+            lab = hang(protocol, dials, seed, truths.append)
             lab.filmed = filmed
             labels = [pack_label(number, 1) for number in numbers]
             lab.make_ahead(labels)
             for label in labels:
                 edges = lab.drop(label)
-                yield json.dumps({"seed": seed, "edges": edges, "truth": asdict(told.pop())})
+                yield json.dumps({"seed": seed, "edges": edges, "truth": asdict(truths.pop())})
 
 
 def main(choose: Choose = choose_world) -> None:

@@ -16,9 +16,9 @@ KEPT = 2000
 """Files at most, of some 0.1 MB each; the oldest go."""
 
 
-def key(*what: object) -> str:
+def key(*causes: object) -> str:
     """Name a fall by all that it follows from, the code of its world included."""
-    return hashlib.sha256(repr((_code(), *what)).encode()).hexdigest()[:32]
+    return hashlib.sha256(repr((_code(), *causes)).encode()).hexdigest()[:32]
 
 
 @cache
@@ -50,12 +50,12 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def save(name: str, what: Any) -> None:
+def save(name: str, drop: Any) -> None:
     """Keep a fall, where that is possible: a full or forbidden disk only costs time later."""
     with suppress(OSError):
         place = folder()
         place.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(what)
+        text = json.dumps(drop)
         beside = place / f"{name}.{os.getpid()}.new"
         try:
             beside.write_text(f"{_digest(text)}\n{text}", encoding="utf-8")
@@ -63,6 +63,6 @@ def save(name: str, what: Any) -> None:
         except OSError:  # what a full disk took of it must not stay
             beside.unlink(missing_ok=True)
             raise
-        kept = sorted(place.glob("*.json"), key=lambda one: one.stat().st_mtime)
-        for old in kept[:-KEPT]:
+        files = sorted(place.glob("*.json"), key=lambda file: file.stat().st_mtime)
+        for old in files[:-KEPT]:
             old.unlink(missing_ok=True)

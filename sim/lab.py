@@ -25,7 +25,7 @@ from rig.units import Quantity
 from .air import air
 from .beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
 from .camera import camera_reading
-from .dials import known
+from .dials import or_stated
 from .path import Path
 from .truth import Truth
 
@@ -137,9 +137,9 @@ class ChainLab:
         if stated is None:
             return None
 
-        def draw(what: str, of: Quantity, dial: float) -> Quantity:
-            off = dials.impact_error * of.u * float(self._rng(what).normal())
-            return Quantity(known(dial, of.value + off))
+        def draw(subject: str, of: Quantity, dial: float) -> Quantity:
+            off = dials.impact_error * of.u * float(self._rng(subject).normal())
+            return Quantity(or_stated(dial, of.value + off))
 
         pile = stated.pile
         if pile is not None:
@@ -162,23 +162,23 @@ class ChainLab:
         """Draw how large something is of what is guessed: to a quarter of that, see `GUESSED`."""
         return math.sqrt(GUESSED / self._rng("size", name).chisquare(GUESSED))
 
-    def _rng(self, *what: object) -> np.random.Generator:
+    def _rng(self, *subject: object) -> np.random.Generator:
         """Give each thing that is drawn a stream of its own."""
-        digest = hashlib.sha256(repr((self.seed, *what)).encode()).digest()
+        digest = hashlib.sha256(repr((self.seed, *subject)).encode()).digest()
         return np.random.default_rng(int.from_bytes(digest[:16], "little"))
 
-    def _drop_rng(self, what: str, run: Run, attempt: int, *side: Side) -> np.random.Generator:
+    def _drop_rng(self, subject: str, run: Run, attempt: int, *side: Side) -> np.random.Generator:
         """Give what is drawn anew in each drop a stream of its own."""
         series = (self.series,) if self.series else ()
-        return self._rng(what, *side, run.number, attempt, *series)
+        return self._rng(subject, *side, run.number, attempt, *series)
 
     def _body(self, spec: RodChain) -> Body:
         rng = self._rng("chain", spec.name)
         places = np.array(spec.chain.heights)
         return Body(
             spec,
-            places + known(self.dials.rod_sd, spec.position_u) * rng.normal(size=places.size),
-            np.array(spec.widths) + known(self.dials.width_sd, spec.width_u) * rng.normal(),
+            places + or_stated(self.dials.rod_sd, spec.position_u) * rng.normal(size=places.size),
+            np.array(spec.widths) + or_stated(self.dials.width_sd, spec.width_u) * rng.normal(),
         )
 
     def _run(self, label: int) -> tuple[Run, int]:
@@ -344,8 +344,8 @@ class ChainLab:
         late, truth.speed_strike_m_s = path.last_at(above)
         if "free" not in paths:
             return truth
-        other, fallen = paths["free"]
-        top = float(other.offsets[-1])
+        free_body, fallen = paths["free"]
+        top = float(free_body.offsets[-1])
         skew = fallen.release_s - path.release_s
         truth.release_skew_s = skew
         truth.separation_raw_m = fallen.height_at(hit_s) + top

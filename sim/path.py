@@ -47,11 +47,8 @@ class Path:
         """When the reference point comes down to `height`, s."""
         # hit_heights falls, so its negative rises and can be searched.
         done = bisect_left(self.hit_heights, -height, key=lambda z: -z)
-        time, top, speed = self.release_s, self.start, 0.0
-        if done:
-            hit = self.hits[done - 1]
-            time += hit.time_s
-            top, speed = self.hit_heights[done - 1], hit.speed_after
+        begun, top, speed = self._leg(done)
+        time = self.release_s + begun
         distance = top - height
         if distance <= 0.0:
             return time
@@ -66,11 +63,8 @@ class Path:
         if since <= 0.0:
             return self.start
         done = bisect_left(self.hits, since, key=lambda hit: hit.time_s)
-        top, speed = self.start, 0.0
-        if done:
-            hit = self.hits[done - 1]
-            since -= hit.time_s
-            top, speed = self.hit_heights[done - 1], hit.speed_after
+        begun, top, speed = self._leg(done)
+        since -= begun
         if self.kappas:
             return top - fallen(since, self.gravity, self._kappa(done), speed)
         return top - (speed + 0.5 * self.gravity * since) * since
@@ -88,10 +82,17 @@ class Path:
         # g − κv² falls by e^(−2κd) on the way down d.
         pull = self.gravity - kappa * speed**2
         rise = math.expm1(2.0 * kappa * above) / kappa if kappa else 2.0 * above
-        there = math.sqrt(max(0.0, speed**2 - pull * rise))
-        start = there if above > 0.0 else speed
+        passing = math.sqrt(max(0.0, speed**2 - pull * rise))
+        start = passing if above > 0.0 else speed
         _, late = drag_leg(abs(above), start, self.gravity, kappa)
-        return math.copysign(late, -above), there
+        return math.copysign(late, -above), passing
+
+    def _leg(self, done: int) -> tuple[float, float, float]:
+        """After so many hits: when since the release, from where and how fast it falls on."""
+        if not done:
+            return 0.0, self.start, 0.0
+        hit = self.hits[done - 1]
+        return hit.time_s, self.hit_heights[done - 1], hit.speed_after
 
     def _kappa(self, done: int) -> float:
         return self.kappas[min(done, len(self.kappas) - 1)]

@@ -24,7 +24,7 @@ class Serial(SimulatedSerial):
         """Hang the chains of the protocol that the URL names."""
         scene = set_scene("sim", read_settings(str(self.port)))
         self.clock = VirtualClock(scene.pace)
-        self.disturb(scene.seed, **scene.line())
+        scene.disturb(self)
         dials = scene.dials
         board = VirtualBoard(
             scene.lab,

@@ -18,8 +18,9 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
+from rig.errors import RigError
 from rig.link.messages import Phase
 
 from .board import VirtualBoard
@@ -72,11 +73,11 @@ class GlassVirtualBoard(VirtualBoard):
         """Tell what it keeps."""
         drop = self._controller.drop
         assert drop is not None
-        found: list[tuple[int, int]] = []
-        while part := drop.part(len(found), 40).events:
-            found += [(event.tick, event.state) for event in part]
+        events: list[tuple[int, int]] = []
+        while part := drop.part(len(events), 40).events:
+            events += [(event.tick, event.state) for event in part]
         certificate = drop.certificate()
-        return {name: getattr(certificate, name) for name in HELD}, found
+        return {name: getattr(certificate, name) for name in HELD}, events
 
 
 class Bench:
@@ -87,9 +88,9 @@ class Bench:
     board
         Its time begins now.
     link
-        Symbolic link to the terminal.
+        Symbolic link to the terminal; none by default, it has a path of the kernel's.
     log
-        File for what happens.
+        File for what happens, if any.
     line
         What happens to bytes on their way.
     resets
@@ -97,11 +98,17 @@ class Bench:
     """
 
     def __init__(
-        self, board: GlassBoard, link: Path, log: Path, line: BadLine, *, resets: bool = False
+        self,
+        board: GlassBoard,
+        link: Path | None,
+        log: Path | None,
+        line: BadLine,
+        *,
+        resets: bool = False,
     ) -> None:
         self.board = board
-        self._terminal = Terminal(link, held=not resets)
-        self._log = log.open("a", encoding="utf-8", buffering=1)
+        self.terminal = Terminal(link, held=not resets)
+        self._log = None if log is None else log.open("a", encoding="utf-8", buffering=1)
         self._line = line
         self._resets = resets
         self._deaf_until_ns = 0
@@ -117,23 +124,24 @@ class Bench:
         self.board.reset(0)
         words = b""
         while True:
-            if self._terminal.wait(_TICK_S, sys.stdin.fileno()):
-                more = os.read(sys.stdin.fileno(), _CHUNK)
-                if not more:
+            if self.terminal.wait(_TICK_S, sys.stdin.fileno()):
+                typed = os.read(sys.stdin.fileno(), _CHUNK)
+                if not typed:
                     return
-                *lines, words = (words + more).split(b"\n")
+                *lines, words = (words + typed).split(b"\n")
                 for line in lines:
                     self._obey(line.decode().split())
-            if not self._terminal.is_in and time.monotonic() >= self._plug_at:
-                self._terminal.plug()
+            if not self.terminal.is_in and time.monotonic() >= self._plug_at:
+                self.terminal.plug()
             begun_s = time.monotonic()
             self._pass_bytes()
             self._note(begun_s)
 
     def close(self) -> None:
         """Hang up."""
-        self._terminal.pull()
-        self._log.close()
+        self.terminal.pull()
+        if self._log is not None:
+            self._log.close()
 
     def _obey(self, words: list[str]) -> None:
         match words:
@@ -142,10 +150,10 @@ class Bench:
             case ["brownout"]:
                 self.board.brown_out(self._now_ns())
             case ["pull", seconds, *elsewhere]:
-                self._terminal.pull()
+                self.terminal.pull()
                 self._plug_at = time.monotonic() + float(seconds)
                 if elsewhere:
-                    self._terminal.link = Path(*elsewhere)
+                    self.terminal.link = Path(*elsewhere)
             case ["mute", when]:
                 self._mute = when
             case ["block", mask]:
@@ -160,35 +168,36 @@ class Bench:
 
     def _pass_bytes(self) -> None:
         now_ns = self._now_ns()
-        if self._terminal.look() and self._resets:
+        if self.terminal.look() and self._resets:
             self.board.reset(now_ns)
             self._deaf_until_ns = now_ns + round(DEAF_S * 1e9)
-        sent, heard = self._line.passed(self.board.line.arrived(now_ns), self._terminal.read())
-        falling = self.board.phase() == Phase.RECORDING
-        if self._mute == "1" or (self._mute == "fall" and falling):
-            sent = b""
+        sent, heard = self._line.passed(self.board.line.arrived(now_ns), self.terminal.read())
+        match self._mute:
+            case "1":
+                sent = b""
+            case "fall" if self.board.phase() == Phase.RECORDING:
+                sent = b""
         if now_ns >= self._deaf_until_ns:
             self.board.receive(now_ns, heard)
-        self._terminal.write(sent)
+        self.terminal.write(sent)
 
     def _note(self, begun_s: float) -> None:
         # The board's time stood between the two: a busy machine may let long pass in between.
         before_s, now_s, self._looked_s = self._looked_s, time.monotonic(), begun_s
         self._gap_s = max(self._gap_s, now_s - before_s)
+        if self._log is None:
+            return
         seen = (int(self.board.phase()), self.board.outputs())
         if seen == self._seen:
             return
         # A recording may begin and be aborted between two looks; a reset shows the drop again.
         if seen[0] == Phase.HOLDING != self._seen[0]:
             drop, events = self.board.held()
-            self._write({"drop": drop, "events": events})
+            self._log.write(json.dumps({"drop": drop, "events": events}) + "\n")
         self._seen = seen
         when = {"at_s": now_s, "after_s": before_s, "gap_s": self._gap_s}
-        self._write(when | {"phase": seen[0], "outputs": seen[1]})
+        self._log.write(json.dumps(when | {"phase": seen[0], "outputs": seen[1]}) + "\n")
         self._gap_s = 0.0
-
-    def _write(self, what: dict[str, Any]) -> None:
-        self._log.write(json.dumps(what) + "\n")
 
 
 def virtual(scene: Scene) -> GlassBoard:
@@ -218,8 +227,8 @@ def main(
     parser = argparse.ArgumentParser(prog=f"python -m {__package__}.pty", description=__doc__)
     parser.add_argument("--protocol", required=True, help="the scene whose chains fall")
     parser.add_argument("--seed", default="0")
-    parser.add_argument("--link", type=Path, required=True, help="symbolic link to the terminal")
-    parser.add_argument("--log", type=Path, required=True, help="file for what happens")
+    parser.add_argument("--link", type=Path, help="also make this symbolic link to the terminal")
+    parser.add_argument("--log", type=Path, help="file for what happens")
     parser.add_argument(
         "--resets", action="store_true", help="restart the board whenever its terminal is opened"
     )
@@ -227,22 +236,35 @@ def main(
         "--busy", type=float, default=0.0, metavar="SHARE", help="of all bytes, changed where both "
         "directions are under way at once: from 230,400 baud on some USB chips do that",
     )  # fmt: skip
-    parser.add_argument("dial", nargs="*", metavar="NAME=VALUE", help="as in a sim:// URL")
+    parser.add_argument(
+        "dial", nargs="*", type=_dial, metavar="NAME=VALUE", help="as in a sim:// URL"
+    )
     options = parser.parse_args(arguments)
-    dials = dict(text.split("=", 1) for text in options.dial)
-    scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
-    scene.get_ready()
-    dialled = scene.line()
-    line = BadLine(dialled["corrupt"], dialled["lose"], options.busy, seed=scene.seed)
-    bench = Bench(make(scene), options.link, options.log, line, resets=options.resets)
+    dials = dict(options.dial)
     try:
-        print(options.link, flush=True)
+        scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
+        scene.get_ready()
+        board = make(scene)
+    except RigError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+    line = BadLine(scene.dials.corrupt, scene.dials.lose, options.busy, seed=scene.seed)
+    bench = Bench(board, options.link, options.log, line, resets=options.resets)
+    try:
+        print(bench.terminal.path, flush=True)
         bench.serve()
     except KeyboardInterrupt:
         pass
     finally:
         bench.close()
     return 0
+
+
+def _dial(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE")
+    return name, value
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def shadows(fall: Fall, height: float, aside: float, widths: Numbers, reach: flo
     # Above zero in the light: the rod passes above or below, or does not reach so far.
     light = np.maximum(np.abs(middle) - half, np.abs(away) - reach)
     dark = light < 0.0
-    found: list[Shadow] = []
+    seen: list[Shadow] = []
     for rod in np.flatnonzero(dark.any(axis=0)):
         turns = np.flatnonzero(np.diff(dark[:, rod]))
         before, after = light[turns, rod], light[turns + 1, rod]
@@ -41,8 +41,8 @@ def shadows(fall: Fall, height: float, aside: float, widths: Numbers, reach: flo
         moments = [*times.tolist(), fall.times[-1]] if dark[-1, rod] else times.tolist()
         if dark[0, rod]:
             moments = moments[1:]
-        found += [
+        seen += [
             Shadow(start, end, int(rod))
             for start, end in zip(moments[::2], moments[1::2], strict=True)
         ]
-    return sorted(found)
+    return sorted(seen)

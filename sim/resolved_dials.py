@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from rig.units import Dimension
 
-from .dial import dial, read_values, silenced
+from .dial import dial, read_values, silent_values
 from .resolved.contact_law import DEADEST
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class ResolvedDials:
     spin_sd: float = dial(0.0, Dimension.TURNING, high=100.0)
 
 
-NAMES = tuple(one.name for one in fields(ResolvedDials))
+NAMES = tuple(spec.name for spec in fields(ResolvedDials))
 
 
 def read_resolved_dials(settings: Mapping[str, str], scheme: str = "sim") -> ResolvedDials:
@@ -87,5 +87,5 @@ def read_resolved_dials(settings: Mapping[str, str], scheme: str = "sim") -> Res
     InputError
         A value that is not a quantity of its dimension, or out of range.
     """
-    quiet = silenced(ResolvedDials) if settings.get("quiet") == "1" else {}
+    quiet = silent_values(ResolvedDials) if settings.get("quiet") == "1" else {}
     return ResolvedDials(**quiet | read_values(ResolvedDials, settings, scheme))

@@ -126,8 +126,8 @@ class ResolvedLab(ChainLab):
         kinds = {
             (run.incline_deg, run.impact, run.free): number for number, run in self.runs.items()
         }
-        some = [self._checked(pack_label(number, 1)) for number in kinds.values()]
-        longest = max(sum(map(processor_time, chains.values())) for chains in some)
+        chains_by_run = [self._hang_safely(pack_label(number, 1)) for number in kinds.values()]
+        longest = max(sum(map(processor_time, chains.values())) for chains in chains_by_run)
         if longest > TOLD_S:
             log.warning(_SLOW if is_compiled() else _NOT_COMPILED, longest)
 
@@ -149,40 +149,40 @@ class ResolvedLab(ChainLab):
         """Let go: every edge in order of time, as (seconds after fire, channel, blocked)."""
         if is_test(label):
             return []
-        made = self._ahead.get(label)
+        parts = self._ahead.get(label)
         run, attempt = self._run(label)
         hung = self._hung(run, attempt)
         rng = hung.rng
         edges: list[SeenEdge] = []
         for gate in self.gates:
-            if str(gate.channel) not in made["shadows"]:
+            if str(gate.channel) not in parts["shadows"]:
                 continue
             let_go = hung.release_s + (hung.skew_s if gate.side == "free" else 0.0)
             seen = [
                 Shadow(let_go + start, let_go + end, rod)
-                for start, end, rod in made["shadows"][str(gate.channel)]
+                for start, end, rod in parts["shadows"][str(gate.channel)]
             ]
             seen += string_shadows(seen, self.dials.string, rng)
             edges += receive(seen, gate.channel, self.dials, rng)
         edges.sort(key=lambda edge: edge.time_s)
-        truth = replace(self._began(ResolvedTruth, run, attempt, edges), **made["truth"])
+        truth = replace(self._began(ResolvedTruth, run, attempt, edges), **parts["truth"])
         self.tell(truth)
         return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
 
     def _make(self, label: int) -> dict[str, Any]:
         """Find a drop on the disk, or let its chains fall."""
         name = fall_cache.key(self._key, self.filmed, self.series, label)
-        made: dict[str, Any] | None = fall_cache.load(name)
-        if made is None:
-            chains = self._checked(label)
+        parts: dict[str, Any] | None = fall_cache.load(name)
+        if parts is None:
+            chains = self._hang_safely(label)
             falls = {side: fall(chain) for side, chain in chains.items()}
-            made = self._seen(label, falls)
+            parts = self._seen(label, falls)
             if self.filmed and "impact" in chains:
-                made["truth"]["film"] = film(chains["impact"], falls["impact"])
-            fall_cache.save(name, made)
-        return made
+                parts["truth"]["film"] = film(chains["impact"], falls["impact"])
+            fall_cache.save(name, parts)
+        return parts
 
-    def _checked(self, label: int) -> dict[Side, Chain]:
+    def _hang_safely(self, label: int) -> dict[Side, Chain]:
         """Hang the chains of a drop, and see that they can fall.
 
         Raises
@@ -208,25 +208,20 @@ class ResolvedLab(ChainLab):
         """Hang the chains of a drop as they really are."""
         run, attempt = self._run(label)
         hang, level = self._hung(run, attempt).hang, self._level(run)
-        found: dict[Side, Chain] = {}
-        if run.impact is not None:
-            rods, swing, spin = self._hang("impact", run.impact, run, attempt)
-            found["impact"] = self._chain(
-                rods,
-                self.protocol.chains[run.impact],
-                hang[0] - level,
-                swing,
-                spin,
-                run.incline_deg,
-            )
-        if run.free is not None:
-            rods, swing, spin = self._hang("free", run.free, run, attempt)
-            if self.protocol.surface is None:
-                # Where nothing is struck a fence may hang, which is stiff: strings do not turn it.
-                swing = np.zeros_like(swing)
-            spec = self.protocol.chains[run.free]
-            found["free"] = self._chain(rods, spec, hang[1] - level, swing, spin)
-        return found
+        chains: dict[Side, Chain] = {}
+        sides: tuple[tuple[Side, str | None, float, float | None], ...] = (
+            ("impact", run.impact, hang[0], run.incline_deg),
+            ("free", run.free, hang[1], None),
+        )
+        for side, name, too_high, incline_deg in sides:
+            if name is not None:
+                rods, swing, spin = self._hang(side, name, run, attempt)
+                if self.protocol.surface is None:
+                    # Where nothing is struck a fence may hang: it is stiff, strings do not turn it.
+                    swing = np.zeros_like(swing)
+                spec = self.protocol.chains[name]
+                chains[side] = self._chain(rods, spec, too_high - level, swing, spin, incline_deg)
+        return chains
 
     def _nominal(self, spec: RodChain) -> Rods:
         diameters = np.array(spec.diameters)
@@ -249,14 +244,14 @@ class ResolvedLab(ChainLab):
         world, body = self.world, self.bodies[name]
         nominal = self._nominal(body.spec)
         own = self._rng("tilts", name)
-        now = self._drop_rng("hung", run, attempt, side)
+        draws = self._drop_rng("hung", run, attempt, side)
         count = nominal.masses.size
         tilts = nominal.tilts + math.radians(world.tilt_sd) * own.normal(size=count)
-        yaws = math.radians(world.yaw_sd) * now.normal(size=count)
-        aside = world.aside_sd * now.normal(size=count)
+        yaws = math.radians(world.yaw_sd) * draws.normal(size=count)
+        aside = world.aside_sd * draws.normal(size=count)
         above = nominal.heights[-1] - nominal.heights
-        swing = world.swing_sd * float(now.normal()) * above / max(float(above[0]), 1e-9)
-        spin = world.spin_sd * float(now.normal())
+        swing = world.swing_sd * float(draws.normal()) * above / max(float(above[0]), 1e-9)
+        spin = world.spin_sd * float(draws.normal())
         hung = replace(nominal, heights=body.offsets, tilts=tilts, yaws=yaws, aside=aside)
         return hung, swing, spin
 
@@ -264,10 +259,10 @@ class ResolvedLab(ChainLab):
         self,
         rods: Rods,
         spec: RodChain,
-        hang: float = 0.0,
-        swing: np.ndarray | None = None,
-        spin: float = 0.0,
-        incline_deg: float | None = None,
+        hang: float,
+        swing: np.ndarray,
+        spin: float,
+        incline_deg: float | None,
     ) -> Chain:
         world, dials, surface = self.world, self.dials, self.surface
         board = touching = None
@@ -297,22 +292,21 @@ class ResolvedLab(ChainLab):
             assert name is not None
             body = self.bodies[name]
             nominal = np.array(body.spec.widths)
-            found = shadows(
+            seen_by = shadows(
                 falls[gate.side],
                 self.heights[gate.channel] - self._level(run),
                 self.beams[gate.channel] + float(aside[int(gate.side == "free")]),
                 np.array(body.spec.diameters) * body.widths / nominal,
                 0.5 * self._nominal(body.spec).length,
             )
-            seen[str(gate.channel)] = [(one.start, one.end, one.rod) for one in found]
+            seen[str(gate.channel)] = [(shadow.start, shadow.end, shadow.rod) for shadow in seen_by]
         return {"shadows": seen, "truth": self._resolved_truth(run, attempt, falls)}
 
     def _resolved_truth(self, run: Run, attempt: int, falls: dict[Side, Fall]) -> dict[str, Any]:
         if "impact" not in falls:
             return {}
         struck = falls["impact"]
-        hung = self._hung(run, attempt)
-        skew = hung.skew_s
+        skew = self._hung(run, attempt).skew_s
         level_s, level_speed = at_level(struck, self.protocol.gravity.value)
         contact = float(struck.touched_height[-1])
         truth: dict[str, Any] = {
@@ -330,15 +324,15 @@ class ResolvedLab(ChainLab):
         moments = np.arange(struck.strike_s, 0.0, -TRACK_S)[::-1]
         truth["track"] = {
             "times_s": moments.tolist(),
-            "impact_top_m": np.interp(moments, struck.times, struck.heights[:, -1]).tolist(),
+            "impact_top_m": top_at(struck, moments).tolist(),
         }
         if "free" not in falls:
             return truth
         free = falls["free"]
-        truth["track"]["free_top_m"] = np.interp(moments, free.times, free.heights[:, -1]).tolist()
+        truth["track"]["free_top_m"] = top_at(free, moments).tolist()
 
         def free_top(time_s: float) -> float:
-            return float(np.interp(time_s, free.times, free.heights[:, -1]))
+            return float(top_at(free, time_s))
 
         truth |= {
             "release_skew_s": skew,
@@ -348,12 +342,17 @@ class ResolvedLab(ChainLab):
             "separation_strike_raw_m": free_top(struck.strike_s - skew) - contact,
         }
         truth["camera_separation_m"], truth["camera_speed_m_s"] = camera_reading(
-            lambda t: float(np.interp(t, struck.times, struck.heights[:, -1])),
+            lambda t: float(top_at(struck, t)),
             lambda t: free_top(t - skew),
             struck.strike_s,
             self._drop_rng("camera", run, attempt),
         )
         return truth
+
+
+def top_at(fall: Fall, times_s: Any) -> Any:
+    """Heights of the top rod's middle at times since its release, m."""
+    return np.interp(times_s, fall.times, fall.heights[:, -1])
 
 
 def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
@@ -372,13 +371,11 @@ def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
         )
     contact, speed = float(struck.touched_height[-1]), struck.top_speed
     if contact >= 0.0:
-        there = math.sqrt(speed**2 + 2.0 * gravity * contact)
-        return struck.strike_s + 2.0 * contact / (speed + there), there
+        passing = math.sqrt(speed**2 + 2.0 * gravity * contact)
+        return struck.strike_s + 2.0 * contact / (speed + passing), passing
     after = int(np.argmax(struck.heights[:, -1] < 0.0))
-    (t0, t1), (z0, z1) = (
-        struck.times[after - 1 : after + 1],
-        struck.heights[after - 1 : after + 1, -1],
-    )
+    near = slice(after - 1, after + 1)
+    (t0, t1), (z0, z1) = struck.times[near], struck.heights[near, -1]
     return float(t0 + (t1 - t0) * z0 / (z0 - z1)), float((z0 - z1) / (t1 - t0))
 
 

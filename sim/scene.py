@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.link.messages import pack_label
@@ -22,19 +22,10 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
     from .dials import Dials
+    from .serial_port import SimulatedSerial
     from .truth import Truth
 
     Hang = Callable[[Protocol, Dials, int, Callable[[Truth], None]], ChainLab]
-
-
-class LineDials(TypedDict):
-    """How bad the line is, see `SimulatedSerial.disturb`."""
-
-    jitter_s: float
-    stalled: float
-    stall_s: float
-    corrupt: float
-    lose: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,16 +47,13 @@ class Scene:
         """Make all planned drops now, for a board that answers in real time."""
         self.lab.make_ahead([pack_label(number, 1) for number in sorted(self.lab.runs)])
 
-    def line(self) -> LineDials:
-        """Name the dials of the line."""
+    def disturb(self, port: SimulatedSerial) -> None:
+        """Make a port's line as bad as the dials say."""
         dials = self.dials
-        return {
-            "jitter_s": dials.latency,
-            "stalled": dials.stalled,
-            "stall_s": dials.stall,
-            "corrupt": dials.corrupt,
-            "lose": dials.lose,
-        }
+        port.disturb(
+            self.seed, jitter_s=dials.latency, stalled=dials.stalled, stall_s=dials.stall,
+            corrupt=dials.corrupt, lose=dials.lose,
+        )  # fmt: skip
 
     def second_ns(self) -> int | None:
         """Length of the wired reference's second; `None` where none is wired."""
@@ -103,9 +91,9 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
     if truth:
         _check_writable(scheme, Path(truth))
 
-    def tell(what: Truth) -> None:
+    def tell(fact: Truth) -> None:
         if truth:
-            append_truth(Path(truth), what)
+            append_truth(Path(truth), fact)
 
     lab = hang(reader.read(source), dials, seed, tell)
     lab.filmed, lab.series = bool(truth), series
@@ -139,8 +127,8 @@ def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[Hang
     from .resolved_lab import ResolvedLab  # noqa: PLC0415
 
     world = read_resolved_dials(rest, scheme)
-    left = {name: text for name, text in rest.items() if name not in NAMES}
-    return partial(ResolvedLab, world=world), left
+    others = {name: text for name, text in rest.items() if name not in NAMES}
+    return partial(ResolvedLab, world=world), others
 
 
 def _check_writable(scheme: str, path: Path) -> None:

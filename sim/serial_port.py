@@ -29,14 +29,8 @@ class SimulatedSerial(SerialBase):
         What is connected; otherwise `make_board` is asked when the port is opened.
     clock
         Virtual time; a new one by default.
-    seed
-        Chooses latencies and line faults: same seed, same bytes.
     jitter_s
-        Mean of the exponential delay with which the host sees a byte.
-    stalled, stall_s
-        Probability of a read to be held up besides, and for how long.
-    corrupt, lose
-        Probability of each byte, either way, to be changed or lost.
+        See `disturb`.
     reset_on_open
         Whether opening restarts the board, as DTR does to a Mega.
     **settings
@@ -49,21 +43,14 @@ class SimulatedSerial(SerialBase):
         *,
         board: Board | None = None,
         clock: VirtualClock | None = None,
-        seed: int = 0,
         jitter_s: float = 0.3e-3,
-        stalled: float = 0.0,
-        stall_s: float = 50e-3,
-        corrupt: float = 0.0,
-        lose: float = 0.0,
         reset_on_open: bool = True,
         **settings: Any,
     ) -> None:
         self.clock = VirtualClock() if clock is None else clock
         self.board = board
         self.reset_on_open = reset_on_open
-        self.disturb(
-            seed, jitter_s=jitter_s, stalled=stalled, stall_s=stall_s, corrupt=corrupt, lose=lose
-        )
+        self.disturb(0, jitter_s=jitter_s)
         self._buffer = bytearray()
         self._line_free_ns = 0
         super().__init__(port, **settings)
@@ -78,7 +65,19 @@ class SimulatedSerial(SerialBase):
         corrupt: float = 0.0,
         lose: float = 0.0,
     ) -> None:
-        """Choose latencies and line faults; the parameters are those of the class."""
+        """Choose latencies and line faults.
+
+        Parameters
+        ----------
+        seed
+            Same seed, same bytes.
+        jitter_s
+            Mean of the exponential delay with which the host sees a byte.
+        stalled, stall_s
+            Probability of a read to be held up besides, and for how long.
+        corrupt, lose
+            Probability of each byte, either way, to be changed or lost.
+        """
         self._random = random.Random(f"latency {seed}")
         self._jitter_s = jitter_s
         self._stalled, self._stall_s = stalled, stall_s

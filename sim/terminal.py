@@ -85,25 +85,27 @@ class Terminal:
         self._far = self._near = None
         self.is_open = False
 
-    def wait(self, seconds: float, *others: int) -> list[int]:
+    def wait(self, seconds: float, *descriptors: int) -> list[int]:
         """Wait for bytes.
 
         Parameters
         ----------
         seconds
             At most so long.
-        others
+        descriptors
             What else may end the waiting, as file descriptors.
 
         Returns
         -------
         list of int
-            Those of `others` that have something.
+            Those of `descriptors` that have something.
         """
         # A line that nobody has open hangs up all the time, and would end each waiting at once.
-        watched = [*others] if self._far is None or not self.is_open else [*others, self._far]
+        watched = (
+            [*descriptors] if self._far is None or not self.is_open else [*descriptors, self._far]
+        )
         readable, _, _ = select.select(watched, [], [], seconds)
-        return [one for one in others if one in readable]
+        return [descriptor for descriptor in descriptors if descriptor in readable]
 
     def look(self) -> bool:
         """See whether somebody has opened it since the last look."""

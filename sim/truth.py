@@ -39,6 +39,6 @@ class Truth:
 
 def append_truth(path: Path, truth: Truth) -> None:
     """Add one drop's truth as a line of JSON."""
-    row = {one.name: getattr(truth, one.name) for one in fields(truth)}
+    row = {spec.name: getattr(truth, spec.name) for spec in fields(truth)}
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(row) + "\n")

@@ -14,7 +14,7 @@ import shutil
 import statistics
 import subprocess
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from decimal import Decimal
 from itertools import accumulate
 from pathlib import Path
@@ -23,13 +23,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.frame import Findings
+from rig.commands.output import say
 from rig.errors import RigError
 from rig.model.batch import FallBatch, Floats, falls, given_impacts
 from rig.model.chain import Chain
 from rig.model.fall import Fall, fall, kicks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from argparse import Namespace
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
 RODS, LENGTH = 25, 1.165  # the paper's chain, m
 ALPHA, GAMMA, DROP, GRAVITY = 0.155, 4.0 / 3.0, 0.18, 9.81  # and its fall at 40°
@@ -41,15 +44,6 @@ _TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 # Turns long enough for the clock, and short enough to fit between two interruptions.
 _SINGLE_FALLS, _ROOTS = 50, 500
 _TRIES = 5
-
-
-@dataclass(frozen=True, slots=True)
-class MedianRange:
-    """Median of all rounds, with the least and the most."""
-
-    median: float
-    least: float
-    most: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +69,13 @@ def varied(count: int, seed: int = 1) -> Batch:
     return Batch(*(source.uniform(low, high, count) for low, high in ranges))
 
 
-def bulk(count: int, rounds: int, say: Callable[[str], None]) -> dict[str, Any]:
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Find how long falls take, as ratios."""
+    ratios = bulk(arguments.falls, arguments.rounds)
+    yield Findings(ratios, _table(ratios))
+
+
+def bulk(count: int, rounds: int) -> dict[str, Any]:
     """Time the falls against square roots, a C loop and a general solver.
 
     Parameters
@@ -84,8 +84,6 @@ def bulk(count: int, rounds: int, say: Callable[[str], None]) -> dict[str, Any]:
         Falls in a batch.
     rounds
         Of measurement, each with all contestants.
-    say
-        Told what was left out, and why.
 
     Raises
     ------
@@ -111,7 +109,7 @@ def bulk(count: int, rounds: int, say: Callable[[str], None]) -> dict[str, Any]:
             raise RigError("there is no C compiler here", "install one, or name it in CC")
         else:
             say("no C compiler here: left out the C loop (install one, or name it in CC)")
-        solver = _solver(chain, say)
+        solver = _solver(chain)
         if solver is not None:
             found["solver"] = solver
             timed["solver"] = lambda: _per_turn(lambda: solve(chain, solver["rtol"]), 1)
@@ -119,9 +117,9 @@ def bulk(count: int, rounds: int, say: Callable[[str], None]) -> dict[str, Any]:
     ratios = {"single_over_roots": ("single", "roots"), "single_over_batch": ("single", "batch")}
     ratios |= {"batch_over_c": ("batch", "c"), "solver_over_single": ("solver", "single")}
     found["falls_per_s"] = _spread([1.0 / seconds for seconds in measured["batch"]])
-    for name, (one, other) in ratios.items():
-        if one in measured and other in measured:
-            pairs = zip(measured[one], measured[other], strict=True)
+    for name, (above, below) in ratios.items():
+        if above in measured and below in measured:
+            pairs = zip(measured[above], measured[below], strict=True)
             found[name] = _spread([a / b for a, b in pairs])
     return found
 
@@ -193,7 +191,7 @@ def solve(chain: Chain, rtol: float) -> Fall:
     return Fall(float(state[2] - state[0]), arrival, clock)
 
 
-def _solver(chain: Chain, say: Callable[[str], None]) -> dict[str, float] | None:
+def _solver(chain: Chain) -> dict[str, float] | None:
     """Find the loosest tolerance whose result is as good as rounding allows; none: left out."""
     try:
         from rig.bench.reference import exact_fall  # noqa: PLC0415 - needs mpmath
@@ -256,4 +254,31 @@ def _in_turns(timed: dict[str, Callable[[], float]], rounds: int) -> dict[str, l
 
 
 def _spread(values: Sequence[float]) -> dict[str, float]:
-    return asdict(MedianRange(statistics.median(values), min(values), max(values)))
+    return {"median": statistics.median(values), "least": min(values), "most": max(values)}
+
+
+def _table(found: Mapping[str, Any]) -> list[str]:
+    rods = found["rods"]
+    lines = [
+        f"{rods} rods, batches of {found['falls']} falls; median of {found['rounds']} rounds, "
+        "least to most",
+        _line(f"one fall over {rods} square roots", found["single_over_roots"], "×"),
+        _line("falls of a batch, million/s", found["falls_per_s"], "", 1e-6),
+        _line("one fall over one of a batch", found["single_over_batch"], "×"),
+    ]
+    if "batch_over_c" in found:
+        line = _line("batch over a C loop", found["batch_over_c"], "×")
+        lines.append(f"{line}   {found['compiler']}")
+    if "solver_over_single" in found:
+        solver = found["solver"]
+        lines.append(
+            f"{_line('solve_ivp over one fall', found['solver_over_single'], '×')}   "
+            f"rtol {solver['rtol']:g}: error {solver['error']:.0e}, "
+            f"of one fall {solver['single_error']:.0e}"
+        )
+    return lines
+
+
+def _line(label: str, spread: Mapping[str, float], unit: str, scale: float = 1.0) -> str:
+    median, least, most = (spread[key] * scale for key in ("median", "least", "most"))
+    return f"{label:<32}{f'{median:.4g}{unit}':>9}   {least:.4g} to {most:.4g}"

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import json
 import math
-import time
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from itertools import islice
-from operator import attrgetter
 from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
@@ -21,22 +20,27 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import yaml
 
-from bench.studies.accuracy import Errors
+from bench.frame import Findings
+from bench.studies.errors import Errors, shares_held
+from bench.studies.sessions import SimulatedSession, without_device
+from bench.workers import results
 from rig.analysis.gravity import check_gravity
 from rig.analysis.result import GOOD, Measured
-from rig.analysis.session import analyze
-from rig.bench.falls import Asked, falls, time_scale, with_setting
+from rig.bench.falls import Asked, SimulatedDrop, falls, simulation
+from rig.commands.output import progress, say
 from rig.errors import InputError
 from rig.estimate.session import estimate
+from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned
+from rig.text_table import text_table
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
+    from argparse import Namespace
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from rig.analysis.session import Analysis
-    from rig.bench.falls import SimulatedDrop
+    Record = Mapping[str, Any]
 
 SHIPPED = (
     "inclined-uniform.yaml",
@@ -49,7 +53,10 @@ GATES = ((1, 1), (1, 3), (2, 2), (3, 5), (4, 4), (5, 5), (8, 8))
 """Gates of the impact side and of the free side, at drawn heights."""
 DROPS = (1, 4, 12)
 RODS = (16, 36)
-LAYOUTS = (*(f"{one} + {other}" for one, other in GATES), *(Path(one).stem for one in SHIPPED))
+LAYOUTS = (
+    *(f"{impact} + {free}" for impact, free in GATES),
+    *(Path(name).stem for name in SHIPPED),
+)
 INCLINES = {"model": (0.0, 80.0), "resolved": (35.0, 80.0), "mujoco": (35.0, 80.0)}
 """°; below some 30° real rods land on a pile, which the model describes by a coefficient."""
 COEFFICIENTS = "coefficients"
@@ -72,6 +79,22 @@ _AVERAGED = ("separation_m", "speed_m_s")
 _STEADY = {"impulse_sd": "0", "hang_sd": "0 mm", "skew_sd": "0 ms"}
 """What differs from drop to drop: a mean over drops estimates the drop without it."""
 MODULES = {"mujoco": "bench.studies.mujoco_world"}
+RIGS = {"model": 200, "resolved": 200, "mujoco": 40, COEFFICIENTS: 20}
+_CHUNK = 4  # rigs for one process of the simulation
+_HEAD = """\
+# Does U hold the true value?
+
+`./run bench coverage`: rigs drawn by a Latin hypercube over layout, rods, incline, drops a session
+and what the protocol does not know: air, and in the resolved world strings, swing and place along
+the beams. Each rig is wrong by as much as its protocol states. 95 % of the intervals should hold
+the true value. ± of a share is from rig to rig. *rms / u*: rms error over the stated standard
+uncertainty. Void shares leave out drops beyond the limit of release skew. The worst tenth of rigs
+stands below each world: the same `--rigs` and `--seed` with `--only NUMBER` draw a rig again."""
+_TABULATED = (
+    "separation_m", "separation_raw_m", "separation_strike_m", "speed_m_s", "speed_strike_m_s",
+    "release_skew_s", "fall_time_s",
+)  # fmt: skip
+_OTHER = {"drag_per_m": ("κ (1/km)", 1e3), "restitution": ("β", 1.0), "friction": ("μ", 1.0)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,13 +130,10 @@ class Rig:
         """Write the protocol, and name the simulation of all its drops."""
         path = folder / f"{self.number}.yaml"
         path.write_text(self.text, encoding="utf-8")
-        url = with_setting("sim://?stated=1", "protocol", str(path))
-        for name, value in self.dials.items():
-            url = with_setting(url, name, f"{value:g}{DIALS[name][2]}")
+        dials = {name: f"{value:g}{DIALS[name][2]}" for name, value in self.dials.items()}
         extra = {"dynamics": "resolved"} if "string_strain" in self.dials else {}
         extra |= {"impact_error": "0"} if self.world == COEFFICIENTS else {}  # true as stated
-        for name, text in (extra | dict(settings or {})).items():
-            url = with_setting(url, name, text)
+        url = simulation(path, dials | extra | dict(settings or {}), "sim://?stated=1")
         runs = [run.number for run in planned(reader.parse(self.text))]
         return Asked(url, [self.seed], [runs])
 
@@ -124,17 +144,16 @@ class Rig:
 
 
 class Interval(NamedTuple):
-    """A result: measured less true, with the expanded and the standard uncertainty."""
+    """A result beside the true value."""
 
     quantity: str
-    error: float
-    expanded: float
-    u: float
+    measured: Measured
+    true: float
 
     @property
     def ratio(self) -> float:
         """|error| over U."""
-        return abs(self.error) / self.expanded
+        return abs(self.measured.value - self.true) / self.measured.expanded
 
 
 @dataclass(slots=True)
@@ -172,17 +191,12 @@ class RigResult:
     @property
     def held(self) -> float:
         """Share of the drops' intervals that hold the true value; 1 where there is none."""
-        return fmean(one.ratio <= 1.0 for one in self.intervals) if self.intervals else 1.0
+        return fmean(each.ratio <= 1.0 for each in self.intervals) if self.intervals else 1.0
 
     @property
     def worst(self) -> Interval | None:
         """The interval with the largest |error| over U."""
-        return max(self.intervals, key=attrgetter("ratio"), default=None)
-
-    def add(self, name: str, measured: Measured, true: float, *, session: bool = False) -> None:
-        """Count one result."""
-        of = self.session if session else self.intervals
-        of.append(Interval(name, measured.value - true, measured.expanded, measured.u))
+        return max(self.intervals, key=lambda interval: interval.ratio, default=None)
 
     def row(self) -> dict[str, Any]:
         """Return a line of the table of rigs."""
@@ -296,97 +310,95 @@ def measure(rigs: Sequence[Rig]) -> list[RigResult]:
     RigError
         The simulation gave up.
     """
-    steady = rigs[0].world == "model"
+    module = MODULES.get(rigs[0].world, "sim.edges")
+    protocols = [reader.parse(rig.text) for rig in rigs]
     with TemporaryDirectory() as folder:
         asked = [rig.ask(Path(folder)) for rig in rigs]
-        more = [rig.ask(Path(folder), _STEADY) for rig in rigs if steady]
-        drops = falls([*asked, *more], MODULES.get(rigs[0].world, "sim.edges"))
-        sessions = [[*islice(drops, len(one.runs[0]))] for one in [*asked, *more]]
-    pairs = zip(rigs, sessions, sessions[len(rigs) :] or [[]] * len(rigs), strict=False)
-    return [_judge(rig, session, without) for rig, session, without in pairs]
+        sessions = [*without_device([*zip(protocols, asked, strict=True)], module)]
+        outcomes = [_judge(*pair) for pair in zip(rigs, sessions, strict=True)]
+        if rigs[0].world == "model":
+            steady = falls([rig.ask(Path(folder), _STEADY) for rig in rigs], module)
+            for outcome, session in zip(outcomes, sessions, strict=True):
+                outcome.session += _means(session, [*islice(steady, len(session.drops))])
+    return outcomes
 
 
-def _judge(
-    rig: Rig, session: Sequence[SimulatedDrop], steady: Sequence[SimulatedDrop]
-) -> RigResult:
-    """Analyse a rig's drops, and judge what each and all together say."""
-    protocol, scale = reader.parse(rig.text), time_scale(rig.seed)
-    drops = {fall.drop.run: fall for fall in session}
-    found = RigResult(rig)
-    begin = time.process_time()
-    analysis = analyze(protocol, [fall.drop for fall in session], lambda _: scale)
-    found.seconds = time.process_time() - begin
-    for result in analysis.runs:
-        fall = drops[result.run.number]
-        found.verdicts[result.verdict] += 1
+def _judge(rig: Rig, session: SimulatedSession) -> RigResult:
+    """Judge what the drops of a rig and all together say."""
+    limit = session.protocol.accept.release_skew
+    outcome = RigResult(rig, seconds=session.analysis_s)
+    for result, fall, _ in session.results():
+        outcome.verdicts[result.verdict] += 1
         void = result.verdict not in GOOD
-        beyond = void and abs(fall.truth["release_skew_s"]) > protocol.accept.release_skew
-        found.beyond += beyond
+        beyond = void and abs(fall.truth["release_skew_s"]) > limit
+        outcome.beyond += beyond
         if result.verdict != "accepted" and not beyond:
-            found.reasons.update(f"{result.verdict}: {reason}" for reason in result.reasons[:1])
-        if void:
-            continue
-        found.wrong += fall.rods(result.matches)[0]
-        for name, measured in result.quantities.items():
-            if fall.truth.get(name) is not None:
-                found.add(name, measured, fall.truth[name])
-    for name, measured, true in _shared(rig, analysis, drops):
-        found.add(name, measured, true, session=True)
-    for line in analysis.summary if steady else ():
+            outcome.reasons.update(f"{result.verdict}: {reason}" for reason in result.reasons[:1])
+        if not void:
+            outcome.wrong += fall.rods(result.matches)[0]
+            outcome.intervals += [
+                Interval(name, measured, fall.truth[name])
+                for name, measured in result.quantities.items()
+                if fall.truth.get(name) is not None
+            ]
+    outcome.session += _shared(rig, session)
+    return outcome
+
+
+def _means(session: SimulatedSession, steady: Sequence[SimulatedDrop]) -> Iterator[Interval]:
+    """Yield means over drops beside those of drops that do not scatter."""
+    for line in session.analysis.summary:
         for name in _AVERAGED:
             true = fmean(fall.truth[name] for fall in steady)
-            found.add(f"mean {name}", line.means[name], true, session=True)
-    return found
+            yield Interval(f"mean {name}", line.means[name], true)
 
 
-def _shared(
-    rig: Rig, analysis: Analysis, drops: Mapping[int, SimulatedDrop]
-) -> Iterator[tuple[str, Measured, float]]:
+def _shared(rig: Rig, session: SimulatedSession) -> Iterator[Interval]:
     """Yield what drops of one rig say together, and what is true: g, κ, and coefficients."""
-    protocol, scale = reader.parse(rig.text), time_scale(rig.seed)
-    runs = ((one, drops[one.run.number].drop, scale) for one in analysis.runs)
-    check = check_gravity(protocol, runs)
+    protocol, analysis = session.protocol, session.analysis
+    results = [(result, fall.drop, scale) for result, fall, scale in session.results()]
+    check = check_gravity(protocol, results)
     if check is not None:
-        true = next(iter(drops.values())).truth["gravity_m_s2"]
-        yield "gravity_m_s2", check.measured, true
+        true = next(fall.truth for fall, _ in session.drops.values())["gravity_m_s2"]
+        yield Interval("gravity_m_s2", check.measured, true)
     if analysis.joint is not None:
         joint, at = analysis.joint, analysis.joint.shared.blocks["drag"].start
         u = math.sqrt(joint.covariance[at, at]) * float(joint.sd[at])
-        yield "drag_per_m", Measured(float(joint.x[at]), u), rig.dials["drag"]
+        yield Interval("drag_per_m", Measured(float(joint.x[at]), u), rig.dials["drag"])
     if rig.world == COEFFICIENTS:
-        estimated = estimate(protocol, analysis).coefficients
-        for one in estimated.parameters if estimated is not None else ():
-            if one.identified:
-                yield one.name, one.least_squares, one.stated.value
+        coefficients = estimate(protocol, analysis).coefficients
+        for each in coefficients.parameters if coefficients is not None else ():
+            if each.identified:
+                yield Interval(each.name, each.least_squares, each.stated.value)
 
 
-def summarize(found: Iterable[RigResult], *, session: bool = False) -> dict[str, Any]:
+def summarize(results: Iterable[RigResult], *, session: bool = False) -> dict[str, Any]:
     """Sum up rigs; shares have standard errors from rig to rig."""
-    rigs = [*found]
-    drops = sum(one.verdicts.total() for one in rigs)
-    fair = max(1, drops - sum(one.beyond for one in rigs))
-    errors: dict[str, Errors] = {}
-    for one in rigs:
-        for name, error, expanded, u in one.session if session else one.intervals:
-            errors.setdefault(name, Errors()).add(error, expanded, one.rig.number, u)
+    rigs = [*results]
+    drops = sum(rig.verdicts.total() for rig in rigs)
+    fair = max(1, drops - sum(rig.beyond for rig in rigs))
+    errors: dict[str, Errors] = defaultdict(Errors)
+    for rig in rigs:
+        for name, measured, true in rig.session if session else rig.intervals:
+            errors[name].add(measured, true, rig.rig.number)
     return {
         "rigs": len(rigs),
         "drops": drops,
         "beyond": drops - fair,
-        "void_share": sum(one.void for one in rigs) / fair,
-        "marginal_share": sum(one.verdicts["marginal"] for one in rigs) / fair,
-        "wrong": sum(one.wrong for one in rigs),
-        "ms_per_drop": 1e3 * sum(one.seconds for one in rigs) / max(1, drops),
-        "quantities": {name: one.json() for name, one in errors.items()},
-        "reasons": dict(sum((one.reasons for one in rigs), Counter[str]()).most_common()),
+        "void_share": sum(rig.void for rig in rigs) / fair,
+        "marginal_share": sum(rig.verdicts["marginal"] for rig in rigs) / fair,
+        "wrong": sum(rig.wrong for rig in rigs),
+        "ms_per_drop": 1e3 * sum(rig.seconds for rig in rigs) / max(1, drops),
+        "quantities": {name: errors[name].json() for name in errors},
+        "reasons": dict(sum((rig.reasons for rig in rigs), Counter[str]()).most_common()),
     }
 
 
-def groups(found: Sequence[RigResult]) -> dict[str, list[RigResult]]:
+def groups(results: Sequence[RigResult]) -> dict[str, list[RigResult]]:
     """Sort rigs by layout, drops a session, and thirds of incline and string restitution."""
-    by: dict[tuple[int, float, str], list[RigResult]] = {}
-    for one in found:
-        rig = one.rig
+    members: dict[tuple[int, float, str], list[RigResult]] = defaultdict(list)
+    for result in results:
+        rig = result.rig
         keys = [
             (0, LAYOUTS.index(rig.layout), rig.layout),
             (1, rig.drops, f"drops a session: {rig.drops}"),
@@ -398,8 +410,8 @@ def groups(found: Sequence[RigResult]) -> dict[str, list[RigResult]]:
             label = _third(rig.dials["string_restitution"], *DIALS["string_restitution"][:2])
             keys.append((3, 0, f"string restitution {label}"))
         for key in keys:
-            by.setdefault(key, []).append(one)
-    return {name: by[kind, order, name] for kind, order, name in sorted(by)}
+            members[key].append(result)
+    return {key[-1]: members[key] for key in sorted(members)}
 
 
 def _third(value: float, low: float, high: float) -> str:
@@ -409,15 +421,108 @@ def _third(value: float, low: float, high: float) -> str:
     return f"{first:.2g} to {first + part:.2g}"
 
 
-def worst_tenth(found: Sequence[RigResult]) -> dict[str, list[RigResult]]:
+def worst_tenth(results: Sequence[RigResult]) -> dict[str, list[RigResult]]:
     """Return the tenth of rigs that hold fewest intervals, and that with the largest |error|/U."""
-    count = math.ceil(len(found) / 10)
-    with_results = [one for one in found if one.intervals]
+    count = math.ceil(len(results) / 10)
+    rigs = [rig for rig in results if rig.intervals]
 
-    def ratio(one: RigResult) -> float:
-        return one.worst.ratio if one.worst else 0.0
+    def ratio(rig: RigResult) -> float:
+        return rig.worst.ratio if rig.worst else 0.0
 
-    fewest = sorted(with_results, key=lambda one: (one.held, -ratio(one)))[:count]
-    largest = sorted(with_results, key=ratio, reverse=True)[:count]
+    fewest = sorted(rigs, key=lambda rig: (rig.held, -ratio(rig)))[:count]
+    largest = sorted(rigs, key=ratio, reverse=True)[:count]
     tenths = {"worst tenth, fewest held": fewest, "worst tenth, |error| / U": largest}
-    return {name: rigs for name, rigs in tenths.items() if rigs}
+    return {name: tenth for name, tenth in tenths.items() if tenth}
+
+
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Let chains fall on the rigs of each world."""
+    worlds = arguments.world or [world for world in WORLDS if world not in MODULES]
+    if "mujoco" in worlds and find_spec("mujoco") is None:
+        raise InputError("the world mujoco needs MuJoCo", ".venv/bin/pip install mujoco")
+    record: dict[str, Any] = {}
+    lines: list[str] = []
+    for world in worlds:
+        rigs = draw_rigs(arguments.protocols, world, arguments.rigs or RIGS[world], arguments.seed)
+        rigs = [rig for rig in rigs if rig.number in (arguments.only or [rig.number])]
+        if not rigs:
+            raise InputError("no rig of the cube has such a number", "give --only up to --rigs")
+        chunks = [(measure, rigs[n : n + _CHUNK]) for n in range(0, len(rigs), _CHUNK)]
+        outcomes: list[RigResult] = []
+        count = progress(world)
+        for chunk in results(chunks, arguments.jobs):
+            outcomes += chunk
+            count(len(outcomes), len(rigs))
+        record[world] = _record(outcomes)
+        lines += [*([""] if lines else []), *_lines(world, outcomes, record[world])]
+        say(f"{world}: {record[world]['all']['drops']} drops of {len(rigs)} rigs")
+        rows = [row for figures in record.values() for row in figures["rigs"]]
+        yield Findings(record, lines, _HEAD, rows, simulated=True)
+
+
+def _record(outcomes: Sequence[RigResult]) -> dict[str, Any]:
+    """Return all figures of a world."""
+    worst = worst_tenth(outcomes)
+    return {
+        "all": summarize(outcomes),
+        "sessions": summarize(outcomes, session=True)["quantities"],
+        "groups": {name: summarize(rigs) for name, rigs in (groups(outcomes) | worst).items()},
+        "worst": {name: [each.rig.number for each in rigs] for name, rigs in worst.items()},
+        "rigs": [outcome.row() for outcome in outcomes],
+    }
+
+
+def _lines(world: str, outcomes: Sequence[RigResult], record: Record) -> Iterator[str]:
+    """Write the tables of a world."""
+    quantities = record["all"]["quantities"] | record["sessions"]
+    rows = [[world, "n", "rms", "bias", "median U95", "in U95", "", "rms / u"]]
+    rows += [_row(name, errors) for name, errors in quantities.items()]
+    yield from text_table(rows, left={0, 6}, rule=True)
+    yield ""
+    names = [name for name in _TABULATED if name in quantities]
+    symbols = [MEASURANDS[name].label for name in names]
+    rows = [["in U95", "rigs", "drops", "void", "wrong edges", "ms a drop", *symbols]]
+    for group, figures in ({"all": record["all"]} | record["groups"]).items():
+        shares = [figures["quantities"].get(name) for name in names]
+        rows.append([
+            group, str(figures["rigs"]), str(figures["drops"]), f"{figures['void_share']:.1%}",
+            str(figures["wrong"]), f"{figures['ms_per_drop']:.0f}",
+            *(" ".join(shares_held(share, 0)).rstrip() if share else "" for share in shares),
+        ])  # fmt: skip
+    yield from text_table(rows, left={0}, rule=True)
+    silent = [str(outcome.rig.number) for outcome in outcomes if not outcome.intervals]
+    if silent:
+        yield f"all drops void: rigs {', '.join(silent)}"
+    for name, rigs in worst_tenth(outcomes).items():
+        yield from ("", f"{name}:", *_worst([each.row() for each in rigs]))
+
+
+def _worst(rows: Sequence[Record]) -> list[str]:
+    """Describe rigs, so that each can be drawn again."""
+    names = [name for name in rows[0] if name not in _HIDDEN]
+    heads = [_HEADINGS.get(name, name) for name in names]
+    return text_table([heads, *([_text(row[name]) for name in names] for row in rows)], rule=True)
+
+
+_HIDDEN = {"world", "heights", "wrong", "ms_per_drop"}
+_HEADINGS = {
+    "number": "rig", "incline_deg": "incline (°)", "drag": "κ (1/m)",
+    "string_restitution": "strings", "string_strain": "strain (%)", "swing_sd": "swing (cm/s)",
+    "off_centre_sd": "off centre (mm)", "worst_ratio": "|error| / U", "worst_quantity": "of",
+}  # fmt: skip
+
+
+def _text(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _row(key: str, errors: Record) -> list[str]:
+    name = key.removeprefix("mean ")
+    label, scale = _OTHER.get(name, (name, 1.0))
+    if name in MEASURANDS:
+        row = MEASURANDS[name]
+        label, scale = f"{row.label} ({row.fine})" if row.fine else row.label, row.fine_scale
+    sizes = [f"{errors[size] * scale:.3f}" for size in ("rms", "bias", "median_U95")]
+    mean = "mean " if key != name else ""
+    shares = shares_held(errors, 1)
+    return [f"{mean}{label}", str(errors["n"]), *sizes, *shares, f"{errors['times_u']:.2f}"]

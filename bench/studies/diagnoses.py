@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from bench.studies.layout_catalogue import FENCE, KINDS, SINGLE, STANDARD, GateLayout, Kind, under
+from bench.frame import Findings
+from bench.studies.layout_catalogue import (
+    FENCE,
+    KINDS,
+    SINGLE,
+    STANDARD,
+    GateLayout,
+    Kind,
+    chosen,
+    under,
+)
 from bench.studies.wrong_rigs import WRONG_RIGS
 from bench.workers import results
 from rig.analysis.drop import fit_drop
-from rig.bench.falls import Asked, falls, time_scale, with_setting
+from rig.bench.falls import Asked, falls, simulation, time_scale
 from rig.clock.calibration import TimeScale
+from rig.commands.output import say
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.reasons import sentences
+from rig.text_table import text_table
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from argparse import Namespace
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rig.analysis.result import DropResult
 
@@ -29,9 +42,20 @@ DROPS = 2
 """With each fault of each size on each layout, every one on a rig of its own."""
 CLEAN = 100
 """Drops on each layout without a fault."""
-OUTCOMES = ("right", "likely", "unnamed", "wrong", "unnoticed")
-"""Named rightly; among the likeliest of several; void or remarked without a name; something else
-is accused; accepted without a word."""
+OUTCOMES = {
+    "right": "named rightly",
+    "likely": "among the likeliest",
+    "unnamed": "void or remarked, unnamed",
+    "wrong": "named wrongly",
+    "unnoticed": "not noticed",
+}
+"""What becomes of a drop, and the heading in the table."""
+_HEAD = """\
+# Which faults of a rig are named
+
+`./run bench diagnoses --drops {drops} --clean {clean}`: on each layout, {drops} drops of a rig
+with one fault, and {clean} without a fault. A fault within the protocol's own ± is rightly not
+noticed. By layout: `diagnoses.csv`."""
 NONE = "no fault"
 _STRIDE = 5  # from run to run of a plan: all inclinations and either chain come soon
 _BY_NAME = {kind.name: kind for kind in KINDS}
@@ -110,31 +134,30 @@ def judged(fault: str, result: DropResult) -> str:
     return "unnamed" if result.reasons else "unnoticed"
 
 
-def study(
-    layouts: Sequence[GateLayout],
-    drops: int,
-    clean: int,
-    jobs: int | None,
-    say: Callable[[str], None],
-) -> list[DiagnosisTally]:
-    """Let chains fall on each layout, of rigs with one fault each and of faultless ones.
-
-    Parameters
-    ----------
-    drops, clean
-        With each size of each fault, and without any.
-    jobs
-        Layouts at a time; as many as there are processors if not given.
-    say
-        Told how far it is.
-    """
-    found: list[DiagnosisTally] = []
-    for layout, some in zip(
-        layouts, results([(cells, one, drops, clean) for one in layouts], jobs), strict=True
-    ):
-        found += some
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Drop chains on rigs with one fault each, and on faultless ones."""
+    layouts = chosen(LAYOUTS, arguments.only)
+    clean = CLEAN if arguments.clean is None else arguments.clean
+    drops = arguments.drops or DROPS
+    records: list[dict[str, Any]] = []
+    calls = [(cells, layout, drops, clean) for layout in layouts]
+    for layout, tallies in zip(layouts, results(calls, arguments.jobs), strict=True):
+        records += [tally.json() for tally in tallies]
         say(f"{layout.kind.name}: done")
-    return found
+    rows = [{name: row[name] for name in row if name != "said"} for row in records]
+    head = _HEAD.format(drops=drops, clean=clean)
+    yield Findings({"diagnoses": records}, _lines(records), head, rows, simulated=True)
+
+
+def _lines(records: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One row a fault and size, all layouts together."""
+    rows: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    for record in records:
+        rows[record["fault"], record["size"]].update({name: record[name] for name in OUTCOMES})
+    table = [
+        [*words, *(str(counts[name] or "–") for name in OUTCOMES)] for words, counts in rows.items()
+    ]
+    return text_table([["fault", "size", *OUTCOMES.values()], *table], left={0, 1}, rule=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,37 +176,29 @@ def cells(layout: GateLayout, drops: int, clean: int) -> list[DiagnosisTally]:
         cases = [*_cases(layout, Path(folder), drops, clean)]
         protocol = reader.parse(layout.protocol())
         planned = {run.number: run for run in runs(protocol)}
-        all_falls = falls([one.asked for one in cases])
-        for one in cases:
-            for fall in islice(all_falls, len(one.asked.seeds)):
+        all_falls = falls([case.asked for case in cases])
+        for case in cases:
+            for fall in islice(all_falls, len(case.asked.seeds)):
                 scale = time_scale(fall.seed)
-                slow = TimeScale(scale.hz / (1.0 - one.slow), scale.u)
+                slow = TimeScale(scale.hz / (1.0 - case.slow), scale.u)
                 result, _ = fit_drop(protocol, planned[fall.drop.run], fall.drop, slow)
-                one.cell.add(result)
-    return [one.cell for one in cases]
+                case.cell.add(result)
+    return [case.cell for case in cases]
 
 
-def _cases(layout: GateLayout, folder: Path, drops: int, clean: int) -> list[_Case]:
+def _cases(layout: GateLayout, folder: Path, drops: int, clean: int) -> Iterator[_Case]:
     stated = layout.protocol()
     numbers = [run.number for run in runs(reader.parse(stated))]
-    found: list[_Case] = []
-
-    def add(
-        text: str, settings: dict[str, str], count: int, slow: float, fault: str, words: str = ""
-    ) -> None:
-        path = folder / f"{len(found)}.yaml"
+    wanted = [
+        (text, fault.settings(size), drops, fault.slow(size), fault.name, fault.words(size))
+        for fault in WRONG_RIGS
+        for size, text in fault.rigs(stated)
+    ]
+    first = 1
+    for text, settings, count, slow, fault, words in [*wanted, (stated, {}, clean, 0.0, NONE, "")]:
+        path = folder / f"{first}.yaml"
         path.write_text(text, encoding="utf-8")
-        url = with_setting("sim://", "protocol", str(path))
-        for name, value in settings.items():
-            url = with_setting(url, name, value)
-        first = 1 + sum(len(one.asked.seeds) for one in found)
-        made = [[numbers[_STRIDE * (first + n) % len(numbers)]] for n in range(count)]
-        cell = DiagnosisTally(layout.kind.name, layout.heights, fault, words)
-        found.append(_Case(cell, Asked(url, range(first, first + count), made), slow))
-
-    for fault in WRONG_RIGS:
-        for size, text in fault.rigs(stated):
-            words = f"{size:+g} {fault.unit}".strip() if fault.unit else ""
-            add(text, dict(fault.settings(size)), drops, fault.slow(size), fault.name, words)
-    add(stated, {}, clean, 0.0, NONE)
-    return found
+        chosen_runs = [[numbers[_STRIDE * (first + n) % len(numbers)]] for n in range(count)]
+        asked = Asked(simulation(path, settings), range(first, first + count), chosen_runs)
+        yield _Case(DiagnosisTally(layout.kind.name, layout.heights, fault, words), asked, slow)
+        first += count

@@ -2,42 +2,49 @@
 
 from __future__ import annotations
 
-import json
-import math
 import time
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from statistics import fmean, median
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bench.studies.accuracy import repeated
+from bench.frame import Findings
 from bench.studies.baselines import TimerReading, line_fit, plain_fit, two_gate_timer
+from bench.studies.errors import Errors
+from bench.studies.figures import estimators_figure
+from bench.studies.sessions import with_device
 from rig.analysis.drop import fit_drop
 from rig.analysis.joint_fit import joint_fit
 from rig.analysis.monte_carlo import monte_carlo
 from rig.analysis.quantities import COMPUTED, Adjusted, measurands
 from rig.analysis.result import GOOD
+from rig.commands.output import say
 from rig.errors import InputError
-from rig.ports import is_simulated, truth_file
-from rig.results import detailed, protocol_of
-from rig.runner import Operator, run_protocol
-from rig.session.store import Session
+from rig.report.columns import Column, aligned
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from argparse import Namespace
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from bench.studies.sessions import SimulatedSession
     from rig.analysis.fit import Fit
+    from rig.bench.falls import SimulatedDrop
     from rig.clock.calibration import TimeScale
-    from rig.protocol.protocol import Protocol, Run
-    from rig.records import Drop
+    from rig.protocol.protocol import Protocol
+
+    Truth = Mapping[str, Any]
 
 TRIALS = (10**2, 10**3, 10**4, 10**5, 10**6)
 _NAMES = ("separation_m", "speed_m_s")
 SEED = 1
+_HEAD = """\
+# Error against time of each method
+
+`./run bench estimators`: the same simulated drops read by each method, compared with the true
+values. Times are of one machine: compare them with each other.
+
+![Error against time](estimators.svg)"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,127 +73,118 @@ class Estimator:
     speed_median_m_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Case:
-    """A good drop with its truth."""
+_COLUMNS: tuple[Column[Estimator], ...] = (
+    Column("estimator", lambda point: point.name, numeric=False),
+    Column("M", lambda point: f"{point.trials:.0e}" if point.trials else ""),
+    Column("runs", lambda point: str(point.runs)),
+    Column("ms per run", lambda point: f"{1e3 * point.seconds:.3g}" if point.seconds else ""),
+    Column("Δz rms (mm)", lambda point: f"{1e3 * point.separation_rms_m:.3f}"),
+    Column("median", lambda point: f"{1e3 * point.separation_median_m:.3f}"),
+    Column("V rms (mm/s)", lambda point: f"{1e3 * point.speed_rms_m_s:.2f}"),
+    Column("median", lambda point: f"{1e3 * point.speed_median_m_s:.2f}"),
+)
+
+
+class _Case(NamedTuple):
+    """A good drop, fitted by itself, with its truth."""
 
     protocol: Protocol
-    run: Run
-    drop: Drop
+    fall: SimulatedDrop
     scale: TimeScale
     fit: Fit
-    truth: Mapping[str, Any]
+
+
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Simulate a session and try every estimator on the same drops."""
+    say("simulating the session")
+    session = with_device(arguments.protocol, arguments.port, arguments.seed, arguments.repeats)
+    if not session.protocol.two_chains:
+        raise InputError(f"{arguments.protocol} has no two chains", "all of them measure Δz")
+    points, left_out, times = estimators(session, arguments.budget)
+    rows = [asdict(point) for point in points]
+    record = {
+        "simulated": True, "estimators": rows, "left_out": left_out, "times_lstsq": times,
+    }  # fmt: skip
+    lines = [*aligned(_COLUMNS, points), *(f"left out: {line}" for line in left_out)]
+    lines += [f"{name}: {ratio:.1f} times numpy.linalg.lstsq" for name, ratio in times.items()]
+    yield Findings(record, lines, _HEAD, rows, estimators_figure(rows), simulated=True)
 
 
 def estimators(
-    protocol: str,
-    url: str,
-    seed: int,
-    repeats: int,
-    budget_s: float,
-    say: Callable[[str], None],
+    session: SimulatedSession, budget_s: float
 ) -> tuple[list[Estimator], list[str], dict[str, float]]:
-    """Simulate a session and try every estimator on the same drops.
+    """Try every estimator on the drops of a session.
 
     Parameters
     ----------
-    protocol, repeats
-        Two chains; drops at each incline.
-    url, seed
-        Of the simulation.
     budget_s
         Seconds that a Monte Carlo may take; settings that would take longer are left out.
-    say
-        Told how far it is.
 
     Returns
     -------
     estimators, left_out, times_lstsq
         And what was left out, in words; and what the adjustments take, over one
         ``numpy.linalg.lstsq`` a chain with as many edges and unknowns.
-
-    Raises
-    ------
-    InputError
-        A port that is no simulation has no truth to compare with.
     """
-    if not is_simulated(url):
-        raise InputError(f"{url} is no simulation", "only a simulation knows the truth: sim://")
-    found: list[Estimator] = []
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "session"
-        source = repeated(protocol, repeats, Path(folder))
-        say("simulating the session")
-        run_protocol(source, url, str(path), Operator(lambda _: None), seed)
-        lines = truth_file(path).read_text(encoding="utf-8").splitlines()
-        truths = {(one["run"], one["attempt"]): one for one in map(json.loads, lines)}
-        with Session.open(path, readonly=True) as session:
-            scene = protocol_of(session)
-            if not scene.two_chains:
-                raise InputError(f"{protocol} has no two chains", "all of them measure Δz")
-            begin = time.process_time()
-            analysis, clock = detailed(session)
-            session_s = time.process_time() - begin
-            drops = {(one.run, one.attempt): one for one in session.latest_drops()}
-    good = [one for one in analysis.runs if one.verdict in GOOD and one.learned]
-    keys = [(one.run.number, one.attempt) for one in good]
-    cases: list[_Case] = []
+    protocol = session.protocol
+    good = [
+        (result, fall, scale)
+        for result, fall, scale in session.results()
+        if result.verdict in GOOD and result.learned
+    ]
     begin = time.process_time()
-    for one, key in zip(good, keys, strict=True):
-        scale = clock.scale(drops[key])
-        fit = fit_drop(scene, one.run, drops[key], scale)[1]
-        if fit is not None:
-            cases.append(_Case(scene, one.run, drops[key], scale, fit, truths[key]))
-    alone_s = (time.process_time() - begin) / max(1, len(good))
-    fit_plainly = one_thread(plain_fit)
-    begin = time.process_time()
-    for one, key in zip(good, keys, strict=True):
-        fit_plainly(scene, drops[key], one, clock.scale(drops[key]).hz)
-    plain_s = (time.process_time() - begin) / max(1, len(good))
+    fits = [fit_drop(protocol, result.run, fall.drop, scale)[1] for result, fall, scale in good]
+    alone_s = _since(begin, good)
+    cases = [
+        _Case(protocol, fall, scale, fit)
+        for (_, fall, scale), fit in zip(good, fits, strict=True)
+        if fit is not None
+    ]
     if not cases:
         raise InputError("no good drop to compare", "take fewer disturbances, or more repeats")
-    session_readings = [
-        TimerReading(*(one.quantities[name].value for name in _NAMES)) for one in good
-    ]
-    alone = [_alone(one) for one in cases]
-    all_truths = [truths[key] for key in keys]
-    camera = [
-        TimerReading(
-            one["camera_separation_m"] - one["separation_raw_m"] + one["separation_m"],
-            one["camera_speed_m_s"],
-        )
-        for one in all_truths
-    ]
-    found.append(_point("camera reading", 0, None, camera, all_truths))
+    plainly = one_thread(plain_fit)
+    begin = time.process_time()
+    for result, fall, scale in good:
+        plainly(protocol, fall.drop, result, scale.hz)
+    plain_s = _since(begin, good)
+    begin = time.process_time()
+    joint_fit([case.fit for case in cases])
+    joint_s = _since(begin, cases)
+    truths = [fall.truth for _, fall, _ in good]
+    own = [case.fall.truth for case in cases]
+    whole = [_reading(result.quantities) for result, _, _ in good]
+    points = [_point("camera reading", 0, None, [*map(_camera, truths)], truths)]
     for name, plain in (("two-gate timer", two_gate_timer), ("line fits", line_fit)):
-        begin = time.process_time()
-        read = [plain(one.protocol, one.drop, one.scale.hz) for one in cases]
-        took = (time.process_time() - begin) / len(cases)
-        if any(one is not None for one in read):
-            found.append(_raw_point(name, took, read, cases))
-    ours = [one.truth for one in cases]
-    found.append(_point("one-run fit", 0, alone_s, alone, ours))
-    found.append(_point("session fit", 0, session_s / len(drops), session_readings, all_truths))
+        points += _plain_point(name, plain, cases)
+    alone = [_reading(measurands(case.fit.model, case.fit.estimate.x)) for case in cases]
+    points.append(_point("one-run fit", 0, alone_s, alone, own))
+    session_s = session.analysis_s / len(session.drops)
+    points.append(_point("session fit", 0, session_s, whole, truths))
     left_out: list[str] = []
     for name, sample in (("Monte Carlo, readjusted", _readjusted), ("Monte Carlo, draws", _draws)):
         pace = 0.0
         for trials in TRIALS:
-            expected = pace * trials * len(cases)
+            words, expected = f"{name}, M = {trials:.0e}", pace * trials * len(cases)
             if expected > budget_s:
-                left_out.append(f"{name}, M = {trials:.0e}: about {expected:.0f} s for these runs")
+                left_out.append(f"{words}: about {expected:.0f} s for these runs")
                 continue
             begin = time.process_time()
-            values = [sample(one, trials) for one in cases]
-            took = time.process_time() - begin
-            pace = took / (trials * len(cases))
-            say(f"{name}, M = {trials:.0e}: {took:.1f} s")
-            seconds = alone_s + took / len(cases)  # it begins with that fit
-            found.append(_point(name, trials, seconds, values, ours))
-    begin = time.process_time()
-    joint_fit([one.fit for one in cases])
-    joint_s = (time.process_time() - begin) / len(cases)
-    times = {"one-run fit": alone_s / plain_s, "joint fit alone": joint_s / plain_s}
-    return found, left_out, times
+            readings = [sample(case, trials) for case in cases]
+            each_s = _since(begin, cases)
+            pace = each_s / trials
+            say(f"{words}: {each_s * len(cases):.1f} s")
+            # It begins with the fit of one run.
+            points.append(_point(name, trials, alone_s + each_s, readings, own))
+    return (
+        points,
+        left_out,
+        {"one-run fit": alone_s / plain_s, "joint fit alone": joint_s / plain_s},
+    )
+
+
+def _since(begin: float, drops: Sequence[object]) -> float:
+    """Processor time since a moment, for each of some drops, s."""
+    return (time.process_time() - begin) / max(1, len(drops))
 
 
 def mean_of_draws(fit: Fit, draws: int, seed: int, spread: float = 1.0) -> TimerReading:
@@ -210,62 +208,60 @@ def mean_of_draws(fit: Fit, draws: int, seed: int, spread: float = 1.0) -> Timer
     total = np.zeros(len(_NAMES))
     for _ in range(draws):
         drop = Adjusted(model, estimate.x + root @ rng.standard_normal(estimate.x.size))
-        found = [COMPUTED[name](drop) for name in _NAMES]
-        total += [one.value for one in found if one is not None]
+        quantities = [COMPUTED[name](drop) for name in _NAMES]
+        total += [quantity.value for quantity in quantities if quantity is not None]
     return TimerReading(*(total / draws).tolist())
 
 
-def as_json(
-    found: list[Estimator], left_out: list[str], times_lstsq: dict[str, float]
-) -> dict[str, Any]:
-    """As ``./run bench estimators --json`` prints it."""
-    return {
-        "simulated": True,
-        "estimators": [asdict(one) for one in found],
-        "left_out": left_out,
-        "times_lstsq": times_lstsq,
-    }
+def _reading(quantities: Mapping[str, Any]) -> TimerReading:
+    return TimerReading(*(quantities[name].value for name in _NAMES))
 
 
-def _alone(case: _Case) -> TimerReading:
-    found = measurands(case.fit.model, case.fit.estimate.x)
-    return TimerReading(*(found[name].value for name in _NAMES))
+def _camera(truth: Truth) -> TimerReading:
+    """Give what a camera reads, as of simultaneous release."""
+    late = truth["separation_raw_m"] - truth["separation_m"]
+    return TimerReading(truth["camera_separation_m"] - late, truth["camera_speed_m_s"])
 
 
 def _readjusted(case: _Case, trials: int) -> TimerReading:
-    found = monte_carlo(case.fit, trials, SEED)
-    return TimerReading(*(found[name].mean for name in _NAMES))
+    means = monte_carlo(case.fit, trials, SEED)
+    return TimerReading(*(means[name].mean for name in _NAMES))
 
 
 def _draws(case: _Case, trials: int) -> TimerReading:
     return mean_of_draws(case.fit, trials, SEED)
 
 
-def _raw_point(
-    name: str, seconds: float, readings: list[TimerReading | None], cases: list[_Case]
-) -> Estimator:
+def _plain_point(
+    name: str, read: Callable[..., TimerReading | None], cases: Sequence[_Case]
+) -> Iterator[Estimator]:
     """These know no release times: their Δz is as it happened, and compared with that."""
-    pairs = [
-        (one, {**case.truth, "separation_m": case.truth["separation_raw_m"]})
-        for one, case in zip(readings, cases, strict=True)
-        if one is not None
+    begin = time.process_time()
+    readings = [read(case.protocol, case.fall.drop, case.scale.hz) for case in cases]
+    seconds = _since(begin, cases)
+    truths = [
+        {**case.fall.truth, "separation_m": case.fall.truth["separation_raw_m"]} for case in cases
     ]
-    return _point(name, 0, seconds, [one for one, _ in pairs], [truth for _, truth in pairs])
+    pairs = [pair for pair in zip(readings, truths, strict=True) if pair[0] is not None]
+    if pairs:
+        yield _point(name, 0, seconds, [reading for reading, _ in pairs if reading],
+                     [truth for _, truth in pairs])  # fmt: skip
 
 
 def _point(
     name: str,
     trials: int,
     seconds: float | None,
-    readings: list[TimerReading],
-    truths: list[Mapping[str, Any]],
+    readings: Sequence[TimerReading],
+    truths: Sequence[Truth],
 ) -> Estimator:
     errors = [
-        [
-            abs(getattr(one, quantity) - truth[quantity])
-            for one, truth in zip(readings, truths, strict=True)
-        ]
+        Errors([
+            getattr(reading, quantity) - truth[quantity]
+            for reading, truth in zip(readings, truths, strict=True)
+        ])
         for quantity in _NAMES
-    ]
-    rms = [math.sqrt(fmean(error**2 for error in each)) for each in errors]
-    return Estimator(name, trials, len(readings), seconds, *rms, *map(median, errors))
+    ]  # fmt: skip
+    sizes = [each.sizes() for each in errors]
+    figures = [size[figure] for figure in ("rms", "median") for size in sizes]
+    return Estimator(name, trials, len(readings), seconds, *figures)

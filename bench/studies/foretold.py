@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from bench.studies.accuracy import repeated
+from bench.frame import Findings
+from bench.studies.sessions import with_device
 from rig.analysis.components import stated
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
+from rig.commands.output import say
 from rig.design.cases import beams_of, cases
 from rig.design.forecast import GateLayout, forecast
 from rig.errors import InputError
@@ -19,12 +19,12 @@ from rig.estimate.session import estimate
 from rig.measurands import MEASURANDS
 from rig.protocol.reader import read
 from rig.ready import ready_protocol
-from rig.results import detailed, protocol_of
-from rig.runner import Operator, run_protocol
-from rig.session.store import Session
+from rig.report.columns import Column, aligned
+from rig.report.estimate import symbol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from argparse import Namespace
+    from collections.abc import Iterator
 
     from rig.analysis.components import Components
     from rig.analysis.session import Analysis
@@ -33,8 +33,13 @@ if TYPE_CHECKING:
 PROTOCOLS = (
     "inclined-uniform", "inclined-uniform-uno", "graded-chain", "graded-chain-uno", "single-chain",
 )  # fmt: skip
-_PORT = "sim://"
 _SPARE = 2  # times as many as learning needs: some are void
+_HEAD = """\
+# Does a session reach the u that was predicted?
+
+`./run bench foretold`: u of one run by `rig design`, from the stated and from the learned
+scatter, beside u of a simulated session. The last column is session over prediction from the
+learned scatter; 1 is agreement."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,66 +66,41 @@ class Foretold:
     by_learned: float
     found: float
 
-    def json(self) -> dict[str, Any]:
-        """Itself as plain data, SI units."""
-        return asdict(self)
 
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Simulate a session of each protocol and compare; of few inclines with more drops each.
 
-def foretold(
-    names: Sequence[str], repeats: int, seed: int, say: Callable[[str], None]
-) -> list[Foretold]:
-    """Simulate a session of each protocol and compare.
-
-    Parameters
-    ----------
-    names
-        Of ready protocols in which something strikes.
-    repeats
-        Drops at each incline; of few inclines more, for of fewer than `FEWEST` in all nothing is
-        learned.
-    seed
-        Of the simulation.
-    say
-        Told how far it is.
-
-    Raises
-    ------
-    InputError
-        Too few good drops to learn from.
+    Of fewer than `FEWEST` drops in all nothing is learned.
     """
-    found: list[Foretold] = []
-    for name in names:
+    forecasts: list[Foretold] = []
+    chosen = [name for name in PROTOCOLS if (arguments.only or "") in name]
+    for name in chosen or PROTOCOLS:
         say(f"{name}: simulating the session")
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "session"
-            ready = ready_protocol(name)
-            inclines = len(read(ready).plan.inclines)
-            each = max(repeats, math.ceil(_SPARE * FEWEST / inclines))
-            source = repeated(str(ready), each, Path(folder))
-            run_protocol(source, _PORT, str(path), Operator(lambda _: None), seed)
-            with Session.open(path, readonly=True) as session:
-                protocol = protocol_of(session)
-                analysis, _ = detailed(session)
-        found += _compared(name, protocol, analysis)
-    return found
+        ready = ready_protocol(name)
+        least = math.ceil(_SPARE * FEWEST / len(read(ready).plan.inclines))
+        repeats = max(arguments.repeats, least)
+        session = with_device(str(ready), "sim://", arguments.seed, repeats)
+        forecasts += _compared(name, session.protocol, session.analysis)
+    rows = [asdict(each) for each in forecasts]
+    yield Findings({"foretold": rows}, aligned(_COLUMNS, forecasts), _HEAD, rows, simulated=True)
 
 
 def _compared(name: str, protocol: Protocol, analysis: Analysis) -> list[Foretold]:
     if analysis.joint is None:
         raise InputError(f"{name}: too few good drops to learn from", "take more repeats")
-    good = [one for one in analysis.runs if one.verdict in GOOD]
+    good = [result for result in analysis.runs if result.verdict in GOOD]
     before = _forecast(protocol, stated(protocol))
     after = _forecast(protocol, analysis.joint.components)
     stands = {
         quantity: math.sqrt(sum(u * u for u in us) / len(us))
         for quantity in before
         if quantity in MEASURANDS
-        and (us := [one.quantities[quantity].u for one in good if quantity in one.quantities])
+        and (us := [run.quantities[quantity].u for run in good if quantity in run.quantities])
     }
     coefficients = estimate(protocol, analysis).coefficients
     if coefficients is not None:
-        stands |= {one.name: one.least_squares.u for one in coefficients.parameters
-                   if one.identified}  # fmt: skip
+        stands |= {each.name: each.least_squares.u for each in coefficients.parameters
+                   if each.identified}  # fmt: skip
     return [
         Foretold(name, quantity, len(good), before[quantity], after[quantity], u)
         for quantity, u in stands.items()
@@ -131,5 +111,25 @@ def _compared(name: str, protocol: Protocol, analysis: Analysis) -> list[Foretol
 def _forecast(protocol: Protocol, components: Components) -> dict[str, float]:
     beams = beams_of(protocol)
     layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
-    found = forecast(protocol, layout, sure=True)
-    return found.wanted()
+    return forecast(protocol, layout, sure=True).wanted()
+
+
+def _words(each: Foretold) -> str:
+    row = MEASURANDS.get(each.quantity)
+    return symbol(each.quantity) if row is None else f"u of {row.symbol}, one run ({row.fine})"
+
+
+def _size(each: Foretold, u: float) -> str:
+    row = MEASURANDS.get(each.quantity)
+    return f"{u * (1.0 if row is None else row.fine_scale):.3g}"
+
+
+_COLUMNS: tuple[Column[Foretold], ...] = (
+    Column("protocol", lambda each: each.protocol, numeric=False),
+    Column("quantity", _words, numeric=False),
+    Column("runs", lambda each: str(each.runs)),
+    Column("foretold by what is stated", lambda each: _size(each, each.by_stated)),
+    Column("by what was learned", lambda each: _size(each, each.by_learned)),
+    Column("found", lambda each: _size(each, each.found)),
+    Column("found / foretold", lambda each: f"{each.found / each.by_learned:.2f}"),
+)

@@ -172,9 +172,7 @@ def under(kind: Kind, impact: Sequence[float], free: Sequence[float]) -> GateLay
     """Put gates below the hanging chain, at shares of its drop."""
     sides = [tuple(round(share * kind.drop_mm, 2) for share in shares) for shares in (impact, free)]
     return GateLayout(
-        kind,
-        () if kind.scene == "fence" else sides[0],
-        () if kind.scene == "single" else sides[1],
+        kind, () if kind.scene == "fence" else sides[0], () if kind.scene == "single" else sides[1]
     )
 
 

@@ -178,7 +178,7 @@ class MujocoLab(resolved_lab.ResolvedLab):
     """The resolved lab with MuJoCo's falls; none is kept on the disk."""
 
     def _make(self, label: int) -> dict[str, Any]:
-        chains = self._checked(label)
+        chains = self._hang_safely(label)
         return self._seen(label, {side: fall(chain) for side, chain in chains.items()})
 
 

@@ -5,45 +5,87 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from subprocess import PIPE, run
-from typing import Any
+from subprocess import PIPE
+from subprocess import run as run_process
+from typing import TYPE_CHECKING, Any
 
-from rig.bench.falls import Asked, falls, with_setting
+from bench.frame import Findings
+from bench.studies.figures import work_figure
+from rig.bench.falls import Asked, falls, simulation
 from rig.errors import RigError
 from rig.films import Film
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned
+from rig.report.film import film_figure
+from rig.text_table import text_table
 
-UNIFORM = "inclined-uniform.yaml"
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator
+
+_UNIFORM = "inclined-uniform.yaml"
+_WORK_HEAD = """\
+# Error against run time of the resolved world
+
+`./run bench resolved --work`: three rods fall with several steps, methods, contacts and strings.
+Errors are against the finest of each kind. Times are of one machine.
+
+![Error against run time](resolved-work.svg)"""
 
 
-def work() -> list[dict[str, Any]]:
-    """Measure error against run time of the resolved world's step and touches.
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Find what is asked for: error against run time, others' chains, or one fall drawn."""
+    if arguments.work:
+        yield _work(measure("resolved_precision"))
+    elif arguments.published:
+        yield _published(measure("published_falls"))
+    else:
+        drawing = film_figure(film(arguments.protocols, arguments.film))
+        yield Findings({}, ["resolved-fall.svg"], picture=drawing, name="resolved-fall")
+
+
+def _work(settings: list[dict[str, Any]]) -> Findings:
+    """Error against run time of the world's step and touches."""
+    rows = [["", "step (µs)", "touch (ms)", "rms error of Δz (mm)", "worst", "time a fall (s)"]]
+    rows += [
+        [row["changed"], f"{1e6 * row['step_s']:g}", f"{1e3 * row['touch_s']:g}",
+         *("–" if row[name] is None else f"{1e3 * row[name]:.4f}" for name in ("rms_m", "worst_m")),
+         f"{row['cpu_s']:.3g}"]
+        for row in settings
+    ]  # fmt: skip
+    return Findings(
+        {"settings": settings}, text_table(rows, left={0}, rule=True), _WORK_HEAD, settings,
+        work_figure(settings), "resolved-work",
+    )  # fmt: skip
+
+
+def _published(chains: list[dict[str, Any]]) -> Findings:
+    """How chains of other experiments fall."""
+    rows = [["", "of", "mean", "sd", "falls"]]
+    rows += [
+        [row["what"], row["of"], f"{row['mean']:.4f}",
+         "–" if row["sd"] is None else f"{row['sd']:.4f}", str(row["n"])]
+        for row in chains
+    ]  # fmt: skip
+    table = text_table(rows, left={0, 1}, rule=True)
+    return Findings(
+        {"results": chains}, table, rows=chains, name="resolved-published", simulated=True
+    )
+
+
+def measure(module: str) -> list[dict[str, Any]]:
+    """Have a module of this folder, in a process of its own, print lines of JSON.
 
     Raises
     ------
     RigError
-        The simulation gave up.
+        It gave up.
     """
-    return _lines("bench.studies.resolved_precision")
-
-
-def published() -> list[dict[str, Any]]:
-    """Let the chains of other experiments fall, see `bench.studies.published_falls`.
-
-    Raises
-    ------
-    RigError
-        The simulation gave up.
-    """
-    return _lines("bench.studies.published_falls")
-
-
-def _lines(module: str) -> list[dict[str, Any]]:
-    done = run([sys.executable, "-m", module], stdout=PIPE, text=True, check=False)
-    if done.returncode:
-        raise RigError(f"the simulation ended with exit code {done.returncode}")
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    command = [sys.executable, "-m", f"{__package__}.{module}"]
+    process = run_process(command, stdout=PIPE, text=True, check=False)
+    if process.returncode:
+        raise RigError(f"the simulation ended with exit code {process.returncode}")
+    return [json.loads(line) for line in process.stdout.splitlines()]
 
 
 def film(folder: str, incline_deg: float) -> Film:
@@ -54,10 +96,10 @@ def film(folder: str, incline_deg: float) -> Film:
     RigError
         The simulation gave up.
     """
-    path = Path(folder) / UNIFORM
+    path = Path(folder) / _UNIFORM
     number = next(
-        one.number for one in planned(reader.read(path)) if one.incline_deg == incline_deg
+        each.number for each in planned(reader.read(path)) if each.incline_deg == incline_deg
     )
-    url = with_setting("sim://?dynamics=resolved&film=1", "protocol", str(path.resolve()))
-    (made,) = falls([Asked(url, [1], [[number]])])
-    return Film(**made.truth["film"])
+    url = simulation(path, {"dynamics": "resolved", "film": "1"})
+    (fall,) = falls([Asked(url, [1], [[number]])])
+    return Film(**fall.truth["film"])

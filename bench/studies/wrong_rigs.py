@@ -17,6 +17,7 @@ from rig.protocol.reader import parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Set as AbstractSet
 
     Scene = dict[str, Any]
 
@@ -47,12 +48,16 @@ class WrongRig:
     """
 
     name: str
-    codes: frozenset[str]
+    codes: AbstractSet[str]
     sizes: tuple[float, ...] = (0.0,)
     unit: str = ""
     change: Callable[[Scene, float], bool] = lambda _scene, _size: True
     settings: Callable[[float], Mapping[str, str]] = field(default=lambda _size: {})
     slow: Callable[[float], float] = lambda _size: 0.0
+
+    def words(self, size: float) -> str:
+        """Write a size with its unit; nothing for what is only right or wrong."""
+        return f"{size:+g} {self.unit}" if self.unit else ""
 
     def rigs(self, stated: str) -> Iterator[tuple[float, str]]:
         """Yield each size with the protocol file of the rig that is so wrong."""
@@ -209,37 +214,21 @@ def _tilted(scene: Scene, forgotten: float) -> bool:
     return len(inclines) > 1
 
 
-NAMELESS: frozenset[str] = frozenset()
-"""Codes of what no reason names."""
-
-
-def _codes(*codes: str) -> frozenset[str]:
-    return frozenset(codes)
-
-
 WRONG_RIGS = (
-    WrongRig("chain stretched", _codes("chain_length"), (0.3, -1.0, 3.0), "%", _stretched),
-    WrongRig("other number of rods", _codes("rod_count"), (-1.0, 1.0, 2.0), "rods", _more_rods),
-    WrongRig("rod missing", _codes("rod_missing"), change=_rod_missing),
-    WrongRig("rods thicker", _codes("thickness"), (25.0, -20.0), "%", _thicker),
-    WrongRig("drop height", _codes("drop_height"), (8.0, -15.0, 30.0), "mm", _hung),
-    WrongRig("contact level", _codes("all_gates"), (3.0, -6.0, 15.0), "mm", _contact),
-    WrongRig(
-        "clock", _codes("clock"), (0.1, -0.5, 2.0), "%", slow=lambda percent: percent / 100.0
-    ),
-    WrongRig("gravity", _codes("gravity"), (0.5, -2.0, 5.0), "%", _attracted),
-    WrongRig(
-        "air",
-        _codes("air"),
-        (0.01, 0.03, 0.08),
-        "per m",
-        settings=lambda size: {"drag": f"{size}"},
-    ),
-    WrongRig("post's datum", _codes("post"), (2.0, 5.0, 15.0), "mm", _post),
-    WrongRig("gate off", _codes("gate_height"), (3.0, -8.0, 20.0), "mm", _one_gate),
-    WrongRig("gate dead", _codes("gate_silent", "side_silent"), change=_dead),
-    WrongRig("gates exchanged", _codes("gates_exchanged"), (1.0, 2.0), "sides", _exchanged),
-    WrongRig("chains exchanged", _codes("chains_exchanged"), change=_crossed),
-    WrongRig("chain upside down", _codes("upside_down"), change=_turned),
-    WrongRig("wrong incline", _codes("other_incline"), (1.0, 2.0), "inclines", _tilted),
-)  # fmt: skip
+    WrongRig("chain stretched", {"chain_length"}, (0.3, -1.0, 3.0), "%", _stretched),
+    WrongRig("other number of rods", {"rod_count"}, (-1.0, 1.0, 2.0), "rods", _more_rods),
+    WrongRig("rod missing", {"rod_missing"}, change=_rod_missing),
+    WrongRig("rods thicker", {"thickness"}, (25.0, -20.0), "%", _thicker),
+    WrongRig("drop height", {"drop_height"}, (8.0, -15.0, 30.0), "mm", _hung),
+    WrongRig("contact level", {"all_gates"}, (3.0, -6.0, 15.0), "mm", _contact),
+    WrongRig("clock", {"clock"}, (0.1, -0.5, 2.0), "%", slow=lambda percent: percent / 100.0),
+    WrongRig("gravity", {"gravity"}, (0.5, -2.0, 5.0), "%", _attracted),
+    WrongRig("air", {"air"}, (0.01, 0.03, 0.08), "per m", settings=lambda k: {"drag": f"{k}"}),
+    WrongRig("post's datum", {"post"}, (2.0, 5.0, 15.0), "mm", _post),
+    WrongRig("gate off", {"gate_height"}, (3.0, -8.0, 20.0), "mm", _one_gate),
+    WrongRig("gate dead", {"gate_silent", "side_silent"}, change=_dead),
+    WrongRig("gates exchanged", {"gates_exchanged"}, (1.0, 2.0), "sides", _exchanged),
+    WrongRig("chains exchanged", {"chains_exchanged"}, change=_crossed),
+    WrongRig("chain upside down", {"upside_down"}, change=_turned),
+    WrongRig("wrong incline", {"other_incline"}, (1.0, 2.0), "inclines", _tilted),
+)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from subprocess import PIPE, Popen
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
@@ -79,22 +81,30 @@ def falls(asked: Sequence[Asked], module: str = "") -> Iterator[SimulatedDrop]:
     with Popen(command, stdout=PIPE, text=True) as simulation:
         assert simulation.stdout is not None
         for line in simulation.stdout:
-            told = json.loads(line)
-            truth = told["truth"]
-            edges = tuple(Edge(round(when * HZ), *rest) for when, *rest in told["edges"])
+            record = json.loads(line)
+            truth = record["truth"]
+            edges = tuple(Edge(round(when * HZ), *rest) for when, *rest in record["edges"])
             drop = Drop(truth["run"], truth["attempt"], HZ, edges)
-            yield SimulatedDrop(int(told["seed"]), drop, truth)
+            yield SimulatedDrop(int(record["seed"]), drop, truth)
     if simulation.returncode:
-        urls = ", ".join(one.url for one in asked)
+        urls = ", ".join(request.url for request in asked)
         raise RigError(f"the simulation {urls} ended with exit code {simulation.returncode}")
 
 
 def time_scale(seed: int) -> TimeScale:
     """Calibrate a rig's clock: it is off by chance, as far as it says."""
-    known = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())
-    return TimeScale(float(known), CLOCK_U)
+    hz = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())
+    return TimeScale(float(hz), CLOCK_U)
 
 
-def with_setting(url: str, name: str, value: str) -> str:
-    """Add a setting to a port's URL."""
-    return f"{url}{'&' if '?' in url else '?'}{name}={quote(value)}"
+def simulation(
+    protocol: str | Path, settings: Mapping[str, str] = MappingProxyType({}), url: str = "sim://"
+) -> str:
+    """Return the URL of the simulation of a protocol file, with settings."""
+    return with_settings(url, {"protocol": str(Path(protocol).resolve()), **settings})
+
+
+def with_settings(url: str, settings: Mapping[str, str]) -> str:
+    """Add settings to a port's URL."""
+    words = "&".join(f"{name}={quote(value)}" for name, value in settings.items())
+    return f"{url}{'&' if '?' in url else '?'}{words}"

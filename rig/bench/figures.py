@@ -125,18 +125,18 @@ def scenes_figure(costs: Sequence[Cost]) -> str:
     """
     names = [cost.scene for cost in costs]
     with canvas((1.5, 1.5, 1.9), simulated=False) as drawing:
-        modules, whole, work = drawing.axes
+        modules, commands, work = drawing.axes
         _bars(modules, names, [len(cost.account.rooms) for cost in costs])
         modules.set_ylabel("modules of rig")
         spreads = [cost.seconds["predict"] for cost in costs]
         medians = [1e3 * spread.median for spread in spreads]
-        _bars(whole, names, medians, at="center")
+        _bars(commands, names, medians, at="center")
         ends = [
             [1e3 * (spread.median - spread.low) for spread in spreads],
             [1e3 * (spread.high - spread.median) for spread in spreads],
         ]
-        whole.errorbar(names, medians, yerr=ends, fmt="none", ecolor=INK, elinewidth=0.8)
-        whole.set_ylabel("rig predict (ms)")
+        commands.errorbar(names, medians, yerr=ends, fmt="none", ecolor=INK, elinewidth=0.8)
+        commands.set_ylabel("rig predict (ms)")
         _bars(work, names, [cost.account.operations["predict"] for cost in costs])
         work.set_yscale("log")
         work.set_ylabel("bytecodes\nof the prediction")

@@ -129,17 +129,19 @@ def methods(scene: PrecisionScene, *, quick: bool = False) -> list[Method]:
 
 def absent(scene: PrecisionScene) -> list[tuple[str, str]]:
     """What does not apply to a scene: method and reason."""
-    gone = []
+    left_out = []
     if not scene.even:
         reason = "Eq. 14 holds for like rods at equal distances"
-        gone.append(("continuum, every method", reason))
+        left_out.append(("continuum, every method", reason))
     if scene.chain.rods > _MANY_RODS:
         reason = (
             f"a solver started afresh for each of {scene.chain.rods} legs takes 30,000 evaluations "
             "and more, many seconds a fall, at any tolerance"
         )
-        gone += [(f"{kind} {solver}", reason) for kind in ("legs", "contact") for solver in SOLVERS]
-    return gone
+        left_out += [
+            (f"{kind} {solver}", reason) for kind in ("legs", "contact") for solver in SOLVERS
+        ]
+    return left_out
 
 
 def _solvers(scene: PrecisionScene, *, quick: bool) -> tuple[Solver, ...]:
@@ -192,18 +194,18 @@ def _discrete(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
         last = hits(*bodies[1], *where)[-1]
         return Answer(None, last.speed_before, last.time_s, chain.rods, chain.rods)
 
-    def stepped(advance: Advance, body: Body, step: float) -> Answer:
+    def fixed_steps(advance: Advance, body: Body, step: float) -> Answer:
         return step_by_step(*body, *where, step, advance)
 
-    def solved(solver: Solver, body: Body, rtol: float) -> Answer:
+    def with_solver(solver: Solver, body: Body, rtol: float) -> Answer:
         return leg_by_leg(*body, *where, solver, rtol)
 
     yield Method("discrete event-exact", "discrete", (Setting("–", 0.0, direct, gate),))
     for solver in _solvers(scene, quick=quick):
-        solve = partial(solved, solver)
+        solve = partial(with_solver, solver)
         yield _swept(f"legs {solver}", "discrete", solve, bodies, tolerances, "rtol {:.0e}")
     for name, advance in (("Euler", euler), ("RK4", rk4)):
-        solve = partial(stepped, advance)
+        solve = partial(fixed_steps, advance)
         yield _swept(f"fixed-step {name}", "discrete", solve, bodies, steps, "step {:.0e} s")
 
 
@@ -213,12 +215,12 @@ def _continuum(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
         return
     reach = scene.gamma * scene.spacing_m
     rest = (scene.alpha, 1.0, scene.drop, scene.gravity)
-    whole = continuum.UniformChain(scene.chain.length, reach, *rest)
+    uncut = continuum.UniformChain(scene.chain.length, reach, *rest)
     # Lower by the gate's height, z + γs and z₀ + γs are the same: so is the fall as far as there.
     cut = continuum.UniformChain(scene.chain.length - GATE_M, reach + GATE_M, *rest)
 
     def eq14() -> Answer:
-        return Answer(None, continuum.speed(whole, 0.0), None, 1, 1)
+        return Answer(None, continuum.speed(uncut, 0.0), None, 1, 1)
 
     def gauss(chain: continuum.UniformChain, nodes: float) -> Answer:
         end = continuum.end(chain, nodes=int(nodes))
@@ -227,7 +229,7 @@ def _continuum(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
     yield Method("continuum Eq. 14", "continuum", (Setting("–", 0.0, eq14, None),))
     counts = _GAUSS[::3] if quick else _GAUSS
     name = "continuum Gauss–Legendre"
-    yield _swept(name, "continuum", gauss, (whole, cut), counts, "{:.0f} nodes")
+    yield _swept(name, "continuum", gauss, (uncut, cut), counts, "{:.0f} nodes")
 
 
 def _contact(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
@@ -236,11 +238,11 @@ def _contact(scene: PrecisionScene, *, quick: bool) -> Iterator[Method]:
     taus = scene.contact_times[:2] if quick else scene.contact_times
     where = scene.drop, scene.gravity
 
-    def solved(solver: Solver, body: Body, tau: float) -> Answer:
+    def with_solver(solver: Solver, body: Body, tau: float) -> Answer:
         return leg_by_leg(*body, *where, solver, CONTACT_RTOL, tau, budget=budget)
 
     for solver in _solvers(scene, quick=quick):
-        solve = partial(solved, solver)
+        solve = partial(with_solver, solver)
         yield _swept(f"contact {solver}", "contact", solve, _bodies(scene), taus, "τ {:.0e} s")
 
 
@@ -308,12 +310,12 @@ def leg_by_leg(
     evaluations = steps = 0
     time = 0.0
 
-    def slope(_time: float, now: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slope(_time: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
         nonlocal evaluations
         evaluations += 1
         if evaluations > budget:
             raise RigError(f"more than {budget} evaluations, and the chain is not down yet")
-        return matrix @ now + falling
+        return matrix @ state + falling
 
     for height, gain in zip(chain.heights, gains, strict=True):
         speed, distance = float(state[1]), float(state[0]) + height
@@ -352,12 +354,7 @@ class _Landing:
 
 
 def step_by_step(
-    chain: Chain,
-    gains: Sequence[float],
-    drop: float,
-    gravity: float,
-    step: float,
-    advance: Advance,
+    chain: Chain, gains: Sequence[float], drop: float, gravity: float, step: float, advance: Advance
 ) -> Answer:
     """Fall as in a spreadsheet: a row a step, the end being the first row past the contact point.
 
@@ -373,8 +370,8 @@ def step_by_step(
     targets = [drop + height for height in chain.heights]
     state: Stage = (0.0, 0.0, 0.0, 0.0)  # way fallen, speed, Δz, speed gained
 
-    def slope(now: Stage) -> Stage:
-        return now[1], gravity, now[3], 0.0
+    def slope(state: Stage) -> Stage:
+        return state[1], gravity, state[3], 0.0
 
     rows = struck = 0
     while True:
@@ -397,13 +394,13 @@ def euler(slope: Slope, state: Stage, step: float) -> Stage:
 
 def rk4(slope: Slope, state: Stage, step: float) -> Stage:
     """One step of the classical Runge–Kutta method."""
-    one = slope(state)
-    two = slope(tuple([y + 0.5 * step * k for y, k in zip(state, one, strict=True)]))
+    k1 = slope(state)
+    two = slope(tuple([y + 0.5 * step * k for y, k in zip(state, k1, strict=True)]))
     three = slope(tuple([y + 0.5 * step * k for y, k in zip(state, two, strict=True)]))
     four = slope(tuple([y + step * k for y, k in zip(state, three, strict=True)]))
     return tuple(
         [
             y + step / 6.0 * (a + 2.0 * (b + c) + d)
-            for y, a, b, c, d in zip(state, one, two, three, four, strict=True)
+            for y, a, b, c, d in zip(state, k1, two, three, four, strict=True)
         ]
     )

@@ -12,12 +12,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from rig.bench.methods import absent, methods
-from rig.bench.precision_reference import (
-    contact_truth,
-    continuum_truth,
-    discrete_truth,
-    scenes,
-)
+from rig.bench.precision_reference import contact_truth, continuum_truth, discrete_truth, scenes
 from rig.bench.stability import relative_error
 from rig.errors import RigError
 
@@ -175,21 +170,21 @@ def precision(
     gaps: list[Gap] = []
     left_out: list[LeftOut] = []
     titles: tuple[tuple[str, str], ...] = ()
-    found = Precision((), (), (), (), ())
+    outcome = Precision((), (), (), (), ())
     for scene in chosen:
         left_out += [LeftOut(scene.name, name, "all", why) for name, why in absent(scene)]
-        trials = _tried(scene, methods(scene, quick=quick), left_out, progress, quick=quick)
+        trials = _run_once(scene, methods(scene, quick=quick), left_out, progress, quick=quick)
         progress(f"{scene.title}: {sum(t.turns for t in trials)} timed falls in turns")
         _take_turns(trials)
         progress(f"{scene.title}: 50 digits")
-        discrete, others = _truths(scene, trials)
-        points += [_point(scene, trial, discrete, others) for trial in trials]
-        gaps += _gaps(scene, discrete, others)
+        discrete, truths = _truths(scene, trials)
+        points += [_point(scene, trial, discrete, truths) for trial in trials]
+        gaps += _gaps(scene, discrete, truths)
         titles = (*titles, (scene.name, scene.title))
         best = tuple(cheapest(points))
-        found = Precision(titles, tuple(points), tuple(gaps), tuple(left_out), best)
-        keep(found)
-    return found
+        outcome = Precision(titles, tuple(points), tuple(gaps), tuple(left_out), best)
+        keep(outcome)
+    return outcome
 
 
 def cheapest(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> list[Cheapest]:
@@ -197,7 +192,7 @@ def cheapest(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> lis
     groups: dict[tuple[str, Model, float | None], list[Point]] = {}
     for point in points:
         groups.setdefault((point.scene, point.model, point.contact_time_s), []).append(point)
-    found = []
+    outcome = []
     for (scene, model, tau), group in groups.items():
         for target in targets:
             good = [
@@ -207,18 +202,18 @@ def cheapest(points: Sequence[Point], targets: Sequence[float] = TARGETS) -> lis
             ]
             best = min(good, key=lambda point: point.median_s, default=None)
             winner = (best.method, best.setting, best.median_s) if best else (None, None, None)
-            found.append(Cheapest(scene, model, tau, target, *winner))
-    return found
+            outcome.append(Cheapest(scene, model, tau, target, *winner))
+    return outcome
 
 
-def as_json(found: Precision) -> dict[str, object]:
+def as_json(outcome: Precision) -> dict[str, object]:
     """All of it as plain objects."""
-    whole = asdict(found)
-    whole["scenes"] = [{"name": name, "title": title} for name, title in found.scenes]
+    whole = asdict(outcome)
+    whole["scenes"] = [{"name": name, "title": title} for name, title in outcome.scenes]
     return whole
 
 
-def _tried(
+def _run_once(
     scene: PrecisionScene,
     lines: Sequence[Method],
     left_out: list[LeftOut],
@@ -268,19 +263,19 @@ def _take_turns(trials: Sequence[_Trial]) -> None:
 
 def _truths(scene: PrecisionScene, trials: Sequence[_Trial]) -> tuple[ExactAnswer, Truths]:
     """50 digits of each model: the discrete one, and by contact time (`None`: the continuum)."""
-    others: Truths = {}
+    truths: Truths = {}
     if scene.even:
-        others[None] = continuum_truth(scene)
+        truths[None] = continuum_truth(scene)
     for trial in trials:
         tau = trial.setting.contact_time_s
-        if tau is not None and tau not in others:
-            others[tau] = contact_truth(scene, tau)
-    return discrete_truth(scene), others
+        if tau is not None and tau not in truths:
+            truths[tau] = contact_truth(scene, tau)
+    return discrete_truth(scene), truths
 
 
-def _point(scene: PrecisionScene, trial: _Trial, discrete: ExactAnswer, others: Truths) -> Point:
+def _point(scene: PrecisionScene, trial: _Trial, discrete: ExactAnswer, truths: Truths) -> Point:
     setting, answer, model = trial.setting, trial.answer, trial.method.model
-    truth = discrete if model == "discrete" else others[setting.contact_time_s]
+    truth = discrete if model == "discrete" else truths[setting.contact_time_s]
     times = trial.times
     lower, median, upper = (
         statistics.quantiles(times, n=4, method="inclusive") if len(times) > 1 else 3 * times
@@ -305,12 +300,12 @@ def _point(scene: PrecisionScene, trial: _Trial, discrete: ExactAnswer, others: 
     )
 
 
-def absolute_error(found: float, exact: Decimal) -> float:
+def absolute_error(outcome: float, exact: Decimal) -> float:
     """|found − exact|; 0 where no float is nearer."""
-    return 0.0 if found == float(exact) else float(abs(type(exact)(found) - exact))
+    return 0.0 if outcome == float(exact) else float(abs(type(exact)(outcome) - exact))
 
 
-def _gaps(scene: PrecisionScene, discrete: ExactAnswer, others: Truths) -> list[Gap]:
+def _gaps(scene: PrecisionScene, discrete: ExactAnswer, truths: Truths) -> list[Gap]:
     return [
         Gap(
             scene.name,
@@ -320,5 +315,5 @@ def _gaps(scene: PrecisionScene, discrete: ExactAnswer, others: Truths) -> list[
             float(truth.speed / discrete.speed - 1),
             float(truth.gate - discrete.gate),
         )
-        for tau, truth in others.items()
+        for tau, truth in truths.items()
     ]

@@ -105,13 +105,13 @@ def scene(
 def discrete_truth(scene: PrecisionScene) -> ExactAnswer:
     """Rod by rod, Eq. 9 and free fall; at the gate, the fall of the chain as far as it struck."""
     chain = scene.chain
-    given = [Decimal(scene.alpha)] * chain.rods, [Decimal(scene.gamma)] * chain.rods
+    coefficients = [Decimal(scene.alpha)] * chain.rods, [Decimal(scene.gamma)] * chain.rods
     where = scene.drop, scene.gravity
-    end = exact_fall(chain.masses, chain.heights, *given, *where)
+    end = exact_fall(chain.masses, chain.heights, *coefficients, *where)
     gate = chain.length - GATE_M
     struck = sum(height < gate for height in chain.heights)
     masses = (*chain.masses[:struck], math.fsum(chain.masses[struck:]))
-    passing = exact_fall(masses, (*chain.heights[:struck], gate), *given, *where)
+    passing = exact_fall(masses, (*chain.heights[:struck], gate), *coefficients, *where)
     return ExactAnswer(end.separation, end.speed, passing.time)
 
 
@@ -138,9 +138,9 @@ def contact_truth(scene: PrecisionScene, contact_time: float) -> ExactAnswer:
             while abs(step) > enough * leg:
                 x = leg / tau
                 ahead = mp.exp(-x)
-                way = first * (x - 2 + (2 + x) * ahead) + second * (x - 1 + ahead)
+                extra_way = first * (x - 2 + (2 + x) * ahead) + second * (x - 1 + ahead)
                 grown = first * (1 - (1 + x) * ahead) + second * (1 - ahead)
-                fallen = (speed + g * leg / 2) * leg + tau * way
+                fallen = (speed + g * leg / 2) * leg + tau * extra_way
                 step = (fallen - distance) / (speed + g * leg + grown)
                 leg -= step
             x = leg / tau
@@ -166,19 +166,19 @@ def continuum_truth(scene: PrecisionScene) -> ExactAnswer:
         z0, h, g = mp.mpf(scene.chain.length), mp.mpf(scene.drop), mp.mpf(scene.gravity)
         reach, alpha = mp.mpf(scene.gamma) * mp.mpf(scene.spacing_m), mp.mpf(scene.alpha)
         power = 1 + 2 * alpha
-        whole = z0 + reach
-        b, d = (1 + alpha) / power, 2 * g * whole / power
+        reach_above = z0 + reach
+        b, d = (1 + alpha) / power, 2 * g * reach_above / power
         c = 2 * g * h + d
 
         def fallen(z: mpmath.mpf) -> mpmath.mpf:
-            v = ((z + reach) / whole) ** power
+            v = ((z + reach) / reach_above) ** power
             primitive = v**b / b * mp.hyp2f1(mp.mpf(1) / 2, b, b + 1, v * d / c)
-            return -whole / power / mp.sqrt(c) * primitive
+            return -reach_above / power / mp.sqrt(c) * primitive
 
         strike = mp.sqrt(2 * h / g)
         gate = strike + fallen(mp.mpf(GATE_M)) - fallen(z0)
         end = strike + fallen(mp.mpf(0)) - fallen(z0)
-        braces = h * whole ** (2 * alpha) + (whole**power - reach**power) / power
+        braces = h * reach_above ** (2 * alpha) + (reach_above**power - reach**power) / power
         speed = mp.sqrt(2 * g * braces / reach ** (2 * alpha))
         return _truth(_separation(scene, end), speed, gate)
 

@@ -83,8 +83,8 @@ def _exact_leg(
         return arrival, (arrival - speed) / gravity if gravity else distance / speed
     terminal, fading = (gravity / kappa).sqrt(), (-2 * kappa * distance).exp()
     arrival = (speed * speed * fading + terminal * terminal * (1 - fading)).sqrt()
-    gone = (terminal + arrival) * (terminal - speed) / ((terminal - arrival) * (terminal + speed))
-    return arrival, gone.ln() / (2 * (gravity * kappa).sqrt())
+    ratio = (terminal + arrival) * (terminal - speed) / ((terminal - arrival) * (terminal + speed))
+    return arrival, ratio.ln() / (2 * (gravity * kappa).sqrt())
 
 
 def _exact_way(time: Decimal, start: Decimal, gravity: Decimal, kappa: Decimal) -> Decimal:

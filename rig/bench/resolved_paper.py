@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.bench.falls import Asked, falls, with_setting
+from rig.bench.falls import Asked, falls, simulation
 from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
 
@@ -38,7 +38,7 @@ gates: {{impact: [{{channel: 0, height: 25 mm}}], free: [{{channel: 8, height: 2
 plan: {{incline: [{inclines}], repeats: {repeats}, settle: 0 s}}
 """
 _HANGING = {
-    "quiet": "1", "rod_sd": "0.3 mm", "tilt_sd": "1 deg", "yaw_sd": "2 deg",
+    "dynamics": "resolved", "quiet": "1", "rod_sd": "0.3 mm", "tilt_sd": "1 deg", "yaw_sd": "2 deg",
     "aside_sd": "0.5 mm", "swing_sd": "0.01 m/s",
 }  # fmt: skip
 """Chains hang as they would, let go together and seen by a perfect rig."""
@@ -86,7 +86,7 @@ def _ensembles(rods: str, tilt: float, inclines: Sequence[float], drops: int) ->
         mu=paper.SURFACE.friction.value,
         drop=1e3 * paper.DROP,
         gravity=paper.GRAVITY,
-        inclines=", ".join(f"{one:g} deg" for one in inclines),
+        inclines=", ".join(f"{incline:g} deg" for incline in inclines),
         repeats=drops,
     )
     runs = [
@@ -97,12 +97,10 @@ def _ensembles(rods: str, tilt: float, inclines: Sequence[float], drops: int) ->
     with TemporaryDirectory() as folder:
         path = Path(folder) / "paper.yaml"
         path.write_text(text, encoding="utf-8")
-        url = with_setting("sim://?dynamics=resolved", "protocol", str(path))
-        for dial, value in _HANGING.items():
-            url = with_setting(url, dial, value)
-        made = falls([Asked(url, range(1, len(runs) + 1), runs)])
+        url = simulation(path, _HANGING)
+        fallen = falls([Asked(url, range(1, len(runs) + 1), runs)])
         # Runs come in the plan's order: all of one incline, then all of the next.
-        return [_ensemble([fall.truth for fall in islice(made, drops)]) for _ in inclines]
+        return [_ensemble([fall.truth for fall in islice(fallen, drops)]) for _ in inclines]
 
 
 def _ensemble(truths: Sequence[Mapping[str, Any]]) -> Ensemble:
@@ -111,24 +109,24 @@ def _ensemble(truths: Sequence[Mapping[str, Any]]) -> Ensemble:
     return Ensemble(truths[0]["incline_deg"], *columns)
 
 
-def figure_3(found: Sequence[Ensemble]) -> Columns:
+def figure_3(ensembles: Sequence[Ensemble]) -> Columns:
     """Means and standard deviations against inclination, as columns for the figure."""
     return {
-        "incline_deg": [one.incline_deg for one in found],
-        SEPARATION.name: [fmean(one.separations) for one in found],
-        SEPARATION.key("sd"): [stdev(one.separations) for one in found],
-        SPEED.name: [fmean(one.speeds) for one in found],
-        SPEED.key("sd"): [stdev(one.speeds) for one in found],
-        "contact_height_m": [fmean(one.heights) for one in found],
-        "falls": [float(len(one.separations)) for one in found],
+        "incline_deg": [ensemble.incline_deg for ensemble in ensembles],
+        SEPARATION.name: [fmean(ensemble.separations) for ensemble in ensembles],
+        SEPARATION.key("sd"): [stdev(ensemble.separations) for ensemble in ensembles],
+        SPEED.name: [fmean(ensemble.speeds) for ensemble in ensembles],
+        SPEED.key("sd"): [stdev(ensemble.speeds) for ensemble in ensembles],
+        "contact_height_m": [fmean(ensemble.heights) for ensemble in ensembles],
+        "falls": [float(len(ensemble.separations)) for ensemble in ensembles],
     }
 
 
-def figure_4(found: Ensemble) -> Columns:
+def figure_4(ensemble: Ensemble) -> Columns:
     """Height of the top rod against V², striking and free, of the fall nearest to the mean Δz."""
-    middle = fmean(found.separations)
-    nearest = min(range(len(found.tracks)), key=lambda n: abs(found.separations[n] - middle))
-    track = found.tracks[nearest]
+    middle = fmean(ensemble.separations)
+    nearest = min(range(len(ensemble.tracks)), key=lambda n: abs(ensemble.separations[n] - middle))
+    track = ensemble.tracks[nearest]
     times = np.asarray(track["times_s"])
     columns: Columns = {"time_s": times[1:-1].tolist()}
     for name, key in (("", "impact_top_m"), ("free_", "free_top_m")):

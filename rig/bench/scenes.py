@@ -176,18 +176,18 @@ def scenes(
     """
     extra = [LadderScene(path.stem, path.read_text("utf-8")) for path in ready]
     with TemporaryDirectory() as folder:
-        wanted = [*ladder(), *extra]
-        files = [Path(folder) / f"{number}.yaml" for number in range(len(wanted))]
-        read = [parse(one.text, one.name) for one in wanted]
-        for one, file in zip(wanted, files, strict=True):
-            file.write_text(one.text, "utf-8")
+        measured = [*ladder(), *extra]
+        files = [Path(folder) / f"{number}.yaml" for number in range(len(measured))]
+        read = [parse(scene.text, scene.name) for scene in measured]
+        for scene, file in zip(measured, files, strict=True):
+            file.write_text(scene.text, "utf-8")
         say("counting …")
         accounts = [account(file) for file in files]
         say("timing …")
-        times = _timed(files, read, rounds)
+        times = _time_in_turns(files, read, rounds)
     costs = [
-        Cost(one.name, counted, _spreads(mine), _ratios(mine, times[0]))
-        for one, counted, mine in zip(wanted, accounts, times, strict=True)
+        Cost(scene.name, counted, _spreads(seconds), _ratios(seconds, times[0]))
+        for scene, counted, seconds in zip(measured, accounts, times, strict=True)
     ]
     steps = len(costs) - len(extra)
     by_work = sorted(costs[steps:], key=lambda cost: cost.account.operations["predict"])
@@ -202,10 +202,10 @@ def account(file: Path) -> Account:
     RigError
         If the process fails, or counts differently when asked again.
     """
-    told = [json.loads(_child("-c", _PROBE, str(file))) for _ in range(_PROBES)]
-    peak = statistics.median(one.pop("peak_bytes") for one in told)
-    first, *others = told
-    if any(other != first for other in others):
+    reports = [json.loads(_child("-c", _PROBE, str(file))) for _ in range(_PROBES)]
+    peak = statistics.median(report.pop("peak_bytes") for report in reports)
+    first, *repeats = reports
+    if any(repeat != first for repeat in repeats):
         raise RigError(f"{file.name}: two equal runs do not count the same")
     return Account(tuple(first["modules"]), peak, first["operations"], first["evaluations"])
 
@@ -225,7 +225,7 @@ def _child(*arguments: str) -> str:
     return done.stdout
 
 
-def _timed(
+def _time_in_turns(
     files: Sequence[Path], protocols: Sequence[Protocol], rounds: int
 ) -> list[dict[str, list[float]]]:
     """Seconds by scene and kind, one a round."""
@@ -237,12 +237,12 @@ def _timed(
         _seconds(protocol, 3)  # a first call is slow
         turns.append(max(1, round(_TURN_S / _seconds(protocol, 3))))
     for _ in range(rounds):
-        for file, protocol, often, mine in zip(files, protocols, turns, times, strict=True):
+        for file, protocol, often, seconds in zip(files, protocols, turns, times, strict=True):
             for command in ("check", "predict"):
                 begin = time.perf_counter()
                 _child("-m", "rig", command, str(file))
-                mine[command].append(time.perf_counter() - begin)
-            mine["compute"].append(_seconds(protocol, often))
+                seconds[command].append(time.perf_counter() - begin)
+            seconds["compute"].append(_seconds(protocol, often))
     return times
 
 

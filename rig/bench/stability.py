@@ -56,9 +56,7 @@ class StabilityRow:
     naive: str
 
 
-def stability(
-    progress: Callable[[StabilityRow], None] | None = None,
-) -> list[StabilityRow]:
+def stability(progress: Callable[[StabilityRow], None] | None = None) -> list[StabilityRow]:
     """Try every scene of `rig.bench.extremes.extremes`.
 
     Parameters
@@ -81,15 +79,15 @@ def examine(scene: Extreme) -> StabilityRow:
         warnings.simplefilter("error")
         try:
             impact = _impact(scene)
-            found = _found(scene, impact)
+            result = _fall(scene, impact)
         except DomainError as error:
             return StabilityRow(scene.group, scene.value, None, None, "refused", error.message, "–")
         except (ArithmeticError, ValueError, Warning) as error:
-            said = f"{type(error).__name__}: {error}"
-            return StabilityRow(scene.group, scene.value, None, None, "FAILED", said, "–")
+            words = f"{type(error).__name__}: {error}"
+            return StabilityRow(scene.group, scene.value, None, None, "FAILED", words, "–")
     exact = _exact(scene)
-    separation = relative_error(found.separation_m, exact.separation)
-    speed = relative_error(found.speed_m_s, exact.speed)
+    separation = relative_error(result.separation_m, exact.separation)
+    speed = relative_error(result.speed_m_s, exact.speed)
     good = max(separation, speed) <= scene.allowed
     verdict = "FAILED" if not good else "noted" if impact.notes else "exact"
     note = "; ".join(impact.notes)
@@ -98,16 +96,16 @@ def examine(scene: Extreme) -> StabilityRow:
     )
 
 
-def relative_error(found: float, exact: Decimal) -> float:
+def relative_error(result: float, exact: Decimal) -> float:
     """|found/exact − 1|; infinite where found is no number, 0 where no float is nearer."""
-    if found == float(exact):
+    if result == float(exact):
         return 0.0
-    if not math.isfinite(found) or exact == 0:
+    if not math.isfinite(result) or exact == 0:
         return math.inf
-    return float(abs(Decimal(found) / exact - 1))
+    return float(abs(Decimal(result) / exact - 1))
 
 
-def _found(scene: Extreme, impact: Impact) -> Fall:
+def _fall(scene: Extreme, impact: Impact) -> Fall:
     chain, where = scene.chain, (scene.drop, scene.gravity, scene.initial_speed)
     if not scene.kappa:
         return fall(chain, impact.alpha, impact.gamma, *where)
@@ -182,7 +180,7 @@ def sonic_lengths(ratios: Iterable[float] = (0.9, 0.7, 0.5, 0.3)) -> list[Sonic]
 
     Rods are `PITCH` apart and fall 18 cm before the first impact, as in the paper.
     """
-    found = []
+    result = []
     for ratio in ratios:
         low, high = 2, 4
         while _end_speed(ratio, high) < SOUND:
@@ -193,8 +191,8 @@ def sonic_lengths(ratios: Iterable[float] = (0.9, 0.7, 0.5, 0.3)) -> list[Sonic]
                 low = middle
             else:
                 high = middle
-        found.append(Sonic(ratio, high, (high - 1) * PITCH, (high - 1) * -math.log10(ratio)))
-    return found
+        result.append(Sonic(ratio, high, (high - 1) * PITCH, (high - 1) * -math.log10(ratio)))
+    return result
 
 
 def _end_speed(ratio: float, rods: int) -> float:

@@ -98,15 +98,6 @@ def stage(label: str) -> None:
             print(f"\r\x1b[K{label}", end="", file=sys.stderr, flush=True)
 
 
-def leave_study(
-    folder: Path, name: str, head: str, lines: Sequence[str], data: Mapping[str, Any],
-    table: str, picture: str | None = None, *, as_json: bool,
-) -> None:  # fmt: skip
-    """Write the files of a study of simulated drops, see `write_study`, and print it."""
-    write_study(folder, name, head, lines, data, table, picture)
-    print_found(data, lambda: "\n".join(["SIMULATED DATA", *lines]), as_json=as_json)
-
-
 def write_study(
     folder: Path, name: str, head: str, lines: Sequence[str], data: Mapping[str, Any],
     table: str, picture: str | None = None,

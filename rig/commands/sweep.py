@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,20 +13,16 @@ from rig.files import check_place, replacing
 from rig.protocol import reader
 from rig.report.canvas import KINDS
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
-from rig.sweep.executors import Inline, cores, processes
+from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
 from rig.sweep.tables import provenance, write_csv, write_npz
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator
-    from concurrent.futures import Executor
 
     from rig.protocol.protocol import Protocol
 
 _KINDS = (".csv", ".npz", *(f".{kind}" for kind in KINDS))
-# Processes take longer to start than this process to compute so many pieces.
-_FEW_CHUNKS = 20
 
 
 def main(arguments: Namespace) -> int:
@@ -47,7 +42,6 @@ def main(arguments: Namespace) -> int:
 
 def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
     size, start = layout.grid.size, time.monotonic()
-    length = chunk_length(layout.chain.rods)
 
     def show(done: int) -> None:
         rate = done / (time.monotonic() - start)
@@ -55,9 +49,10 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
         stage(f"{done / size:4.0%} of {size} points, {rate:.3g}/s, {rest:.0f} s left")
 
     try:
-        with _executor(jobs, address, -(-size // length)) as (executor, workers):
+        with executor(jobs, address) as (workers, count):
             # Twice as many pieces as workers, so that none waits for its next one.
-            return compute(layout, executor, 2 * workers, length, show)
+            length = chunk_length(layout.chain.rods)
+            return compute(layout, workers, 2 * count, length, show)
     finally:
         stage("")
 
@@ -75,23 +70,6 @@ def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> No
             write_npz(stream, facts, protocol.text, layout, swept)
         else:
             write_csv(stream, facts, layout, swept)
-
-
-@contextmanager
-def _executor(jobs: int | None, address: str | None, chunks: int) -> Iterator[tuple[Executor, int]]:
-    """Choose who computes, and say how many they are."""
-    if address is not None:
-        from rig.sweep.cluster import cluster  # noqa: PLC0415 - it needs Dask
-
-        with cluster(address) as executor:
-            yield executor
-        return
-    workers = min(cores() if jobs is None else jobs, chunks)
-    if workers == 1 or (jobs is None and chunks < _FEW_CHUNKS):
-        yield Inline(), 1
-        return
-    with processes(workers) as pool:
-        yield pool, workers
 
 
 def _drawn(output: Path) -> bool:

@@ -158,18 +158,18 @@ def cases(
     first = {(run.incline_deg, run.impact, run.free): run for run in reversed(planned)}
     models = {kind: _model(protocol, first[kind], components) for kind in sorted(kinds, key=str)}
     shared = SharedUnknowns(model for model, _ in models.values())
-    kept = np.ones(len(shared), dtype=np.bool_)
+    shared_kept = np.ones(len(shared), dtype=np.bool_)
     for name in _BEAMS:
         if name in shared.blocks:
-            kept[shared.blocks[name]] = False
+            shared_kept[shared.blocks[name]] = False
     # Beams are left out here and added by each layout: the rest is worked out once for all.
-    number = np.cumsum(kept) - 1
-    found = [
-        _case(first[kind], kinds[kind], model, x, shared, kept, number)
+    number = np.cumsum(shared_kept) - 1
+    collected = [
+        _case(first[kind], kinds[kind], model, x, shared, shared_kept, number)
         for kind, (model, x) in models.items()
     ]
-    found.sort(key=lambda one: one.run.incline_deg)
-    return Cases(tuple(found), int(kept.sum()))
+    collected.sort(key=lambda case: case.run.incline_deg)
+    return Cases(tuple(collected), int(shared_kept.sum()))
 
 
 def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[ChainRecord, Array]]:
@@ -185,7 +185,7 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
     list
         Records with their trains, and α of each rod, shape ``(rods,)``; empty for a free chain.
     """
-    found = []
+    collected = []
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     for record in records_of(protocol, run):
         alphas = model_alphas(protocol, record, run)
@@ -193,8 +193,8 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
         trains = tuple(
             observed(train, path.times(train.levels), train.blocks) for train in record.trains
         )
-        found.append((replace(record, trains=trains), alphas))
-    return found
+        collected.append((replace(record, trains=trains), alphas))
+    return collected
 
 
 def records_of(protocol: Protocol, run: Run) -> list[ChainRecord]:
@@ -259,18 +259,18 @@ def _case(
     model: DropModel,
     x: Array,
     shared: SharedUnknowns,
-    kept: NDArray[np.bool_],
+    shared_kept: NDArray[np.bool_],
     number: Index,
 ) -> Case:
     at, sd = model.unknowns, model.unknowns.sd
-    mine, here = shared.places(model)
+    common_places, here = shared.places(model)
     beam = np.zeros(len(at), dtype=np.bool_)
     for name in _BEAMS:
         if name in at:
             beam[at[name]] = True
     alpha = np.arange(at["alpha"].start, at["alpha"].stop) if "alpha" in at else np.zeros(0, int)
     # Own first, then α, then common, as `Case` has them: eliminated from the front.
-    common = mine[kept[here]]
+    common = common_places[shared_kept[here]]
     own = np.setdiff1d(np.flatnonzero(~beam), np.append(common, alpha))
     order = np.concatenate([own, alpha, common])
     place = np.full(len(at), -1)
@@ -284,9 +284,9 @@ def _case(
         count,
         own.size,
         alpha.size,
-        number[here[kept[here]]],
+        number[here[shared_kept[here]]],
         np.concatenate(chance),
-        {name: (one.slopes * sd)[order] for name, one in measurands(model, x).items()},
+        {name: (measurand.slopes * sd)[order] for name, measurand in measurands(model, x).items()},
         tuple(blocks.get(n, _BLIND) for n in range(at[_BEAMS[0]].stop - at[_BEAMS[0]].start)),
     )
 
@@ -305,12 +305,12 @@ def _blocks(
     columns = np.flatnonzero(place[rows.columns] >= 0)
     where = np.full(len(at), -1)
     where[rows.columns] = np.arange(rows.columns.size)
-    found = {}
+    collected = {}
     for train in record.trains:
         own = [where[at[name].start + train.gate] for name in _BEAMS if name in at]
-        mine = slopes[gate == train.gate]
-        part = np.zeros((mine.shape[0], columns.size + BEAM))
-        part[:, : columns.size] = mine[:, columns]
-        part[:, columns.size : columns.size + len(own)] = mine[:, own]
-        found[train.gate] = Block(place[rows.columns[columns]], part)
-    return found
+        rows_of_beam = slopes[gate == train.gate]
+        part = np.zeros((rows_of_beam.shape[0], columns.size + BEAM))
+        part[:, : columns.size] = rows_of_beam[:, columns]
+        part[:, columns.size : columns.size + len(own)] = rows_of_beam[:, own]
+        collected[train.gate] = Block(place[rows.columns[columns]], part)
+    return collected

@@ -56,7 +56,7 @@ class GateLayout:
     def plus(self, *beams: int) -> GateLayout:
         """Return the layout with more beams."""
         pairs = zip(self.cases.cases, self.rows, strict=True)
-        rows = tuple(_stacked(rows, [case.blocks[beam] for beam in beams]) for case, rows in pairs)
+        rows = tuple(_stack(rows, [case.blocks[beam] for beam in beams]) for case, rows in pairs)
         return GateLayout(self.cases, self.beams + len(beams), rows)
 
     def triangles(self) -> GateLayout:
@@ -64,17 +64,17 @@ class GateLayout:
         return replace(self, rows=tuple(map(triangle, self.rows)))
 
 
-def _stacked(rows: Array, blocks: Sequence[Block]) -> Array:
+def _stack(rows: Array, blocks: Sequence[Block]) -> Array:
     """Put what beams say below what others said, each beam's own unknowns behind."""
     height = rows.shape[0] + sum(block.slopes.shape[0] for block in blocks)
-    whole = np.zeros((height, rows.shape[1] + BEAM * len(blocks)))
-    (end, beam), whole[: rows.shape[0], : rows.shape[1]] = rows.shape, rows
+    stack = np.zeros((height, rows.shape[1] + BEAM * len(blocks)))
+    (end, beam), stack[: rows.shape[0], : rows.shape[1]] = rows.shape, rows
     for block in blocks:
         begin, end = end, end + block.slopes.shape[0]
-        whole[begin:end, block.columns] = block.slopes[:, :-BEAM]
-        whole[begin:end, beam : beam + BEAM] = block.slopes[:, -BEAM:]
+        stack[begin:end, block.columns] = block.slopes[:, :-BEAM]
+        stack[begin:end, beam : beam + BEAM] = block.slopes[:, -BEAM:]
         beam += BEAM
-    return whole
+    return stack
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,22 +132,23 @@ def forecast(
         _Drop.of(case, rows, layout.cases.shared)
         for case, rows in zip(layout.cases.cases, layout.rows, strict=True)
     ]
-    kept, stated = _described(protocol, drops)
+    in_model, stated = _describe(protocol, drops)
     # What needs no α of a drop is common to coefficients and measurands.
-    tied = [drop for drop, said in zip(drops, kept, strict=True) if said]
+    tied = [drop for drop, fits in zip(drops, in_model, strict=True) if fits]
     root = _session([drop.given_alpha() for drop in tied], np.eye(size))
-    rest = [drop.given_alpha() for drop, said in zip(drops, kept, strict=True) if not said]
-    alone = _session([*rest, *(drop.own_alpha() for drop in drops)], root)
-    inverse = np.linalg.inv(alone)  # once a layout, then asked by every measurand and incline
+    rest = [drop.given_alpha() for drop, fits in zip(drops, in_model, strict=True) if not fits]
+    session_root = _session([*rest, *(drop.own_alpha() for drop in drops)], root)
+    # Once a layout, then asked by every measurand and incline.
+    inverse = np.linalg.inv(session_root)
     single: dict[str, dict[Condition, float]] = {}
     mean: dict[str, dict[Condition, float]] = {}
-    for here in by_case(protocol, drops, lambda drop: drop.case.run):
-        at = protocol.condition(here[0].case.run)
-        n = sum(drop.case.count for drop in here)
-        gradients = here[0].case.gradients
+    for group in by_case(protocol, drops, lambda drop: drop.case.run):
+        at = protocol.condition(group[0].case.run)
+        n = sum(drop.case.count for drop in group)
+        gradients = group[0].case.gradients
         for name in (name for name in gradients if name in (names or gradients)):
             by_one, by_mean, common = 0.0, 0.0, np.zeros(size)
-            for drop in here:
+            for drop in group:
                 share = drop.case.count / n
                 own, slopes = drop.spread(name)
                 shared = slopes @ inverse[drop.place]
@@ -158,8 +159,8 @@ def forecast(
             single.setdefault(name, {})[at] = math.sqrt(by_one)
             mean.setdefault(name, {})[at] = math.sqrt(by_mean + float(common @ common))
     coefficients, held = _coefficients(protocol, tied, stated, root) if stated else ({}, set())
-    told = {name: u for name, u in coefficients.items() if sure or name not in held}
-    return Forecast(single, mean, told, frozenset(held))
+    reported = {name: u for name, u in coefficients.items() if sure or name not in held}
+    return Forecast(single, mean, reported, frozenset(held))
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,17 +191,17 @@ class _Drop:
         """Eliminate a drop's own unknowns, and α as far as its prior goes."""
         own, size = case.own, rows.shape[1]
         # A last row of zeros: α has a row also where there is no edge.
-        whole = triangle(np.vstack([rows, np.eye(own, size), np.zeros((1, size))]))
-        alpha = whole[own, own:] if case.struck else np.zeros(1 + size - own)
-        others = whole[: own + case.struck, own + case.struck :].copy()
-        root = whole[: own + case.struck, : own + case.struck].copy()
+        stack = triangle(np.vstack([rows, np.eye(own, size), np.zeros((1, size))]))
+        alpha = stack[own, own:] if case.struck else np.zeros(1 + size - own)
+        of_others = stack[: own + case.struck, own + case.struck :].copy()
+        root = stack[: own + case.struck, : own + case.struck].copy()
         if case.struck:  # turned against the row of its prior, 1
             root[own, own] = math.hypot(1.0, alpha[0])
-            others[own] *= alpha[0] / root[own, own]
+            of_others[own] *= alpha[0] / root[own, own]
         inverse = np.linalg.inv(root).astype(np.float64, copy=False)
         place = np.append(case.here, np.arange(shared, shared + size - case.core))
-        rest = whole[own + case.struck :, own + case.struck :]
-        return cls(case, place, inverse, others, alpha, rest)
+        rest = stack[own + case.struck :, own + case.struck :]
+        return cls(case, place, inverse, of_others, alpha, rest)
 
     def given_alpha(self) -> tuple[Array, Index]:
         """Return what all such drops say of the session's unknowns with α known."""
@@ -239,14 +240,12 @@ def _session(observations: Sequence[tuple[Array, Index]], root: Array) -> Array:
     return triangle(stack)
 
 
-def _described(
-    protocol: Protocol, drops: Sequence[_Drop]
-) -> tuple[list[bool], dict[str, Quantity]]:
+def _describe(protocol: Protocol, drops: Sequence[_Drop]) -> tuple[list[bool], dict[str, Quantity]]:
     """Return which drops the model describes, and what is stated of its coefficients."""
     if protocol.surface is None:
         return [False] * len(drops), {}
-    kept, stated, _ = described(protocol, [_impact(protocol, drop.case) for drop in drops])
-    return kept, stated
+    in_model, stated, _ = described(protocol, [_impact(protocol, drop.case) for drop in drops])
+    return in_model, stated
 
 
 def _impact(protocol: Protocol, case: Case) -> tuple[Chain, float]:
@@ -258,25 +257,25 @@ def _coefficients(
 ) -> tuple[dict[str, float], set[str]]:
     """Standard uncertainties of β, μ and a pile's β, and those that edges do not tell."""
     assert protocol.surface is not None
-    now = {name: quantity.value for name, quantity in stated.items()}
-    given = given_alphas(protocol)
-    size, count = root.shape[0], len(now)
-    whole = np.eye(size + count)  # ±1 of a coefficient is as good as nothing known
-    whole[:size, :size] = root
+    values = {name: quantity.value for name, quantity in stated.items()}
+    alpha_names = given_alphas(protocol)
+    size, count = root.shape[0], len(values)
+    stack = np.eye(size + count)  # ±1 of a coefficient is as good as nothing known
+    stack[:size, :size] = root
     tied = []
     for drop in drops:
         chain, incline = _impact(protocol, drop.case)
-        slopes = alphas(protocol.surface, chain, incline, now, given.get(chain))[1].mean(axis=0)
-        tied.append(drop.tied_alpha(slopes, size))
-    edges = _session(tied, whole)[size:, size:]
+        _, slopes = alphas(protocol.surface, chain, incline, values, alpha_names.get(chain))
+        tied.append(drop.tied_alpha(slopes.mean(axis=0), size))
+    edges = _session(tied, stack)[size:, size:]
 
     def uncertainties(priors: Mapping[str, float]) -> dict[str, float]:
         """With some held within these uncertainties; 0 is exact, which is no unknown."""
-        free = [n for n, name in enumerate(now) if priors.get(name) != 0.0]
-        weights = [1.0 / priors[name] if priors.get(name) else 0.0 for name in now]
+        free = [n for n, name in enumerate(values) if priors.get(name) != 0.0]
+        weights = [1.0 / priors[name] if priors.get(name) else 0.0 for name in values]
         inverse = np.linalg.inv(triangle(np.vstack([edges, np.diag(weights)])[:, free]))
-        known = dict(zip(free, np.linalg.norm(inverse, axis=1).tolist(), strict=True))
-        return {name: known.get(n, 0.0) for n, name in enumerate(now)}
+        by_place = dict(zip(free, np.linalg.norm(inverse, axis=1).tolist(), strict=True))
+        return {name: by_place.get(n, 0.0) for n, name in enumerate(values)}
 
     held = held_back(stated, uncertainties)
     by_edges, present = uncertainties({}), uncertainties(held)

@@ -48,16 +48,16 @@ def with_heights(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> str
             changes.append((place.line - 1, place.column - 1, height))
     for line, column, height in sorted(changes, reverse=True):  # from behind: places stay true
         text = lines[line]
-        found = _VALUE.match(text, column)
-        if found is not None:
-            lines[line] = f"{text[:column]}{height * 1e3:.1f} mm{text[found.end() :]}"
+        value = _VALUE.match(text, column)
+        if value is not None:
+            lines[line] = f"{text[:column]}{height * 1e3:.1f} mm{text[value.end() :]}"
     text = "".join(lines)
     gates = parse(text, protocol.source).gates
     assert gates is not None
     written = sorted((gate.side, gate.height) for gate in gates.gates)
     if any(
-        side != other or abs(height - meant) > _ROUNDED
-        for (side, height), (other, meant) in zip(written, sorted(beams), strict=True)
+        side != wanted_side or abs(height - meant) > _ROUNDED
+        for (side, height), (wanted_side, meant) in zip(written, sorted(beams), strict=True)
     ):
         raise InputError(
             f"{protocol.source}: its heights are not written one by one", "change them by hand"

@@ -69,7 +69,7 @@ def room(protocol: Protocol, lowest: float | None, highest: float | None, spacin
     """Take limits as they are given, else from the gates that are there and the chains."""
     assert protocol.gates is not None
     heights = [gate.height for gate in protocol.gates.gates]
-    top = min(protocol.drop.value + one.chain.length for one in protocol.chains.values())
+    top = min(protocol.drop.value + rods.chain.length for rods in protocol.chains.values())
     return Room(
         min(heights) if lowest is None else lowest,
         min(top, max(heights)) if highest is None else min(top, highest),
@@ -83,8 +83,8 @@ def candidates(protocol: Protocol, limits: Room) -> list[float]:
     hanging = np.array(
         [
             (protocol.drop.value + height, width / 2.0 + limits.clearance)
-            for one in protocol.chains.values()
-            for height, width in zip(one.chain.heights, one.widths, strict=True)
+            for rods in protocol.chains.values()
+            for height, width in zip(rods.chain.heights, rods.widths, strict=True)
         ]
     )
     n = math.floor((limits.highest - limits.lowest) / _GRID_M + 1e-9)
@@ -126,37 +126,37 @@ def better(
     sides = list(dict.fromkeys(gate.side for gate in gates))
     beams: list[tuple[Side, float]] = [(gate.side, gate.height) for gate in gates]
     beams += [(side, height) for side in sides for height in heights]
-    found = cases(protocol, beams, components, _few(protocol.plan.inclines))
+    all_cases = cases(protocol, beams, components, _few(protocol.plan.inclines))
     layout = list(range(len(gates)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
     floor = min(MARGIN, margin(protocol, beams[: len(gates)]))
-    best = score(protocol, GateLayout.of(found, layout))
+    best = score(protocol, GateLayout.of(all_cases, layout))
     for sweep in range(1, _SWEEPS + 1):
         before = best
         for slot, gate in enumerate(gates):
             stay = [n for other, n in enumerate(layout) if other != slot]
-            others = [beams[n] for n in stay]
-            fixed = GateLayout.of(found, stay).triangles()
-            mine = [
+            neighbours = [beams[n] for n in stay]
+            fixed = GateLayout.of(all_cases, stay).triangles()
+            places = [
                 n
                 for n in range(len(gates), len(beams))
-                if beams[n][0] == gate.side and not _crowded(beams[n], others, limits.spacing)
+                if beams[n][0] == gate.side and not _too_close(beams[n], neighbours, limits.spacing)
             ]
-            for stride, reach in ((_COARSE, len(mine)), (1, _COARSE - 1)):
-                centre = mine.index(layout[slot]) if layout[slot] in mine else len(mine) // 2
-                near = [n for n in mine[::stride] if abs(mine.index(n) - centre) <= reach]
+            for stride, reach in ((_COARSE, len(places)), (1, _COARSE - 1)):
+                centre = places.index(layout[slot]) if layout[slot] in places else len(places) // 2
+                near = [n for n in places[::stride] if abs(places.index(n) - centre) <= reach]
                 for n in near:
                     trial = score(protocol, fixed.plus(n))
                     if trial >= best - _WORTH:
                         continue
                     # Only now: whether it can be read takes a few drops to be read.
-                    proposed = [beams[one] for one in (*layout[:slot], n, *layout[slot + 1 :])]
+                    proposed = [beams[beam] for beam in (*layout[:slot], n, *layout[slot + 1 :])]
                     if _held(protocol, proposed) and margin(protocol, proposed) >= floor:
                         best, layout[slot] = trial, n
         say(f"sweep {sweep}: uncertainties × {math.exp(best):.3g} in the geometric mean")
         if before - best < _WORTH:
             break
-    return _ordered([beams[n] for n in layout])
+    return _sort_sides([beams[n] for n in layout])
 
 
 def _held(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
@@ -169,8 +169,8 @@ def _held(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
     if protocol.surface is None:
         return True
     for side in dict.fromkeys(side for side, _ in beams):
-        now = sum(gate.height > start for gate in protocol.gates.on(side))
-        if sum(height > start for one, height in beams if one == side) < min(now, _BEFORE):
+        present = sum(gate.height > start for gate in protocol.gates.on(side))
+        if sum(height > start for where, height in beams if where == side) < min(present, _BEFORE):
             return False
     return True
 
@@ -182,11 +182,11 @@ def _few(inclines: Sequence[float]) -> list[float]:
     return [ordered[round(n * (len(ordered) - 1) / (FEW - 1))] for n in range(FEW)]
 
 
-def _crowded(
-    beam: tuple[Side, float], others: Sequence[tuple[Side, float]], spacing: float
+def _too_close(
+    beam: tuple[Side, float], neighbours: Sequence[tuple[Side, float]], spacing: float
 ) -> bool:
     side, height = beam
-    return any(side == one and abs(height - at) < spacing - 1e-9 for one, at in others)
+    return any(side == where and abs(height - at) < spacing - 1e-9 for where, at in neighbours)
 
 
 def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
@@ -200,14 +200,17 @@ def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
     least = MARGIN
     for incline in {min(ends), max(ends)}:
         for off in (-_OFF, _OFF):
-            records = [one for one, _ in perfect(protocol, ends[incline], off * protocol.drop.u)]
-            found = identify(protocol, records, CLOCK_U, stated(protocol))
+            records = [
+                record for record, _ in perfect(protocol, ends[incline], off * protocol.drop.u)
+            ]
+            identification = identify(protocol, records, CLOCK_U, stated(protocol))
             all_seen: dict[str, list[Index]] = {
-                one.role: [np.arange(train.rods.size) for train in one.trains] for one in records
+                record.role: [np.arange(train.rods.size) for train in record.trains]
+                for record in records
             }
-            if found.fit is None or misread(found, all_seen):
+            if identification.fit is None or misread(identification, all_seen):
                 return -math.inf
-            least = min(least, found.log_odds)
+            least = min(least, identification.log_odds)
     return least
 
 
@@ -219,15 +222,15 @@ def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
 def score(protocol: Protocol, layout: GateLayout) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
     goals = (*(row.name for row in averaged()), *COEFFICIENTS)
-    wanted = forecast(protocol, layout, goals, sure=True).wanted()
-    values = [math.log(wanted[name]) for name in goals if name in wanted]
+    uncertainties = forecast(protocol, layout, goals, sure=True).wanted()
+    values = [math.log(uncertainties[name]) for name in goals if name in uncertainties]
     return sum(values) / len(values)
 
 
-def _ordered(beams: Sequence[tuple[Side, float]]) -> list[tuple[Side, float]]:
+def _sort_sides(beams: Sequence[tuple[Side, float]]) -> list[tuple[Side, float]]:
     """Sort each side's beams upwards, sides staying where they are."""
-    found = []
+    in_order = []
     rest = {side: sorted(h for s, h in beams if s == side) for side, _ in beams}
     for side, _ in beams:
-        found.append((side, rest[side].pop(0)))
-    return found
+        in_order.append((side, rest[side].pop(0)))
+    return in_order

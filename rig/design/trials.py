@@ -76,18 +76,28 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     rng = np.random.default_rng(_SEED)
     kinds = {(run.incline_deg, run.impact, run.free): run for run in reversed(runs(protocol))}
     read, failing = 0, Counter[str]()
-    wanted: tuple[str, float] | None = None
+    further_gate: tuple[str, float] | None = None
     for run in islice(cycle(kinds.values()), drops):
-        here = at_contact(protocol, run.incline_deg, run.impact)
-        start = here.drop.value + here.drop.u * rng.standard_normal()
-        fallen = [_fallen(here, one, run, start, rng) for one in records_of(here, run)]
-        found = identify(here, [one for one, _ in fallen], CLOCK_U, stated(here), _WINDOW)
-        wrong = misread(found, {record.role: truth for record, truth in fallen})
+        protocol_here = at_contact(protocol, run.incline_deg, run.impact)
+        start = protocol_here.drop.value + protocol_here.drop.u * rng.standard_normal()
+        fallen = [
+            _fallen(protocol_here, record, run, start, rng)
+            for record in records_of(protocol_here, run)
+        ]
+        identification = identify(
+            protocol_here, [record for record, _ in fallen], CLOCK_U, stated(protocol_here), _WINDOW
+        )
+        wrong = misread(identification, {record.role: truth for record, truth in fallen})
         read += not wrong
         failing.update(wrong)
-        if wrong and wanted is None and found.fit is not None and found.other is not None:
-            wanted = deciding_gate(found.fit, found.other)
-    return Trials(drops, read, tuple(failing.items()), wanted)
+        if (
+            wrong
+            and further_gate is None
+            and identification.fit is not None
+            and identification.other is not None
+        ):
+            further_gate = deciding_gate(identification.fit, identification.other)
+    return Trials(drops, read, tuple(failing.items()), further_gate)
 
 
 def _fallen(
@@ -133,7 +143,7 @@ def _path(
     return trajectory(protocol, record, release, start, alphas, rods)
 
 
-def misread(found: Identification, truth: Mapping[str, Sequence[Index]]) -> list[str]:
+def misread(identification: Identification, truth: Mapping[str, Sequence[Index]]) -> list[str]:
     """Return the sides of which no fall, or the wrong one, was found.
 
     Parameters
@@ -141,12 +151,12 @@ def misread(found: Identification, truth: Mapping[str, Sequence[Index]]) -> list
     truth
         For each train of each side which edge every expected edge is, −1 for a missed one.
     """
-    unlike = list(pattern_faults(found))
-    if unlike or found.fit is None:
+    unlike = list(pattern_faults(identification))
+    if unlike or identification.fit is None:
         return unlike or list(truth)
     return [
         role
-        for role, matches in found.fit.matches.items()
+        for role, matches in identification.fit.matches.items()
         if any(
             np.any((match >= 0) & (match != true))
             for match, true in zip(matches, truth[role], strict=True)

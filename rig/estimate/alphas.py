@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -40,8 +41,8 @@ class ConditionAlpha:
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        said = self.condition.json() | attributes(self, "n", "alpha")
-        return said if self.model is None else said | {"model": self.model}
+        record = self.condition.json() | attributes(self, "n", "alpha")
+        return record if self.model is None else record | {"model": self.model}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +60,9 @@ class RunAlpha:
 
     def json(self) -> dict[str, Any]:
         """One of ``runs``."""
-        said: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
-        said |= {"impact_chain": self.run.impact, "alpha": self.alpha.json()}
-        return said if self.residual is None else said | {"residual": self.residual}
+        record: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
+        record |= {"impact_chain": self.run.impact, "alpha": self.alpha.json()}
+        return record if self.residual is None else record | {"residual": self.residual}
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,59 +88,54 @@ class SingleAlphas:
     def json(self) -> dict[str, Any]:
         """``alpha`` and ``tests``."""
         tests = {"runs_share_alpha": self.runs_share_alpha, "model": self.by_model}
-        made = {name: plain(one) for name, one in tests.items() if one is not None}
-        return {"alpha": attributes(self, "inclines", "runs"), "tests": made}
+        results = {name: plain(test) for name, test in tests.items() if test is not None}
+        return {"alpha": attributes(self, "inclines", "runs"), "tests": results}
 
 
 def single_alphas(
     protocol: Protocol,
-    found: CoefficientProblem | None,
+    problem: CoefficientProblem | None,
     outcome: HypothesisFit | None,
     forms: Sequence[QuadraticForm],
-    like: Sequence[QuadraticForm],
+    groups: Sequence[QuadraticForm],
 ) -> SingleAlphas:
     """Fit one α to each run, and one to each condition.
 
     Parameters
     ----------
-    found, outcome
+    problem, outcome
         The coefficients and their fit, where there is one.
-    forms, like
+    forms, groups
         Of each drop, and of like drops merged.
     """
 
-    def case(one: QuadraticForm) -> Condition:
-        return protocol.condition(one.run)
+    def case(form: QuadraticForm) -> Condition:
+        return protocol.condition(form.run)
 
-    by_run = fit(forms, one_alpha(forms, lambda one: one.run.number))
-    by_case = fit(like, one_alpha(like, case))
+    by_run = fit(forms, one_alpha(forms, lambda form: form.run.number))
+    by_case = fit(groups, one_alpha(groups, case))
     model: dict[Condition, float] = {}
     by_model = None
-    if found is not None and outcome is not None:
+    if problem is not None and outcome is not None:
         model = dict(
-            zip(map(case, found.forms), _by_coefficients(protocol, found, outcome), strict=True)
+            zip(map(case, problem.forms), _by_coefficients(protocol, problem, outcome), strict=True)
         )
-        degrees = len(set(map(case, found.forms))) - len(found.parameters)
-        if found.parameters and not found.held and degrees > 0:
+        degrees = len(set(map(case, problem.forms))) - len(problem.parameters)
+        if problem.parameters and not problem.held and degrees > 0:
             # Without the nuisances, so that both suppose the same but for α.
-            open_ = fit(found.forms, one_alpha(found.forms, case))
-            plain = fit(found.forms, of.model(protocol, found.parameters))
+            open_ = fit(problem.forms, one_alpha(problem.forms, case))
+            plain = fit(problem.forms, of.model(protocol, problem.parameters))
             by_model = LikelihoodRatio(plain.chi2 - open_.chi2, degrees)
-    cases = sorted(set(map(case, like)))
-    fewer = len(forms) - len(cases)
+    cases = sorted(set(map(case, groups)))
+    fewer, counts = len(forms) - len(cases), Counter(map(case, forms))
     return SingleAlphas(
         tuple(
-            ConditionAlpha(
-                key,
-                sum(case(one) == key for one in forms),
-                Measured(*by_case[f"α {key}"]),
-                model.get(key),
-            )
+            ConditionAlpha(key, counts[key], Measured(*by_case[f"α {key}"]), model.get(key))
             for key in cases
         ),
         tuple(
-            RunAlpha(one.run, Measured(*by_run[f"α {one.run.number}"]), model.get(case(one)))
-            for one in forms
+            RunAlpha(form.run, Measured(*by_run[f"α {form.run.number}"]), model.get(case(form)))
+            for form in forms
         ),
         LikelihoodRatio(by_case.chi2 - by_run.chi2, fewer) if fewer > 0 else None,
         by_model,
@@ -147,9 +143,11 @@ def single_alphas(
 
 
 def _by_coefficients(
-    protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
+    protocol: Protocol, problem: CoefficientProblem, outcome: HypothesisFit
 ) -> list[float]:
     """α of each form by the model with the fitted coefficients."""
-    model = of.model(protocol, found.parameters)
-    values = outcome.values[: len(found.parameters)]
-    return [float(model.targets(one, values)[0][: one.alphas.size].mean()) for one in found.forms]
+    model = of.model(protocol, problem.parameters)
+    values = outcome.values[: len(problem.parameters)]
+    return [
+        float(model.targets(form, values)[0][: form.alphas.size].mean()) for form in problem.forms
+    ]

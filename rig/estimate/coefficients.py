@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.drop_model import prior_air
-from rig.estimate.hypotheses import (
-    ALPHA,
-    BETA,
-    MU,
-    PILE,
-    coefficients,
-    with_contact,
-    with_drag,
-)
+from rig.estimate.hypotheses import ALPHA, BETA, MU, PILE, coefficients, with_contact, with_drag
 from rig.estimate.hypothesis_fit import Parameter, fit
 from rig.model.impact import impact_on
 
@@ -82,14 +74,14 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
     forms
         Of like drops, see `rig.estimate.quadratic_forms.merged`.
     """
-    ordered = sorted(forms, key=lambda one: one.run.incline_deg)
-    kept, stated, left_out = described(
-        protocol, [(one.chain, one.run.incline_deg) for one in ordered]
+    ordered = sorted(forms, key=lambda form: form.run.incline_deg)
+    in_model, stated, left_out = described(
+        protocol, [(form.chain, form.run.incline_deg) for form in ordered]
     )
     parameters = [Parameter(name, quantity.value) for name, quantity in stated.items()]
-    told = tuple(one for one, said in zip(ordered, kept, strict=True) if said)
-    found = CoefficientProblem(told, tuple(parameters), (), stated, tuple(left_out))
-    return _identified(protocol, found) if told else found
+    informative = tuple(form for form, fits in zip(ordered, in_model, strict=True) if fits)
+    problem = CoefficientProblem(informative, tuple(parameters), (), stated, tuple(left_out))
+    return _hold_unknown(protocol, problem) if informative else problem
 
 
 def described(
@@ -107,35 +99,35 @@ def described(
     assert surface is not None
     stated: dict[str, Quantity] = {}
     left_out: list[str] = []
-    kept = []
-    given = given_alphas(protocol)
+    in_model = []
+    alpha_names = given_alphas(protocol)
     for chain, incline in drops:
         impact = impact_on(surface, chain, incline)
-        kept.append(impact.basis == "given" or not impact.notes)
-        if not kept[-1]:
-            said = f"{incline:g}° tells no coefficient: {'; '.join(impact.notes)}"
-            left_out += [said] if said not in left_out else []
+        in_model.append(impact.basis == "given" or not impact.notes)
+        if not in_model[-1]:
+            sentence = f"{incline:g}° tells no coefficient: {'; '.join(impact.notes)}"
+            left_out += [sentence] if sentence not in left_out else []
         elif chain.alpha is not None:
-            stated[given[chain]] = chain.alpha
+            stated[alpha_names[chain]] = chain.alpha
         elif impact.basis == "pile" and surface.pile is not None:
             stated[PILE] = surface.pile.restitution
         else:
             stated[BETA] = surface.restitution
             if impact.basis == "surface":
                 stated[MU] = surface.friction
-    return kept, stated, left_out
+    return in_model, stated, left_out
 
 
 def given_alphas(protocol: Protocol) -> dict[Chain, str]:
     """Name the α of each chain whose α is simply given; like chains have one."""
-    chains = {one.chain: one.name for one in protocol.chains.values() if one.chain.alpha}
+    chains = {rods.chain: rods.name for rods in protocol.chains.values() if rods.chain.alpha}
     return {chain: ALPHA if len(chains) == 1 else f"{ALPHA} {chains[chain]}" for chain in chains}
 
 
 def words(name: str) -> str:
     """Write a coefficient's name for people."""
-    what, _, chain = name.partition(" ")
-    return what.replace("_", " ") + (f" of chain {chain}" if chain else "")
+    coefficient, _, chain = name.partition(" ")
+    return coefficient.replace("_", " ") + (f" of chain {chain}" if chain else "")
 
 
 def held_back(
@@ -159,7 +151,7 @@ def held_back(
     held: dict[str, float] = {}
     models = [name for name in (MU, BETA, PILE) if name in stated]
     for name in [*models, *(name for name in stated if name not in models)]:
-        unsure = {other for other, u in uncertainties(held).items() if u > KNOWN}
+        unsure = {coefficient for coefficient, u in uncertainties(held).items() if u > KNOWN}
         if not unsure:
             break
         if name != MU or unsure & {MU, BETA}:
@@ -167,37 +159,37 @@ def held_back(
     return held
 
 
-def _identified(protocol: Protocol, given: CoefficientProblem) -> CoefficientProblem:
+def _hold_unknown(protocol: Protocol, problem: CoefficientProblem) -> CoefficientProblem:
     """Hold what the edges do not tell."""
 
     def holding(held: Mapping[str, float]) -> CoefficientProblem:
         exact = {name for name, u in held.items() if not u}
-        priors = {name: (given.stated[name].value, u) for name, u in held.items()}
+        priors = {name: (problem.stated[name].value, u) for name, u in held.items()}
         return replace(
-            given,
+            problem,
             parameters=tuple(
-                one._replace(prior=priors.get(one.name))
-                for one in given.parameters
-                if one.name not in exact
+                parameter._replace(prior=priors.get(parameter.name))
+                for parameter in problem.parameters
+                if parameter.name not in exact
             ),
             held=tuple(name for name in held if name not in exact),
-            stated={name: one for name, one in given.stated.items() if name not in exact},
+            stated={name: size for name, size in problem.stated.items() if name not in exact},
         )
 
     def uncertainties(held: Mapping[str, float]) -> dict[str, float]:
-        found = holding(held)
-        outcome = best(protocol, found)
-        return {name: outcome[name][1] for name in found.stated}
+        candidate = holding(held)
+        outcome = best(protocol, candidate)
+        return {name: outcome[name][1] for name in candidate.stated}
 
-    held = held_back(given.stated, uncertainties)
-    inclines = ", ".join(f"{incline:g}°" for incline in given.inclines)
+    held = held_back(problem.stated, uncertainties)
+    inclines = ", ".join(f"{incline:g}°" for incline in problem.inclines)
     left_out = [
         f"{words(name)} is not identified by drops at {inclines}: held at the protocol's "
-        f"{given.stated[name].value:g}"
+        f"{problem.stated[name].value:g}"
         + (f" ± {u:g}, which the other coefficients allow for" if u else "")
         for name, u in held.items()
     ]
-    return replace(holding(held), left_out=(*given.left_out, *left_out))
+    return replace(holding(held), left_out=(*problem.left_out, *left_out))
 
 
 def model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
@@ -206,15 +198,15 @@ def model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
     return coefficients(protocol.surface, parameters, given_alphas(protocol))
 
 
-def nuisances(protocol: Protocol, found: CoefficientProblem, inner: Hypothesis) -> Hypothesis:
+def nuisances(protocol: Protocol, problem: CoefficientProblem, inner: Hypothesis) -> Hypothesis:
     """Add where the contact point is at each incline, and the air."""
-    added = with_contact(inner, found.inclines, (0.0, CONTACT_U))
+    added = with_contact(inner, problem.inclines, (0.0, CONTACT_U))
     return with_drag(added, prior_air(protocol))
 
 
-def best(protocol: Protocol, found: CoefficientProblem) -> HypothesisFit:
+def best(protocol: Protocol, problem: CoefficientProblem) -> HypothesisFit:
     """Fit the coefficients with all nuisances."""
-    return fit(found.forms, nuisances(protocol, found, model(protocol, found.parameters)))
+    return fit(problem.forms, nuisances(protocol, problem, model(protocol, problem.parameters)))
 
 
 def correlation(outcome: HypothesisFit, names: Sequence[str]) -> Array:
@@ -222,5 +214,5 @@ def correlation(outcome: HypothesisFit, names: Sequence[str]) -> Array:
     at = [outcome.names.index(name) for name in names]
     part = outcome.covariance[np.ix_(at, at)]
     sd = np.sqrt(np.diag(part))
-    found: Array = part / np.outer(sd, sd)
-    return found
+    matrix: Array = part / np.outer(sd, sd)
+    return matrix

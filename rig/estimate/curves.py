@@ -78,12 +78,12 @@ class DropCurves:
 
     def json(self) -> dict[str, Any]:
         """One of ``curves``."""
-        said: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
-        said |= {"impact_chain": self.run.impact} | attributes(self, "height_m")
-        said |= self.squared_speed.json("speed2_m2_s2")
+        record: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
+        record |= {"impact_chain": self.run.impact} | attributes(self, "height_m")
+        record |= self.squared_speed.json("speed2_m2_s2")
         if self.separation is not None:
-            said |= attributes(self, "time_s") | self.separation.json(SEPARATION.name)
-        return said
+            record |= attributes(self, "time_s") | self.separation.json(SEPARATION.name)
+        return record
 
 
 def drop_curves(
@@ -96,7 +96,7 @@ def drop_curves(
     assert joint is not None
     adjusted, budgets = Adjusted(drop.model, drop.x), Budgets(joint)
 
-    def banded(measured: Dual, model: Array) -> Curve:
+    def with_band(measured: Dual, model: Array) -> Curve:
         _, own, shared = budgets.roots(drop, measured.slopes)
         variance = np.sum(own**2, axis=1) + np.sum(shared**2, axis=1)
         return Curve(measured.value, coverage_factor(np.inf) * np.sqrt(variance), model)
@@ -109,11 +109,11 @@ def drop_curves(
     separation = None
     if "free" in drop.model.records:
         by_model = _separations_by_model(protocol, run, times)
-        separation = banded(_separations(adjusted, times), by_model)
+        separation = with_band(_separations(adjusted, times), by_model)
     length = drop.model.records["impact"].chain.chain.length
     by_model = _squares_by_model(protocol, run, heights, length)
     return DropCurves(
-        run, heights, banded(_squares(adjusted, heights), by_model), times, separation
+        run, heights, with_band(_squares(adjusted, heights), by_model), times, separation
     )
 
 
@@ -124,8 +124,8 @@ def _squares(drop: Adjusted, heights: Array) -> Dual:
     for _ in range(2):  # what the top rod is off its chain hardly depends on the level
         levels = levels + heights - drop.top("impact", levels)
     speed = drop.squares("impact", levels).root() + drop.stretched(levels.value)[1]
-    if (way := drop.model.discrepancy.late_way) > 0.0:  # it comes by and by, below the lowest beam
-        speed += drop.late * np.clip(1.0 - heights / way, 0.0, 1.0)
+    if (catching_up := drop.model.discrepancy.late_way) > 0.0:  # below the lowest beam
+        speed += drop.late * np.clip(1.0 - heights / catching_up, 0.0, 1.0)
     return speed * speed
 
 
@@ -144,7 +144,7 @@ def _by_model(protocol: Protocol, run: Run) -> tuple[Chain, float, list[float]]:
     assert protocol.surface is not None
     chain, drop = as_struck(protocol, run.incline_deg, run.impact)
     impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
-    gains = kicks(chain, [one.alpha for one in impacts], [one.gamma for one in impacts])
+    gains = kicks(chain, [impact.alpha for impact in impacts], [impact.gamma for impact in impacts])
     return chain, drop.value, gains
 
 
@@ -157,8 +157,8 @@ def _squares_by_model(protocol: Protocol, run: Run, heights: Array, top: float) 
     after = np.array([0.0, *(hit.speed_after for hit in struck[:-1])])
     fallen = top - heights
     leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)
-    found: Array = np.maximum(after[leg] ** 2 + 2.0 * gravity * (fallen - before[leg]), 0.0)
-    return found
+    squares: Array = np.maximum(after[leg] ** 2 + 2.0 * gravity * (fallen - before[leg]), 0.0)
+    return squares
 
 
 def _separations_by_model(protocol: Protocol, run: Run, times: Array) -> Array:

@@ -11,7 +11,7 @@ from rig.analysis.distributions import chi2_tail
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
 from rig.estimate.coefficients import nuisances
-from rig.estimate.hypotheses import END, ended, one_alpha
+from rig.estimate.hypotheses import END, one_alpha, with_end_correction
 from rig.estimate.hypothesis_fit import fit
 from rig.model.rods import rod_impacts
 
@@ -52,7 +52,7 @@ class EndCorrection:
     @property
     def aic(self) -> dict[str, float]:
         """Akaike's criterion of each; γ is one parameter more where it is open."""
-        return {name: one + (2.0 if name == "open" else 0.0) for name, one in self.chi2.items()}
+        return {name: chi2 + (2.0 if name == "open" else 0.0) for name, chi2 in self.chi2.items()}
 
     @property
     def gamma(self) -> Measured | None:
@@ -97,7 +97,7 @@ class EndCorrection:
 
     def json(self) -> dict[str, Any]:
         """``end_correction``."""
-        said: dict[str, Any] = {
+        record: dict[str, Any] = {
             "scale": self.scale.json(),
             "delta_chi2": _above_least(self.chi2),
             "delta_aic": _above_least(self.aic),
@@ -105,15 +105,15 @@ class EndCorrection:
             "p_eq10": self._p("eq10"),
         }
         if self.gamma is not None:
-            said |= attributes(self, "gamma_eq10", "gamma")
-        return said | attributes(self, "needed", "sentence")
+            record |= attributes(self, "gamma_eq10", "gamma")
+        return record | attributes(self, "needed", "sentence")
 
 
 def _above_least(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: one - min(values.values()) for name, one in values.items()}
+    return {name: value - min(values.values()) for name, value in values.items()}
 
 
-def end_correction(protocol: Protocol, found: CoefficientProblem) -> EndCorrection | None:
+def end_correction(protocol: Protocol, problem: CoefficientProblem) -> EndCorrection | None:
     """Compare the three, with one α for each incline, so that Eqs. 8 to 13 are not at stake.
 
     Returns
@@ -124,18 +124,19 @@ def end_correction(protocol: Protocol, found: CoefficientProblem) -> EndCorrecti
 
     def gammas(form: QuadraticForm) -> Array:
         assert protocol.surface is not None
-        return np.array([one.gamma for one in rod_impacts(protocol.surface, form.chain, 0.0)])
+        impacts = rod_impacts(protocol.surface, form.chain, 0.0)
+        return np.array([impact.gamma for impact in impacts])
 
-    by_eq10 = {float(gamma) for form in found.forms for gamma in gammas(form)}
+    by_eq10 = {float(gamma) for form in problem.forms for gamma in gammas(form)}
     if by_eq10 == {0.0}:
         return None
-    cases = one_alpha(found.forms, lambda one: protocol.condition(one.run))
-    inclines = nuisances(protocol, found, cases)
-    open_ = fit(found.forms, ended(inclines, gammas, None))
+    cases = one_alpha(problem.forms, lambda form: protocol.condition(form.run))
+    inclines = nuisances(protocol, problem, cases)
+    open_ = fit(problem.forms, with_end_correction(inclines, gammas, None))
     chi2 = {
         "open": open_.chi2,
-        "eq10": fit(found.forms, inclines).chi2,
-        "without": fit(found.forms, ended(inclines, gammas, 0.0)).chi2,
+        "eq10": fit(problem.forms, inclines).chi2,
+        "without": fit(problem.forms, with_end_correction(inclines, gammas, 0.0)).chi2,
     }
     same = by_eq10.pop() if len(by_eq10) == 1 else None
     return EndCorrection(Measured(*open_[END]), chi2, same)

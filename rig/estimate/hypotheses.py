@@ -30,26 +30,25 @@ _STEP = 1e-5  # of a coefficient, for its derivative
 
 
 def coefficients(
-    surface: Surface, parameters: Sequence[Parameter], given: Mapping[Chain, str]
+    surface: Surface, parameters: Sequence[Parameter], alpha_names: Mapping[Chain, str]
 ) -> Hypothesis:
     """Suppose Eqs. 8 to 13 with these of β, μ and the pile's β unknown, the others as stated.
 
     Parameters
     ----------
-    given
+    alpha_names
         Name of the α of each chain whose α is simply given.
     """
-    names = [one.name for one in parameters]
-    known: dict[tuple[float, int, tuple[float, ...]], tuple[Array, Array]] = {}
+    names = [parameter.name for parameter in parameters]
+    computed: dict[tuple[float, int, tuple[float, ...]], tuple[Array, Array]] = {}
 
     def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         key = form.run.incline_deg, id(form.chain), tuple(values.tolist())
-        if key not in known:
-            now = dict(zip(names, values.tolist(), strict=True))
-            known[key] = _padded(
-                *alphas(surface, form.chain, form.run.incline_deg, now, given.get(form.chain))
-            )
-        return known[key]
+        if key not in computed:
+            current = dict(zip(names, values.tolist(), strict=True))
+            name, incline_deg = alpha_names.get(form.chain), form.run.incline_deg
+            computed[key] = _with_extras(*alphas(surface, form.chain, incline_deg, current, name))
+        return computed[key]
 
     return Hypothesis(tuple(parameters), targets)
 
@@ -59,7 +58,7 @@ def alphas(
     chain: Chain,
     incline_deg: float,
     values: Mapping[str, float],
-    given: str | None = None,
+    alpha_name: str | None = None,
 ) -> tuple[Array, Array]:
     """α of every rod by Eqs. 8 to 13, shape ``(rods,)``, with its derivatives by coefficients.
 
@@ -67,17 +66,17 @@ def alphas(
     ----------
     values
         Coefficients by name; others are as stated.
-    given
+    alpha_name
         Name of this chain's α, where it is simply given.
     """
-    if given is not None and given in values:
+    if alpha_name is not None and alpha_name in values:
         slopes = np.zeros((chain.rods, len(values)))
-        slopes[:, [*values].index(given)] = 1.0
-        return np.full(chain.rods, values[given]), slopes
+        slopes[:, [*values].index(alpha_name)] = 1.0
+        return np.full(chain.rods, values[alpha_name]), slopes
 
     def at(moved: Mapping[str, float]) -> Array:
         impacts = rod_impacts(with_coefficients(surface, moved), chain, incline_deg)
-        return np.array([one.alpha for one in impacts])
+        return np.array([impact.alpha for impact in impacts])
 
     slopes = np.zeros((chain.rods, len(values)))
     for n, (name, value) in enumerate(values.items()):
@@ -117,22 +116,22 @@ def _open(
     """Suppose an α for each of some sets of rods of all drops that share a key."""
     parameters: list[Parameter] = []
     sets: dict[object, list[tuple[int, Index]]] = {}
-    for one in dict.fromkeys(map(key, forms)):
-        alphas = np.array([form.alphas for form in forms if key(form) == one])
+    for group in dict.fromkeys(map(key, forms)):
+        alphas = np.array([form.alphas for form in forms if key(form) == group])
         for name, rods in split(alphas.shape[1]).items():
-            sets.setdefault(one, []).append((len(parameters), rods))
-            parameters.append(Parameter(f"α {one}{name}", float(alphas[:, rods].mean())))
+            sets.setdefault(group, []).append((len(parameters), rods))
+            parameters.append(Parameter(f"α {group}{name}", float(alphas[:, rods].mean())))
 
     def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         slopes = np.zeros((form.alphas.size, values.size))
         for place, rods in sets[key(form)]:
             slopes[rods, place] = 1.0
-        return _padded(slopes @ values, slopes)
+        return _with_extras(slopes @ values, slopes)
 
     return Hypothesis(tuple(parameters), targets)
 
 
-def ended(
+def with_end_correction(
     inner: Hypothesis, gammas: Callable[[QuadraticForm], Array], scale: float | None
 ) -> Hypothesis:
     """Suppose γ to be so many times that of Eq. 10, or (`None`) leave it open.
@@ -195,7 +194,7 @@ def _with(
     return Hypothesis((*inner.parameters, *added), targets)
 
 
-def _padded(target: Array, slopes: Array) -> tuple[Array, Array]:
+def _with_extras(target: Array, slopes: Array) -> tuple[Array, Array]:
     """Add the extras, which are nothing unless supposed."""
     none = np.zeros((len(EXTRA), slopes.shape[1]))
     return np.append(target, np.zeros(len(EXTRA))), np.vstack([slopes, none])

@@ -112,31 +112,31 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
     """
     parameters = hypothesis.parameters
     shared = 1 + max((int(form.here.max(initial=-1)) for form in forms), default=-1)
-    priors = [one.prior or (one.start, ANYTHING) for one in parameters]
+    priors = [parameter.prior or (parameter.start, ANYTHING) for parameter in parameters]
     centre = np.append(np.zeros(shared), [mean for mean, _ in priors])
-    begin = np.append(np.zeros(shared), [one.start for one in parameters]) - centre
+    begin = np.append(np.zeros(shared), [parameter.start for parameter in parameters]) - centre
     sd = np.append(np.ones(shared), [u for _, u in priors])
 
     def linearize(off: Array, _inflation: float) -> Linearization:
         at, blocks = centre + off, {}
         for number, form in enumerate(forms):
             target, by_parameters = hypothesis.targets(form, at[shared:])
-            slopes, left, _ = form.rows.after(np.append(at[form.here], target))
+            slopes, remainder, _ = form.rows.after(np.append(at[form.here], target))
             n = form.here.size
             # The targets are taken as linear: where the fit is good, their curvature counts little.
             slopes = np.column_stack([slopes[:, :n], slopes[:, n:] @ by_parameters])
             columns = np.append(form.here, np.arange(shared, at.size))
-            blocks[str(number)] = EquationRows(slopes, left, columns)
+            blocks[str(number)] = EquationRows(slopes, remainder, columns)
         chi2 = sum(float(rows.left @ rows.left) for rows in blocks.values())
         return Linearization(blocks, chi2, sum(form.edges for form in forms), chi2)
 
-    found = least_squares(linearize, sd, begin, done=_DONE, rough=True)
-    if not found.settled:
+    solution = least_squares(linearize, sd, begin, done=_DONE, rough=True)
+    if not solution.settled:
         raise RigError("the fit does not settle", "rig analyze shows whether the drops are sound")
-    chi2 = sum(float(rows.left @ rows.left) for rows in found.rows.values())
-    chi2 += float(np.sum(scaled(found.x, sd) ** 2))
-    by_root = found.inverse[shared:] * sd[shared:, None]
-    volume = float(np.sum(np.log(sd[sd > 0.0])) - np.linalg.slogdet(found.root)[1])
-    names = tuple(one.name for one in parameters)
-    values = centre[shared:] + found.x[shared:]
+    chi2 = sum(float(rows.left @ rows.left) for rows in solution.rows.values())
+    chi2 += float(np.sum(scaled(solution.x, sd) ** 2))
+    by_root = solution.inverse[shared:] * sd[shared:, None]
+    volume = float(np.sum(np.log(sd[sd > 0.0])) - np.linalg.slogdet(solution.root)[1])
+    names = tuple(parameter.name for parameter in parameters)
+    values = centre[shared:] + solution.x[shared:]
     return HypothesisFit(names, values, by_root @ by_root.T, chi2, volume)

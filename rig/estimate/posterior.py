@@ -53,8 +53,8 @@ class Posterior:
 
     def json(self) -> dict[str, Any]:
         """``posterior``."""
-        said = attributes(self, "names", "weights", "means", "sds")
-        return said | {"nodes": self.weights.size}
+        record = attributes(self, "names", "weights", "means", "sds")
+        return record | {"nodes": self.weights.size}
 
     def moments(self, name: str) -> tuple[float, float]:
         """Mean and standard deviation."""
@@ -75,12 +75,12 @@ class Posterior:
         low, high = mean - 20.0 * sd, mean + 20.0 * sd
         while high - low > 1e-9 * sd and low < (middle := 0.5 * (low + high)) < high:
             z = (middle - self.means[:, n]) / (self.sds[:, n] * math.sqrt(2.0))
-            below = float(self.weights @ [0.5 * math.erfc(-one) for one in z.tolist()])
+            below = float(self.weights @ [0.5 * math.erfc(-scaled) for scaled in z.tolist()])
             low, high = (middle, high) if below < probability else (low, middle)
         return 0.5 * (low + high)
 
 
-def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisFit) -> Posterior:
+def posterior(protocol: Protocol, problem: CoefficientProblem, centre: HypothesisFit) -> Posterior:
     """Work the posterior out.
 
     Parameters
@@ -90,11 +90,11 @@ def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisF
     """
     priors = {
         name: Parameter(name, centre[name][0], (stated.value, stated.u) if stated.u else None)
-        for name, stated in found.stated.items()
+        for name, stated in problem.stated.items()
     }
     names = tuple(priors)
     if MU not in priors:
-        only = fit(found.forms, nuisances(protocol, found, model(protocol, [*priors.values()])))
+        only = fit(problem.forms, nuisances(protocol, problem, model(protocol, [*priors.values()])))
         pairs = np.array([only[name] for name in names])
         return Posterior(names, np.ones(1), pairs[None, :, 0], pairs[None, :, 1])
     nodes = _nodes(*_around(centre[MU], priors[MU].prior))
@@ -102,7 +102,7 @@ def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisF
     for mu in nodes.tolist():
         # The node holds μ; what was known of it is counted below, not twice.
         fixed = {**priors, MU: Parameter(MU, mu, (mu, 0.0))}
-        at = fit(found.forms, nuisances(protocol, found, model(protocol, [*fixed.values()])))
+        at = fit(problem.forms, nuisances(protocol, problem, model(protocol, [*fixed.values()])))
         prior = priors[MU].prior
         off = (mu - prior[0]) / prior[1] if prior else 0.0
         logs.append(at.log_volume - 0.5 * (at.chi2 + off**2))
@@ -115,12 +115,14 @@ def posterior(protocol: Protocol, found: CoefficientProblem, centre: HypothesisF
     return Posterior(names, weights / weights.sum(), np.array(means), widths)
 
 
-def _around(found: tuple[float, float], prior: tuple[float, float] | None) -> tuple[float, float]:
+def _around(
+    measured: tuple[float, float], prior: tuple[float, float] | None
+) -> tuple[float, float]:
     """Mean and standard uncertainty with the prior; roughly, for it only places the nodes."""
     if prior is None:
-        return found
-    weights = np.array([found[1] ** -2, prior[1] ** -2])
-    mean = float(weights @ [found[0], prior[0]]) / weights.sum()
+        return measured
+    weights = np.array([measured[1] ** -2, prior[1] ** -2])
+    mean = float(weights @ [measured[0], prior[0]]) / weights.sum()
     return float(mean), float(weights.sum()) ** -0.5
 
 

@@ -93,12 +93,12 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     blocks, edges = _blocks(drop, alphas, inflation)
     size, rods = len(at) + len(EXTRA), alphas.size
     impulses = np.arange(at["impulses"].start, at["impulses"].stop)
-    gone = np.concatenate([common, impulses, [at["alpha"].start]])
+    eliminated = np.concatenate([common, impulses, [at["alpha"].start]])
     # Of one drop alone: its own unknowns, and how far each impulse is off its mean.
-    own = np.append(np.setdiff1d(np.arange(len(at)), gone), impulses)
-    kept = np.concatenate([common, size + np.arange(rods), np.arange(len(at), size)])
+    own = np.append(np.setdiff1d(np.arange(len(at)), eliminated), impulses)
+    remaining = np.concatenate([common, size + np.arange(rods), np.arange(len(at), size)])
     sd = np.append(at.sd, np.ones(len(EXTRA) + rods))
-    rest = eliminate(blocks, sd, np.zeros(sd.size), own, kept).rest
+    rest = eliminate(blocks, sd, np.zeros(sd.size), own, remaining).rest
     hits = model.trajectory("impact", x).hits
     assert hits is not None
     return QuadraticForm(
@@ -106,7 +106,7 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
         record.chain.chain,
         record.ratios,
         here,
-        rest._replace(columns=np.arange(kept.size)),
+        rest._replace(columns=np.arange(remaining.size)),
         alphas,
         hits.arrival,
         edges,
@@ -143,8 +143,8 @@ def _blocks(
         columns = np.concatenate(place)
         sigma = rows.residuals.sigma * inflation
         weight = np.sqrt(robust_weights(rows.residuals.values / sigma, STRAY)) / sigma
-        left = rows.residuals.values - slopes @ point[columns]
-        blocks.append(EquationRows(slopes * weight[:, None], left * weight, columns))
+        remainder = rows.residuals.values - slopes @ point[columns]
+        blocks.append(EquationRows(slopes * weight[:, None], remainder * weight, columns))
         edges += int((weight > 0.0).sum())
     return blocks, edges
 
@@ -164,21 +164,21 @@ def merged(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
 
     Drops are alike where the same chain strikes at the same incline. The run kept is the first.
     """
-    like: dict[tuple[object, ...], list[QuadraticForm]] = {}
-    for one in forms:
-        like.setdefault((one.run.incline_deg, one.run.impact, one.run.free), []).append(one)
+    groups: dict[tuple[object, ...], list[QuadraticForm]] = {}
+    for form in forms:
+        groups.setdefault((form.run.incline_deg, form.run.impact, form.run.free), []).append(form)
     return [
         replace(
             group[0],
             rows=group[0]
             .rows._replace(
-                slopes=np.concatenate([one.rows.slopes for one in group]),
-                left=np.concatenate([one.rows.left for one in group]),
+                slopes=np.concatenate([form.rows.slopes for form in group]),
+                left=np.concatenate([form.rows.left for form in group]),
             )
             .triangle(),
-            alphas=np.mean([one.alphas for one in group], axis=0),
-            arrivals=np.mean([one.arrivals for one in group], axis=0),
-            edges=sum(one.edges for one in group),
+            alphas=np.mean([form.alphas for form in group], axis=0),
+            arrivals=np.mean([form.arrivals for form in group], axis=0),
+            edges=sum(form.edges for form in group),
         )
-        for group in like.values()
+        for group in groups.values()
     ]

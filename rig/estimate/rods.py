@@ -60,8 +60,8 @@ class Gain:
 
     def json(self) -> dict[str, Any]:
         """One of ``groups``."""
-        said = {"rods": [self.first, self.last], "gain_m_s": self.measured.json()}
-        return said | attributes(self, "eq9_m_s", "normalized_error")
+        record = {"rods": [self.first, self.last], "gain_m_s": self.measured.json()}
+        return record | attributes(self, "eq9_m_s", "normalized_error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +89,12 @@ class Impulses:
     @property
     def resolved(self) -> int:
         """How many rods are told from both their neighbours."""
-        return sum(one.first == one.last for one in self.gains)
+        return sum(gain.first == gain.last for gain in self.gains)
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        said = self.condition.json() | attributes(self, "rods", "resolved", "alpha")
-        return said | self.eq9.json() | {"groups": plain(self.gains)}
+        record = self.condition.json() | attributes(self, "rods", "resolved", "alpha")
+        return record | self.eq9.json() | {"groups": plain(self.gains)}
 
 
 def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impulses, ...]:
@@ -113,22 +113,22 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
     tuple of Impulses
         One a condition.
     """
-    cases = by_case(protocol, forms, lambda one: one.run)
+    cases = by_case(protocol, forms, lambda form: form.run)
     return tuple(_impulses(protocol.condition(group[0].run), group) for group in cases)
 
 
-def resolution(found: Sequence[Impulses]) -> str:
+def resolution(impulses_by_case: Sequence[Impulses]) -> str:
     """Say whether each rod was resolved."""
-    if all(one.resolved == one.rods for one in found):
+    if all(case.resolved == case.rods for case in impulses_by_case):
         return "The gates resolve the impulse of every rod at every incline."
-    counts = {(one.resolved, one.rods) for one in found}
+    counts = {(case.resolved, case.rods) for case in impulses_by_case}
     if len(counts) == 1:
         ((resolved, rods),) = counts
         return f"{_TOGETHER} Resolved alone at every incline: {resolved} of {rods}."
     short = "; ".join(
-        f"{one.condition.incline_deg:g}°: {one.resolved} of {one.rods}"
-        for one in found
-        if one.resolved < one.rods
+        f"{case.condition.incline_deg:g}°: {case.resolved} of {case.rods}"
+        for case in impulses_by_case
+        if case.resolved < case.rods
     )
     return f"{_TOGETHER} Resolved alone at {short}."
 
@@ -138,17 +138,17 @@ def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
         return with_contact(hypothesis, [condition.incline_deg], (0.0, CONTACT_U))
 
     single = fit(forms, contact(one_alpha(forms, lambda _: "one")))
-    each = fit(forms, contact(each_rod(forms, lambda _: "one")))
+    open_fit = fit(forms, contact(each_rod(forms, lambda _: "one")))
     rods = forms[0].alphas.size - 1
     weight = forms[0].ratios[:rods] * np.mean([form.arrivals[:rods] for form in forms], axis=0)
-    gains = weight * each.values[:rods]
-    covariance = each.covariance[:rods, :rods] * np.outer(weight, weight)
+    gains = weight * open_fit.values[:rods]
+    covariance = open_fit.covariance[:rods, :rods] * np.outer(weight, weight)
     model = weight * single.values[0]
     return Impulses(
         condition,
         rods,
         Measured(*single["α one"]),
-        LikelihoodRatio(single.chi2 - each.chi2, rods - 1),
+        LikelihoodRatio(single.chi2 - open_fit.chi2, rods - 1),
         tuple(
             _gain(first, last, gains, covariance, model)
             for first, last in _groups(covariance, np.abs(model))
@@ -169,15 +169,15 @@ def _sum_u(covariance: Array, part: slice) -> float:
 
 def _groups(covariance: Array, sizes: Array) -> list[tuple[int, int]]:
     """Neighbours whose sum is resolved, from the bottom; what is left joins the last ones."""
-    found: list[tuple[int, int]] = []
+    groups: list[tuple[int, int]] = []
     first = 0
     for last in range(sizes.size):
         part = slice(first, last + 1)
         u = Measured(0.0, _sum_u(covariance, part)).expanded
         if u <= RESOLVED * sizes[part].sum():
-            found.append((first, last))
+            groups.append((first, last))
             first = last + 1
     if first < sizes.size:
-        begin = found.pop()[0] if found else first
-        found.append((begin, sizes.size - 1))
-    return found
+        begin = groups.pop()[0] if groups else first
+        groups.append((begin, sizes.size - 1))
+    return groups

@@ -73,10 +73,10 @@ class Coefficient:
 
     def json(self) -> dict[str, Any]:
         """One of ``parameters``."""
-        said = attributes(self, "name", "identified", "least_squares")
-        said["stated"] = {"value": self.stated.value, "u": self.stated.u}
-        known = {"value": self.mean, "u": self.sd, "low": self.low, "high": self.high}
-        return said | {"posterior": known}
+        record = attributes(self, "name", "identified", "least_squares")
+        record["stated"] = {"value": self.stated.value, "u": self.stated.u}
+        posterior = {"value": self.mean, "u": self.sd, "low": self.low, "high": self.high}
+        return record | {"posterior": posterior}
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,12 +125,12 @@ class Coefficients:
 
     def json(self) -> dict[str, Any]:
         """``parameters`` to ``edges_chi2``."""
-        said = attributes(self, "parameters", "contact")
+        record = attributes(self, "parameters", "contact")
         if self.posterior is not None:
-            names = [one.name for one in self.parameters]
-            said["correlation"] = {"names": names, "matrix": self.correlation.tolist()}
-            said["posterior"] = self.posterior.json()
-        return said | {"drag_per_m": plain(self.drag), "edges_chi2": self.chi2}
+            names = [parameter.name for parameter in self.parameters]
+            record["correlation"] = {"names": names, "matrix": self.correlation.tolist()}
+            record["posterior"] = self.posterior.json()
+        return record | {"drag_per_m": plain(self.drag), "edges_chi2": self.chi2}
 
 
 @dataclass(slots=True)
@@ -168,17 +168,17 @@ class SessionEstimate:
 
     def json(self) -> dict[str, Any]:
         """As `rig estimate --json` prints it."""
-        said = attributes(self, "drops", "edges")
+        record = attributes(self, "drops", "edges")
         if self.coefficients is not None:
-            said |= self.coefficients.json() | attributes(self, "end_correction")
+            record |= self.coefficients.json() | attributes(self, "end_correction")
         if self.alphas is not None:
-            said |= self.alphas.json()
+            record |= self.alphas.json()
         if self.impulses is not None:
             sentence = resolution(self.impulses)
-            said["impulses"] = {"inclines": plain(self.impulses), "sentence": sentence}
-        whole = ("left_out", "comparison", "curves")
-        said |= attributes(self, *(name for name in whole if getattr(self, name) is not None))
-        return said | (attributes(self, "failed") if self.failed else {})
+            record["impulses"] = {"inclines": plain(self.impulses), "sentence": sentence}
+        optional = ("left_out", "comparison", "curves")
+        record |= attributes(self, *(name for name in optional if getattr(self, name) is not None))
+        return record | (attributes(self, "failed") if self.failed else {})
 
 
 @one_thread
@@ -202,7 +202,11 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
             "this scene has no coefficients to estimate",
             "rig analyze SESSION gives the acceleration of free fall",
         )
-    good = {(one.run.number, one.attempt): one.run for one in analysis.runs if one.verdict in GOOD}
+    good = {
+        (result.run.number, result.attempt): result.run
+        for result in analysis.runs
+        if result.verdict in GOOD
+    }
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:
         none = "no motion fits the edges of any good drop" if good else "no good drop"
@@ -211,35 +215,35 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
         analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
     )
     forms = [quadratic_form(good[key], drop, shared) for key, drop in drops.items()]
-    like = merged(forms)
-    said = SessionEstimate(len(forms), sum(one.edges for one in forms))
+    groups = merged(forms)
+    results = SessionEstimate(len(forms), sum(result.edges for result in forms))
     sections = Sections()
-    found, outcome = None, None
+    problem, outcome = None, None
     with sections.alone("The coefficients"):
-        found = of.coefficient_problem(protocol, like)
-        said.left_out = (*_runs_left_out(good.keys() - drops.keys()), *found.left_out)
-        if found.forms:
-            outcome = of.best(protocol, found)
-            said.coefficients = _coefficients(protocol, found, outcome)
+        problem = of.coefficient_problem(protocol, groups)
+        results.left_out = (*_runs_left_out(good.keys() - drops.keys()), *problem.left_out)
+        if problem.forms:
+            outcome = of.best(protocol, problem)
+            results.coefficients = _coefficients(protocol, problem, outcome)
     with sections.alone("The end correction"):
-        if found is not None and found.forms:
-            said.end_correction = end_correction(protocol, found)
+        if problem is not None and problem.forms:
+            results.end_correction = end_correction(protocol, problem)
     with sections.alone("The best single α"):
-        said.alphas = single_alphas(protocol, found, outcome, forms, like)
+        results.alphas = single_alphas(protocol, problem, outcome, forms, groups)
     with sections.alone("The speed gained from each rod"):
-        said.impulses = impulses(protocol, like)
+        results.impulses = impulses(protocol, groups)
     with sections.alone("The comparison with the model"):
-        said.comparison = compare(protocol, good_cases(protocol, analysis.runs))
+        results.comparison = compare(protocol, good_cases(protocol, analysis.runs))
     with sections.alone("The curves"):
         first: Mapping[Condition, tuple[int, int]] = {
             protocol.condition(good[key]): key for key in reversed(drops)
         }
-        said.curves = tuple(
+        results.curves = tuple(
             drop_curves(protocol, good[key], drops[key], analysis.joint)
             for _, key in sorted(first.items())
         )
-    said.failed = tuple(sections.failed.values())
-    return said
+    results.failed = tuple(sections.failed.values())
+    return results
 
 
 def _runs_left_out(keys: Iterable[tuple[int, int]]) -> Iterator[str]:
@@ -251,31 +255,31 @@ def _runs_left_out(keys: Iterable[tuple[int, int]]) -> Iterator[str]:
 
 
 def _coefficients(
-    protocol: Protocol, found: CoefficientProblem, outcome: HypothesisFit
+    protocol: Protocol, problem: CoefficientProblem, outcome: HypothesisFit
 ) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
-    names = list(found.stated)
+    names = list(problem.stated)
     drag = Measured(*outcome[AIR]) if AIR in outcome else None
-    told = posterior(protocol, found, outcome) if names else None
+    spread = posterior(protocol, problem, outcome) if names else None
     return Coefficients(
         tuple(
             Coefficient(
                 name,
-                name not in found.held,
+                name not in problem.held,
                 Measured(*outcome[name]),
-                *told.moments(name),
-                *told.interval(name),
-                found.stated[name],
+                *spread.moments(name),
+                *spread.interval(name),
+                problem.stated[name],
             )
             for name in names
         )
-        if told
+        if spread
         else (),
         of.correlation(outcome, names),
-        told,
+        spread,
         tuple(
             ContactPoint(incline, Measured(*outcome[f"contact {incline:g}"]))
-            for incline in found.inclines
+            for incline in problem.inclines
         ),
         drag if drag and drag.u < of.FOUND * prior_air(protocol)[1] else None,
         outcome.chi2,

@@ -130,14 +130,14 @@ def falls(
         As in `rig.model.fall.hits`: m, m/s² and m/s; these and the impacts broadcast.
     """
     profile = _floats(masses), _floats(heights)
-    given = impacts.alpha, impacts.gamma, *map(_floats, (drop, gravity, initial_speed))
-    shape = np.broadcast_shapes(*(one.shape for one in given))
-    flat = [np.broadcast_to(one, shape).reshape(-1) for one in given]
+    inputs = impacts.alpha, impacts.gamma, *map(_floats, (drop, gravity, initial_speed))
+    shape = np.broadcast_shapes(*(array.shape for array in inputs))
+    flat = [np.broadcast_to(array, shape).reshape(-1) for array in inputs]
     ends = np.empty((3, flat[0].size))
     with np.errstate(all="ignore"):
         for start in range(0, flat[0].size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            ends[:, block] = _block_ends(*profile, *(one[block] for one in flat))
+            ends[:, block] = _block_ends(*profile, *(array[block] for array in flat))
     return FallBatch(*(row.reshape(shape) for row in ends))
 
 

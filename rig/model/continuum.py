@@ -195,8 +195,8 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     v = _speeds(chain, x)
     passing = (chain.length_m + chain.reach_m) * np.exp(-x) / v * stretch
     gaining = v * stretch
-    whole = gaining @ rule.weights
-    before = np.concatenate(([0.0], np.cumsum(whole[:-1])))
+    panel_gains = gaining @ rule.weights
+    before = np.concatenate(([0.0], np.cumsum(panel_gains[:-1])))
     gained = before[:, None] + gaining @ rule.running.T
     lay_down = float(np.sum(passing @ rule.weights))
     return ContinuumEnd(

@@ -50,7 +50,9 @@ def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
 
 @lru_cache(maxsize=64)  # fractions take their time, and there are few chains
 def _per_mass(drags: tuple[float, ...], masses: tuple[float, ...]) -> tuple[float, ...]:
-    falling = [list(accumulate(map(Fraction, reversed(each))))[::-1] for each in (drags, masses)]
+    falling = [
+        list(accumulate(map(Fraction, reversed(values))))[::-1] for values in (drags, masses)
+    ]
     return tuple(float(drag / mass) for drag, mass in zip(*falling, strict=True))
 
 
@@ -153,15 +155,15 @@ def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tup
     """
     if distance == 0.0:
         return speed, 0.0
-    left = exp(-2.0 * kappa * distance)
+    decay = exp(-2.0 * kappa * distance)
     reach = 2.0 * distance * _per(expm1, -2.0 * kappa * distance)
-    arrival = sqrt(speed * speed * left + gravity * reach)
+    arrival = sqrt(speed * speed * decay + gravity * reach)
     if arrival == 0.0:
         raise DomainError(
             "the chain never arrives: no gravity, and no speed or too much drag",
             "give a gravity above zero",
         )
-    slow = reach / (arrival + left * speed)
+    slow = reach / (arrival + decay * speed)
     rate = sqrt(kappa * gravity)
     if rate * slow < 0.5:
         return arrival, slow * _per(atanh, rate * slow)
@@ -184,8 +186,8 @@ def fallen(time: float, gravity: float, kappa: float, initial_speed: float = 0.0
     if x <= 1.0:
         # (cosh x + r sinh x − 1)/κ, which is the way without drag as κ → 0.
         half = time * _per(sinh, 0.5 * x)
-        way = 0.5 * gravity * half * half + initial_speed * time * _per(sinh, x)
-        return way * _per(log1p, kappa * way)
+        distance = 0.5 * gravity * half * half + initial_speed * time * _per(sinh, x)
+        return distance * _per(log1p, kappa * distance)
     return (x + log1p(0.5 * (kappa * initial_speed / rate - 1.0) * -expm1(-2.0 * x))) / kappa
 
 

@@ -80,11 +80,7 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float])
 
 
 def hits(
-    chain: Chain,
-    gains: Sequence[float],
-    drop: float,
-    gravity: float,
-    initial_speed: float = 0.0,
+    chain: Chain, gains: Sequence[float], drop: float, gravity: float, initial_speed: float = 0.0
 ) -> list[Hit]:
     """Every impact of a fall, bottom rod first.
 
@@ -137,7 +133,7 @@ def fall(
         and SMALL < gravity < LARGE
         and initial_speed < LARGE
     ):
-        return _rescaled(chain, alpha, gamma, drop, gravity, initial_speed)
+        return _fall_in_own_units(chain, alpha, gamma, drop, gravity, initial_speed)
     return _fall(chain, alpha, gamma, drop, gravity, initial_speed)
 
 
@@ -170,7 +166,7 @@ def _fall(
     return Fall(separation, arrival, time)
 
 
-def _rescaled(
+def _fall_in_own_units(
     chain: Chain, alpha: float, gamma: float, drop: float, gravity: float, initial_speed: float
 ) -> Fall:
     """The same fall in units of its own size, so that no square over- or underflows.
@@ -183,7 +179,7 @@ def _rescaled(
     speeds += [math.frexp(initial_speed)[1]] if initial_speed else []
     unit = max(speeds, default=0)
     small = replace(chain, heights=tuple(math.ldexp(z, -length) for z in chain.heights))
-    found = _fall(
+    scaled = _fall(
         small,
         alpha,
         gamma,
@@ -192,9 +188,9 @@ def _rescaled(
         math.ldexp(initial_speed, -unit),
     )
     return Fall(
-        math.ldexp(found.separation_m, length),
-        math.ldexp(found.speed_m_s, unit),
-        math.ldexp(found.time_s, length - unit),
+        math.ldexp(scaled.separation_m, length),
+        math.ldexp(scaled.speed_m_s, unit),
+        math.ldexp(scaled.time_s, length - unit),
     )
 
 

@@ -108,15 +108,15 @@ def impact_on(
         Where Eq. 13 has no finite solution.
     """
     if chain.alpha is not None:
-        return _noted(chain.alpha.value, chain.gamma or 0.0, "given")
+        return _with_notes(chain.alpha.value, chain.gamma or 0.0, "given")
     gamma = gamma_finite(chain.inertia) if chain.gamma is None else chain.gamma
     pile = surface.pile
     if pile is not None and incline_deg < pile.below_deg:
         beta = pile.restitution.value if restitution is None else restitution
-        return _noted(alpha_level(beta, chain.inertia), gamma, "pile")
+        return _with_notes(alpha_level(beta, chain.inertia), gamma, "pile")
     beta = surface.restitution.value if restitution is None else restitution
     if incline_deg == 0.0:
-        return _noted(alpha_level(beta, chain.inertia), gamma, "level")
+        return _with_notes(alpha_level(beta, chain.inertia), gamma, "level")
     mu = surface.friction.value if friction is None else friction
     alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia, chain.inertia_z)
     notes: list[str] = []
@@ -126,10 +126,10 @@ def impact_on(
             f"the rod does not slide: incline {incline_deg:g}° is below arctan μ = {sliding:.1f}°, "
             "so f = μN does not hold"
         )
-    return _noted(alpha, gamma, "surface", *notes)
+    return _with_notes(alpha, gamma, "surface", *notes)
 
 
-def _noted(alpha: float, gamma: float, basis: str, *notes: str) -> Impact:
+def _with_notes(alpha: float, gamma: float, basis: str, *notes: str) -> Impact:
     """Add the notes that apply to any α."""
     if alpha > 0.5:
         notes = (*notes, f"α = {alpha:.4g} is above ½: more energy than the rod brings")

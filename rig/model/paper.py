@@ -7,13 +7,7 @@ from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from rig.model.chain import Chain
-from rig.model.continuum import (
-    UniformChain,
-    end,
-    separation_fast,
-    separation_leading_order,
-    speed,
-)
+from rig.model.continuum import UniformChain, end, separation_fast, separation_leading_order, speed
 from rig.model.fall import fall, free_fall_speed, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_liftoff, impact_on
 from rig.model.motion import Motion
@@ -72,8 +66,8 @@ def figure_3(step_deg: float = 1.0) -> Columns:
             impact = impact_on(surface, UNIFORM, min(incline, 29.999) if on_pile else incline)
             if impact.notes:
                 continue
-            found = _fall(UNIFORM, impact)
-            rows.append((incline, on_pile, found.separation_m, found.speed_m_s))
+            fall_end = _fall(UNIFORM, impact)
+            rows.append((incline, on_pile, fall_end.separation_m, fall_end.speed_m_s))
     return _columns(("incline_deg", "pile", "separation_m", "speed_m_s"), rows)
 
 
@@ -96,9 +90,9 @@ def figure_4() -> Columns:
         moments += [(hit.time_s, hit.speed_before), (hit.time_s, hit.speed_after)]
     rows = []
     for time, velocity in moments[:-1]:  # the top rod's own impact pulls on nothing
-        now = motion.at(time)
-        top = now.height_m + chain.length
-        rows.append((time, top, velocity**2, top + now.separation_m, (GRAVITY * time) ** 2))
+        instant = motion.at(time)
+        top = instant.height_m + chain.length
+        rows.append((time, top, velocity**2, top + instant.separation_m, (GRAVITY * time) ** 2))
     return _columns(("time_s", "height_m", "speed2", "free_height_m", "free_speed2"), rows)
 
 
@@ -111,10 +105,10 @@ def figure_6(points: int = 199) -> Columns:
 def _inertia_row(inertia: float) -> Sequence[float]:
     chain = replace(UNIFORM, inertia=inertia)
     impact = impact_on(BARE, chain, MIDDLE_INCLINE)
-    found = _fall(chain, impact)
+    fall_end = _fall(chain, impact)
     smooth = UniformChain(LENGTH, PITCH, impact.alpha, impact.gamma, DROP, GRAVITY)
     eq15 = separation_leading_order(impact.alpha, LENGTH, smooth.reach_m)
-    return inertia, found.separation_m, found.speed_m_s, eq15, speed(smooth, 0.0)
+    return inertia, fall_end.separation_m, fall_end.speed_m_s, eq15, speed(smooth, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

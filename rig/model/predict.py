@@ -199,8 +199,8 @@ def _moved_alphas(
             yield low, high, weight
 
 
-def _steps(given: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:
+def _steps(quantity: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:
     """An input moved down and up by u, not below `least`; nothing where it is exact."""
-    low, high = max(least, given.value - given.u), given.value + given.u
+    low, high = max(least, quantity.value - quantity.u), quantity.value + quantity.u
     if high > low:
-        yield low, high, given.u / (high - low)
+        yield low, high, quantity.u / (high - low)

@@ -32,10 +32,10 @@ def rod_impacts(surface: Surface, chain: Chain, incline_deg: float) -> list[Impa
     masses_above = list(accumulate(reversed(chain.masses[1:])))[::-1]
     moments_above = list(accumulate(reversed(moments[1:])))[::-1]
     above = [i / m for i, m in zip(moments_above, masses_above, strict=True)]
-    found = []
+    impacts = []
     for xi, xi_above in zip(chain.inertias, [*above, chain.inertias[-1]], strict=True):
-        one = impact_on(surface, replace(chain, inertia=xi, inertias=None), incline_deg)
+        impact = impact_on(surface, replace(chain, inertia=xi, inertias=None), incline_deg)
         if chain.alpha is None and chain.gamma is None:
-            one = replace(one, gamma=gamma_finite(xi, xi_above))
-        found.append(one)
-    return found
+            impact = replace(impact, gamma=gamma_finite(xi, xi_above))
+        impacts.append(impact)
+    return impacts

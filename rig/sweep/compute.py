@@ -154,8 +154,8 @@ def ends(
     alpha, gamma, drop, gravity, initial_speed
         Shape ``(falls,)`` or one number for all; m, m/s² and m/s.
     """
-    found = falls(masses, heights, given_impacts(alpha, gamma), drop, gravity, initial_speed)
-    return found.separation_m, found.speed_m_s
+    flags = falls(masses, heights, given_impacts(alpha, gamma), drop, gravity, initial_speed)
+    return flags.separation_m, flags.speed_m_s
 
 
 def _values(layout: Layout, chunk: range) -> dict[str, _Numbers]:
@@ -183,8 +183,8 @@ def _impacts(layout: Layout, values: dict[str, _Numbers]) -> Impacts:
 
 
 def _notes(layout: Layout, values: dict[str, _Numbers], impacts: Impacts) -> NDArray[np.uint8]:
-    found = NOT_SLIDING * ~impacts.sliding
-    found |= ABOVE_HALF * (impacts.alpha > 0.5)
+    flags = NOT_SLIDING * ~impacts.sliding
+    flags |= ABOVE_HALF * (impacts.alpha > 0.5)
     if layout.pile is not None:
-        found = found | PILE * np.less(values["incline"], layout.pile.below_deg)
-    return found.astype(np.uint8)
+        flags = flags | PILE * np.less(values["incline"], layout.pile.below_deg)
+    return flags.astype(np.uint8)

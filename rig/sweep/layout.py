@@ -110,22 +110,22 @@ def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
     """
     scene = scene_values(protocol)
     varied = read_vary(vary, tuple(scene))
-    kept = {name: values for name, values in scene.items() if name not in varied}
-    values = kept | varied
-    grid = Grid(tuple(Axis(name, each) for name, each in values.items() if len(each) > 1))
+    stated = {name: values for name, values in scene.items() if name not in varied}
+    values = stated | varied
+    grid = Grid(tuple(Axis(name, numbers) for name, numbers in values.items() if len(numbers) > 1))
     if grid.size > MOST_POINTS:
         shape = " × ".join(map(str, grid.shape))
         raise InputError(
             f"{shape} are {grid.size} points; at most {MOST_POINTS} are accepted",
             "vary less, or hold the incline with --vary incline=40deg",
         )
-    first, *others = (one.chain for one in protocol.chains.values())
+    first, *twins = (rods.chain for rods in protocol.chains.values())
     return Layout(
         grid=grid,
-        layered=any(len(each) > 1 for each in kept.values()),
-        fixed={name: each[0] for name, each in values.items() if len(each) == 1},
+        layered=any(len(numbers) > 1 for numbers in stated.values()),
+        fixed={name: numbers[0] for name, numbers in values.items() if len(numbers) == 1},
         chain=first,
-        longer_m=others[0].length - first.length if others else 0.0,
+        longer_m=twins[0].length - first.length if twins else 0.0,
         pile=protocol.surface.pile if protocol.surface and "incline" in scene else None,
         two_chains=protocol.two_chains,
     )
@@ -139,7 +139,7 @@ class _FaultError(Exception):
         self.column = column
 
 
-def read_vary(texts: Iterable[str], known: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Read all ``--vary`` of a command line.
 
     Parameters
@@ -147,8 +147,8 @@ def read_vary(texts: Iterable[str], known: Sequence[str]) -> dict[str, tuple[flo
     texts
         Each ``NAME=LOW..HIGH:COUNT``, or ``NAME=VALUE`` to hold a parameter at another value than
         the protocol's. Quantities have their unit, as in a protocol.
-    known
-        Names of the parameters that the scene has.
+    names
+        Of the parameters that the scene has.
 
     Returns
     -------
@@ -160,30 +160,30 @@ def read_vary(texts: Iterable[str], known: Sequence[str]) -> dict[str, tuple[flo
     InputError
         With every problem found, each with its text and column.
     """
-    found: dict[str, tuple[float, ...]] = {}
+    varied_values: dict[str, tuple[float, ...]] = {}
     problems = []
     for text in texts:
         try:
-            name, values = _read(text, known, found)
+            name, values = _read(text, names, varied_values)
         except _FaultError as fault:
             problems.append(f"--vary {quoted(text, 80)}, column {fault.column + 1}: {fault}")
         else:
-            found[name] = values
+            varied_values[name] = values
     if problems:
         raise InputError("\n".join(problems))
-    if all(len(values) == 1 for values in found.values()):
+    if all(len(values) == 1 for values in varied_values.values()):
         raise InputError("nothing is varied", f"{_EXAMPLE.partition(' or')[0]} behind --vary")
-    return found
+    return varied_values
 
 
-def _read(text: str, known: Sequence[str], taken: Container[str]) -> tuple[str, tuple[float, ...]]:
+def _read(text: str, names: Sequence[str], taken: Container[str]) -> tuple[str, tuple[float, ...]]:
     before, equals, after = text.partition("=")
     name, start = before.strip(), len(before) + 1
     if not equals:
         raise _FaultError(0, _EXAMPLE)
-    if name not in known:
-        guess = did_you_mean(name, tuple(known))
-        raise _FaultError(0, f"not in this scene; {guess}it can vary: {', '.join(known)}")
+    if name not in names:
+        guess = did_you_mean(name, tuple(names))
+        raise _FaultError(0, f"not in this scene; {guess}it can vary: {', '.join(names)}")
     if name in taken:
         raise _FaultError(0, "given twice; keep one of them")
     if ".." not in after:
@@ -224,8 +224,8 @@ def _count(text: str, column: int) -> int:
         number = int(digits)
         if 2 <= number <= MOST_VALUES:
             return number
-    wanted = f"a whole number from 2 to {MOST_VALUES} is wanted"
-    raise _FaultError(column, f"found {quoted(digits)}; {wanted}")
+    range_words = f"a whole number from 2 to {MOST_VALUES} is wanted"
+    raise _FaultError(column, f"found {quoted(digits)}; {range_words}")
 
 
 def spaced(low: float, high: float, count: int) -> tuple[float, ...]:

@@ -70,12 +70,12 @@ def _text(layout: Layout, swept: Swept, rows: range) -> Iterator[list[str]]:
     for axis, place in zip(layout.grid.axes, places, strict=True):
         values = list(map(repr, axis.values))
         yield [values[number] for number in place.tolist()]
-    some = slice(rows.start, rows.stop)
-    for found in (swept.separation_m, swept.speed_m_s):
+    part = slice(rows.start, rows.stop)
+    for column in (swept.separation_m, swept.speed_m_s):
         # The only number that is not equal to itself is NaN.
-        yield [repr(x) if x == x else "" for x in found.reshape(-1)[some].tolist()]  # noqa: PLR0124
-    yield ["1" if inside else "0" for inside in swept.in_domain.reshape(-1)[some].tolist()]
-    yield list(map(str, swept.notes.reshape(-1)[some].tolist()))
+        yield [repr(x) if x == x else "" for x in column.reshape(-1)[part].tolist()]  # noqa: PLR0124
+    yield ["1" if inside else "0" for inside in swept.in_domain.reshape(-1)[part].tolist()]
+    yield list(map(str, swept.notes.reshape(-1)[part].tolist()))
 
 
 def write_npz(

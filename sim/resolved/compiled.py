@@ -38,7 +38,7 @@ def compiled(function: Function, *, keep: bool = True) -> Function:
     if numba is None:
         return function
     try:
-        made: Function = numba.njit(cache=keep, nogil=True, error_model="numpy")(function)
+        loops: Function = numba.njit(cache=keep, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # there is no folder that it may keep it in
-        made = numba.njit(nogil=True, error_model="numpy")(function)
-    return made
+        loops = numba.njit(nogil=True, error_model="numpy")(function)
+    return loops

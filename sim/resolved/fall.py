@@ -91,17 +91,17 @@ def _turn(world: World, clock: Clock) -> Pages:
     """Go on to the end; everything that was kept."""
     motion.drift(world.bodies, clock.step / 2.0)
     number = world.bodies.mass.size
-    kept: list[Pages] = []
+    sets: list[Pages] = []
     steps, done = 0, _ROOM * FRAME
     while done == _ROOM * FRAME:
         pages = _pages(number)
         done = motion.advance(world, clock, steps, pages)
         steps += done
         samples, frames = -(-done // SAMPLE), -(-done // FRAME)
-        kept.append(
-            Pages(*(one[:samples] for one in pages[:3]), *(one[:frames] for one in pages[3:]))
+        sets.append(
+            Pages(*(part[:samples] for part in pages[:3]), *(part[:frames] for part in pages[3:]))
         )
-    return Pages(*(np.concatenate(parts) for parts in zip(*kept, strict=True)))
+    return Pages(*(np.concatenate(parts) for parts in zip(*sets, strict=True)))
 
 
 def _pages(number: int) -> Pages:
@@ -128,20 +128,20 @@ def skip(chain: Chain, world: World, step: float) -> Numbers:
     if chain.held or np.any(bodies.drag != kappa) or bodies.spin.any():
         return np.zeros(0)
     if chain.board is None:
-        way = chain.start + float(chain.rods.heights[-1]) + 2.0 * float(bodies.half[-1])
+        reach = chain.start + float(chain.rods.heights[-1]) + 2.0 * float(bodies.half[-1])
     else:
         down = world.ground.normal[2]
-        way = float(gaps(world).min()) / down - _EARLY if down > 0.0 else 0.0
+        reach = float(gaps(world).min()) / down - _EARLY if down > 0.0 else 0.0
     # Samples are SAMPLE steps apart, from half a step after the release.
     grid = SAMPLE * step
-    longest = 1.5 * math.sqrt(2.0 * max(way, 0.0) / chain.gravity)
+    longest = 1.5 * math.sqrt(2.0 * max(reach, 0.0) / chain.gravity)
     moments = np.arange(2 + int(longest / grid)) * grid
-    count = int((fallen(moments, chain.gravity, kappa)[0] < way).sum())
+    count = int((fallen(moments, chain.gravity, kappa)[0] < reach).sum())
     begin = count * grid
     moved = bodies.place + begin * bodies.velocity
     if (lengths(moved, bodies) - world.strings.rest).max(initial=0.0) > _SLIGHT:
         return np.zeros(0)
-    distance, speed = (float(one) for one in fallen(np.array(begin), chain.gravity, kappa))
+    distance, speed = (float(part) for part in fallen(np.array(begin), chain.gravity, kappa))
     bodies.place[:] = moved
     bodies.place[:, 2] -= distance
     bodies.velocity[:, 2] -= speed

@@ -48,12 +48,12 @@ def _overlapping(world: World) -> int | None:
 
 def duration(chain: Chain) -> float:
     """How long a chain would fall until its top rod is at the contact level and a little on, s."""
-    way = max(0.0, chain.start + float(chain.rods.heights[-1]))
+    distance = max(0.0, chain.start + float(chain.rods.heights[-1]))
     kappa = 0.0 if chain.drag is None else float(chain.drag.max())
     if kappa == 0.0:
-        return math.sqrt(2.0 * way / chain.gravity) + AFTER
+        return math.sqrt(2.0 * distance / chain.gravity) + AFTER
     # From v' = g − κv²: cosh(t √(gκ)) = exp(κ way), of which the exponential may be too large.
-    growth = kappa * way
+    growth = kappa * distance
     stretched = growth + math.log1p(math.sqrt(-math.expm1(-2.0 * growth)))
     return stretched / math.sqrt(chain.gravity * kappa) + AFTER
 

@@ -45,7 +45,7 @@ def stable_step(chain: Chain) -> float:
     strings = _SOUND / float(fastest) if fastest else math.inf
     bounces = [chain.board.bounce] if chain.board is not None else []
     bounces += [chain.touching] if chain.touching is not None else []
-    return min([strings, *(one.time_s / _TOUCH for one in bounces)])
+    return min([strings, *(first.time_s / _TOUCH for first in bounces)])
 
 
 def gaps(world: World) -> Numbers:
@@ -144,14 +144,14 @@ def board_height(chain: Chain, board: Board) -> float:
 
 def _neighbours(chain: Chain, bodies: Bodies) -> Neighbours:
     count = bodies.mass.size if chain.touching is not None else 0
-    one, other = np.triu_indices(count, 1)
-    both = bodies.mass[one] * bodies.mass[other] / (bodies.mass[one] + bodies.mass[other])
-    rest = np.zeros(one.size), np.zeros(one.size, np.intp), np.zeros(1, np.intp)
+    first, second = np.triu_indices(count, 1)
+    both = bodies.mass[first] * bodies.mass[second] / (bodies.mass[first] + bodies.mass[second])
+    rest = np.zeros(first.size), np.zeros(first.size, np.intp), np.zeros(1, np.intp)
     if chain.touching is None:
-        return Neighbours(one, other, both, *rest, 0.0, 0.0)
+        return Neighbours(first, second, both, *rest, 0.0, 0.0)
     bounce = chain.touching
     stiffness = _stiffness(chain.rods, both, bounce)
-    return Neighbours(one, other, stiffness, *rest, bounce.friction, damping(bounce.restitution))
+    return Neighbours(first, second, stiffness, *rest, bounce.friction, damping(bounce.restitution))
 
 
 def _record(chain: Chain) -> Record:

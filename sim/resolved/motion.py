@@ -102,8 +102,8 @@ class Ground(NamedTuple):
 class Neighbours(NamedTuple):
     """Rods that may touch each other; `near` lists the `number[0]` that are close now."""
 
-    one: Numbers
-    other: Numbers
+    first: Numbers
+    second: Numbers
     stiffness: Numbers
     fastest: Numbers
     near: Numbers
@@ -143,7 +143,7 @@ class Record(NamedTuple):
     since: Numbers
     lost: Numbers
     impulse: Numbers
-    now: Numbers
+    pushing: Numbers
     elastic: Numbers
     slack: Numbers
     top: Numbers
@@ -239,9 +239,9 @@ def _rubbing(
     slip: Vector, force: float, friction: float, ease: float, mass: float, step: float
 ) -> Vector:
     """Coulomb friction against a slip; one step must not do more than end it."""
-    most = friction * force
-    least = max(STICKS_BELOW, ease * most * step / mass)
-    return _times(-most / max(math.sqrt(_dot(slip, slip)), least), slip)
+    strongest = friction * force
+    least = max(STICKS_BELOW, ease * strongest * step / mass)
+    return _times(-strongest / max(math.sqrt(_dot(slip, slip)), least), slip)
 
 
 @compiled
@@ -340,7 +340,7 @@ def rim(bodies: Bodies, normal: Vector, k: int) -> Vector:
 def _strike(bodies: Bodies, ground: Ground, record: Record, step: float) -> None:
     """Let the board push."""
     normal = ground.normal
-    record.now[0] = record.now[1] = record.now[2] = 0.0
+    record.pushing[0] = record.pushing[1] = record.pushing[2] = 0.0
     for k in range(bodies.mass.size):
         above = _dot(normal, _row(bodies.place, k)) - ground.level
         if above > bodies.half[k] + bodies.radius[k]:
@@ -361,23 +361,23 @@ def _strike(bodies: Bodies, ground: Ground, record: Record, step: float) -> None
             )
             slip = _plus(moving, _times(rate, normal))
             rub = _rubbing(slip, force, ground.friction, bodies.ease, bodies.mass[k], step)
-            whole = _plus(_times(force, normal), rub)
-            _add(bodies, k, whole, arm)
+            push_and_rub = _plus(_times(force, normal), rub)
+            _add(bodies, k, push_and_rub, arm)
             _touches(record, k, overlap, rate)
             record.lost[BOARD] += step * (force - ground.stiffness[k] * overlap) * rate
             record.lost[BOARD_FRICTION] -= step * _dot(rub, slip)
             record.elastic[0] += 0.5 * ground.stiffness[k] * overlap * overlap
             for c in range(3):
-                record.now[c] += whole[c]
-                record.impulse[c] += step * whole[c]
+                record.pushing[c] += push_and_rub[c]
+                record.impulse[c] += step * push_and_rub[c]
 
 
 @compiled
-def closest(bodies: Bodies, one: int, other: int) -> tuple[float, Vector, Vector, Vector]:
+def closest(bodies: Bodies, first: int, second: int) -> tuple[float, Vector, Vector, Vector]:
     """Overlap of two rods, both arms, and the normal from the other to the one."""
-    u, w = _row(bodies.axis, one), _row(bodies.axis, other)
-    apart = _minus(_row(bodies.place, one), _row(bodies.place, other))
-    half, other_half = bodies.half[one], bodies.half[other]
+    u, w = _row(bodies.axis, first), _row(bodies.axis, second)
+    apart = _minus(_row(bodies.place, first), _row(bodies.place, second))
+    half, other_half = bodies.half[first], bodies.half[second]
     b, c, f = _dot(u, w), _dot(u, apart), _dot(w, apart)
     across = 1.0 - b * b
     s = (b * f - c) / across if across > _PARALLEL else 0.0
@@ -388,7 +388,7 @@ def closest(bodies: Bodies, one: int, other: int) -> tuple[float, Vector, Vector
     between = _plus(apart, _minus(arm, other_arm))
     distance = math.sqrt(max(_dot(between, between), 1e-18))
     normal = _times(1.0 / distance, between)
-    radius, other_radius = bodies.radius[one], bodies.radius[other]
+    radius, other_radius = bodies.radius[first], bodies.radius[second]
     return (
         radius + other_radius - distance,
         _minus(arm, _times(radius, normal)),
@@ -401,12 +401,12 @@ def closest(bodies: Bodies, one: int, other: int) -> tuple[float, Vector, Vector
 def _look(bodies: Bodies, neighbours: Neighbours) -> None:
     """List the rods that are near each other: first by height alone, then by their distance."""
     number = 0
-    for p in range(neighbours.one.size):
-        one, other = neighbours.one[p], neighbours.other[p]
-        tall = bodies.half[one] * abs(bodies.axis[one, 2]) + bodies.radius[one] + REACH
-        tall += bodies.half[other] * abs(bodies.axis[other, 2]) + bodies.radius[other] + REACH
-        high = abs(bodies.place[one, 2] - bodies.place[other, 2])
-        if high < tall and closest(bodies, one, other)[0] > -REACH:
+    for p in range(neighbours.first.size):
+        first, second = neighbours.first[p], neighbours.second[p]
+        tall = bodies.half[first] * abs(bodies.axis[first, 2]) + bodies.radius[first] + REACH
+        tall += bodies.half[second] * abs(bodies.axis[second, 2]) + bodies.radius[second] + REACH
+        high = abs(bodies.place[first, 2] - bodies.place[second, 2])
+        if high < tall and closest(bodies, first, second)[0] > -REACH:
             neighbours.near[number] = p
             number += 1
         else:
@@ -419,28 +419,28 @@ def _collide(bodies: Bodies, neighbours: Neighbours, record: Record, step: float
     """Let rods push each other."""
     for n in range(neighbours.number[0]):
         p = neighbours.near[n]
-        one, other = neighbours.one[p], neighbours.other[p]
-        overlap, arm, other_arm, normal = closest(bodies, one, other)
+        first, second = neighbours.first[p], neighbours.second[p]
+        overlap, arm, other_arm, normal = closest(bodies, first, second)
         if overlap <= 0.0:
             neighbours.fastest[p] = 0.0
             continue
-        moving = _minus(_moving(bodies, one, arm), _moving(bodies, other, other_arm))
+        moving = _minus(_moving(bodies, first, arm), _moving(bodies, second, other_arm))
         rate = -_dot(normal, moving)
         stiffness = neighbours.stiffness[p]
         force, neighbours.fastest[p] = push(
             overlap, rate, neighbours.fastest[p], stiffness, neighbours.damping
         )
         slip = _plus(moving, _times(rate, normal))
-        lighter = min(bodies.mass[one], bodies.mass[other]) / 2.0
+        lighter = min(bodies.mass[first], bodies.mass[second]) / 2.0
         rub = _rubbing(slip, force, neighbours.friction, bodies.ease, lighter, step)
-        whole = _plus(_times(force, normal), rub)
-        _add(bodies, one, whole, arm)
-        _add(bodies, other, _times(-1.0, whole), other_arm)
+        push_and_rub = _plus(_times(force, normal), rub)
+        _add(bodies, first, push_and_rub, arm)
+        _add(bodies, second, _times(-1.0, push_and_rub), other_arm)
         # Two that brush each other on the way down have not landed yet.
-        if record.touched[other] < math.inf:
-            _touches(record, one, overlap, rate)
-        if record.touched[one] < math.inf:
-            _touches(record, other, overlap, rate)
+        if record.touched[second] < math.inf:
+            _touches(record, first, overlap, rate)
+        if record.touched[first] < math.inf:
+            _touches(record, second, overlap, rate)
         record.lost[RODS] += step * ((force - stiffness * overlap) * rate - _dot(rub, slip))
         record.elastic[0] += 0.5 * stiffness * overlap * overlap
 
@@ -513,7 +513,7 @@ def _frame(world: World, step: float, pages: Pages, n: int) -> None:
             pages.places[n, c, k], pages.axes[n, c, k] = bodies.place[k, c], axis[c]
     pages.energy[n] = energy
     for c in range(3):
-        pages.momentum[n, c] = momentum[c] - record.impulse[c] + step / 2.0 * record.now[c]
+        pages.momentum[n, c] = momentum[c] - record.impulse[c] + step / 2.0 * record.pushing[c]
 
 
 @compiled

@@ -7,18 +7,12 @@ from dataclasses import asdict
 
 import pytest
 
-from bench.accuracy import acceptance_table, failures
-from bench.studies.accuracy import Errors
+from bench.studies.accuracy import acceptance_table, blocks, failures, short_sessions
 from bench.studies.baselines import plain_fit, two_gate_timer
-from bench.studies.fast_accuracy import (
-    DOUBLED,
-    STACK,
-    blocks,
-    doubled,
-    fast_accuracy,
-    with_setting,
-)
-from rig.bench.falls import Asked, falls
+from bench.studies.disturbances import DOUBLED, STACK
+from bench.studies.errors import Errors
+from rig.analysis.result import Measured
+from rig.bench.falls import Asked, falls, simulation, with_settings
 from rig.errors import RigError
 from rig.ports import read_settings
 from rig.protocol.plan import runs
@@ -26,12 +20,11 @@ from sim.dials import Dials, read_dials
 from tests.analysis.drops import PROTOCOLS, SINGLE, UNIFORM, case
 
 
-@pytest.mark.parametrize("dial", DOUBLED)
-def test_doubled_is_twice_the_default(dial):
-    settings = read_settings(doubled("sim://?rod_sd=0.3mm" if dial != "rod_sd" else "sim://", dial))
-    expected = asdict(Dials())
-    expected[dial] *= 2
-    assert asdict(read_dials(settings)) == pytest.approx(expected, rel=1e-12, nan_ok=True)
+def test_doubled_is_twice_the_default():
+    dials = asdict(read_dials(read_settings(with_settings("sim://", DOUBLED))))
+    expected = {name: size * (1 + (name in DOUBLED)) for name, size in asdict(Dials()).items()}
+    assert dials == pytest.approx(expected, rel=1e-12, nan_ok=True)
+    assert set(STACK) < set(DOUBLED)
 
 
 def test_a_plain_timer_is_near_on_a_perfect_rig():
@@ -48,11 +41,11 @@ def test_bias_and_coverage_are_as_sure_as_there_are_rigs():
     errors = Errors()
     for rig, values in enumerate(([0.1, 0.1], [0.3, 0.5], [-0.2, -0.2])):
         for value in values:
-            errors.add(value, 0.25, rig, u=0.1)
+            errors.add(Measured(1.0 + value, 0.125), 1.0, rig)
     found = errors.json()
-    assert found["times_u"] == pytest.approx(10.0 * math.sqrt(0.44 / 6))
+    assert found["times_u"] == pytest.approx(8.0 * math.sqrt(0.44 / 6))
     assert found["bias"] == pytest.approx(0.1)
-    assert found["bias_over_U"] == pytest.approx(0.4)
+    assert found["bias_over_U"] == pytest.approx(0.1 / Measured(0.0, 0.125).expanded)
     assert found["coverage"] == pytest.approx(4 / 6)
     assert found["coverage_se"] == pytest.approx(math.sqrt(1 / 3) / math.sqrt(3))
     assert found["bias_se"] == pytest.approx(math.sqrt((0 + 0.09 + 0.09) / 2) / math.sqrt(3))
@@ -63,19 +56,18 @@ SOURCE = str(PROTOCOLS / "single-chain.yaml")
 
 def test_falls_without_a_device_are_the_simulation_s():
     one = case(SINGLE, Dials(skew_sd=4e-3), seed=2, run=3)
-    url = with_setting(doubled("sim://", "skew_sd"), "protocol", SOURCE)
-    quiet = with_setting("sim://?quiet=1", "protocol", SOURCE)
+    url, quiet = (simulation(SOURCE, dials) for dials in ({"skew_sd": "4 ms"}, {"quiet": "1"}))
     found = list(falls([Asked(url, [1, 2], [[1], [2, 3]]), Asked(quiet, [1], [[1]])]))
     assert [(fall.seed, fall.drop.run) for fall in found] == [(1, 1), (2, 2), (2, 3), (1, 1)]
     assert found[0].truth["speed_m_s"] != found[3].truth["speed_m_s"]
-    told = found[2]
-    assert [tuple(edge) for edge in told.truth["edges"]] == [*map(tuple, one.truth.edges)]
-    assert [edge[1:] for edge in told.drop.edges] == [edge[1:] for edge in one.drop.edges]
-    assert told.truth["speed_m_s"] == one.truth.speed_m_s
+    last = found[2]
+    assert [tuple(edge) for edge in last.truth["edges"]] == [*map(tuple, one.truth.edges)]
+    assert [edge[1:] for edge in last.drop.edges] == [edge[1:] for edge in one.drop.edges]
+    assert last.truth["speed_m_s"] == one.truth.speed_m_s
 
 
 def test_a_simulation_that_gives_up_is_said(capfd):
-    url = with_setting("sim://?no_such_dial=1", "protocol", SOURCE)
+    url = simulation(SOURCE, {"no_such_dial": "1"})
     with pytest.raises(RigError, match="exit code 1"):
         list(falls([Asked(url, [1], [[1]])]))
     assert "no_such_dial" in capfd.readouterr().err
@@ -91,7 +83,7 @@ def test_every_planned_run_has_its_turn():
 
 
 def test_a_rig_s_drops_are_judged_by_their_truth():
-    found = fast_accuracy(SOURCE, "sim://", 1)
+    found = short_sessions(SOURCE, "sim://", 1)
     assert found["verdicts"].keys() <= {"accepted", "marginal"}
     assert found["edges_matched"] > 1000
     assert found["edges_given_to_a_wrong_rod"] == 0
@@ -125,7 +117,3 @@ def test_what_is_beyond_a_limit_by_more_than_chance_is_said(change, said):
     assert list(failures(found)) == said
     wrong = list(failures(found | {"edges_given_to_a_wrong_rod": 2}))
     assert wrong == ["2 edges given to a wrong rod", *said]
-
-
-def test_dials_that_only_a_device_shows_are_dials():
-    assert set(STACK) < set(DOUBLED)

@@ -8,14 +8,13 @@ import json
 import numpy as np
 import pytest
 
-from bench import coverage as bench_coverage
 from bench.__main__ import main
 from bench.studies import coverage as study
 from bench.studies.coverage import (
+    Interval,
     Rig,
     RigResult,
     draw_rigs,
-    groups,
     measure,
     summarize,
     worst_tenth,
@@ -69,7 +68,7 @@ def rig_result(number: int, errors: list[float], **changes: object) -> RigResult
     result = RigResult(Rig(**parts), seconds=0.5)
     for error in errors:
         result.verdicts["accepted"] += 1
-        result.add("separation_m", Measured(1.0 + error, 0.5), 1.0)
+        result.intervals.append(Interval("separation_m", Measured(1.0 + error, 0.5), 1.0))
     return result
 
 
@@ -82,7 +81,7 @@ def test_the_worst_tenth_is_chosen_by_both_measures():
     assert held[:2] == [19, 20]
     assert error[:2] == [20, 19]
     assert far.worst is not None
-    assert far.row()["worst_ratio"] == pytest.approx(9.0 / far.worst.expanded)
+    assert far.row()["worst_ratio"] == pytest.approx(9.0 / far.worst.measured.expanded)
     assert worst_tenth([silent]) == {}
 
 
@@ -96,15 +95,6 @@ def test_shares_are_from_rig_to_rig_and_leave_out_what_must_be_void():
     assert found["quantities"]["separation_m"]["coverage_se"] >= 0.25
 
 
-def test_each_rig_is_in_one_group_of_each_kind():
-    found = [rig_result(n, [0.1], drops=drops, incline_deg=40.0 + n)
-             for n, drops in enumerate((1, 4, 12, 4))]  # fmt: skip
-    sizes = {name: len(rigs) for name, rigs in groups(found).items()}
-    assert sum(sizes.values()) == 4 * len(found)
-    assert sizes["drops a session: 4"] == 2
-    assert sizes["incline 35 to 50°"] == 4
-
-
 def test_a_rig_s_drops_are_set_beside_the_truth():
     (rig,) = [one for one in draw_rigs(FOLDER, "model", 12, seed=1) if one.number == 2]
     (found,) = measure([rig])
@@ -115,16 +105,11 @@ def test_a_rig_s_drops_are_set_beside_the_truth():
     assert all(one.ratio < 3.0 for one in [*found.intervals, *found.session])
 
 
-def test_coefficients_are_set_beside_what_is_stated():
-    (found,) = measure(draw_rigs(FOLDER, "coefficients", 1, seed=1))
-    assert {"restitution", "friction"} <= {one.quantity for one in found.session}
-
-
 @pytest.fixture
 def here(monkeypatch):
     """Work in this process."""
     monkeypatch.setattr(
-        bench_coverage, "results", lambda calls, _: (call(*inputs) for call, *inputs in calls)
+        study, "results", lambda calls, _: (call(*inputs) for call, *inputs in calls)
     )
 
 
@@ -153,6 +138,6 @@ def test_a_rig_is_drawn_again_by_its_number(tmp_path, here):
 
 
 def test_a_world_without_its_engine_says_how_to_get_it(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(bench_coverage, "find_spec", lambda name: None)
+    monkeypatch.setattr(study, "find_spec", lambda name: None)
     assert main(["coverage", "-o", str(tmp_path), "--world", "mujoco"]) == 2
     assert "pip install mujoco" in capsys.readouterr().err

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from bench.__main__ import main
 from bench.studies.baselines import TimerReading, line_fit
 from bench.studies.estimators import mean_of_draws
 from rig.analysis.drop import fit_drop
-from rig.protocol.protocol import Priors
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
 from tests.cli.lab import short
@@ -35,24 +32,6 @@ def test_draws_of_no_spread_are_the_adjustment_itself():
     assert reading == TimerReading(known["separation_m"].value, known["speed_m_s"].value)
 
 
-def test_draws_have_the_mean_of_the_adjustment():
-    """Within what so many draws allow; what is not linear adds less than that.
-
-    Where impulses are known to be nearly alike: else a single drop says so little of the last ones
-    that they move Δz by more than in proportion.
-    """
-    like = Priors(departure=0.1e-3, impulses=0.05, last_impulse=0.01, strings=0.0, swing=0.01)
-    one = case(replace(UNIFORM, priors=like), Dials(skew_sd=1e-3), incline=40.0)
-    fit = fit_drop(one.protocol, one.run, one.drop, one.scale)[1]
-    known = one.analyze().quantities
-    draws = 1_000
-    reading = mean_of_draws(fit, draws, 3)
-    for name in ("separation_m", "speed_m_s"):
-        off = getattr(reading, name) - known[name].value
-        assert 0.0 < abs(off) < 5 * known[name].u / np.sqrt(draws) + 0.01 * known[name].u
-    assert mean_of_draws(fit, draws, 3) == reading
-
-
 def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("bench.studies.estimators.TRIALS", (10, 10**6))  # the ends only
     protocol = tmp_path / "p.yaml"
@@ -71,9 +50,3 @@ def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
     assert any("M = 1e+06" in one for one in found["left_out"])
     assert {path.suffix for path in (tmp_path / "o").iterdir()} == {".csv", ".json", ".md", ".svg"}
     assert "SIMULATED" in (tmp_path / "o" / "estimators.svg").read_text("utf-8")
-
-
-def test_only_a_simulation_has_a_truth(tmp_path, capsys):
-    arguments = ["estimators", "-o", str(tmp_path / "o"), "--port", "/dev/ttyACM0"]
-    assert main(arguments) == 2
-    assert "no simulation" in capsys.readouterr().err

@@ -7,20 +7,16 @@ import json
 from dataclasses import asdict, replace
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from bench.__main__ import main
-from bench.studies.layout_catalogue import LAYOUTS, STANDARD
+from bench.studies.layout_catalogue import LAYOUTS
 from bench.studies.layouts import DISTURBANCES, Cell, as_json
 from rig.bench.falls import SimulatedDrop
 from rig.protocol.measurable import unmeasurable
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.reader import parse
 from rig.reasons import make_reason
-from sim.dials import Dials, read_dials
+from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
-from tests.analysis.layouts import layouts
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda one: f"{one.kind.name}: {one.heights}")
@@ -30,34 +26,6 @@ def test_every_layout_is_a_protocol_that_can_be_measured(layout):
     assert len(protocol.gates.gates) == len(layout.impact) + len(layout.free)
     assert (protocol.surface is None) == (layout.kind.scene == "fence")
     assert protocol.two_chains == (layout.kind.scene == "two")
-
-
-@given(layouts(), st.integers(1, 16))
-@settings(max_examples=40)
-def test_every_rod_passes_every_gate_of_any_layout_that_properties_are_tried_on(layout, number):
-    """Undisturbed: two edges each, and nothing else."""
-    protocol = parse(layout.protocol())
-    one = case(protocol, Dials.quiet(), run=min(number, len(planned_runs(protocol))))
-    passages = sorted((channel, rod) for _, channel, _, rod in one.truth.edges)
-    rods = len(protocol.chains["A"].widths)
-    channels = [gate.channel for gate in protocol.gates.gates]
-    assert passages == sorted((c, rod) for c in channels for rod in range(rods) for _ in range(2))
-
-
-def test_from_one_gate_a_side_to_eight():
-    sizes = {
-        len(side) for one in LAYOUTS for side in (one.impact, one.free) if one.kind is STANDARD
-    }
-    assert {1, 2, 3, 4, 5, 6, 8} <= sizes
-    rods = {len(parse(one.protocol()).chains["A"].widths) for one in LAYOUTS}
-    assert {2, 100} <= rods
-
-
-def test_disturbances_are_those_of_the_simulated_rig():
-    dials = {name: read_dials(settings) for name, settings in DISTURBANCES.items()}
-    assert dials["quiet"] == Dials.quiet()
-    assert dials["default"] == Dials()
-    assert dials["doubled"].missed == 2 * Dials().missed
 
 
 def judged(change=lambda result: result, dials=None, drop=lambda one: one):
@@ -131,8 +99,3 @@ def test_what_is_no_result_of_this_bench_cannot_be_added_to(tmp_path, capsys, te
     assert main(["layouts", "-o", str(tmp_path), "--more"]) == 2
     why = "No such file or directory" if text is None else "it is not what this bench leaves"
     assert f"cannot add to {tmp_path / 'layouts.json'}: {why}\n" in capsys.readouterr().err
-
-
-def test_an_unknown_layout_is_told_with_those_there_are(tmp_path, capsys):
-    assert main(["layouts", "-o", str(tmp_path), "--only", "17 gates"]) == 2
-    assert "25 rods: 1 + 1" in capsys.readouterr().err

@@ -29,10 +29,3 @@ def test_all_decoders_find_the_same_edges():
     assert edges == wanted == decoding.bytewise(data)
     assert decoding.bytewise(data[:-2] + b"?" + data[-1:]) == wanted[:-EVENTS_PER_FRAME]
     assert decoding.speed(decoding.checked, 4) > 0.0
-
-
-def test_reading_alone_is_the_same_stream():
-    rate, latencies = link.read_alone(10, 2e-3)
-    assert len(latencies) == 10
-    assert min(latencies) > 0.0
-    assert 0.0 < rate < EVENTS_PER_FRAME / 2e-3 * 1.2

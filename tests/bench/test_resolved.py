@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from bench import resolved as bench_resolved
 from bench.__main__ import main
+from bench.studies import resolved as bench_resolved
 from rig import cli
 from rig.bench import resolved_paper
 from rig.bench.resolved_paper import Ensemble
@@ -24,12 +24,6 @@ def ensemble(incline: float) -> Ensemble:
         "free_top_m": [0.2 - 4.0 * t for t in times],
     }
     return Ensemble(incline, (0.1, 0.12), (6.9, 7.1), (0.01, 0.02), (track, track))
-
-
-def test_speeds_of_the_track_are_its_slopes():
-    columns = resolved_paper.figure_4(ensemble(40.0))
-    assert columns["speed2"] == pytest.approx([25.0] * 18)
-    assert columns["free_speed2"] == pytest.approx([16.0] * 18)
 
 
 @pytest.mark.parametrize("number", [3, 4])
@@ -48,12 +42,6 @@ def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
     assert target.read_text() != plain.read_text()
 
 
-def test_a_figure_without_falls_says_so(tmp_path, capsys):
-    target = str(tmp_path / "figure.svg")
-    assert cli.main(["predict", "--figure", "6", "--resolved", "-o", target]) == 2
-    assert "figure 6 has no resolved falls" in capsys.readouterr().err
-
-
 WORK = [
     {"changed": changed, "step_s": step, "touch_s": touch, "rms_m": rms, "worst_m": 2 * rms,
      "cpu_s": cpu}
@@ -68,7 +56,7 @@ WORK = [
 
 
 def test_error_against_run_time_is_kept_and_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(bench_resolved, "work", lambda: WORK)
+    monkeypatch.setattr(bench_resolved, "measure", lambda module: WORK)
     assert main(["resolved", "--work", "-o", str(tmp_path)]) == 0
     assert "0.0200" in capsys.readouterr().out
     with (tmp_path / "resolved-work.csv").open(newline="") as table:
@@ -82,7 +70,7 @@ def test_what_others_published_is_kept_and_printed(tmp_path, monkeypatch, capsys
         {"what": "ahead (m)", "of": "15 rods", "mean": 0.055, "sd": 0.005, "n": 16},
         {"what": "T/T_ff", "of": "20 rods", "mean": 0.926, "sd": None, "n": 1},
     ]
-    monkeypatch.setattr(bench_resolved, "published", lambda: lines)
+    monkeypatch.setattr(bench_resolved, "measure", lambda module: lines)
     assert main(["resolved", "--published", "-o", str(tmp_path)]) == 0
     assert "0.9260" in capsys.readouterr().out
     with (tmp_path / "resolved-published.csv").open(newline="") as table:

@@ -12,14 +12,13 @@ from rig.analysis.components import Components
 from rig.analysis.session import Analysis
 from rig.design.cases import beams_of, cases, with_beams
 from rig.design.forecast import Forecast, GateLayout, forecast
-from rig.design.search import Room, better, candidates, readable, room, score
+from rig.design.search import Room, better, readable, score
 from rig.design.trials import Trials, trials, trials_text
 from rig.errors import InputError
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.quadratic_forms import merged
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Gates, Plan, Protocol
-from rig.units import Quantity
 from rig.vocabulary import OBJECT, TWO_CHAINS
 from sim.dials import Dials
 from tests.analysis.drops import SINGLE, UNIFORM, Case, case
@@ -99,17 +98,6 @@ def test_more_runs_tell_more_but_not_of_what_is_common():
         assert many.mean["separation_m"][at] < one.mean["separation_m"][at]
         # Beam heights are off by as much in every run.
         assert many.mean["separation_m"][at] > 0.2 * one.mean["separation_m"][at]
-
-
-def test_unlike_chains_have_forecasts_of_their_own():
-    """B is given an α twice that of A at 50°: its strike ends faster, and V is known less well."""
-    b = UNIFORM.chains["B"]
-    given = replace(b, chain=replace(b.chain, alpha=Quantity(0.25, 0.02)))
-    protocol = replace(UNIFORM, chains={**UNIFORM.chains, "B": given}, plan=Plan((50.0,), 4))
-    found = foretold(protocol, TRUE)
-    for by_striker in (found.single["speed_m_s"], found.mean["speed_m_s"]):
-        assert set(by_striker) == {(50.0, "A"), (50.0, "B")}
-        assert by_striker[50.0, "B"] > by_striker[50.0, "A"]
 
 
 def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
@@ -195,17 +183,6 @@ def test_proposals_respect_limits_and_are_never_worse():
     assert score(protocol, GateLayout.of(every, range(4, 8))) <= (
         score(protocol, GateLayout.of(every, range(4))) + 1e-9
     )
-
-
-def test_candidates_are_where_a_protocol_may_have_a_gate():
-    limits = room(UNIFORM, None, None, 0.01)
-    found = candidates(UNIFORM, limits)
-    assert (limits.lowest, limits.highest) == (0.020, 1.078)
-    assert found[0] == 0.02
-    hanging = 0.18 + np.array(UNIFORM.chains["A"].chain.heights)
-    width = UNIFORM.chains["A"].widths[0]
-    assert all(np.abs(hanging - h).min() >= width / 2 + 0.002 for h in found)
-    assert room(UNIFORM, 0.03, 9.0, 0.01).highest == pytest.approx(0.18 + 1.165)
 
 
 def test_a_scene_without_gates_has_no_layout():

@@ -54,32 +54,12 @@ def test_the_coefficients_are_found_whatever_the_protocol_says(found, name, trut
     assert abs(measured["value"] - one["stated"]["value"]) > 4 * measured["u"]
 
 
-def test_restitution_and_friction_pull_against_each_other(found):
-    names, matrix = found["correlation"]["names"], np.array(found["correlation"]["matrix"])
-    assert matrix[names.index("restitution"), names.index("friction")] < -0.5
-    assert np.diag(matrix) == pytest.approx(np.ones(len(names)))
-
-
-def test_every_incline_has_the_alpha_of_its_truth(found):
-    for line in found["alpha"]["inclines"]:
-        truth = alpha_inclined(BETA, MU, line["incline_deg"])
-        assert abs(line["alpha"]["value"] - truth) < 4 * line["alpha"]["u"]
-        assert line["alpha"]["u"] < 0.01 * truth
-
-
 def test_the_end_correction_is_needed_and_is_that_of_eq_10(found):
     end = found["end_correction"]
     assert end["needed"]
     assert end["delta_aic"]["without"] > 100  # ten times what is called decisive
     assert abs(end["scale"]["value"] - 1) < 4 * end["scale"]["u"]
     assert end["gamma_eq10"] == pytest.approx(4 / 3)
-
-
-def test_no_test_of_a_true_model_fails(found):
-    """p-values of what is true are anything but tiny."""
-    assert found["tests"]["runs_share_alpha"]["p"] > 1e-4
-    assert found["tests"]["model"]["p"] > 1e-4
-    assert all(line["p"] > 1e-4 for line in found["impulses"]["inclines"])
 
 
 def test_impulses_of_all_rods_are_within_their_uncertainty(found):
@@ -93,12 +73,6 @@ def test_impulses_of_all_rods_are_within_their_uncertainty(found):
         assert [
             rod for group in line["groups"] for rod in range(group["rods"][0], group["rods"][1] + 1)
         ] == list(range(24))
-
-
-def test_contact_and_air_are_found_where_they_are(found):
-    """The simulated contact point is where the protocol says, and there is no air."""
-    assert all(abs(one["height_m"]["value"]) < 1e-3 for one in found["contact"])
-    assert abs(found["drag_per_m"]["value"]) < 4 * found["drag_per_m"]["u"]
 
 
 @pytest.mark.parametrize("name", ["uniform", "graded", "single"])
@@ -176,8 +150,7 @@ def test_without_priors_the_posterior_is_the_least_squares_fit():
     """But for the curvature of α in μ, which is small over so narrow a range."""
     surface = UNIFORM.surface
     vague = replace(
-        UNIFORM,
-        surface=replace(surface, restitution=Quantity(0.5), friction=Quantity(0.2)),
+        UNIFORM, surface=replace(surface, restitution=Quantity(0.5), friction=Quantity(0.2))
     )
     found = coefficient_problem(vague, merged(forms(SURFACE)))
     centre = best(vague, found)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
 from itertools import pairwise
@@ -14,14 +13,12 @@ import pytest
 
 import rig.boards
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
-from rig.clock.rate import tick_rate
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.frames import Decoder
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
-from rig_emulator import pty
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make
 from tests.waiting import PATIENCE_S
@@ -83,41 +80,6 @@ def test_a_drop_is_the_truth_to_the_cycle(tmp_path, board):
     assert (port.board.avr.overruns, port.board.avr.watchdog_resets) == (0, 0)
 
 
-def test_the_same_seed_gives_the_same_conversation_byte_for_byte():
-    one, two, other = (talk(url(seed=seed)) for seed in (3, 3, 4))
-    assert one[:3] == two[:3]
-    assert one[2].unique_id != other[2].unique_id
-    assert one[1].edges != other[1].edges
-
-
-def test_a_bad_line_still_gives_the_whole_drop_once(tmp_path):
-    file = tmp_path / "truth.jsonl"
-    bad, clean = (
-        talk(url(seed=2, truth=file, **faults))
-        for faults in ({"corrupt": "0.5 %", "lose": "0.5 %"}, {})
-    )
-    assert len(bad[1].edges) == len(clean[1].edges) > 20
-    for edge, other in zip(bad[1].edges, clean[1].edges, strict=True):
-        assert edge[1:] == other[1:]
-        assert abs(edge.tick - other.tick) <= 5  # another instruction was interrupted
-    assert len(bad[0]) > len(clean[0])  # something had to be said twice
-    assert len(file.read_text("utf-8").splitlines()) == 2  # a repeated FIRE does not let go twice
-
-
-def test_the_clock_dial_shows_in_the_pings():
-    port = open_port(url(clock="-1300 ppm"))
-    device = Device(port, port_clock(port))
-    device.connect()
-    pings = []
-    for n in range(20):
-        port_clock(port).sleep(0.1 + 0.037 * (n % 7))
-        ping = device.ping()
-        assert ping is not None
-        pings.append(ping)
-    rate = tick_rate(pings, HZ)
-    assert abs(rate.hz / HZ - 1 + 1300e-6) < 4 * rate.u_hz / HZ < 200e-6
-
-
 def test_the_firmware_stamps_a_wired_reference_each_second():
     port = open_port(url(clock="-1300 ppm", reference="0"))
     device = Device(port, port_clock(port))
@@ -136,15 +98,6 @@ def test_the_firmware_stamps_a_wired_reference_each_second():
 def test_a_clock_that_the_emulator_has_not_is_refused():
     with pytest.raises(InputError, match="steady"):
         open_port(url(wander="5 ppm"))
-
-
-def test_a_read_waits_in_virtual_time_only():
-    port = open_port(url(latency="0 s"))
-    Device(port, port_clock(port)).connect()
-    start = port.clock.now_ns()
-    port.timeout = 0.25
-    assert port.read(1) == b""
-    assert port.clock.now_ns() - start == pytest.approx(0.25e9, rel=1e-4)
 
 
 def test_opening_resets_the_board():
@@ -188,12 +141,6 @@ def test_every_board_of_the_table_can_be_emulated():
     assert rig.boards.BOARDS.keys() == BOARDS.keys() | {"pico"}
 
 
-def test_a_board_is_no_name_before_the_settings():
-    with pytest.raises(InputError, match="found 'uno' before the") as caught:
-        open_port(url().replace("?", "uno?"))
-    assert "emu://?board=mega" in caught.value.hint
-
-
 def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):
     package = tmp_path / "rig"
     (package / "flash").mkdir(parents=True)
@@ -206,49 +153,43 @@ def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):
     assert firmware_for(BOARDS["mega"]) == shipped
 
 
-class Terminal:
-    """The pty program, started as a user would."""
-
-    def __init__(self, link: Path, *arguments: str) -> None:
-        command = [sys.executable, "-m", "rig_emulator.pty", "--link", str(link), *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        self.path = self.process.stdout.readline().strip()
-
-    def end(self) -> int:
-        self.process.send_signal(signal.SIGTERM)
-        code = self.process.wait(PATIENCE_S)
-        self.process.stdout.close()
-        return code
+HANDS = [sys.executable, "-m", "rig_emulator.hands"]
 
 
 def test_the_pty_is_a_board_to_any_program(tmp_path):
     link = tmp_path / "board"
-    terminal = Terminal(link, "--protocol", str(FENCE), "quiet=1")
-    try:
-        assert str(link.readlink()) == terminal.path
+    command = [*HANDS, "--link", str(link), "--protocol", str(FENCE), "quiet=1"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, **pipes) as terminal:
+        assert terminal.stdout.readline().strip() == str(link)
         port = open_port(str(link))
         device = Device(port, port_clock(port))
         identity = device.connect(boot_wait_s=0)
         assert len(drop_from(device).edges) > 20
         port.close()
-        port = open_port(terminal.path)
+        port = open_port(str(link.readlink()))
         device = Device(port, port_clock(port))
         assert device.connect(boot_wait_s=0) == identity
-        terminal.process.send_signal(signal.SIGUSR1)
+        terminal.stdin.write("reset\n")
+        terminal.stdin.flush()
         with pytest.raises(DeviceError, match="restarted"):
             device.collect(pack_label(1, 1), timeout=10.0)
         port.close()
-    finally:
-        code = terminal.end()
-    assert code == 0
+        terminal.stdin.close()
+        assert terminal.wait(PATIENCE_S) == 0
     assert not link.is_symlink()
 
 
-def test_the_pty_says_what_is_wrong(capsys, tmp_path):
-    assert pty.main(["--elf", str(tmp_path / "nothing.elf")]) == 2
-    assert "cannot read" in capsys.readouterr().err
-    assert pty.main(["--protocol", str(FENCE), "skew=1"]) == 2
-    assert "unknown dial 'skew'" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        pty.main(["quiet"])
-    assert "NAME=VALUE" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--elf", "nothing.elf"], "cannot read"),
+        (["skew=1"], "unknown dial 'skew'"),
+        (["quiet"], "NAME=VALUE"),
+    ],
+)
+def test_the_pty_says_what_is_wrong(arguments, complaint):
+    command = [*HANDS, "--protocol", str(FENCE), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert complaint in done.stderr

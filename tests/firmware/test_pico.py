@@ -14,7 +14,6 @@ from rig.link.port import open_port, port_clock
 from rig_emulator import boards_bench
 from rig_emulator.controller import EmulatorError
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
-from rig_emulator.pico_chip import PicoChip
 from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, programs, symbol
@@ -105,16 +104,6 @@ def test_a_program_that_does_what_is_not_modelled_is_named(tmp_path):
     (file := tmp_path / "odd.uf2").write_bytes(image)
     with pytest.raises(EmulatorError, match="WAIT"):
         EmulatedPico(PICO, file, baudrate=USB_RATE)
-
-
-def test_an_emulator_that_was_ended_is_told_of_and_needs_no_ending():
-    """As when a shell ends all that runs in it."""
-    chip = PicoChip(build(), b"any name")
-    chip._node.kill()
-    chip._node.wait()
-    with pytest.raises(EmulatorError, match="ended"):
-        chip.run(10**9)
-    chip.close()
 
 
 @pytest.mark.slow

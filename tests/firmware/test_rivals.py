@@ -6,8 +6,7 @@ import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig_emulator import rivals, trials
-from rig_emulator.wiring import BOARDS, PICO
-from tests.firmware.pico import build
+from rig_emulator.wiring import BOARDS
 from tests.firmware.toolchain import need
 
 
@@ -31,11 +30,3 @@ def test_printing_at_once_costs_edges_when_they_come_fast(tmp_path):
     fast, lost = seen_by("polling, printed at once", tmp_path, 700, 4000)
     assert none_lost == 0 < lost
     assert fast.sd > 10 * slow.sd
-
-
-def test_a_pico_s_loop_has_steps_of_a_microsecond(tmp_path):
-    build()
-    step = PICO.clock_hz / 1e6 / 12**0.5
-    account = rivals.drop_of_pico(rivals.compile_for_pico(tmp_path), trials.train(16, 200, 1e5))
-    assert account.lost == 0
-    assert 0.8 * step < trials.spread(account.stamps).sd < 1.2 * step

@@ -56,23 +56,3 @@ def test_the_bound_follows_pointers_and_counts_the_interrupt(program):
     # Return addresses: 3 × 2; the array: 40, with the frame pointer's 2; the interrupt saves SREG
     # and two registers. The pushes that only assembly shows are not in the compiler's account.
     assert 6 + 42 + 3 <= found.stack <= 6 + 42 + 3 + 6, found
-
-
-def test_recursion_has_no_bound(program):
-    with pytest.raises(ValueError, match="deep calls itself"):
-        measure(program("if (n) return deep(n - 1) + 1;"))
-
-
-def test_a_frame_of_unknown_size_has_no_bound(program):
-    with pytest.raises(ValueError, match="dynamic"):
-        measure(program('char b[n]; __asm__ volatile("" :: "r"(b) : "memory");'))
-
-
-def test_make_size_prints_it():
-    need("avr-objdump")
-    make("size")
-    done = subprocess.run(
-        ["make", "-s", "-C", FIRMWARE, "size"], capture_output=True, text=True, check=True
-    )
-    for word in (*BOARDS.values(), "flash", "memory", "stack", "main > "):
-        assert word in done.stdout

@@ -18,17 +18,7 @@ from rig.model.impact import impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
-from tests.model.chains import (
-    ALPHAS,
-    DROPS,
-    GAMMAS,
-    GRAVITIES,
-    SPEEDS,
-    chains,
-    close,
-    even_chain,
-)
-from tests.model.reference import reference_fall
+from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, even_chain
 
 ONE_OR_MANY = st.lists(st.tuples(ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS), min_size=1, max_size=8)
 
@@ -54,13 +44,6 @@ def falls_of(chain, rows):
 def test_one_chain_falls_as_it_does_alone(chain, rows):
     found = falls_of(chain, rows)
     assert ends(found) == [end(chain, *row) for row in rows]
-
-
-def test_a_few_falls_against_many_digits():
-    chain, rows = even_chain(25), [(0.155, 4 / 3, 0.18, 9.81, 0.0), (1e-12, 0.0, 0.0, 1.62, 0.3)]
-    for found, row in zip(ends(falls_of(chain, rows)), rows, strict=True):
-        wanted = reference_fall(chain.masses, chain.heights, *row)
-        assert all(close(one, other, 1e-14) for one, other in zip(found, wanted, strict=True))
 
 
 def test_arguments_broadcast():
@@ -92,12 +75,6 @@ def test_where_there_is_no_answer_it_says_so_and_the_others_stay_right():
     for row in found:
         assert np.isnan(row).tolist() == [False, True]
     assert ends(found)[0] == end(chain, 0.1, 1.0, 0.18, 9.81)
-
-
-def test_a_scalar_in_gives_a_scalar_out():
-    found = falls([1.0, 1.0], [0.0, 1.0], given_impacts(0.1), 0.0, 9.81)
-    assert found.time_s.shape == ()
-    assert ends(found) == [end(even_chain(2, 1.0), 0.1, 0.0, 0.0, 9.81)]
 
 
 SURFACES = st.tuples(
@@ -139,13 +116,6 @@ def test_impacts_are_those_of_one_surface(rows, own_z, piled):
             assert found.sliding[k] == ("does not slide" not in "".join(impact.notes))
 
 
-def test_singular_surfaces_have_no_answer():
-    found = surface_impacts([12.0, 40.0, 0.0], 0.5, 0.5, [0.01, 1 / 3, 0.01])
-    assert np.isnan(found.alpha).tolist() == [True, False, False]
-    end = falls([1.0, 1.0], [0.0, 1.0], found, 0.1, 9.81)
-    assert np.isnan(end.separation_m).tolist() == [True, False, False]
-
-
 def test_beyond_the_domain_there_are_answers():
     # Sliding; not sliding; level; α above ½; α below 0.
     found = surface_impacts([40, 5, 0, 0, 0], [0.5, 0.5, 0.5, 1.0, -1.5], 0.2, [1/3, 1/3, 1/3, 0.1,
@@ -153,23 +123,3 @@ def test_beyond_the_domain_there_are_answers():
     assert found.sliding.tolist() == [True, False, True, True, True]
     end = falls([1.0, 1.0], [0.0, 1.0], found, 0.1, 9.81)
     assert np.isfinite(end).all()
-
-
-def test_given_arrays_are_left_alone():
-    alpha, gamma = np.array([0.1, np.nan]), np.array([1.0, 1.0])
-    given_impacts(alpha, gamma)
-    assert gamma.tolist() == [1.0, 1.0]
-
-
-@pytest.mark.parametrize(("incline", "separation", "speed", "time"), [
-    (0, 0.17762380452368596, 8.3678802518552439, 0.48784955224134661),
-    (30, 0.14455777135466808, 7.5511640917900483, 0.49471049795616742),
-    (40, 0.11546810526538031, 6.9327596650855757, 0.50066864460340956),
-    (60, 0.053585554933341692, 5.8609487859073973, 0.51311334995443199),
-    (80, 0.0098142050953198042, 5.2579813110300101, 0.52173665052246976),
-])  # fmt: skip
-def test_the_table_of_reference_values(incline, separation, speed, time):
-    chain = even_chain(25)
-    found = falls(chain.masses, chain.heights, surface_impacts(incline, 0.5, 0.2), 0.18, 9.81)
-    for one, other in zip(ends(found)[0], (separation, speed, time), strict=True):
-        assert close(one, other, 5e-15)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -26,17 +24,6 @@ def test_running_integrals_are_exact_for_polynomials(count):
     for degree in {0, count // 2, count - 1}:
         exact = (rule.nodes ** (degree + 1) - (-1) ** (degree + 1)) / (degree + 1)
         np.testing.assert_allclose(rule.running @ rule.nodes**degree, exact, rtol=0, atol=5e-15)
-
-
-def test_running_integrals_converge_faster_than_any_power():
-    def error(count):
-        rule = gauss(count)
-        exact = np.exp(rule.nodes) - math.exp(-1)
-        return float(np.max(np.abs(rule.running @ np.exp(rule.nodes) - exact)))
-
-    assert error(4) < 2e-3
-    assert error(8) < 2e-8
-    assert error(14) < 4e-15
 
 
 def test_rules_are_shared_and_cannot_be_spoilt():

@@ -42,6 +42,6 @@ def outcomes(port, loopback=GATE, drops=5, release=True, gates=None):
     return {finding.name: finding for finding in findings}
 
 
-def port_of(board, **line):
+def port_of(board, **settings):
     """Plug a board in."""
-    return SimulatedSerial("test", board=board, timeout=0.02, **line)
+    return SimulatedSerial("test", board=board, timeout=0.02, **settings)

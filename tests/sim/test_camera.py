@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.camera import FRAME_RATE_HZ, POSITION_NOISE_M, SPEED_FRAMES, camera_reading
+from sim.camera import FRAME_RATE_HZ, POSITION_NOISE_M, camera_reading
 
 HIT = 0.5
 SPEED = 6.93
@@ -49,16 +49,3 @@ def test_speed_is_a_line_through_four_frames(readings):
     errors = readings[:, 1] - SPEED
     assert abs(errors.mean()) < SIGMAS * scatter / math.sqrt(N)
     assert errors.std() == pytest.approx(scatter, rel=SIGMAS / math.sqrt(2 * N))
-
-
-def test_all_frames_are_before_the_hit_and_a_frame_apart():
-    asked: list[float] = []
-
-    def top(time: float) -> float:
-        asked.append(time)
-        return 0.0
-
-    camera_reading(top, lambda _: 0.0, HIT, np.random.default_rng(1))
-    assert len(asked) == SPEED_FRAMES
-    assert HIT - 1 / FRAME_RATE_HZ <= asked[0] <= HIT
-    assert np.diff(asked) == pytest.approx([-1 / FRAME_RATE_HZ] * (SPEED_FRAMES - 1), rel=1e-9)

@@ -37,15 +37,3 @@ def test_wander_is_the_scatter_after_an_hour():
     ]
     assert np.std(ends) == pytest.approx(20.0, rel=0.12)
     assert abs(np.mean(ends)) < 3.3 * 20.0 / 20.0
-
-
-def test_the_count_is_the_integral_of_the_rate_whatever_is_asked_first():
-    asked = Counter(HZ, -40.0, 5, drift_ppm=300.0, wander_ppm=100.0, seed=3)
-    late = asked.tick_at(100 * 10**9)
-    fresh = Counter(HZ, -40.0, 5, drift_ppm=300.0, wander_ppm=100.0, seed=3)
-    moments = [n * 10**9 // 2 for n in range(201)]
-    ticks = np.unwrap([float(fresh.tick_at(when)) for when in moments], period=2.0**32)
-    assert fresh.tick_at(100 * 10**9) == late
-    rates = [fresh.hz(when) for when in moments[:-1]]
-    assert ticks[-1] - ticks[0] == pytest.approx(sum(rates) / 2.0, abs=2.0)
-    assert (np.diff(ticks) > 0).all()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -13,24 +12,12 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.link.messages import pack_label
-from rig.model.chain import Chain
-from rig.model.fall import fall
-from rig.model.impact import alpha_inclined
 from rig.protocol import reader
 from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.examples import examples
-from tests.sim.chance import with_dials
-from tests.sim.falls import (
-    DELAY,
-    PROTOCOLS,
-    UNIFORM,
-    WITHOUT_GATES,
-    ByHand,
-    crossings,
-    free_time_down,
-)
+from tests.sim.falls import DELAY, PROTOCOLS, UNIFORM, ByHand, crossings, free_time_down
 
 QUIET = Dials.quiet()
 RUN_OF = {run.incline_deg: number for number, run in ChainLab(UNIFORM, QUIET, 0).runs.items()}
@@ -85,21 +72,6 @@ def test_quiet_truth_is_the_reference(incline):
     assert (truth.incline_deg, truth.release_skew_s) == (incline, 0.0)
 
 
-def test_quiet_truth_is_the_model_room_s_fall():
-    _, truth = drop(UNIFORM, run=RUN_OF[40])
-    chain = Chain((1.0,) * 25, tuple(1.165 * k / 24 for k in range(25)))
-    model = fall(chain, alpha_inclined(0.5, 0.2, 40), 4 / 3, 0.18, 9.81)
-    assert truth.separation_m == pytest.approx(model.separation_m, rel=1e-12)
-    assert truth.speed_m_s == pytest.approx(model.speed_m_s, rel=1e-12)
-    assert truth.fall_time_s == pytest.approx(model.time_s, rel=1e-12)
-
-
-def test_a_graded_chain_has_the_reference_separation():
-    _, truth = drop(reader.read(PROTOCOLS / "graded-chain.yaml"))
-    assert truth.separation_m == pytest.approx(0.20034710240655192, rel=1e-12)
-    assert truth.speed_m_s == pytest.approx(8.0478400772111967, rel=1e-12)
-
-
 def test_a_single_chain_has_a_speed_and_no_separation():
     protocol = reader.read(PROTOCOLS / "single-chain.yaml")
     edges, truth = drop(protocol)
@@ -125,28 +97,6 @@ def test_a_picket_fence_falls_freely():
         assert_same_edges(on(edges, channel), expected)
     assert truth.speed_m_s is truth.separation_m is truth.release_skew_s is None
     assert (truth.impact_chain, truth.gravity_m_s2) == (None, 9.81)
-
-
-def test_a_chain_alone_has_nothing_to_be_late_against():
-    fence = reader.read(PROTOCOLS / "picket-fence.yaml")
-    skewed = with_dials(skew_sd=0.05)
-    assert drop(fence, skewed)[0] == drop(fence)[0]
-
-
-def test_a_scene_without_gates_has_no_edges():
-    edges, truth = drop(reader.read(PROTOCOLS / "bead-chain.yaml"))
-    assert edges == truth.edges == []
-    assert truth.speed_m_s > math.sqrt(2 * 9.81 * 1.1)  # faster than free fall
-
-
-def test_a_gate_just_below_a_hanging_rod_sees_it_and_one_just_above_does_not():
-    # The bottom rod hangs at 180 mm and is 13 mm thick.
-    low, high = (replace(UNIFORM.gates.on("free")[0], height=h) for h in (0.1725, 0.1875))
-    scene = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=(low, replace(high, channel=9))))
-    edges, truth = drop(scene)
-    assert_same_edges(on(edges, 8), crossings(0.1725, free_time_down))
-    assert_same_edges(on(edges, 9), crossings(0.1875, free_time_down))
-    assert [min(e[3] for e in truth.edges if e[1] == c) for c in (8, 9)] == [0, 1]
 
 
 def test_hanging_chains_leave_the_beams_free_unless_hung_too_low():
@@ -177,14 +127,6 @@ def test_a_drop_depends_on_seed_run_and_attempt_alone(asked, order: random.Rando
     other = ChainLab(UNIFORM, Dials(), 3)
     for label in again:
         assert other.drop(pack_label(*label)) == first[label]
-
-
-def test_other_runs_attempts_and_seeds_are_other_drops():
-    # Runs 1 and 4 hang the same chains at the same incline: only chance tells them apart.
-    late = with_dials(delay_sd=1e-3)
-    cases = ((1, 1, 1), (1, 1, 2), (1, 4, 1), (2, 1, 1))
-    assert len({drop(UNIFORM, late, *case)[0][0] for case in cases}) == len(cases)
-    assert len({drop(UNIFORM, QUIET, *case)[0][0] for case in cases}) == 1
 
 
 def test_a_run_the_plan_does_not_have_is_bad_input():
@@ -222,8 +164,3 @@ def test_for_any_dials_levels_alternate_and_time_runs_forward(dials, seed, run):
         assert levels == [i % 2 == 0 for i in range(len(levels))]
         assert len(levels) % 2 == 0
     assert [(t, c, b) for t, c, b, _ in truth.edges] == edges
-
-
-def test_the_chains_swap_sides_and_the_truth_says_which_strikes():
-    struck = [drop(WITHOUT_GATES, run=run)[1].impact_chain for run in (1, 2, 3, 4)]
-    assert struck == ["A", "B", "B", "A"]

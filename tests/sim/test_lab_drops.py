@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from rig.model.chain import Chain
 from rig.model.fall import fall
 from sim.beam import NOT_A_ROD
-from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.sim.chance import (
@@ -18,11 +16,8 @@ from tests.sim.chance import (
     B_STRIKES,
     FEW_GATES,
     FREE,
-    RUN_40,
-    assert_binomial,
     assert_normal,
     attempts,
-    truths,
     with_dials,
 )
 from tests.sim.falls import DELAY, RODS, UNIFORM, WITHOUT_GATES, ByHand, alpha
@@ -117,16 +112,6 @@ def test_jitter_scatters_single_edges():
     assert_normal([t - then[c, b, r] for t, c, b, r in truth.edges], 2e-6)
 
 
-def test_impulses_scatter_after_the_first_hit_and_leave_the_free_chain_alone():
-    quiet = attempts(with_dials(), 1)[0]
-    truth = attempts(with_dials(impulse_sd=0.02), 1)[0]
-    first_hit = DELAY + math.sqrt(2 * 0.18 / G)
-    then = {(c, b, r): t for t, c, b, r in quiet.edges}
-    for time, channel, blocked, rod in truth.edges:
-        same = abs(time - then[channel, blocked, rod]) < 1e-12
-        assert same == (channel in FREE or time <= first_hit)
-
-
 def test_single_impulses_scatter_independently_by_the_dial():
     sd, wiggle = 0.02, 1e-6
     a = alpha(40)
@@ -147,13 +132,6 @@ def test_true_coefficients_may_differ_from_the_protocol_s(true):
     truth = attempts(with_dials(**true), 1)[0]
     assert truth.separation_m == pytest.approx(float(by_hand.separation), rel=1e-12)
     assert truth.speed_m_s == pytest.approx(float(by_hand.before[-1]), rel=1e-12)
-
-
-def test_missed_edges_are_the_dial_s_share():
-    quiet, lossy = (
-        sum(len(t.edges) for t in attempts(with_dials(missed=share), 20)) for share in (0, 0.05)
-    )
-    assert_binomial((quiet - lossy) / 2, quiet // 2, 0.05)  # rods and gaps are lost whole
 
 
 def test_the_string_flickers_in_gaps_between_rods():
@@ -181,23 +159,3 @@ def test_rods_bounce_through_the_lowest_beam_of_the_impact_side_alone():
     assert min(t for t, *_ in bounces) > hits[0] + 4e-3
     assert max(t for t, *_ in bounces) < hits[-1] + 40e-3
     assert {edge[1] for edge in truth.edges if edge[0] > hits[-1] + 1e-3 and edge[1] < 8} == {0}
-
-
-def test_a_quarter_of_the_struck_rods_bounces():
-    # Two rods far apart, so that every bounce is alone in the beam.
-    a = UNIFORM.chains["A"]
-    pair = replace(a, chain=Chain((1.0, 1.0), (0.0, 1.165)), widths=a.widths[:2])
-    scene = replace(
-        UNIFORM,
-        chains={"A": pair},
-        gates=replace(UNIFORM.gates, gates=UNIFORM.gates.on("impact")[:1]),
-    )
-    drops = attempts(with_dials(bounce=0.25), 200, scene)
-    bounces = sum(rod == NOT_A_ROD and blocked for t in drops for _, _, blocked, rod in t.edges)
-    assert_binomial(bounces, 2 * 200, 0.25)
-
-
-def test_the_graver_dials_all_at_once_still_end_in_a_truth():
-    truth = truths(Dials(skew_sd=0.01, missed=0.1, chatter=0.1, bounce=0.5), 5, (RUN_40, 1))[0]
-    assert 0 < truth.separation_m < 0.3
-    assert truth.separation_raw_m != truth.separation_m

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -12,7 +11,7 @@ from mpmath import mp
 
 from rig.model.chain import Chain
 from rig.model.drag import drag_hits, drag_leg
-from rig.model.fall import hits, kicks
+from rig.model.fall import kicks
 from sim.path import Path
 
 
@@ -38,10 +37,6 @@ def paths(draw) -> Path:
     return Path(draw(st.floats(0, 1)), start, gravity, events, heights, kappas)
 
 
-def end(path: Path) -> float:
-    return path.release_s + path.hits[-1].time_s
-
-
 @given(paths(), st.floats(0, 1))
 def test_height_undoes_time(path, part):
     low, high = path.hit_heights[-1] - 0.3, path.start
@@ -56,41 +51,6 @@ def test_time_undoes_height(path, part):
     assert path.time_at(path.height_at(time)) == pytest.approx(time, abs=1e-11)
 
 
-@given(paths())
-def test_each_hit_is_on_the_way(path):
-    for hit, height in zip(path.hits, path.hit_heights, strict=True):
-        when = path.release_s + hit.time_s
-        assert path.time_at(height) == pytest.approx(when, abs=1e-13)
-        assert path.height_at(when) == pytest.approx(height, abs=1e-12)
-
-
-@given(paths())
-def test_the_speed_steps_at_each_hit_and_only_there(path):
-    g, e = path.gravity, 1e-4
-    kappas = path.kappas or [0.0] * len(path.hits)
-    for (before, after), kappa in zip(pairwise(path.hits), kappas[1:], strict=True):
-        if after.time_s - before.time_s < e:
-            continue
-        first, last = path.release_s + before.time_s, path.release_s + after.time_s
-        # Exact for constant acceleration: v(0) = Δz/e − a e/2, v(e) = Δz/e + a e/2. Here z falls.
-        slow, fast = before.speed_after, after.speed_before
-        left, come = (g - kappa * v * v for v in (slow, fast))
-        leaving = (path.height_at(first) - path.height_at(first + e)) / e - left * e / 2
-        arriving = (path.height_at(last - e) - path.height_at(last)) / e + come * e / 2
-        # In air the acceleration changes by 2κva, which two thirds of e²/2 make a speed of.
-        change = kappa * e * e
-        assert leaving == pytest.approx(slow, abs=1e-8 + change * slow * abs(left))
-        assert arriving == pytest.approx(fast, abs=1e-8 + change * fast * abs(come))
-
-
-@given(paths(), st.lists(st.floats(-0.5, 1.5), min_size=2).map(sorted))
-def test_it_never_rises_and_hangs_still_before(path, parts):
-    span = path.hits[-1].time_s
-    heights = [path.height_at(path.release_s + part * span) for part in parts]
-    assert all(b <= a + 1e-14 for a, b in pairwise(heights))
-    assert all(z == path.start for z, part in zip(heights, parts, strict=True) if part <= 0)
-
-
 @given(st.floats(0.1, 3), st.floats(0.5, 30), st.floats(1e-3, 1.0), st.floats(1e-3, 1.5))
 def test_a_free_fall_in_air_is_the_logarithm_of_a_cosh(start, gravity, kappa, since):
     path = Path(0.02, start, gravity, kappas=[kappa])
@@ -98,34 +58,6 @@ def test_a_free_fall_in_air_is_the_logarithm_of_a_cosh(start, gravity, kappa, si
         x = mp.sqrt(mp.mpf(kappa) * gravity) * ((0.02 + since) - 0.02)
         fallen = float(mp.log(mp.cosh(x)) / kappa)
     assert path.height_at(0.02 + since) == pytest.approx(start - fallen, abs=1e-12)
-
-
-@given(st.floats(0, 1), st.floats(0.1, 3), st.floats(0.5, 30), st.floats(0, 3))
-def test_free_fall_is_half_g_t_squared(release, start, gravity, since):
-    path = Path(release, start, gravity)
-    since = (release + since) - release  # what is left of it in floats
-    assert path.height_at(release + since) == pytest.approx(
-        start - gravity * since**2 / 2, rel=1e-13, abs=1e-13
-    )
-    depth = 0.5 * gravity * since**2
-    assert path.time_at(start - depth) == pytest.approx(
-        release + math.sqrt(2 * (start - (start - depth)) / gravity), abs=1e-13
-    )
-
-
-def test_before_the_first_hit_impacts_change_nothing():
-    struck = Path(
-        0.02, 0.18, 9.81, hits(Chain((1, 1), (0, 0.05)), [0.2, 0], 0.18, 9.81), (0, -0.05)
-    )
-    free = Path(0.02, 0.18, 9.81)
-    assert struck.time_at(0.001) == free.time_at(0.001)
-    assert struck.time_at(0.0) == free.time_at(0.0)  # a hit changes speed, not place
-    assert struck.time_at(-0.02) < free.time_at(-0.02) - 1e-4
-    assert struck.height_at(end(struck)) < free.height_at(end(struck))
-
-
-def test_a_height_above_the_start_is_passed_at_release():
-    assert Path(0.3, 0.1, 9.81).time_at(0.2) == 0.3
 
 
 @given(paths(), st.floats(1e-3, 0.05))

@@ -20,11 +20,10 @@ from rig.protocol import reader
 from rig.runner import Operator, run_protocol
 from sim import fall_cache, resolved_lab
 from sim.dials import Dials, read_dials
-from sim.edges import Request, falls
 from sim.film import film
 from sim.resolved import foresight
 from sim.resolved.fall import fall
-from sim.resolved_dials import NAMES, ResolvedDials, read_resolved_dials
+from sim.resolved_dials import ResolvedDials, read_resolved_dials
 from sim.resolved_lab import ResolvedLab, at_level
 from sim.scene import choose_world, set_scene
 
@@ -107,15 +106,6 @@ def test_truth_at_level_and_at_strike(dropped):
         assert 0.0 <= truth.slack <= 1.0
 
 
-def test_a_rod_that_strikes_early_is_followed_to_the_level(dropped):
-    lab, _, _ = dropped
-    struck = fall(lab.chains(pack_label(1, 1))["impact"])
-    struck.touched_height[-1], struck.top_speed = 0.02, 4.0
-    time_s, speed = at_level(struck, GRAVITY)
-    assert speed == pytest.approx(math.sqrt(16.0 + 2 * GRAVITY * 0.02))
-    assert time_s - struck.strike_s == pytest.approx((speed - 4.0) / GRAVITY)
-
-
 def test_a_drop_comes_out_the_same_alone_again_and_from_the_disk(dropped, monkeypatch, tmp_path):
     lab, truths, edges = dropped
     assert lab.drop(pack_label(2, 1)) == edges[1]
@@ -147,23 +137,6 @@ def test_arming_a_drop_has_the_next_ones_made(dropped, monkeypatch, tmp_path):
     twin.rest(labels[0])  # armed once more
     assert [twin.drop(label) for label in labels] == edges
     assert sorted(made) == labels
-
-
-def test_a_scene_without_a_board_costs_little():
-    fence = reader.read(Path(__file__).parents[2] / "protocols/picket-fence.yaml")
-    lab = ResolvedLab(fence, Dials(), 3, world=ResolvedDials())
-    chain = lab.chains(pack_label(1, 1))["free"]
-    found = fall(chain)
-    assert found.frames_s.size == 0  # not one step: the whole way down is a formula
-    assert foresight.processor_time(chain) == 0.0
-
-
-def test_what_was_kept_for_other_parameters_is_not_taken(dropped):
-    lab, _, edges = dropped
-    other = ResolvedLab(
-        lab.protocol, lab.dials, 3, world=replace(lab.world, string_restitution=0.7)
-    )
-    assert other.drop(pack_label(1, 1)) != edges[0]
 
 
 def test_a_disk_that_takes_nothing_only_costs_time(monkeypatch, tmp_path):
@@ -221,13 +194,6 @@ def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
     assert shown.times_s[-1] > truth["strike_time_s"]
 
 
-def test_falls_for_benchmarks(scene):
-    url = f"sim://?protocol={scene}&dynamics=resolved&quiet=1&yaw_sd=1 deg"
-    lines = [json.loads(line) for line in falls([Request(url, [3, 4], [[1], [2]])])]
-    assert [line["seed"] for line in lines] == [3, 4]
-    assert {line["truth"]["run"] for line in lines} == {1, 2}
-
-
 @pytest.mark.parametrize(
     ("setting", "text", "says"),
     [
@@ -283,13 +249,6 @@ def test_a_top_rod_that_never_lands_is_said(dropped):
     struck = replace(fall(lab.chains(pack_label(1, 1))["impact"]), touched_s=np.full(4, np.inf))
     with pytest.raises(InputError, match="strikes nothing"):
         at_level(struck, GRAVITY)
-
-
-def test_quiet_hangs_chains_still_and_keeps_the_materials():
-    quiet = read_resolved_dials({"quiet": "1"})
-    for name in NAMES:
-        wanted = 0.0 if name.endswith("_sd") else getattr(ResolvedDials(), name)
-        assert getattr(quiet, name) == wanted
 
 
 def test_air_takes_from_a_chain_what_the_dial_says(scene):

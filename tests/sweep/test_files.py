@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from rig import __version__
-from tests.cli.lab import PROTOCOLS
 from tests.sweep.conftest import SCENE, VARY
 from tests.test_imports import packages_loaded_by
 
@@ -75,23 +74,6 @@ def test_a_picture_has_maps_or_curves_and_its_provenance(sweep, tmp_path, vary, 
     assert hashlib.sha256(SCENE.encode()).hexdigest() in svg
 
 
-def test_a_chain_alone_is_apart_from_nothing(sweep, tmp_path):
-    protocol = tmp_path / "one.yaml"
-    protocol.write_text((PROTOCOLS / "single-chain.yaml").read_text("utf-8"), "utf-8")
-    for vary in (("friction=0..1:3",), ("friction=0..1:3", "restitution=0..1:3")):
-        assert sweep("s.svg", *vary, protocol=protocol).code == 0
-        svg = (tmp_path / "s.svg").read_text("utf-8")
-        assert "speed V" in svg
-        assert "Δz" not in svg
-
-
-def test_a_title_is_no_formula(sweep, tmp_path):
-    protocol = tmp_path / "priced.yaml"
-    protocol.write_text(SCENE.replace("title: ", "title: 5 $ and \\frac{ of $, "), "utf-8")
-    said = sweep("s.svg", "friction=0..1:3", ONE_INCLINE, protocol=protocol)
-    assert said == (0, f"{tmp_path / 's.svg'}: 3 points, 1 beyond the model's domain\n")
-
-
 @pytest.mark.parametrize(("output", "vary", "said"), [
     ("s.txt", ("friction=0..1:3",), "end the name in one of .csv, .npz, .svg"),
     ("no/s.csv", ("friction=0..1:3",), "No such file or directory"),
@@ -130,7 +112,6 @@ def test_a_table_needs_neither_dask_nor_matplotlib(scene, tmp_path):
 
 
 def test_a_missing_dask_is_named(sweep, monkeypatch):
-    monkeypatch.delitem(sys.modules, "rig.sweep.cluster", raising=False)
     monkeypatch.setitem(sys.modules, "distributed", None)
     done = sweep("s.csv", "friction=0..1:3", ONE_INCLINE, more=("--cluster", "127.0.0.1:1"))
     assert done.code == 2

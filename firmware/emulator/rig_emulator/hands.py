@@ -2,20 +2,24 @@
 """The emulated board with hands around it and a log: ``python -m rig_emulator.hands``.
 
 As `sim.pty` in everything, but the real program runs inside; what it keeps of a drop is read out
-of its memory. ``--loader`` before all else puts Arduino's own boot loader before the program.
+of its memory. ``--board`` names the board, ``--elf`` another firmware than the built one, and
+``--loader`` puts Arduino's own boot loader before the program.
 """
 
 from __future__ import annotations
 
+import argparse
 import struct
 import sys
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.link.messages import Phase
 from rig_emulator.board import EmulatedBoard
 from rig_emulator.bootloader import LOADERS, behind_loader
 from rig_emulator.protocol_emu import put_before
-from rig_emulator.wiring import board_named, firmware_for
+from rig_emulator.wiring import BOARDS, board_named, firmware_for
 from sim.pty import main
 
 if TYPE_CHECKING:
@@ -44,21 +48,30 @@ class GlassBoard(EmulatedBoard):
         return told | {"overflows": overflows}, list(_EVENT.iter_unpack(memory))
 
 
-def emulated(scene: Scene) -> GlassBoard:
-    """Put an emulated Mega before a scene."""
-    wiring = board_named("mega")
-    return put_before(scene, wiring, firmware_for(wiring), BAUDRATE, GlassBoard)
-
-
-def bought(scene: Scene) -> GlassBoard:
-    """Put one with Arduino's own boot loader before it."""
-    wiring = board_named("mega")
-    program = behind_loader(wiring.mcu, LOADERS["mega"], firmware_for(wiring))
+def emulated(scene: Scene, options: argparse.Namespace) -> GlassBoard:
+    """Put an emulated board before a scene."""
+    wiring = board_named(options.board)
+    program = options.elf or firmware_for(wiring)
+    if options.loader:
+        program = behind_loader(wiring.mcu, LOADERS[options.board], program)
     return put_before(scene, wiring, program, BAUDRATE, GlassBoard)
 
 
+def start() -> int:
+    """Run the command line; what is not said here `sim.pty` reads.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--board", choices=sorted(BOARDS), default="mega")
+    parser.add_argument("--elf", type=Path)
+    parser.add_argument("--loader", action="store_true")
+    options, rest = parser.parse_known_args()
+    return main(rest, make=partial(emulated, options=options), scheme="emu")
+
+
 if __name__ == "__main__":
-    first, *others = sys.argv[1:]
-    if first == "--loader":
-        sys.exit(main(others, make=bought, scheme="emu"))
-    sys.exit(main(make=emulated, scheme="emu"))
+    sys.exit(start())

@@ -71,7 +71,7 @@ class Serial(EmulatedSerial):
             self.reset_on_open = False
         scene = set_scene("emu", settings)
         self.clock = VirtualClock(scene.pace)
-        self.disturb(scene.seed, **scene.line())
+        scene.disturb(self)
         return board_before(
             scene, wiring, Path(program) if program else firmware_for(wiring), self.baudrate
         )
