@@ -36,14 +36,11 @@ Size = TypeVar("Size", float, "Array")
 
 STATED_WEIGHT = 2.0
 """Members that a stated uncertainty counts for: a scale known to half of itself (GUM G.4.2)."""
-_LARGER = 4.0
-"""Times as many against a larger one: a few gates that seem off may be how chains fall instead."""
 _MEMBERS = ("stretch", "gates", "rods", "beam", "hang", "swing")
 _EDGES = ("jitter", "floor", "departure", "few")
 _DOUBTED = 2.0
 """Times the share of the stated departures that is found is the least share of every other scale:
 once or thrice this moves no coverage by more than a point."""
-_BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
 _MANY = 9  # rods that still fall: so many are as good as more
@@ -133,11 +130,11 @@ class Evidence:
             # Where no rod is off its chain, few are not either: the least of it explains nothing.
             self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
             new["few"] = LEAST_SHARE * self.stated.few
-        self._settle("stretch", LEAST_SHARE, new)
         # Where chains leave the equations, whatever else is found may be how they do that.
+        self._settle("stretch", _least(parted), new)
         if self._determined["stretch"] > 0.0:
             parted = max(parted, new["stretch"])
-        parted = max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
+        parted = _least(parted)
         for kind in _MEMBERS[1:]:
             self._settle(kind, parted, new)
         for name in ("jitter", "floor"):
@@ -154,16 +151,9 @@ class Evidence:
         old, beforehand = getattr(self.components, kind), getattr(self.stated, kind)
         if not beforehand:
             return  # known exactly, so that nothing scatters
-        weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
-        degrees = weight + self._determined[kind]
-        self.degrees[kind] = max(STATED_WEIGHT, degrees)
-        squares = weight * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
-        size = old * (squares / degrees) ** 0.5
-        if size > beforehand:
-            weight *= _LARGER
-            squares = weight * (beforehand / old) ** 2 + self._squares[kind]
-            size = max(beforehand, old * (squares / (weight + self._determined[kind])) ** 0.5)
-        new[kind] = max(size, share_at_least * beforehand)
+        self.degrees[kind] = degrees = STATED_WEIGHT + self._determined[kind]
+        squares = STATED_WEIGHT * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
+        new[kind] = max(old * (squares / degrees) ** 0.5, share_at_least * beforehand)
 
     def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
         """Sort edges by what scatters alike: at about the same speed, with as many rods falling.
@@ -223,6 +213,11 @@ class Evidence:
         for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
+
+
+def _least(parted: float) -> float:
+    """Share of what is stated that is the least of every scale, for that of the departures."""
+    return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
 
 
 def _member(stated: Size, found: Size) -> Size:
