@@ -37,7 +37,8 @@ Size = TypeVar("Size", float, "Array")
 STATED_WEIGHT = 2.0
 """Members that a stated uncertainty counts for: a scale known to half of itself (GUM G.4.2)."""
 _MEMBERS = ("stretch", "gates", "rods", "beam", "hang", "swing")
-_EDGES = ("jitter", "floor", "departure", "few")
+_EDGES = ("jitter", "floor", "departure")
+_LEAVES = {"departure", "stretch"}  # how far chains leave the equations
 _DOUBTED = 2.0
 """Times the share of the stated departures that is found is the least share of every other scale:
 once or thrice this moves no coverage by more than a point."""
@@ -121,39 +122,33 @@ class Evidence:
         struck
             How many of them only the edges after a first impact can have told.
         """
-        old = self.components
         new: dict[str, float] = {}
-        kinds, squares, counts = self._binned(parameters, struck)
-        self._share(_EDGES, kinds, squares, counts, new)
-        parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
-        if parted < 2.0 * LEAST_SHARE:
-            # Where no rod is off its chain, few are not either: the least of it explains nothing.
-            self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
-            new["few"] = LEAST_SHARE * self.stated.few
-        # Where chains leave the equations, whatever else is found may be how they do that.
-        self._settle("stretch", _least(parted), new)
-        if self._determined["stretch"] > 0.0:
-            parted = max(parted, new["stretch"])
-        parted = _least(parted)
-        for kind in _MEMBERS[1:]:
-            self._settle(kind, parted, new)
-        for name in ("jitter", "floor"):
-            new[name] = max(new[name], parted * getattr(self.stated, name))
+        self._share(_EDGES, *self._binned(parameters, struck), new)
+        for kind in _MEMBERS:
+            self._settle(kind, new)
         if self._impulses:
             size, alone, squares, counts = np.concatenate(self._impulses, axis=1)
             kinds = np.stack([size, np.ones_like(size), alone])
-            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new, parted)
-        self.components = replace(old, landed=parted, **new)
+            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new)
+        # Where chains leave the equations, whatever else is found may be how they do that.
+        parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
+        new["stretch"] = max(new["stretch"], min(1.0, _DOUBTED * (parted - LEAST_SHARE)))
+        left = max(parted, new["stretch"]) if self._determined["stretch"] else parted
+        least = max(LEAST_SHARE, min(1.0, _DOUBTED * left))
+        for name in new.keys() - _LEAVES:
+            new[name] = max(new[name], least * getattr(self.stated, name))
+        new["few"] = parted * self.stated.few
+        self.components = replace(self.components, landed=least, **new)
         return self
 
-    def _settle(self, kind: str, share_at_least: float, new: dict[str, float]) -> None:
+    def _settle(self, kind: str, new: dict[str, float]) -> None:
         """Estimate the scale of a kind from its members."""
         old, beforehand = getattr(self.components, kind), getattr(self.stated, kind)
         if not beforehand:
             return  # known exactly, so that nothing scatters
         self.degrees[kind] = degrees = STATED_WEIGHT + self._determined[kind]
         squares = STATED_WEIGHT * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
-        new[kind] = max(old * (squares / degrees) ** 0.5, share_at_least * beforehand)
+        new[kind] = old * (squares / degrees) ** 0.5
 
     def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
         """Sort edges by what scatters alike: at about the same speed, with as many rods falling.
@@ -161,7 +156,7 @@ class Evidence:
         Returns
         -------
         kinds, squares, counts
-            By how much each component counts in each bin, shape ``(4, bins)``; sums of squares,
+            By how much each component counts in each bin, shape ``(3, bins)``; sums of squares,
             and their degrees of freedom.
         """
         parts = zip(*self._edges, strict=True)
@@ -175,13 +170,15 @@ class Evidence:
         counts: Array = np.bincount(place, minlength=bins).astype(np.float64)
         sums: Array = np.bincount(place, squares, bins).astype(np.float64)
         middles = np.bincount(place, speeds, bins) / np.maximum(counts, 1)
-        few = np.bincount(place, loose**2, bins) / np.maximum(counts, 1)
-        late = (few > 0.0).astype(np.float64)
+        late = (np.bincount(place, loose, bins) > 0.0).astype(np.float64)
+        stated = self.stated.departures(loose)
+        departed = np.bincount(place, stated, bins) / np.maximum(counts, 1)
+        departed /= self.stated.departure**2 or 1.0
         # Every unknown that the edges determine takes one degree of freedom, at all speeds alike.
         total, behind = max(1, squares.size), max(1, int(after.sum()))
         taken = (parameters - struck) / total + late * struck / behind
         full = counts > 0
-        kinds = np.stack([middles, np.ones_like(middles), late, few])[:, full]
+        kinds = np.stack([middles, np.ones_like(middles), departed])[:, full]
         degrees: Array = (np.maximum(0.5, 1.0 - taken) * counts)[full]
         return kinds, sums[full], degrees
 
@@ -192,7 +189,6 @@ class Evidence:
         squares: Array,
         counts: Array,
         new: dict[str, float],
-        share_at_least: float = LEAST_SHARE,
     ) -> None:
         """Estimate components that make up one variance.
 
@@ -204,7 +200,7 @@ class Evidence:
         # The stated member is spread over all sizes, so that it pulls no component alone.
         share = STATED_WEIGHT / squares.size
         squares, counts = squares + share * (_member(stated, found) @ kinds), counts + share
-        least = share_at_least**2 * stated
+        least = LEAST_SHARE**2 * stated
         for _ in range(_INNER):
             for n, sizes in enumerate(kinds):
                 found[n] = max(
@@ -213,11 +209,6 @@ class Evidence:
         for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
-
-
-def _least(parted: float) -> float:
-    """Share of what is stated that is the least of every scale, for that of the departures."""
-    return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
 
 
 def _member(stated: Size, found: Size) -> Size:
