@@ -132,9 +132,8 @@ class Evidence:
             self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new)
         # Where chains leave the equations, whatever else is found may be how they do that.
         parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
-        new["stretch"] = max(new["stretch"], min(1.0, _DOUBTED * (parted - LEAST_SHARE)))
-        left = max(parted, new["stretch"]) if self._determined["stretch"] else parted
-        least = max(LEAST_SHARE, min(1.0, _DOUBTED * left))
+        new["stretch"] = max(new["stretch"], _doubted(parted - LEAST_SHARE))
+        least = _doubted(max(parted, new["stretch"]) if self._determined["stretch"] else parted)
         for name in new.keys() - _LEAVES:
             new[name] = max(new[name], least * getattr(self.stated, name))
         new["few"] = parted * self.stated.few
@@ -209,6 +208,11 @@ class Evidence:
         for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
+
+
+def _doubted(parted: float) -> float:
+    """Share of what is stated that a scale has at least, for that by which chains are parted."""
+    return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
 
 
 def _member(stated: Size, found: Size) -> Size:
