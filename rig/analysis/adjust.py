@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -166,77 +166,86 @@ def least_squares(
     Estimate
         Always of finite numbers; where no further step could be taken it is not settled.
     """
-    y = scaled(x, sd)
-    prior = np.zeros_like(x) if centre is None else scaled(centre, sd)
-    search = _Search(linearize, sd, prior)
-    here: _Point | None = None
-    limit = math.inf
-    share, damping, moved = 1.0, 0.0, 0.0
-    settled, ahead = False, np.zeros_like(y)
-    for step in range(steps):
-        point = search.rooted(search.look(y), limit)
-        if not math.isfinite(point.size):
-            if here is None:
+    search = _Search(linearize, sd, np.zeros_like(x) if centre is None else scaled(centre, sd))
+    here = search.look(scaled(x, sd))
+    if not math.isfinite(here.loss):
+        return Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
+    damping, previous, settled, step = 0.0, 0.0, False, np.zeros_like(x)
+    for _ in range(steps):
+        step = search.step(here, damping)
+        moved = length(step, here.root.matrix)
+        near = here.size < here.usual
+        # As long as steps get shorter alike, the next one is that of the last times their ratio.
+        short = near and (moved < done or (not damping and moved**2 < done * previous))
+        if short or (near and not rough):
+            factor = search.scatter(here)
+            if short and (rough or factor == 1.0):
+                search.inflation, settled = search.inflation * factor, True
                 break
-            share, damping = 1.0, damping * _FASTER or _DAMPED
-            y, limit = search.onward(here, damping)
-            continue
-        before, here = here, point
-        turned, damping = ahead, damping / _SLOWER if damping > _FAINT else 0.0
-        y, _ = search.onward(here, damping)
-        ahead = y - here.y
-        # Steps to and fro that get shorter end by themselves, and sooner.
-        if step > PATIENT and not damping and here.root.turns_back(ahead, turned):
-            share *= 0.5
-        y = here.y + share * ahead
-        limit = search.limit(here, share * ahead)
-        last, moved = moved, share * here.size
-        whole = share == 1.0 and not damping
-        short = moved < done or (whole and moved**2 < done * last)
-        # While the unknowns still move, χ² is large for that, and says nothing of the scatter.
-        # Unknowns take away less than their number: a chi2 so small needs no closer look.
-        seen = here.seen
-        previous = 0.0 if before is None else before.seen.chi2
-        calm = seen.chi2 <= seen.size - x.size or (
-            bool(step) and abs(seen.chi2 - previous) <= _STEADY * max(seen.chi2, 1.0)
-        )
-        if not (short if rough else calm):
-            continue
-        factor = search.scatter(here)
-        if short and (rough or factor == 1.0):
-            settled = True
-            search.inflation *= factor
-            break
-        if factor != 1.0 and here.size <= factor:
-            # They scatter more or less than assumed: weigh them so, once more from here.
-            search.weigh(factor)
-            y, limit, ahead, moved = here.y, math.inf, turned, 0.0
-    return (
-        search.estimate(here, y, limit, settled=settled)
-        if here
-        else Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
+            if factor != 1.0:
+                here, previous = search.weigh(here, factor), 0.0
+                continue
+        there = search.look(here.y + step)
+        if there.loss <= here.loss - _GAIN * here.promised(step):
+            here, previous = there, moved
+            damping = damping / _SLOWER if damping > _FAINT else 0.0
+        else:
+            damping = damping * _FASTER or _DAMPED
+    step = step if settled else np.zeros_like(x)
+    rows = {role: rows.after(step * sd) for role, rows in here.seen.rows.items()}
+    return Estimate(
+        (here.y + step) * sd,
+        sd,
+        here.root.matrix,
+        here.seen.chi2,
+        here.seen.size,
+        search.inflation,
+        settled,
+        rows,
     )
 
 
-class _Point(NamedTuple):
+@dataclass(frozen=True)
+class _Point:
     """Where a search is.
 
     Attributes
     ----------
     y, seen
         Unknowns in units of their prior uncertainties, and what was linearized there.
-    loss
-        What a step has to make less, priors included.
-    root, size
-        Of the information, and how long the step of Gauss and Newton is; no number where there is
-        no such step.
+    sd, pull
+        These uncertainties, and how far the unknowns are above their prior means, in these units.
     """
 
     y: Array
     seen: Linearization
-    loss: float
-    root: Root
-    size: float = math.nan
+    sd: Array
+    pull: Array
+
+    @property
+    def loss(self) -> float:
+        """What a step has to make less, priors included."""
+        return self.seen.loss + float(self.pull @ self.pull)
+
+    @property
+    def usual(self) -> float:
+        """How many times as much as assumed observations scatter, if they fit as well as can be."""
+        return math.sqrt(max(1.0, self.seen.chi2 / max(1, self.seen.size)))
+
+    @cached_property
+    def root(self) -> Root:
+        """Observations and priors, reduced to a square root."""
+        return square_root([*self.seen.rows.values()], self.sd, self.pull)
+
+    @property
+    def size(self) -> float:
+        """How long the step of Gauss and Newton is, see `length`."""
+        return float(np.linalg.norm(self.root.left))
+
+    def promised(self, step: Array) -> float:
+        """By how much a step makes the loss less, if slopes were the same everywhere."""
+        left = self.root.left + self.root.matrix @ step
+        return float(self.root.left @ self.root.left - left @ left)
 
 
 class _Search:
@@ -251,10 +260,7 @@ class _Search:
     """
 
     def __init__(
-        self,
-        linearize: Callable[[Array, float], Linearization],
-        sd: Array,
-        prior: Array,
+        self, linearize: Callable[[Array, float], Linearization], sd: Array, prior: Array
     ) -> None:
         self._linearize, self._sd, self._prior = linearize, sd, prior
         self.inflation = 1.0
@@ -262,25 +268,17 @@ class _Search:
 
     def look(self, y: Array) -> _Point:
         """Look what observations say about a point."""
-        seen, off = self._linearize(y * self._sd, self.inflation), y - self._prior
-        return _Point(y, seen, seen.loss + float(off @ off), _NO_ROOT)
+        return _Point(y, self._linearize(y * self._sd, self.inflation), self._sd, y - self._prior)
 
-    def rooted(self, point: _Point, limit: float) -> _Point:
-        """Reduce observations and priors where the loss is within a limit."""
-        if not point.loss <= limit:
-            return point
-        root = square_root([*point.seen.rows.values()], self._sd, point.y - self._prior)
-        return point._replace(root=root, size=float(np.linalg.norm(root.left)))
+    def step(self, here: _Point, damping: float) -> Array:
+        """Step downhill; the more it is damped, the shorter (Marquardt 1963).
 
-    def onward(self, here: _Point, damping: float) -> tuple[Array, float]:
-        """Return where a step leads, and what the loss may be there."""
+        By its second derivative along the way it follows a curve (Transtrum and Sethna 2012).
+        """
         lengths = np.linalg.norm(here.root.matrix, axis=0)
         self._steepest = np.maximum(_FORGOTTEN * self._steepest, lengths)
-        step = self._bent(here, damping) if damping else here.root.step()
-        return here.y + step, self.limit(here, step)
-
-    def _bent(self, here: _Point, damping: float) -> Array:
-        """Step along a curve, by the second derivative along it (Transtrum and Sethna 2012)."""
+        if not damping:
+            return here.root.step()
         root = here.root.damped(damping, self._steepest)
         straight = root.step()
         there, gradient = self.look(here.y + _TRIED * straight).seen, np.zeros_like(here.y)
@@ -293,61 +291,21 @@ class _Search:
         short = 2.0 * np.linalg.norm(self._steepest * bend) <= _BENT * long
         return straight + bend if short else straight * math.nan
 
-    def limit(self, here: _Point, step: Array) -> float:
-        """What the loss may be after a step: mostly it has to become less, see `_GAIN`.
-
-        A step to and fro about the best place may make it a little more, for slopes are not quite
-        its.
-        """
-        left, usual = here.root.left + here.root.matrix @ step, _usual(here.seen)
-        if here.size**2 < usual:
-            return here.loss + usual
-        return here.loss - _GAIN * (here.size**2 - float(left @ left))
-
     def scatter(self, here: _Point) -> float:
         """How many times as much as thought observations scatter; 1 where that is near enough.
 
         They never scatter less than stated.
         """
-        seen, root = here.seen, here.root.matrix
-        free = seen.size - len(root)
-        # No unknown is left open by less than if all others were known.
-        least = free + float(np.sum(1.0 / np.sum(root**2, axis=0)))
-        if self.inflation == 1.0 and seen.chi2 < _MORE**2 * max(least, 1.0):
-            return 1.0
-        degrees = free + float(np.sum(np.linalg.inv(root) ** 2))
-        factor = max(math.sqrt(seen.chi2 / max(degrees, 1.0)), 1.0 / self.inflation)
+        seen, inverse = here.seen, np.linalg.inv(here.root.matrix)
+        degrees = max(1.0, seen.size - len(inverse) + float(np.sum(inverse**2)))
+        factor = max(math.sqrt(seen.chi2 / degrees), 1.0 / self.inflation)
         return 1.0 if 1.0 / _MORE < factor < _MORE else factor
 
-    def weigh(self, factor: float) -> None:
-        """Weigh observations as if they scattered so many times as before."""
+    def weigh(self, here: _Point, factor: float) -> _Point:
+        """Look at a point as if observations scattered so many times as before."""
         self.inflation *= factor
         self._steepest = self._steepest / factor
-
-    def estimate(self, here: _Point, y: Array, limit: float, *, settled: bool) -> Estimate:
-        """Sum up a search that was last at a point, and has another one in mind.
-
-        That one is looked at where it is far, or was not reached from a better one.
-        """
-        far = length(y - here.y, here.root.matrix)
-        if not far <= _UNSEEN and not self.look(y).loss <= limit:
-            y, settled = here.y, False
-        moved = (y - here.y) * self._sd
-        return Estimate(
-            y * self._sd,
-            self._sd,
-            here.root.matrix,
-            here.seen.chi2,
-            here.seen.size,
-            self.inflation,
-            settled,
-            {role: rows.after(moved) for role, rows in here.seen.rows.items()},
-        )
-
-
-def _usual(seen: Linearization) -> float:
-    """What an observation adds to χ²: 1, or more where they scatter more than assumed."""
-    return max(1.0, seen.chi2 / max(1, seen.size))
+        return self.look(here.y)
 
 
 def length(step: Array, root: Array) -> float:

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from rig.analysis.drop_model import DropModel
     from rig.analysis.dual import Dual
     from rig.analysis.gate_passages import GatePassage
-    from rig.analysis.joint_fit import JointDrop, JointFit
+    from rig.analysis.joint_fit import JointFit
+    from rig.analysis.joint_step import JointDrop
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]

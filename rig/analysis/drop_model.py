@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from rig.predictions import air_of
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
+
+T = TypeVar("T")
 
 
 class DropModel:
@@ -87,29 +89,35 @@ class DropModel:
         self.components: Components = components or stated(protocol)
         self.suspects: tuple[Unknown, ...] = ()
         self.owners: Mapping[str, str] = {}
-        made: dict[str, DropModel] = {role: one for one in sides for role in one.records}
-        self.expected: dict[str, Expected] = {
-            role: made[role].expected[role] if role in made else Expected.of(record, protocol)
-            for role, record in self.records.items()
-        }
-        self.pairings: dict[str, Pairing] = {
-            role: made[role].pairings[role]
-            if role in made
-            else Pairing.of(record.trains, _widths(record))
-            for role, record in self.records.items()
-        }
+        made = {role: model for model in sides for role in model.records}
+        self.expected: dict[str, Expected] = {}
+        self.pairings: dict[str, Pairing] = {}
+        for role, record in self.records.items():
+            model = made.get(role)
+            self.expected[role] = model.expected[role] if model else Expected.of(record, protocol)
+            self.pairings[role] = (
+                model.pairings[role] if model else Pairing.of(record.trains, _widths(record))
+            )
         self.discrepancy: Discrepancy  # where a chain strikes
-        if "impact" in made:
-            self.discrepancy = made["impact"].discrepancy
-        elif "impact" in self.records:
+        if "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
-            self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
+            self.discrepancy = (
+                made["impact"].discrepancy
+                if "impact" in made
+                else Discrepancy.of(record, edges, protocol, self._kappa)
+            )
+        self._held: dict[tuple[str, str], tuple[object, Any]] = {}
         self.unknowns = Unknowns(self)
         self.slopes = {role: side_slopes(self, role) for role in self.records}
-        # The last path, levels and matches of each side: nothing older is asked for again.
-        self._paths: dict[str, tuple[bytes, Trajectory]] = {}
-        self._levels: dict[str, tuple[bytes, Array]] = {}
-        self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
+
+    def changed(self, **attributes: Any) -> DropModel:
+        """Return the same drop with something else about it, and priors that follow."""
+        other = copy(self)
+        vars(other).update(attributes, _held={})
+        other.unknowns = Unknowns(other)
+        if "suspects" in attributes:
+            other.slopes = {role: side_slopes(other, role) for role in other.records}
+        return other
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
         """Return the same drop with other priors, that of impulses relative to the α found.
@@ -121,57 +129,52 @@ class DropModel:
         """
         guesses = dict(self.guesses)
         if "impact" in guesses:
-            at = self.unknowns["alpha"]
-            struck = guesses["impact"]
+            at, struck = self.unknowns["alpha"], guesses["impact"]
             guesses["impact"] = replace(struck, alpha=struck.alpha + float(x[at][0]))
             x[at] = 0.0
-        # Columns and matched edges stay: only priors and where α is counted from are others.
-        other = copy(self)
-        other.components, other.clock_u, other.guesses = components, clock_u, guesses
-        other.unknowns = Unknowns(other)
-        other._paths = {}
-        return other
+        return self.changed(components=components, clock_u=clock_u, guesses=guesses)
 
     def under(self, protocol: Protocol) -> DropModel:
         """Return the same drop with the priors of another protocol, alike but for these."""
-        other = copy(self)
-        other.components = stated(protocol)
         # Its heights stay: they may be counted from a contact point that is this drop's own.
         mine, gates, level = self.protocol, self.protocol.gates, protocol.contact.level
         assert protocol.gates is not None
         assert gates is not None
-        other.protocol = replace(
-            protocol,
-            drop=Quantity(mine.drop.value, protocol.drop.u),
-            gates=replace(protocol.gates, gates=gates.gates),
-            contact=replace(mine.contact, level=replace(mine.contact.level, u=level.u)),
-            stated=mine.stated,
+        kappa, kappa_u = prior_air(protocol)
+        return self.changed(
+            components=stated(protocol),
+            protocol=replace(
+                protocol,
+                drop=Quantity(mine.drop.value, protocol.drop.u),
+                gates=replace(protocol.gates, gates=gates.gates),
+                contact=replace(mine.contact, level=replace(mine.contact.level, u=level.u)),
+                stated=mine.stated,
+            ),
+            _kappa=kappa,
+            kappa_u=kappa_u,
+            # Widths of rods and their places have priors of their own.
+            records={
+                role: replace(record, chain=protocol.chains[record.chain.name])
+                for role, record in self.records.items()
+            },
         )
-        other._kappa, other.kappa_u = prior_air(protocol)
-        # Widths of rods and their places have priors of their own.
-        other.records = {
-            role: replace(record, chain=protocol.chains[record.chain.name])
-            for role, record in self.records.items()
-        }
-        other.unknowns = Unknowns(other)
-        other._paths = {}
-        return other
 
     def owned(self, owners: Mapping[str, str]) -> DropModel:
         """Return the same drop with its rig told from others."""
-        other = copy(self)
-        other.owners = owners
-        return other
+        return self.changed(owners=owners)
 
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
         """Return the same drop with its edges moved in time, by so many seconds each."""
-        other = copy(self)
-        other._paths, other._seen = {}, {}
-        other.expected = {
-            role: expected._replace(times=expected.times + shifts[role])
-            for role, expected in self.expected.items()
-        }
-        return other
+        return self.changed(
+            expected={
+                role: expected._replace(times=expected.times + shifts[role])
+                for role, expected in self.expected.items()
+            }
+        )
+
+    def suspecting(self, suspect: Unknown) -> DropModel:
+        """Return the same drop with one thing more that is not known, behind all others."""
+        return self.changed(suspects=(suspect,))
 
     def first(self) -> Array:
         """Unknowns as the first guess has them, shape ``(unknowns,)``."""
@@ -188,15 +191,6 @@ class DropModel:
             x[self.unknowns["drag"]] = kappa - self._kappa
         return x
 
-    def suspecting(self, suspect: Unknown) -> DropModel:
-        """Return the same drop with one thing more that is not known, behind all others."""
-        other = copy(self)
-        other.suspects = (suspect,)
-        other.unknowns = Unknowns(other)
-        other.slopes = {role: side_slopes(other, role) for role in other.records}
-        other._paths, other._levels = {}, {}
-        return other
-
     def rate(self, x: Array) -> float:
         """How much later each moment is than it was stamped, as a factor."""
         return 1.0 + float(self.unknowns.rate @ x)
@@ -205,14 +199,17 @@ class DropModel:
         """κ of the first chain as a whole, 1/m."""
         return self._kappa + float(x[self.unknowns["drag"]][0])
 
+    def _last(self, what: str, role: str, key: object, make: Callable[[], T]) -> T:
+        """Return what was last made, where it is asked for again: matching and adjusting do so."""
+        held = self._held.get((what, role))
+        if held is None or held[0] != key:
+            held = self._held[what, role] = key, make()
+        made: T = held[1]
+        return made
+
     def trajectory(self, role: str, x: Array) -> Trajectory:
         """Path of one side for given unknowns."""
-        # Matching, adjusting and judging ask for the same one again and again.
-        asked = x.tobytes()
-        known = self._paths.get(role)
-        if known is None or known[0] != asked:
-            known = self._paths[role] = asked, self._trajectory(role, x)
-        return known[1]
+        return self._last("path", role, x.tobytes(), lambda: self._trajectory(role, x))
 
     def _trajectory(self, role: str, x: Array) -> Trajectory:
         record, parameters = self.records[role], self.slopes[role].path @ x
@@ -255,19 +252,19 @@ class DropModel:
 
     def all_levels(self, role: str, x: Array) -> Array:
         """Where the reference point should be at every expected edge of all trains, m."""
-        asked = x.tobytes()
-        known = self._levels.get(role)
-        if known is None or known[0] != asked:
-            levels = self.expected[role].levels + self.slopes[role].levels @ x
-            known = self._levels[role] = asked, levels
-        return known[1]
+
+        def levels() -> Array:
+            return self.expected[role].levels + self.slopes[role].levels @ x
+
+        return self._last("levels", role, x.tobytes(), levels)
 
     def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
         """Collect the matched edges; a matching stays for many steps of an adjustment."""
-        known = self._seen.get(role)
-        if known is None or known[0] is not matches:
-            known = self._seen[role] = matches, self.expected[role].seen(matches)
-        return known[1]
+
+        def seen() -> tuple[Sequence[Index], Seen]:
+            return matches, self.expected[role].seen(matches)  # held, so that no other is the same
+
+        return self._last("matched", role, id(matches), seen)[1]
 
     def residuals(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
         """What the unknowns leave over of one side's matched edges."""

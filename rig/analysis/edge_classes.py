@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.fit import Fit
-    from rig.analysis.joint_fit import JointDrop
+    from rig.analysis.joint_step import JointDrop
     from rig.analysis.trajectory import Trajectory
 
     Array = NDArray[np.float64]

@@ -36,14 +36,12 @@ Size = TypeVar("Size", float, "Array")
 
 STATED_WEIGHT = 2.0
 """Members that a stated uncertainty counts for: a scale known to half of itself (GUM G.4.2)."""
-_LARGER = 4.0
-"""Times as many against a larger one: a few gates that seem off may be how chains fall instead."""
 _MEMBERS = ("stretch", "gates", "rods", "beam", "hang", "swing")
-_EDGES = ("jitter", "floor", "departure", "few")
+_EDGES = ("jitter", "floor", "departure")
+_LEAVES = {"departure", "stretch"}  # how far chains leave the equations
 _DOUBTED = 2.0
 """Times the share of the stated departures that is found is the least share of every other scale:
 once or thrice this moves no coverage by more than a point."""
-_BOUND = 0.01  # of that, for what is stated as a bound and not as a usual size
 _INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
 _BINS = 64
 _MANY = 9  # rods that still fall: so many are as good as more
@@ -124,46 +122,32 @@ class Evidence:
         struck
             How many of them only the edges after a first impact can have told.
         """
-        old = self.components
         new: dict[str, float] = {}
-        kinds, squares, counts = self._binned(parameters, struck)
-        self._share(_EDGES, kinds, squares, counts, new)
-        parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
-        if parted < 2.0 * LEAST_SHARE:
-            # Where no rod is off its chain, few are not either: the least of it explains nothing.
-            self._share(_EDGES[:-1], kinds[:-1], squares, counts, new)
-            new["few"] = LEAST_SHARE * self.stated.few
-        self._settle("stretch", LEAST_SHARE, new)
-        # Where chains leave the equations, whatever else is found may be how they do that.
-        if self._determined["stretch"] > 0.0:
-            parted = max(parted, new["stretch"])
-        parted = max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
-        for kind in _MEMBERS[1:]:
-            self._settle(kind, parted, new)
-        for name in ("jitter", "floor"):
-            new[name] = max(new[name], parted * getattr(self.stated, name))
+        self._share(_EDGES, *self._binned(parameters, struck), new)
+        for kind in _MEMBERS:
+            self._settle(kind, new)
         if self._impulses:
             size, alone, squares, counts = np.concatenate(self._impulses, axis=1)
             kinds = np.stack([size, np.ones_like(size), alone])
-            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new, parted)
-        self.components = replace(old, landed=parted, **new)
+            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new)
+        # Where chains leave the equations, whatever else is found may be how they do that.
+        parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
+        new["stretch"] = max(new["stretch"], _doubted(parted - LEAST_SHARE))
+        least = _doubted(max(parted, new["stretch"]) if self._determined["stretch"] else parted)
+        for name in new.keys() - _LEAVES:
+            new[name] = max(new[name], least * getattr(self.stated, name))
+        new["few"] = parted * self.stated.few
+        self.components = replace(self.components, landed=least, **new)
         return self
 
-    def _settle(self, kind: str, share_at_least: float, new: dict[str, float]) -> None:
+    def _settle(self, kind: str, new: dict[str, float]) -> None:
         """Estimate the scale of a kind from its members."""
         old, beforehand = getattr(self.components, kind), getattr(self.stated, kind)
         if not beforehand:
             return  # known exactly, so that nothing scatters
-        weight = STATED_WEIGHT * (_BOUND if kind == "swing" else 1.0)
-        degrees = weight + self._determined[kind]
-        self.degrees[kind] = max(STATED_WEIGHT, degrees)
-        squares = weight * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
-        size = old * (squares / degrees) ** 0.5
-        if size > beforehand:
-            weight *= _LARGER
-            squares = weight * (beforehand / old) ** 2 + self._squares[kind]
-            size = max(beforehand, old * (squares / (weight + self._determined[kind])) ** 0.5)
-        new[kind] = max(size, share_at_least * beforehand)
+        self.degrees[kind] = degrees = STATED_WEIGHT + self._determined[kind]
+        squares = STATED_WEIGHT * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
+        new[kind] = old * (squares / degrees) ** 0.5
 
     def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
         """Sort edges by what scatters alike: at about the same speed, with as many rods falling.
@@ -171,7 +155,7 @@ class Evidence:
         Returns
         -------
         kinds, squares, counts
-            By how much each component counts in each bin, shape ``(4, bins)``; sums of squares,
+            By how much each component counts in each bin, shape ``(3, bins)``; sums of squares,
             and their degrees of freedom.
         """
         parts = zip(*self._edges, strict=True)
@@ -185,13 +169,15 @@ class Evidence:
         counts: Array = np.bincount(place, minlength=bins).astype(np.float64)
         sums: Array = np.bincount(place, squares, bins).astype(np.float64)
         middles = np.bincount(place, speeds, bins) / np.maximum(counts, 1)
-        few = np.bincount(place, loose**2, bins) / np.maximum(counts, 1)
-        late = (few > 0.0).astype(np.float64)
+        late = (np.bincount(place, loose, bins) > 0.0).astype(np.float64)
+        stated = self.stated.departures(loose)
+        departed = np.bincount(place, stated, bins) / np.maximum(counts, 1)
+        departed /= self.stated.departure**2 or 1.0
         # Every unknown that the edges determine takes one degree of freedom, at all speeds alike.
         total, behind = max(1, squares.size), max(1, int(after.sum()))
         taken = (parameters - struck) / total + late * struck / behind
         full = counts > 0
-        kinds = np.stack([middles, np.ones_like(middles), late, few])[:, full]
+        kinds = np.stack([middles, np.ones_like(middles), departed])[:, full]
         degrees: Array = (np.maximum(0.5, 1.0 - taken) * counts)[full]
         return kinds, sums[full], degrees
 
@@ -202,7 +188,6 @@ class Evidence:
         squares: Array,
         counts: Array,
         new: dict[str, float],
-        share_at_least: float = LEAST_SHARE,
     ) -> None:
         """Estimate components that make up one variance.
 
@@ -214,7 +199,7 @@ class Evidence:
         # The stated member is spread over all sizes, so that it pulls no component alone.
         share = STATED_WEIGHT / squares.size
         squares, counts = squares + share * (_member(stated, found) @ kinds), counts + share
-        least = share_at_least**2 * stated
+        least = LEAST_SHARE**2 * stated
         for _ in range(_INNER):
             for n, sizes in enumerate(kinds):
                 found[n] = max(
@@ -223,6 +208,11 @@ class Evidence:
         for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
+
+
+def _doubted(parted: float) -> float:
+    """Share of what is stated that a scale has at least, for that by which chains are parted."""
+    return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
 
 
 def _member(stated: Size, found: Size) -> Size:

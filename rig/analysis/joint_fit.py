@@ -9,7 +9,7 @@ of nuisance scatters is estimated on the way (`rig.analysis.evidence`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,8 @@ from rig.analysis.adjust import PATIENT
 from rig.analysis.components import stated
 from rig.analysis.equations import STRAY, scaled
 from rig.analysis.evidence import Evidence
-from rig.analysis.fit import Matched, match, without_strays
-from rig.analysis.joint_step import DropState, joint_step, take
+from rig.analysis.fit import match, without_strays
+from rig.analysis.joint_step import JointDrop, joint_step, take
 from rig.analysis.likeness import likeness
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from rig.analysis.likeness import Likeness
 
     Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
-    Matches = dict[str, list[Index]]
 
 FEWEST = 4
 """Drops that a session must have for a joint fit: one block of A, B, B, A."""
@@ -53,28 +51,6 @@ _SHORTEST = 1e-6  # share of a step, less of which is none
 _STEADY = 0.02  # relative change of the components
 _LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
 """Where others of their kind count for more."""
-
-
-@dataclass(frozen=True, slots=True)
-class JointDrop(Matched):
-    """One drop after all have been fitted together.
-
-    Attributes
-    ----------
-    x
-        Unknowns of the joint solution.
-    own, common, here
-        Its own unknowns and the common ones in the drop's vector, and the latter in the session's.
-    inverse, gain
-        As in `rig.analysis.square_root.Eliminated`.
-    """
-
-    x: Array
-    own: Index
-    common: Index
-    here: Index
-    inverse: Array
-    gain: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,13 +154,11 @@ class JointFit:
 
 def by_itself(fit: Fit) -> JointFit:
     """Take a drop that was adjusted by itself for a session that has nothing in common."""
-    estimate, model = fit.estimate, fit.model
-    nothing, all_own = np.zeros(0, dtype=np.intp), np.arange(fit.x.size)
-    gain = np.zeros((fit.x.size, 0))
-    drop = JointDrop(model, fit.matches, fit.x, all_own, nothing, nothing, estimate.inverse, gain)
-    degrees = {"jitter": estimate.degrees, "impulse": GUESSED}
     shared, x = SharedUnknowns(()), np.zeros(0)
-    return JointFit(shared, x, x, gain[:0], model.components, degrees, (drop,), estimate.settled)
+    drop = replace(JointDrop.of(fit, shared), inverse=fit.estimate.inverse)
+    degrees = {"jitter": fit.estimate.degrees, "impulse": GUESSED}
+    components, settled = fit.model.components, fit.estimate.settled
+    return JointFit(shared, x, x, np.zeros((0, 0)), components, degrees, (drop,), settled)
 
 
 @one_thread
@@ -202,29 +176,26 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
     for model in (fit.model for fit in fits):
         rig = model.owners.get("rig")
         clock_u[rig] = max(model.clock_u, clock_u.get(rig, 0.0))
-    drops = [_begin(fit, shared) for fit in fits]
-    x = _average(drops, shared)
+    drops = [JointDrop.of(fit, shared) for fit in fits]
+    x = _average(drops, len(shared))
     beforehand = stated(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, moved, damping, previous = False, 0.0, 1.0, np.zeros(len(shared))
     inverse, before = np.eye(len(shared)), evidence.components
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
+        drops = [_informed(drop.at(x), evidence.components, clock_u) for drop in drops]
         for drop in drops:
-            # Priors follow the scatter that was found, and impulses the α that was found.
-            rig = drop.model.owners.get("rig")
-            drop.model = drop.model.informed(evidence.components, clock_u[rig], drop.x)
-            drop.x[drop.common] = x[drop.here]
-            if round_ == _REMATCH:
-                drop.matches = match(drop.model, drop.x)
             sd[drop.here] = drop.model.unknowns.sd[drop.common]
+        if round_ == _REMATCH:
+            drops = [replace(drop, matches=match(drop.model, drop.x)) for drop in drops]
         # At first the common unknowns are not yet what a drop's own go with: all may be far off.
-        root = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
+        root, drops = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
         step = root.step()
         moves = _move(drops, x, sd, step, damping) if np.isfinite(step).all() else None
         if moves is None:
             return JointFit(shared, x, sd, inverse, before, evidence.degrees, (), settled=False)
-        x, left, damping = moves
+        x, drops, left, damping = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
         variance = np.sum(inverse**2, axis=1)
         ahead = step / np.sqrt(variance)
@@ -238,58 +209,50 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
             break
-    return JointFit(
-        shared,
-        x,
-        sd,
-        inverse,
-        before,  # those that the solution was made with
-        evidence.degrees,
-        tuple(_jointly_fitted(drop) for drop in drops),
-        settled,
+    # Components are those that the solution was made with.
+    good = tuple(
+        replace(drop, matches=without_strays(drop.model, drop.x, drop.matches)) for drop in drops
     )
+    return JointFit(shared, x, sd, inverse, before, evidence.degrees, good, settled)
+
+
+def _informed(
+    drop: JointDrop, components: Components, clock_u: Mapping[str | None, float]
+) -> JointDrop:
+    """Let priors follow the scatter that was found, and impulses the α that was found."""
+    rig = drop.model.owners.get("rig")
+    return replace(drop, model=drop.model.informed(components, clock_u[rig], drop.x))
 
 
 def _move(
-    drops: Sequence[DropState], x: Array, sd: Array, step: Array, share: float
-) -> tuple[Array, list[Residuals], float] | None:
+    drops: Sequence[JointDrop], x: Array, sd: Array, step: Array, share: float
+) -> tuple[Array, list[JointDrop], list[Residuals], float] | None:
     """Take a step, or as much of it as leads to where chains fall.
 
     Returns
     -------
-    x, left, share
-        The common unknowns, what all edges leave over, and how much of the step was taken; nothing
-        where no part of it will do.
+    x, drops, left, share
+        The common unknowns, the drops there, what all edges leave over, and how much of the step
+        was taken; nothing where no part of it will do.
     """
-    begin = [drop.x.copy() for drop in drops]
     while share > _SHORTEST:
-        there = take(drops, x, sd, step, share)
+        there, moved = take(drops, x, sd, step, share)
         left = [
             drop.model.residuals(role, drop.x, match)
-            for drop in drops
+            for drop in moved
             for role, match in drop.matches.items()
         ]
-        if all(np.isfinite(one.values).all() for one in left):
-            return there, left, share
-        for drop, at in zip(drops, begin, strict=True):
-            drop.x[:] = at
+        if all(np.isfinite(residuals.values).all() for residuals in left):
+            return there, moved, left, share
         share *= 0.5
     return None
 
 
-def _begin(fit: Fit | JointDrop, shared: SharedUnknowns) -> DropState:
-    common, here = shared.places(fit.model)
-    own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
-    return DropState(fit.model, fit.matches, fit.x.copy(), own, common, here)
-
-
-def _average(drops: Sequence[DropState], shared: SharedUnknowns) -> Array:
+def _average(drops: Sequence[JointDrop], size: int) -> Array:
     """Begin at the mean of what the drops say by themselves."""
-    total, count = np.zeros(len(shared)), np.zeros(len(shared))
-    for drop in drops:
-        total[drop.here] += drop.x[drop.common]
-        count[drop.here] += 1.0
-    return total / count
+    here = np.concatenate([drop.here for drop in drops])
+    total = np.bincount(here, np.concatenate([drop.x[drop.common] for drop in drops]), size)
+    return total / np.bincount(here, minlength=size)
 
 
 def _weigh(
@@ -298,7 +261,7 @@ def _weigh(
     x: Array,
     sd: Array,
     inverse: Array,
-    drops: Sequence[DropState],
+    drops: Sequence[JointDrop],
     left: Sequence[Residuals],
 ) -> Evidence:
     """Estimate the components anew from what is left over and what was found."""
@@ -310,11 +273,10 @@ def _weigh(
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
     struck = 0.0
     for drop in drops:
-        assert drop.reduced is not None
-        reduced, model = drop.reduced, drop.model
+        model = drop.model
         # The variance of an own unknown: with the common ones known, and what these leave open.
-        by_common = reduced.gain @ inverse[drop.here]
-        variances = np.sum(reduced.inverse**2, axis=1) + np.sum(by_common**2, axis=1)
+        by_common = drop.gain @ inverse[drop.here]
+        variances = np.sum(drop.inverse**2, axis=1) + np.sum(by_common**2, axis=1)
         own_sd = model.unknowns.sd[drop.own]
         variance = np.zeros(drop.x.size)
         variance[drop.own] = variances
@@ -326,7 +288,7 @@ def _weigh(
     return new.settled(parameters, struck)
 
 
-def _steady(one: Components, other: Components, drops: Sequence[DropState]) -> bool:
+def _steady(one: Components, other: Components, drops: Sequence[JointDrop]) -> bool:
     """Whether no component changes much; a floor that is not there shrinks for ever.
 
     Of impulses it is their scatter in these drops that counts: where all have about the same α, it
@@ -344,17 +306,3 @@ def _steady(one: Components, other: Components, drops: Sequence[DropState]) -> b
         for a, b in zip(one.impulses(alpha, ends), other.impulses(alpha, ends), strict=True)
     ]
     return all(abs(a - b) <= _STEADY * max(b, least) for a, b, least in pairs)
-
-
-def _jointly_fitted(drop: DropState) -> JointDrop:
-    assert drop.reduced is not None
-    return JointDrop(
-        drop.model,
-        without_strays(drop.model, drop.x, drop.matches),
-        drop.x,
-        drop.own,
-        drop.common,
-        drop.here,
-        drop.reduced.inverse,
-        drop.reduced.gain,
-    )

@@ -2,60 +2,78 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.equations import STRAY, linearize, scaled
-from rig.analysis.square_root import Root, eliminate, square_root
+from rig.analysis.fit import Matched
+from rig.analysis.square_root import eliminate, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rig.analysis.drop_model import DropModel
-    from rig.analysis.square_root import Eliminated
+    from rig.analysis.fit import Fit
+    from rig.analysis.square_root import Root
+    from rig.analysis.unknowns import SharedUnknowns
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
-    Matches = dict[str, list[Index]]
 
 
-@dataclass(slots=True)
-class DropState:
-    """One drop on the way.
+@dataclass(frozen=True, slots=True)
+class JointDrop(Matched):
+    """One drop among others, on the way to the joint solution or there.
 
     Attributes
     ----------
-    model, matches, x
-        Its equations and unknowns.
+    x
+        Its unknowns, the common ones included.
     own, common, here
-        As in `rig.analysis.joint_fit.JointDrop`.
+        Its own unknowns and the common ones in the drop's vector, and the latter in the session's.
+    inverse, gain
+        As in `rig.analysis.square_root.Eliminated`.
+    target
+        What its own unknowns become for no step of the common ones, likewise.
     centre
         Prior means of its own unknowns, zero if not given.
-    reduced
-        Its equations at the last step.
     """
 
-    model: DropModel
-    matches: Matches
     x: Array
     own: Index
     common: Index
     here: Index
+    inverse: Array
+    gain: Array
+    target: Array
     centre: Array | None = None
-    reduced: Eliminated | None = None
+
+    @classmethod
+    def of(cls, fit: Fit | JointDrop, shared: SharedUnknowns) -> JointDrop:
+        """Take a drop as it was adjusted by itself, or among others before."""
+        common, here = shared.places(fit.model)
+        own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
+        gain = np.zeros((own.size, here.size))
+        nothing = np.zeros(own.size)
+        return cls(fit.model, fit.matches, fit.x, own, common, here, gain, gain, nothing)
+
+    def at(self, common: Array) -> JointDrop:
+        """Return it with other values of the session's common unknowns."""
+        x = self.x.copy()
+        x[self.common] = common[self.here]
+        return replace(self, x=x)
 
 
 def joint_step(
-    drops: Sequence[DropState],
+    drops: Sequence[JointDrop],
     x: Array,
     sd: Array,
     centre: Array | None = None,
     cut: float = STRAY,
-) -> Root:
+) -> tuple[Root, list[JointDrop]]:
     """Reduce all drops to what they say together of what they have in common.
 
     Parameters
@@ -69,40 +87,37 @@ def joint_step(
 
     Returns
     -------
-    Root
-        In units of `sd`.
+    Root, list of JointDrop
+        In units of `sd`; and the drops with their own unknowns eliminated.
     """
-    rows = []
+    rows, reduced = [], []
     for drop in drops:
-        own_sd = drop.model.unknowns.sd
-        seen = linearize(drop.model, drop.matches, drop.x, cut=cut)
-        pull = np.zeros(drop.x.size)
+        own_sd, pull = drop.model.unknowns.sd, np.zeros(drop.x.size)
         off = drop.x[drop.own] if drop.centre is None else drop.x[drop.own] - drop.centre
         pull[drop.own] = scaled(off, own_sd[drop.own])
-        drop.reduced = eliminate([*seen.rows.values()], own_sd, pull, drop.own, drop.common)
-        rest = drop.reduced.rest
+        blocks = [*linearize(drop.model, drop.matches, drop.x, cut=cut).rows.values()]
+        inverse, gain, target, rest = eliminate(blocks, own_sd, pull, drop.own, drop.common)
         rows.append(rest._replace(columns=drop.here))
-    return square_root(rows, np.ones(x.size), scaled(x if centre is None else x - centre, sd))
+        reduced.append(replace(drop, inverse=inverse, gain=gain, target=target))
+    pull = scaled(x if centre is None else x - centre, sd)
+    return square_root(rows, np.ones(x.size), pull), reduced
 
 
-def take(drops: Sequence[DropState], x: Array, sd: Array, step: Array, share: float = 1.0) -> Array:
+def take(
+    drops: Sequence[JointDrop], x: Array, sd: Array, step: Array, share: float = 1.0
+) -> tuple[Array, list[JointDrop]]:
     """Take a share of a step of the common unknowns, and of what each drop's own do then.
 
     Parameters
     ----------
     step
         In units of `sd`.
-
-    Returns
-    -------
-    ndarray
-        The common unknowns; the drops' own are moved in place.
     """
     x = x + share * step * sd
+    moved = []
     for drop in drops:
-        assert drop.reduced is not None
-        own = drop.reduced.own - drop.reduced.gain @ step[drop.here]
-        drop.x[drop.own] += share * drop.model.unknowns.sd[drop.own] * own
-        # Its copy of the common unknowns follows, so that the next equations are made there.
-        drop.x[drop.common] = x[drop.here]
-    return x
+        there = drop.at(x)
+        own = drop.target - drop.gain @ step[drop.here]
+        there.x[drop.own] += share * drop.model.unknowns.sd[drop.own] * own
+        moved.append(there)
+    return x, moved

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.analysis.adjust import adjust
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.joint_step import DropState, joint_step, take
+from rig.analysis.joint_step import joint_step, take
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import measurands
 from rig.analysis.unknowns import ANYTHING
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Fit
-    from rig.analysis.joint_fit import JointDrop, JointFit
+    from rig.analysis.joint_fit import JointFit
+    from rig.analysis.joint_step import JointDrop
     from rig.analysis.result import Measured
 
     Array = NDArray[np.float64]
@@ -214,12 +215,10 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
             sd = drop.model.unknowns.sd[drop.own]
             own = _stated(sd) * rng.normal(size=sd.size)
             moved = {role: one.draw(rng) for role, one in scatter.items()}
-            model = drop.model.shaken(moved)
-            places = drop.own, drop.common, drop.here
-            states.append(DropState(model, drop.matches, drop.x.copy(), *places, own))
+            states.append(replace(drop, model=drop.model.shaken(moved), centre=own))
         for _step in range(_SESSION_STEPS):
-            step = joint_step(states, x, joint.sd, centre).step()
-            x = take(states, x, joint.sd, step)
+            root, states = joint_step(states, x, joint.sd, centre)
+            x, states = take(states, x, joint.sd, root.step())
         for one, values in zip(states, found, strict=True):
             values.append(_values(one.model, one.x))
     return [Propagated.all(values) for values in found]

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from rig.analysis.fit import Fit
     from rig.analysis.identified import IdentifiedByDrop
-    from rig.analysis.joint_fit import JointDrop, JointFit, RigEstimate
+    from rig.analysis.joint_fit import JointFit, RigEstimate
+    from rig.analysis.joint_step import JointDrop
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run

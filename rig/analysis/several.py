@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rig.analysis.fit import Fit
-    from rig.analysis.joint_fit import JointDrop, JointFit
+    from rig.analysis.joint_fit import JointFit
+    from rig.analysis.joint_step import JointDrop
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline

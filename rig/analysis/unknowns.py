@@ -512,14 +512,17 @@ class SharedUnknowns:
         return self._size
 
     def places(self, model: DropModel) -> tuple[Index, Index]:
-        """Where a drop's common unknowns are, in its own vector and in this one."""
-        places: list[Index] = []
-        here: list[Index] = []
-        for name, own in _common(model).items():
-            block, common = model.unknowns[own], self.blocks[name]
-            places.append(np.arange(block.start, block.stop))
-            here.append(np.arange(common.start, common.stop))
-        return np.concatenate(places), np.concatenate(here)
+        """Where a drop's unknowns that are here too are, in its own vector and in this one."""
+        both = [
+            (model.unknowns[own], self.blocks[name])
+            for name, own in _common(model).items()
+            if name in self.blocks
+        ]
+        place, here = np.arange(len(model.unknowns)), np.arange(len(self))
+        return (
+            np.concatenate([place[:0], *(place[own] for own, _ in both)]),
+            np.concatenate([here[:0], *(here[common] for _, common in both)]),
+        )
 
 
 def _common(model: DropModel) -> dict[str, str]:

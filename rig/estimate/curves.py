@@ -23,7 +23,8 @@ from rig.protocol.contact import as_struck, at_contact
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rig.analysis.joint_fit import JointDrop, JointFit
+    from rig.analysis.joint_fit import JointFit
+    from rig.analysis.joint_step import JointDrop
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol, Run
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.joint_fit import JointDrop
+    from rig.analysis.joint_step import JointDrop
     from rig.analysis.trajectory import Trajectory
     from rig.analysis.unknowns import SharedUnknowns
     from rig.model.chain import Chain
