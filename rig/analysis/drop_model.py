@@ -132,6 +132,14 @@ class DropModel:
         other._paths = {}
         return other
 
+    def begun(self, guesses: Mapping[str, Guess]) -> DropModel:
+        """Return the same drop with other first guesses."""
+        other = copy(self)
+        other.guesses = guesses
+        other.unknowns = Unknowns(other)
+        other._paths, other._seen = {}, {}
+        return other
+
     def under(self, protocol: Protocol) -> DropModel:
         """Return the same drop with the priors of another protocol, alike but for these."""
         other = copy(self)
