@@ -21,10 +21,9 @@ FAINT = 1e-5
 """κ below which its first orders are exact to 1e-10 while a difference over κ is not, 1/m."""
 
 
-def some_air(kappa: float | Array) -> float | Array:
+def some_air(kappa: float | Array) -> Array:
     """Return κ, or what does nothing in its place where it is zero."""
-    mended: float | Array = kappa + NONE * (np.abs(kappa) < NONE)
-    return mended
+    return np.asarray(kappa + NONE * (np.abs(kappa) < NONE), dtype=np.float64)
 
 
 def _rate(gravity: float | Array, kappa: float | Array) -> float | Array:
