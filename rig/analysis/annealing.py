@@ -2,8 +2,8 @@
 
 An edge at a gate is a rod's side of its polarity or clutter, and all sides compete for it: with the
 height h by which an edge misses a side, it belongs to that side with the weight
-(1 − m) N(h; 0, σ) / (λ/v + (1 − m) Σ N). σ falls from a part of the rods' distance to its own value
-over a dozen Gauss-Newton steps of the few unknowns that move a chain as a whole; many falls at once
+(1 − m) N(h; 0, σ) / (λ/v + (1 − m) Σ N). σ halves from a part of the rods' distance to its own
+value over a few Gauss-Newton steps of the unknowns that move a chain as a whole; many falls at once
 are one array. They begin where most edges agree, on a grid of what is not known, the likeliest
 first.
 """
@@ -17,9 +17,11 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
+from rig.analysis.chain_records import WIDER
 from rig.analysis.components import above
 from rig.analysis.discrepancy import LOWEST_START
-from rig.analysis.free_flight import fall_for, fall_through, lasting, leg_slopes, reach_of
+from rig.analysis.free_flight import FAINT
+from rig.analysis.trajectory import COMMON, GRAVITY, free_trajectory, struck_trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,46 +29,44 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
+    from rig.analysis.drop_model import DropModel
+    from rig.analysis.trajectory import Trajectory
 
     Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
     Index = NDArray[np.intp]
 
 Item = TypeVar("Item", bound=np.generic)
 Span = tuple[float, float]
 
 EVER: Span = (-np.inf, np.inf)
-ANY_ALPHA: Span = (-0.10, 0.60)
-"""Impact coefficients beyond both ends of what energy allows."""
 MISSED = 0.02
 """Share of expected edges that leave no trace, as far as one can know beforehand."""
 STRAYS = 2.0
 """Edges of a gate that belong to no rod, 1/s."""
-SLOWEST = 0.05
-"""m/s: no edge is stamped by a chain slower than this, as far as the density of its time goes."""
+ANY_ALPHA: Span = (-0.10, 0.60)
+"""Impact coefficients beyond both ends of what energy allows (½ and 0)."""
 RELEASE, START, CLOCK, PULL, DRAG, ALPHA, GROWTH = range(7)
 """Unknowns of a fall: when it begins, how high, the clock's rate, g, κ, α, and how much more the
 last impulses are."""
 UNKNOWNS = 7
-_PART = 6.0  # of the least distance of two rods: σ of the first step, in which no rod is hidden
-_WIDEST = 8e-3  # and σ at most, m
-_OWN = 8.0  # and what part of that distance σ is at most in the end
-_WIDER = 2.0  # by which σ is wider than stated: what is common to a beam or a rod is in it
+PART = 6.0
+"""Of the least distance of two rods: σ of the first step, in which no rod is hidden."""
+_BROADER = 2.0
+"""By which σ of the last step is larger than stated: what is common to a beam or rod is in it."""
 _STEPS = 12
-_COOLING = 0.5  # of σ, from step to step
-_DONE = 1.0  # of a standard uncertainty: a step so short is the last
-_FAR = 2.5  # prior standard uncertainties within which falls begin
-_FAINTEST = 1e-5  # κ, 1/m: of a fall of a metre 3 µm
-_SMALL = 1e-4  # of a prior standard uncertainty: steps of differences
-_LONGEST = 5e-3  # half width of a vote, s: at the very start a chain is too slow to tell more
-_SHORTEST = 0.05e-3
-_RECORD = 4.0  # s: what longer a record is, is only searched where most of its edges are
-_NODES = 400  # of the grid
+_FAR = 2.5
+"""Prior standard uncertainties within which falls begin: 99 of 100 of what is as stated."""
+_RECORD = 4.0
+"""What longer a record is, is only searched where most of its edges are, s: no fall is longer."""
+_NODES = 400
 _BATCH = 8  # of which are asked together at first
-_PEAKS = 5  # starts of a batch that are annealed
-_MUCH = 0.7  # of what the best of several falls explains, below which no other is one
-_INSTANTS = 12  # at which two falls are compared
-_LONGER = 1.2  # widths of a rod: beams see none so wide, see `rig.analysis.later_passages`
+PEAKS = 5
+"""Starts of a batch that are annealed."""
+_ALIKE = 0.75
+"""Share of the edges that two starts give to the same rods, above which they end as one fall."""
+LEAST = 0.6
+"""Share of the expected edges, or of what the best of several falls explains, below which no fall
+is one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,25 +97,27 @@ class Guess:
     pull: float = 0.0
 
 
-def _solved(matrix: Array, right: Array) -> Array:
-    """Solve one system of equations for each fall."""
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=np.float64)
-
-
-def _densest(releases: Array) -> Span:
-    """Return the first and the last of the fullest seconds of a record that may last hours."""
-    if float(np.ptp(releases)) <= _RECORD:
-        return float(releases.min()), float(releases.max())
-    some = np.sort(releases)
-    held = np.searchsorted(some, some + _RECORD, side="right") - np.arange(some.size)
-    begin = int(np.argmax(held))
-    return float(some[begin]), float(some[begin + held[begin] - 1])
-
-
 def split(line: NDArray[Item], ends: Index) -> list[NDArray[Item]]:
     """Cut a line of all trains' values at the end of each; much quicker than numpy does."""
     stops = ends.tolist()
     return [line[begin:end] for begin, end in zip([0, *stops], stops, strict=False)]
+
+
+def log_density(off: Array, sigma: Array | float, speed: Array) -> Array:
+    """Logarithm of how much likelier an edge's time is as a rod's than as a stray, beforehand.
+
+    Relative to a reading in which all edges are strays and every rod was missed.
+
+    Parameters
+    ----------
+    off, sigma
+        By what height it misses the rod's side, and the standard deviation of that, m.
+    speed
+        Of the rod, m/s.
+    """
+    worth = math.log((1.0 - MISSED) / MISSED / STRAYS / math.sqrt(2.0 * math.pi))
+    tiny = np.finfo(float).tiny
+    return np.log(np.maximum(speed, tiny) / sigma) - 0.5 * (off / sigma) ** 2 + worth
 
 
 class Weights(NamedTuple):
@@ -139,7 +141,7 @@ class Weights(NamedTuple):
     weight: Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Pairing:
     """The edges of one side, ready to be matched again and again.
 
@@ -178,28 +180,35 @@ class Pairing:
             Of the chain's rods, m; without them, shadows may be of any length.
         """
         none = np.zeros(0, dtype=np.intp)
-        blocks = np.concatenate([none, *(train.blocks for train in trains)])
         blocked = np.concatenate([none, *(train.blocked for train in trains)])
-        numbers = np.concatenate([none, *(np.arange(train.times.size) for train in trains)])
         rods = np.concatenate([none, *(train.rods for train in trains)])
-        each = range(len(trains))
-        gate = np.repeat(each, [train.times.size for train in trains]).astype(np.intp)
-        gates = np.repeat(each, [train.rods.size for train in trains]).astype(np.intp)
-        other = np.full(numbers.size, -1)
-        begins = np.flatnonzero((gate[1:] == gate[:-1]) & (blocked[:-1] > blocked[1:]))
+        kind, kinds = (
+            np.concatenate([none, *(2 * n + sides for n, sides in enumerate(every))])
+            for every in ([one.blocked for one in trains], [one.blocks for one in trains])
+        )
+        other = np.full(blocked.size, -1)
+        begins = np.flatnonzero((kind[1:] == kind[:-1] - 1) & (blocked[:-1] > blocked[1:]))
         other[begins], other[begins + 1] = begins + 1, begins
         return cls(
             np.concatenate([np.zeros(0), *(train.times for train in trains)]),
-            numbers,
-            2 * gate + blocked,
+            np.concatenate([none, *(np.arange(train.times.size) for train in trains)]),
+            kind,
             other,
-            2 * gates + blocks,
+            kinds,
             rods,
             np.array(widths)[rods] if widths else np.full(rods.size, np.inf),
             np.cumsum([train.rods.size for train in trains], dtype=np.intp),
         )
 
-    def weights(self, levels: Array, heights: Array, speeds: Array, sigma: Array) -> Weights:
+    @cached_property
+    def pairs(self) -> tuple[Index, Index]:
+        """Every edge with every expected one that it may be by its gate and polarity."""
+        edge, side = np.nonzero(self.kind[:, None] == self.kinds)
+        return edge, side
+
+    def weights(
+        self, levels: Array, heights: Array, speeds: Array, sigma: Array | float
+    ) -> Weights:
         """Let the two nearest sides of rods, above and below, compete for each edge.
 
         Parameters
@@ -208,24 +217,23 @@ class Pairing:
             The height of the reference point at every expected edge, m, and its standard deviation;
             shape ``(expected,)``.
         heights, speeds
-            Where chains are when each edge comes, and how fast; shape ``(falls, edges)``.
+            Where chains are when each edge comes, and how fast; shape ``(…, edges)``.
         """
         low, high = levels.min(initial=np.inf), levels.max(initial=-np.inf)
         room = high - low + 1.0  # m: kinds in one line, further apart than any two edges of a kind
         line = self.kinds * (3.0 * room) + levels
         order = np.argsort(line)
         heights = np.clip(heights, low - 0.5 * room, high + 0.5 * room)
-        mine = self.kind * (3.0 * room) + heights
-        after = np.searchsorted(line[order], mine)
-        place = np.stack([after - 1, after], axis=-1)
-        side = order[np.clip(place, 0, line.size - 1)]
+        after = np.searchsorted(line[order], self.kind * (3.0 * room) + heights)
+        side = order[np.clip(np.stack([after - 1, after], axis=-1), 0, line.size - 1)]
         off = heights[..., None] - levels[side]
-        alike = (self.kinds[side] == self.kind[:, None]) & (place >= 0) & (place < line.size)
-        width = sigma[side]
-        far = np.where(alike, off / width, 40.0)
-        density = np.exp(-0.5 * far * far) * ((1.0 - MISSED) / (math.sqrt(2.0 * math.pi) * width))
-        clutter = STRAYS / np.maximum(speeds, SLOWEST)
-        return Weights(side, off, width, density / (clutter + density.sum(axis=-1))[..., None])
+        width = np.broadcast_to(sigma, levels.shape)[side]
+        far = np.where(self.kinds[side] == self.kind[:, None], off / width, 40.0)
+        far[..., 1] = np.where(side[..., 0] == side[..., 1], 40.0, far[..., 1])
+        # Nothing that hangs still is seen to pass.
+        density = speeds[..., None] * np.exp(-0.5 * far * far) / width
+        clutter = STRAYS * math.sqrt(2.0 * math.pi) / (1.0 - MISSED)
+        return Weights(side, off, width, density / (clutter + density.sum(-1, keepdims=True)))
 
     def chosen(self, weights: Weights, speeds: Array) -> Index:
         """Match one to one: each edge and each side of a rod that want each other most, above ½.
@@ -240,17 +248,12 @@ class Pairing:
         ndarray
             The edge of every expected one, −1 for a missed one; shape ``(expected,)``.
         """
-        best = weights.weight.argmax(axis=1)[:, None]
-        taken = {
-            name: np.take_along_axis(getattr(weights, name), best, axis=1)[:, 0]
-            for name in Weights._fields
-        }
-        edges = np.flatnonzero(taken["weight"] > 0.5)
+        edges, which = np.nonzero(weights.weight > 0.5)
         # In units of σ: of several edges the nearest; written last, it stays.
-        far = np.abs(taken["off"][edges]) / taken["sigma"][edges]
-        edges = edges[np.argsort(-far, kind="stable")]
+        far = np.abs(weights.off[edges, which]) / weights.sigma[edges, which]
+        order = np.argsort(-far, kind="stable")
         found = np.full(self.kinds.size, -1)
-        found[taken["side"][edges]] = edges
+        found[weights.side[edges, which][order]] = edges[order]
         return self._whole(found, speeds)
 
     def _whole(self, found: Index, speeds: Array) -> Index:
@@ -263,12 +266,12 @@ class Pairing:
         below = np.zeros(self.times.size + 1, dtype=np.bool_)
         below[found[(found >= 0) & (self.rods < last)]] = True
         sides = np.flatnonzero((found >= 0) & (self.rods == last))
+        sides = sides[self.other[found[sides]] >= 0]
         edges = found[sides]
-        sides, edges = sides[self.other[edges] >= 0], edges[self.other[edges] >= 0]
         other = self.other[edges]
         # At uniform acceleration the mean of both speeds is that of the way between.
         length = np.abs(self.times[edges] - self.times[other]) * (speeds[edges] + speeds[other])
-        found[sides[(0.5 * length > _LONGER * self.widths[sides]) & ~below[other]]] = -1
+        found[sides[(0.5 * length > WIDER * self.widths[sides]) & ~below[other]]] = -1
         return found
 
     def matched(self, levels: Array, heights: Array, speeds: Array, scale: float) -> list[Index]:
@@ -290,10 +293,9 @@ class Pairing:
             For each train the index of its edge for every expected edge, −1 for a missed one; shape
             ``(expected,)``.
         """
-        sigma = np.full(levels.size, scale)
         if not levels.size or not self.times.size:
             return split(np.full(levels.size, -1), self.ends)
-        weights = self.weights(levels, heights, speeds, sigma)
+        weights = self.weights(levels, heights, speeds, scale)
         return self.numbered(self.chosen(weights, speeds))
 
     def numbered(self, found: Index) -> list[Index]:
@@ -301,48 +303,13 @@ class Pairing:
         return split(np.where(found >= 0, self.number[found], -1), self.ends)
 
 
-class Legs(NamedTuple):
-    """Falls from a release at zero, shape ``(falls, legs)`` each, and what they fall by.
-
-    Attributes
-    ----------
-    gravity, kappa
-        m/s², 1/m; shape ``(falls,)``.
-    """
-
-    time: Array
-    height: Array
-    speed: Array
-    gravity: Array
-    kappa: Array
-
-
-class Flights(NamedTuple):
-    """Where falls are on their legs, shape ``(falls, times)``; the last two may be ``(falls, 1)``.
-
-    Attributes
-    ----------
-    leg, height
-        Which, and where it begins, m.
-    lasted, speed
-        For how long each is on it, s, and how fast it began there, m/s.
-    """
-
-    leg: Index
-    height: Array
-    lasted: Array
-    speed: Array
-    gravity: Array
-    kappa: Array
-
-
 class Annealed(NamedTuple):
     """A fall whose edges found their rods.
 
     Attributes
     ----------
-    unknowns
-        As deviations from what is stated, shape ``(UNKNOWNS,)``.
+    guess
+        The fall.
     edges
         Of every expected edge, −1 for a missed one.
     evidence
@@ -351,7 +318,7 @@ class Annealed(NamedTuple):
         Root of the mean square of what the edges are off, in σ.
     """
 
-    unknowns: Array
+    guess: Guess
     edges: Index
     evidence: float
     scatter: float
@@ -362,48 +329,53 @@ class Annealed(NamedTuple):
         return int(np.count_nonzero(self.edges >= 0))
 
 
-class Ballot(NamedTuple):
-    """How many edges vote for each release of some falls.
-
-    Attributes
-    ----------
-    table
-        Votes, shape ``(falls, releases)``.
-    first, step
-        Where the releases begin, and how far apart they are, s.
-    fastest
-        Of all passages, m/s.
-    """
-
-    table: Index
-    first: float
-    step: float
-    fastest: float
-
-
 @dataclass(frozen=True)
 class SideFall:
     """One chain's falls as its edges may tell them, by few unknowns.
+
+    A fall is an array of these in units of their prior uncertainties, as deviations from what is
+    stated; many falls have the shape ``(falls, UNKNOWNS)``.
 
     Attributes
     ----------
     record, pairing
         The chain, and the edges of its trains.
-    start, gravity, kappa
-        As stated, m, m/s², 1/m.
+    stated
+        Where it begins as stated.
+    gravity
+        As stated, m/s².
     sd
-        Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 for what is known.
+        Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 for what is known, and
+        1 s for the release, of which nothing is.
     sigma
         By how much every expected edge may be off by itself, m.
     """
 
     record: ChainRecord
     pairing: Pairing
-    start: float
+    stated: Guess
     gravity: float
-    kappa: float
     sd: Array
     sigma: Array
+
+    @classmethod
+    def of(cls, model: DropModel, role: str) -> SideFall:
+        """Take a side of a drop that begins as stated."""
+        protocol, components, record = model.protocol, model.components, model.records[role]
+        every, strings = model.unknowns.sd, protocol.priors.strings
+        sd = np.zeros(UNKNOWNS)
+        sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, components.hang)
+        sd[CLOCK], sd[DRAG] = model.clock_u, model.kappa_u
+        sd[PULL] = every[model.unknowns["gravity"]][0]
+        # What else moves where an edge is expected is no unknown here, but scatters.
+        variance = components.floor**2 + (model.slopes[role].levels ** 2) @ every**2
+        if record.ratios is not None:
+            variance += components.departure**2
+            # All α are alike that energy allows.
+            sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
+            sd[GROWTH] = strings * abs(record.alpha)
+        stated, gravity = model.guesses[role], protocol.gravity.value
+        return cls(record, model.pairings[role], stated, gravity, sd, np.sqrt(variance))
 
     @cached_property
     def levels(self) -> Array:
@@ -411,255 +383,161 @@ class SideFall:
         return np.concatenate([train.levels for train in self.record.trains])
 
     @cached_property
-    def pitch(self) -> float:
-        """The least distance of two rods, m."""
-        places = np.array(self.record.chain.chain.heights)
-        return float(np.diff(places).min()) if places.size > 1 else np.inf
-
-    @property
     def slack(self) -> float:
-        """How far off a rod may be in the first step, m."""
-        return min(self.pitch / _PART, _WIDEST)
+        """How far off a rod may be in the first step, m: part of the least distance of two rods.
+
+        A single object's width takes its place.
+        """
+        places, widths = self.record.chain.chain.heights, self.record.chain.widths
+        return float(min(np.diff(places) if len(places) > 1 else widths)) / PART
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Within which unknowns stay: air holds back, and something falls."""
         low, high = np.full(UNKNOWNS, -np.inf), np.full(UNKNOWNS, np.inf)
-        low[START] = LOWEST_START - self.start
+        low[START] = LOWEST_START - self.stated.start
         low[PULL] = -0.9 * self.gravity
-        # Of all falls or of none there is air: formulas for both are not the same.
-        if self.kappa or self.sd[DRAG]:
-            low[DRAG] = _FAINTEST - self.kappa
-        low[ALPHA] = min(ANY_ALPHA[0] - self.record.alpha, 0.0)
-        high[ALPHA] = max(ANY_ALPHA[1] - self.record.alpha, 0.0)
-        return low, high
+        low[DRAG] = FAINT - self.stated.kappa  # formulas for air and for none are not the same
+        low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated.alpha, *ANY_ALPHA)
+        with np.errstate(divide="ignore"):
+            return low / self.sd, high / self.sd
 
-    def guess(self, unknowns: Array) -> Guess:
-        """Say a fall by what it is instead of what it is off."""
-        alpha = self.record.alpha + float(unknowns[ALPHA])
-        return Guess(
-            float(unknowns[RELEASE] * (1.0 + unknowns[CLOCK])),
-            self.start + float(unknowns[START]),
-            alpha if self.record.ratios is not None else 0.0,
-            self.kappa + float(unknowns[DRAG]),
-            float(unknowns[CLOCK]),
-            float(unknowns[PULL]),
+    @cached_property
+    def _by(self) -> Array:
+        """Derivatives of a trajectory's parameters by the unknowns, but for times."""
+        rods = 0 if self.record.ratios is None else self.record.ratios.size
+        by = np.zeros((COMMON + 2 * rods, UNKNOWNS))
+        by[[1, GRAVITY, 3], [START, PULL, DRAG]] = 1.0
+        by[COMMON : COMMON + rods, ALPHA] = 1.0
+        by[COMMON : COMMON + rods, GROWTH] = above(rods) ** -2.0
+        return by * self.sd
+
+    def path(self, falls: Array) -> Trajectory:
+        """Let the chain fall from a release at zero."""
+        off, record = (falls * self.sd).T[..., None], self.record
+        start, gravity = self.stated.start + off[START], self.gravity + off[PULL]
+        kappa = self.stated.kappa + off[DRAG]
+        if record.ratios is None:
+            return free_trajectory(0.0, start, gravity, kappa, record.air)
+        gains = record.alpha + off[ALPHA] + off[GROWTH] * above(record.ratios.size) ** -2.0
+        strikes = record.strikes
+        return struck_trajectory(
+            0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air
         )
 
-    def legs(self, unknowns: Array) -> Legs:
-        """Let the chain fall, shape of `unknowns` ``(falls, UNKNOWNS)``."""
-        start, gravity = self.start + unknowns[:, START], self.gravity + unknowns[:, PULL]
-        kappa = self.kappa + unknowns[:, DRAG]
-        count = len(unknowns)
-        if self.record.ratios is None:
-            return Legs(np.zeros((count, 1)), start[:, None], np.zeros((count, 1)), gravity, kappa)
-        ratios, rods = self.record.ratios, self.record.ratios.size
-        height = np.empty((rods + 1, count))
-        height[0], height[1:] = start, -self.record.strikes[:, None]
-        air = np.broadcast_to(self.record.air, rods + 1)[:rods, None] * kappa
-        reach = reach_of(height[:-1] - height[1:], air)
-        left, gained = 1.0 - air * reach, gravity * reach
-        gains = self.record.alpha + unknowns[:, ALPHA]
-        gains = gains + above(rods)[:, None] ** -2.0 * unknowns[:, GROWTH]
-        factors = np.maximum(1.0 + gains * ratios[:, None], 1e-3) ** 2
-        # Squared speeds before each impact: q f² times the last one, and what was gained since.
-        kept = np.cumprod(np.concatenate([np.ones((1, count)), (left[1:] * factors[:-1])]), axis=0)
-        before = np.maximum(kept * np.cumsum(gained / kept, axis=0), 0.0)
-        after = np.concatenate([np.zeros((1, count)), before * factors])
-        time, speed = np.zeros((rods + 1, count)), np.sqrt(after)
-        lasted = lasting(reach, speed[:-1], np.sqrt(before), gravity, air)
-        np.cumsum(lasted, axis=0, out=time[1:])
-        return Legs(time.T, height.T, speed.T, gravity, kappa)
+    def since(self, falls: Array, times: Array) -> Array:
+        """How long after the release some times of the edges' clock are, s.
 
-    def passages(self, unknowns: Array) -> tuple[Array, Array]:
-        """When falls released at zero pass each expected edge, and how fast; NaN above the start.
+        The clock's rate counts from there: hours after the fire it is not told from it.
+        """
+        rate: Array = 1.0 + falls[:, CLOCK, None] * self.sd[CLOCK]
+        return (times - falls[:, RELEASE, None]) * rate
+
+    def sights(self, falls: Array) -> tuple[Array, Array, Array]:
+        """Where falls are as each edge comes, how fast, and the derivatives by all unknowns.
 
         Returns
         -------
-        ndarray, ndarray
-            Shape ``(falls, expected)``.
+        ndarray, ndarray, ndarray
+            m, m/s; shape ``(falls, edges)``, and ``(falls, edges, UNKNOWNS)``.
         """
-        legs = self.legs(unknowns)
-        levels = self.levels
-        # All falls strike at the same levels: only where they start differs.
-        leg = np.searchsorted(-legs.height[0, 1:], -levels, side="right")
-        distance = np.maximum(legs.height[:, leg] - levels, 0.0)
-        share = np.broadcast_to(self.record.air, legs.height.shape[1])[leg]
-        kappa = legs.kappa[:, None] * share
-        arrival, lasted = fall_through(distance, legs.speed[:, leg], legs.gravity[:, None], kappa)
-        times = legs.time[:, leg] + lasted
-        times[levels >= legs.height[:, :1]] = np.nan
-        return times, arrival
+        since = self.since(falls, self.pairing.times)
+        height, speed, slopes = self.path(falls).sights(since, self._by)
+        # A clock's rate is 1 to the digits that count here.
+        slopes[..., RELEASE], slopes[..., CLOCK] = speed, -speed * since * self.sd[CLOCK]
+        return height, speed, slopes
 
-    def _flights(self, legs: Legs, unknowns: Array, times: Array) -> Flights:
-        """On which leg each fall is at each time, and how it fares there."""
-        count, size = legs.time.shape
-        # The clock's rate counts from the release: hours after the fire it is not told from it.
-        since = (times - unknowns[:, RELEASE, None]) * (1.0 + unknowns[:, CLOCK, None])
-        leg = np.zeros(since.shape, dtype=np.intp)
-        if size > 1:
-            # One row after the other in one line.
-            last, row = float(legs.time[:, -1].max()), np.arange(count)[:, None]
-            line, sought = legs.time + (last + 1.0) * row, np.clip(since, 0.0, last + 0.5)
-            leg += np.searchsorted(line.ravel(), sought + (last + 1.0) * row, side="right")
-            leg = np.clip(leg - 1 - size * row, 0, size - 1)
-        begin, height, speed = (np.take_along_axis(part, leg, axis=1) for part in legs[:3])
-        share = np.broadcast_to(self.record.air, size)[leg]
-        lasted = np.maximum(since - begin, 0.0)
-        return Flights(
-            leg, height, lasted, speed, legs.gravity[:, None], legs.kappa[:, None] * share
-        )
-
-    def heights(self, unknowns: Array, times: Array) -> tuple[Array, Array]:
-        """Where falls are at some times by the edges' clock, and how fast.
+    def anneal(self, falls: Array, close: float = np.inf) -> list[Annealed]:
+        """Let falls find their edges, σ from wide to narrow.
 
         Parameters
         ----------
-        times
-            Shape ``(times,)``.
-
-        Returns
-        -------
-        ndarray, ndarray
-            m, m/s; shape ``(falls, times)``.
+        falls
+            Where they start.
+        close
+            Log odds behind the best one beyond which a fall is given up.
         """
-        _, height, *flight = self._flights(self.legs(unknowns), unknowns, times)
-        fallen, speed = fall_for(*flight)
-        return height - fallen, speed
-
-    def sights(self, unknowns: Array, times: Array) -> tuple[Array, Array, Array]:
-        """What `heights` says, and the derivatives by all unknowns; ``(falls, times, UNKNOWNS)``.
-
-        Those of when a leg begins and how fast are differences; on a leg they are exact.
-        """
-        struck = self.record.ratios is not None
-        moved = [n for n in (START, PULL, DRAG, ALPHA, GROWTH) if struck and self.sd[n] > 0.0]
-        steps = _SMALL * self.sd * np.eye(UNKNOWNS)[[RELEASE, *moved]]
-        steps[0] = 0.0
-        legs = self.legs((unknowns + steps[:, None]).reshape(-1, UNKNOWNS))
-        every = [part.reshape(len(steps), len(unknowns), *part.shape[1:]) for part in legs]
-        leg, height, *flight = self._flights(Legs(*(part[0] for part in every)), unknowns, times)
-        fallen, falling, by_speed, by_gravity, by_kappa = leg_slopes(*flight)
-        slopes = np.zeros((*leg.shape, UNKNOWNS))
-        slopes[..., RELEASE] = falling * (1.0 + unknowns[:, CLOCK, None])
-        slopes[..., CLOCK] = -falling * (times - unknowns[:, RELEASE, None])
-        slopes[..., START] = leg == 0
-        slopes[..., PULL] = -by_gravity
-        slopes[..., DRAG] = -by_kappa * np.broadcast_to(self.record.air, legs.time.shape[1])[leg]
-        for n, name in enumerate(moved, 1):
-            later, faster = ((every[of][n] - every[of][0]) / steps[n, name] for of in (0, 2))
-            slopes[..., name] += falling * np.take_along_axis(later, leg, axis=1)
-            slopes[..., name] -= by_speed * np.take_along_axis(faster, leg, axis=1)
-        return height - fallen, falling, slopes
-
-    def anneal(self, starts: Array) -> list[Annealed]:
-        """Let falls find their edges, σ from wide to narrow; shape ``(falls, UNKNOWNS)``."""
-        own = np.minimum(_WIDER * self.sigma, self.pitch / _OWN)
-        times, sd = self.pairing.times, self.sd.copy()
-        sd[RELEASE] = 1.0
-        unit = np.where(sd > 0.0, sd, 1.0)
-        prior = np.eye(UNKNOWNS)
-        prior[RELEASE, RELEASE] = 1e-9
-        low, high = self.bounds
-        x = np.clip(starts, low, high)
-        matrix = np.broadcast_to(prior, (len(x), UNKNOWNS, UNKNOWNS))
+        own, (low, high) = np.minimum(_BROADER * self.sigma, self.slack), self.bounds
+        prior = np.diag(np.where(np.arange(UNKNOWNS) == RELEASE, 1e-9, 1.0))
+        y = np.clip(falls, low, high)
         for step in range(_STEPS):
-            width = np.maximum(own, self.slack * _COOLING**step)
-            height, speed, slopes = self.sights(x, times)
+            width = np.maximum(own, self.slack * 0.5**step)
+            height, speed, slopes = self.sights(y)
             weights = self.pairing.weights(self.levels, height, speed, width)
-            part = weights.weight / weights.sigma**2
-            slopes *= sd
+            part, taken = weights.weight / weights.sigma**2, weights.weight.sum(axis=2)
             across = np.swapaxes(slopes, 1, 2)
             matrix = (across * part.sum(axis=2)[:, None, :]) @ slopes + prior
-            right = (across @ (part * weights.off).sum(axis=2)[..., None])[..., 0]
-            right += (x / unit) @ prior
-            change = self._bounded(matrix, right, (x - high) / unit, (x - low) / unit)
-            # No chain moves on by more than its rods are sought within.
-            taken = weights.weight.sum(axis=2)
-            moved = np.abs((slopes @ change[..., None])[..., 0]) * (taken > 0.5)
-            change *= np.minimum(1.0, width.max() / np.maximum(moved.max(axis=1), 1e-9))[:, None]
-            x = np.clip(x - sd * change, low, high)
-            explained = taken.sum(axis=1)
-            kept = np.flatnonzero(explained >= _MUCH * explained.max())
-            x, matrix, change = x[kept], matrix[kept], change[kept]
-            if (width > own).any():
-                continue
-            best = int(np.argmax(explained[kept]))
-            if change[best] @ matrix[best] @ change[best] < _DONE**2:
+            right = (across @ (part * weights.off).sum(axis=2)[..., None])[..., 0] + y @ prior
+            change = _bounded(matrix, right, y - high, y - low)
+            lasting, done = np.ones(len(y), dtype=np.bool_), False
+            if (width <= own).all():  # before that a fall may be on its way
+                likely = -np.log1p(-np.minimum(taken, 1.0 - 1e-12)).sum(axis=1)
+                lasting = likely >= likely.max() - close
+                size = (change[:, None] @ matrix @ change[..., None])[:, 0, 0]
+                done = bool((size[lasting] < 1.0).all())
+            if done or step == _STEPS - 1:
                 break
-            # Starts that have become the same fall go on as one.
-            if len(x) > 1:
-                alike = self.unlike(x, np.zeros((0, UNKNOWNS)), len(x), 0.1 * self.slack)
-                x, matrix = x[alike], matrix[alike]
-        height, speed = self.heights(x, times)
-        weights = self.pairing.weights(self.levels, height, speed, own)
-        y = x / unit
+            # No chain moves on by more than its rods are sought within.
+            moved = (slopes @ change[..., None])[..., 0] * (taken > 0.5)
+            most = np.abs(moved).max(axis=1, initial=1e-9)
+            change *= np.minimum(1.0, width.max() / most)[:, None]
+            y = np.clip(y - change, low, high)[lasting]
         lost = 0.5 * ((y @ prior) * y).sum(axis=1) + 0.5 * np.linalg.slogdet(matrix)[1]
         return [
             self._judged(
-                x[n], Weights(*(part[n] for part in weights)), height[n], speed[n], own, loss
+                y[n], Weights(*(part[n] for part in weights)), height[n], speed[n], lost[n]
             )
-            for n, loss in enumerate(lost.tolist())
+            for n in np.flatnonzero(lasting)
         ]
 
-    @staticmethod
-    def _bounded(matrix: Array, right: Array, least: Array, most: Array) -> Array:
-        """Solve for steps; what would leave its bounds goes there, and the others follow."""
-        change = _solved(matrix, right)
-        held = (change < least) | (change > most)
-        if not held.any():
-            return change
-        known = np.where(held, np.clip(change, least, most), 0.0)
-        right = np.where(held, known, right - (matrix @ known[..., None])[..., 0])
-        free = ~held[:, :, None] & ~held[:, None, :]
-        matrix = np.where(free, matrix, np.eye(UNKNOWNS))
-        return _solved(matrix, right)
-
     def _judged(
-        self, x: Array, weights: Weights, height: Array, speed: Array, sigma: Array, loss: float
+        self, fall: Array, weights: Weights, height: Array, speed: Array, lost: float
     ) -> Annealed:
         """Match one fall's edges one to one, and weigh what that explains."""
         edges = self.pairing.chosen(weights, speed)
         sides = np.flatnonzero(edges >= 0)
-        mine = edges[sides]
-        far = (height[mine] - self.levels[sides]) / sigma[sides]
-        density = np.log(
-            np.maximum(speed[mine], SLOWEST) / (sigma[sides] * math.sqrt(2.0 * math.pi))
+        sigma = np.minimum(_BROADER * self.sigma, self.slack)[sides]
+        off = height[edges[sides]] - self.levels[sides]
+        evidence = float(log_density(off, sigma, speed[edges[sides]]).sum() - lost)
+        scatter = math.sqrt(float(((off / sigma) ** 2).sum()) / max(1, sides.size))
+        x, stated = (fall * self.sd).tolist(), self.stated
+        guess = Guess(
+            x[RELEASE] * (1.0 + x[CLOCK]),
+            stated.start + x[START],
+            stated.alpha + x[ALPHA],
+            stated.kappa + x[DRAG],
+            x[CLOCK],
+            x[PULL],
         )
-        worth = math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS)
-        evidence = float(np.sum(density - 0.5 * far**2 + worth)) - loss
-        scatter = math.sqrt(float(far @ far) / max(1, far.size))
-        return Annealed(x, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
+        return Annealed(guess, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self) -> Array:
-        """Falls to begin with, the likeliest first; shape ``(nodes, UNKNOWNS)``.
+        """Falls to begin with, the likeliest first.
 
         Along each unknown they are so near that none between them is missed: with the release
         free, none is off by more than the first step allows.
         """
         low, high = self.bounds
         stated = np.clip(np.zeros((1, UNKNOWNS)), low, high)
-        times = self.passages(stated)[0][0]
-        times = times[np.isfinite(times)]
-        grid = np.zeros((1, UNKNOWNS))
-        if times.size:
-            slopes = self.sights(stated, times)[2][0]
-            begin = slopes[:, RELEASE]
-            slopes = slopes - np.outer(begin, begin @ slopes) / max(float(begin @ begin), 1e-12)
-            effects = (np.abs(slopes).max(axis=0) * self.sd / (2.0 * self.slack)).tolist()
-            for name in (START, CLOCK, PULL, DRAG, ALPHA):
-                steps = int(_FAR * effects[name] + 0.5)
-                axis = np.arange(-steps, steps + 1) / max(effects[name], steps / _FAR, 1e-9)
+        path = self.path(stated)
+        times = path.times(self.levels)[0]
+        _, begin, slopes = (part[0] for part in path.sights(times, self._by))
+        slopes[:, CLOCK] = -begin * times * self.sd[CLOCK]
+        slopes -= np.outer(begin, begin @ slopes) / max(float(begin @ begin), 1e-12)
+        effects = np.abs(slopes).max(axis=0, initial=0.0) / (2.0 * self.slack)
+        grid = stated
+        for name in (START, CLOCK, PULL, DRAG, ALPHA):
+            if steps := int(_FAR * effects[name] + 0.5):
+                axis = np.arange(-steps, steps + 1) / max(effects[name], steps / _FAR)
                 grid = np.repeat(grid, axis.size, axis=0)
-                grid[:, name] = np.tile(axis, len(grid) // axis.size)
+                grid[:, name] += np.tile(axis, len(grid) // axis.size)
                 # What is unlikely for one unknown will not be likelier with another.
                 unlikely = (grid * grid).sum(axis=1)
                 order = np.argsort(unlikely, kind="stable")[:_NODES]
-                grid = grid[order[unlikely[order] <= _FAR**2 + _SMALL]]
-        x = stated + self.sd * grid
-        return np.asarray(x[((x >= low) & (x <= high)).all(axis=1)])
+                grid = grid[order[unlikely[order] <= _FAR**2 + 1e-9]]
+        return np.asarray(grid[((grid >= low) & (grid <= high)).all(axis=1)])
 
-    def starts(self, window: Span = EVER, least: float = 0.0) -> Iterator[tuple[Array, Array]]:
+    def starts(self, window: Span = EVER, least: float = 0.0) -> Iterator[tuple[Array, Index]]:
         """Yield falls where most edges agree, batch by batch of the grid.
 
         Parameters
@@ -672,99 +550,89 @@ class SideFall:
         Yields
         ------
         ndarray, ndarray
-            Falls, shape ``(falls, UNKNOWNS)``, and how many edges vote for each.
+            Falls, and how many edges vote for each.
         """
-        nodes, begin, size = self.nodes(), 0, _BATCH
-        while begin < len(nodes):
-            some = nodes[begin : begin + size]
-            ballot = self._ballot(some, window)
-            yield (
-                (np.zeros((0, UNKNOWNS)), np.zeros(0))
-                if ballot is None
-                else self._peaks(some, ballot, least)
-            )
-            begin, size = begin + size, 2 * size
+        nodes, size = self.nodes(), _BATCH
+        while len(nodes):
+            batch, nodes = nodes[:size], nodes[size:]
+            size *= 2
+            falls, votes = self._voted(batch, window)
+            enough = (votes > 0) & (votes >= max(least, LEAST * votes.max(initial=0)))
+            order = np.flatnonzero(enough)[np.argsort(-votes[enough], kind="stable")][: 4 * PEAKS]
+            if order.size:
+                order = order[self._unlike(falls[order])]
+            yield falls[order], votes[order]
 
     def most_votes(self) -> int:
         """Count the edges that agree on one of the likeliest falls of the grid, at most."""
-        ballot = self._ballot(self.nodes()[:_BATCH], EVER)
-        return 0 if ballot is None else int(ballot.table.max())
+        return int(self._voted(self.nodes()[:_BATCH], EVER)[1].max(initial=0))
 
-    def _ballot(self, nodes: Array, window: Span) -> Ballot | None:
-        """Let every edge vote, for each node, for the releases from which it would be a rod's."""
-        due, speeds = self.passages(nodes)
-        edge, side = np.nonzero(self.pairing.kind[:, None] == self.pairing.kinds)
-        # What no fall passes votes for no moment, and what is outside the window either.
-        due = np.where(np.isnan(due), np.inf, due)
-        near = self.pairing.times[edge] - due.min(axis=0)[side] >= window[0] - 2.0 * _LONGEST
-        edge, side = edge[near], side[near]
-        release = self.pairing.times[edge] - due[:, side] / (1.0 + nodes[:, CLOCK, None])
-        there = (release >= max(window[0], -1e9) - _LONGEST) & (release <= window[1] + _LONGEST)
-        if not there.any():
-            return None
-        first, last = _densest(release[there])
-        there &= (release >= first) & (release <= last)
-        half = np.clip(self.slack / np.maximum(speeds, 1e-9), _SHORTEST, _LONGEST)
-        step = float(half.min()) / 2.0
-        first -= _LONGEST
-        bins = int((last + _LONGEST - first) / step) + 2
-        place, reach = (release[there] - first) / step, half[:, side][there] / step
-        row = (bins + 1) * np.nonzero(there)[0]
+    def _voted(self, nodes: Array, window: Span) -> tuple[Array, Index]:
+        """Let every edge vote, for each node, for the releases from which it would be a rod's.
+
+        Returns
+        -------
+        ndarray, ndarray
+            The `PEAKS` releases of each node with the most votes, and their votes.
+        """
+        path, rate = self.path(nodes), 1.0 + nodes[:, CLOCK, None] * self.sd[CLOCK]
+        late, early = (path.times(self.levels + off) / rate for off in (-self.slack, self.slack))
+        times, lasts = np.sort(self.pairing.times), (late - early)[late > early]
+        # A record may last hours: a fall is where most of the edges are.
+        until = np.searchsorted(times, times + _RECORD, side="right")
+        first = int(np.argmax(until - np.arange(times.size)))
+        begin = max(float(times[first] - late.max()), window[0])
+        end = min(float(times[until[first] - 1] - early.min()), window[1])
+        if end < begin or not lasts.size:
+            return nodes[:0], np.zeros(0, dtype=np.intp)
+        # At the fastest passages votes are two steps wide.
+        step = float(lasts.min()) / 2.0
+        bins = int((end - begin) / step) + 2
+        came = np.rint(np.clip((self.pairing.times - begin) / step, -1e9, 1e9)).astype(np.intp)
+        edge, side = self.pairing.pairs
         votes = np.zeros(len(nodes) * (bins + 1), dtype=np.intp)
-        for sign in (-1, 1):
-            bound = np.clip(np.rint(place + sign * reach), 0, bins).astype(np.intp)
-            votes -= sign * np.bincount(row + bound, minlength=votes.size)
-        table = np.cumsum(votes.reshape(len(nodes), bins + 1), axis=1)
-        return Ballot(table, first, step, float(speeds.max()))
-
-    def _peaks(self, nodes: Array, ballot: Ballot, least: float) -> tuple[Array, Array]:
-        """Take the highest counts of which no two are the same fall."""
-        table, step = ballot.table, ballot.step
-        found, votes = [], []
-        row = np.arange(len(nodes))
-        width = max(1, int(0.5 * _PART * self.slack / ballot.fastest / step))
-        width = min(width, max(1, int(_LONGEST / step)))
-        near = np.arange(-width, width + 1)
-        for _ in range(_PEAKS):
+        for lasted, sign in ((late, 1), (early, -1)):
+            place = came[edge] - np.rint(lasted / step).astype(np.intp)[:, side]
+            np.clip(place, 0, bins, out=place)
+            place += (bins + 1) * np.arange(len(nodes))[:, None]
+            votes += sign * np.bincount(place.ravel(), minlength=votes.size)
+        table = np.cumsum(votes.reshape(len(nodes), -1), axis=1)
+        # A rod's distance at the fastest passage apart, no two are the same.
+        row, near = np.arange(len(nodes)), np.arange(-int(PART / 2.0), int(PART / 2.0) + 1)
+        falls, most = np.repeat(nodes[None], PEAKS, axis=0), []
+        for peak in falls:
             at = table.argmax(axis=1)
-            count = table[row, at]
+            most.append(table[row, at])
             # The middle of a plateau, not its beginning.
-            end = np.array(
-                [np.argmin(line[n:] == c) for line, n, c in zip(table, at, count, strict=True)]
-            )
-            middle = at + np.maximum(end - 1, 0) // 2
-            starts = nodes.copy()
-            starts[:, RELEASE] = ballot.first + step * (middle + 0.5)
-            found.append(starts)
-            votes.append(count)
-            table[row[:, None], np.clip(middle[:, None] + near, 0, table.shape[1] - 1)] = 0
-        every, count = np.concatenate(found), np.concatenate(votes)
-        enough = (count > 0) & (count >= least) & (count >= _MUCH * count.max())
-        every, count = every[enough], count[enough]
-        order = np.argsort(-count, kind="stable")
-        every, count = every[order], count[order]
-        chosen = self.unlike(every, np.zeros((0, UNKNOWNS)), _PEAKS)
-        return every[chosen], count[chosen]
+            ends = [
+                np.argmin(line[n:] == line[n]) for line, n in zip(table, at.tolist(), strict=True)
+            ]
+            middle = at + np.maximum(np.array(ends) - 1, 0) // 2
+            peak[:, RELEASE] = begin + step * (middle + 0.5)
+            table[row[:, None], np.clip(middle[:, None] + near, 0, bins)] = 0
+        return falls.reshape(-1, UNKNOWNS), np.concatenate(most)
 
-    def unlike(
-        self, falls: Array, known: Array, most: int, apart: float | None = None
-    ) -> list[int]:
-        """Return the first falls of which each differs from all before and from those known."""
-        if not len(falls):
-            return []
-        apart = self.slack if apart is None else apart
-        begin, end = float(self.pairing.times.min()), float(self.pairing.times.max())
-        begin = max(begin, min(float(falls[:, RELEASE].min()), end))
-        times = np.linspace(begin, end, _INSTANTS)
-        heights = self.heights(np.concatenate([known, falls]), times)[0]
-        # Below the ground nothing tells them apart.
-        heights = np.maximum(
-            heights, float(self.levels.min()) - self.pitch if self.pitch < np.inf else -np.inf
-        )
-        kept = [*range(len(known))]
-        for n in range(len(known), len(heights)):
-            if len(kept) - len(known) >= most:
-                break
-            if not kept or np.abs(heights[kept] - heights[n]).max(axis=1).min() > apart:
-                kept.append(n)
-        return [n - len(known) for n in kept[len(known) :]]
+    def _unlike(self, falls: Array) -> list[int]:
+        """Return the first falls of which each gives other rods to the edges than all before."""
+        chosen: list[int] = []
+        height, speed = self.path(falls).heights(self.since(falls, self.pairing.times))
+        side, _, _, weight = self.pairing.weights(self.levels, height, speed, self.slack)
+        rods = np.where(weight > 0.5, side, -1).max(axis=2)
+        for n, mine in enumerate(rods):
+            alike = ((rods[chosen] == mine) & (mine >= 0)).sum(axis=1)
+            if len(chosen) < PEAKS and (alike <= _ALIKE * (mine >= 0).sum()).all():
+                chosen.append(n)
+        return chosen
+
+
+def _bounded(matrix: Array, right: Array, least: Array, most: Array) -> Array:
+    """Solve for steps; what would leave its bounds goes there, and the others follow."""
+    change = np.linalg.solve(matrix, right[..., None])[..., 0]
+    held = (change < least) | (change > most)
+    if held.any():
+        known = np.where(held, np.clip(change, least, most), 0.0)
+        right = np.where(held, known, right - (matrix @ known[..., None])[..., 0])
+        free = ~held[:, :, None] & ~held[:, None, :]
+        matrix = np.where(free, matrix, np.eye(UNKNOWNS))
+        change = np.linalg.solve(matrix, right[..., None])[..., 0]
+    return np.asarray(change)

@@ -1,32 +1,34 @@
 """A drop's edges as times: a train for each gate, a record for each chain.
 
-Beside what each gate reported stands what it should see of the chain that hangs there.
+Beside what each gate reported stands what it should see of the chain that hangs there: down to
+where its rods strike the surface, or others that lie there.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rig.analysis.heap import strike_heights
 from rig.analysis.trajectory import ONE
 from rig.errors import DomainError
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.model.rods import rod_impacts
 from rig.predictions import air_shares
-from rig.protocol.contact import higher_contacts
+from rig.protocol.contact import higher_contacts, lacking_geometry, touching_heights
+from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from rig.model.chain import Chain
+    from rig.model.surface import Surface
     from rig.protocol.protocol import Gate, Protocol, RodChain, Run
     from rig.records import Drop
 
@@ -40,6 +42,13 @@ QUICK = 0.3e-3
 LONGEST = 64
 """Edges of one flicker from which on its middle says no more: a clean edge has 1, a rod in front of
 a receiver that flickers with the mains some ten. What is fitted takes time with each edge."""
+
+UNEVEN = 1 / 3
+"""Relative standard uncertainty of the height of a heap: tops of heaps of resolved rods scatter by
+27 % about `heap_heights`, from 16 to 36 rods and 0 to 30°."""
+WIDER = 1.2
+"""By which a beam may see an object wider or narrower than stated: one that passes half its radius
+off the middle of a beam has a chord that is 13 % shorter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,88 +86,63 @@ class EdgeTrain:
     thinned: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class EdgeArrays:
-    """A drop's edges as arrays, shape ``(edges,)`` each.
+    """A drop's edges as arrays, one channel after the other, shape ``(edges,)`` each.
+
+    Of each flicker of more than `LONGEST` edges as many are left, half at either end.
 
     Attributes
     ----------
-    whole
-        Those of which these were left, see `thinned`; `None` where these are all.
+    times, channels, blocked
+        s, and the state after it.
+    burst
+        How long the flicker of its gate lasts that each edge is part of, s; 0 if clean.
     numbers
-        Of each among all.
+        Of each in the drop.
+    received
+        Edges by channel, with those that were left out; shape ``(channels,)``.
     """
 
     times: Array
     channels: Index
     blocked: Flags
-    whole: EdgeArrays | None = None
-    numbers: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    burst: Array
+    numbers: Index
+    received: Index
 
-    @cached_property
-    def darkening(self) -> bool:
-        """Whether beams only ever darken: some timers tell nothing else."""
-        return bool(self.blocked.size and self.blocked.all())
+    @classmethod
+    def of(cls, edges: Sequence[Sequence[int]] | NDArray[np.int64], hz: float) -> EdgeArrays:
+        """Take edges whose ticks come at a rate in Hz: tick, channel and state of each."""
+        if not isinstance(edges, np.ndarray):
+            flat = itertools.chain.from_iterable(edges)  # much faster than an array of rows
+            edges = np.fromiter(flat, np.int64, 3 * len(edges)).reshape(-1, 3)
+        order = np.argsort(edges[:, 1], kind="stable")
+        times, channels = edges[order, 0] / hz, edges[order, 1].astype(np.intp)
+        begins = np.diff(times, prepend=-np.inf) > QUICK
+        begins |= np.diff(channels, prepend=-1) != 0
+        first, flicker = np.flatnonzero(begins), np.cumsum(begins) - 1
+        last = np.append(first[1:], times.size)[: first.size] - 1
+        place = np.arange(times.size)
+        from_end = np.minimum(place - first[flicker], last[flicker] - place)
+        left = np.flatnonzero(from_end < LONGEST // 2)
+        return cls(
+            times[left],
+            channels[left],
+            edges[order[left], 2].astype(np.bool_),
+            (times[last] - times[first])[flicker[left]],
+            order[left],
+            np.bincount(channels, minlength=1),
+        )
 
-    @cached_property
-    def order(self) -> Index:
-        """Edges of one channel after the other."""
-        return np.argsort(self.channels, kind="stable")
-
-    def of_channel(self, channel: int) -> Index:
-        """Return the numbers of one channel's edges."""
-        begin, end = np.searchsorted(self._ordered, [channel, channel + 1])
-        return self.order[begin:end]
-
-    @cached_property
-    def _ordered(self) -> Index:
-        return self.channels[self.order]
-
-    @cached_property
-    def _flickers(self) -> tuple[Index, Index]:
-        """First and last place of each flicker in `order`; a clean edge is one by itself."""
-        apart = (np.diff(self.times[self.order]) > QUICK) | (np.diff(self._ordered) != 0)
-        edge = np.ones(min(1, self.times.size), dtype=np.bool_)
-        begins, ends = np.concatenate([edge, apart]), np.concatenate([apart, edge])
-        return np.flatnonzero(begins), np.flatnonzero(ends)
-
-    @cached_property
-    def burst(self) -> Array:
-        """How long the flicker of its gate lasts that each edge is part of, s; 0 if clean."""
-        if self.whole is not None:
-            return self.whole.burst[self.numbers]
-        first, last = self._flickers
-        times = self.times[self.order]
-        found = np.empty_like(times)
-        found[self.order] = np.repeat(times[last] - times[first], last - first + 1)
-        return found
-
-    def thinned(self) -> EdgeArrays:
-        """Leave of each flicker of more than `LONGEST` edges as many, half at either end."""
-        first, last = self._flickers
-        size = last - first + 1
-        if not size.size or size.max() <= LONGEST:
-            return self
-        place = np.arange(self.times.size)
-        since, until = place - np.repeat(first, size), np.repeat(last, size) - place
-        ends = np.minimum(since, until) < LONGEST // 2
-        left = np.sort(self.order[ends])
-        parts = self.times[left], self.channels[left], self.blocked[left]
-        return EdgeArrays(*parts, self, left)
+    def of_channel(self, channel: int) -> slice:
+        """Return where one channel's edges are."""
+        return slice(*np.searchsorted(self.channels, [channel, channel + 1]).tolist())
 
     def count_thinned(self, channel: int) -> int:
         """Count the edges of a channel that were left out."""
-        if self.whole is None:
-            return 0
-        return self.whole.of_channel(channel).size - self.of_channel(channel).size
-
-    @classmethod
-    def of(cls, drop: Drop, hz: float) -> EdgeArrays:
-        """Take them from a drop whose ticks come at a rate in Hz, thinned."""
-        flat = itertools.chain.from_iterable(drop.edges)  # much faster than an array of rows
-        table = np.fromiter(flat, np.int64, 3 * len(drop.edges)).reshape(-1, 3)
-        times, channels, blocked = table[:, 0] / hz, table[:, 1], table[:, 2]
-        return cls(times, channels.astype(np.intp), blocked.astype(np.bool_)).thinned()
+        received = int(self.received[channel]) if channel < self.received.size else 0
+        return received - int(np.count_nonzero(self.channels == channel))
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,16 +229,15 @@ def edge_train(
         `None` where nothing is struck.
     """
     mine = edges.of_channel(gate.channel)
-    rods, blocks, levels = _passages(gate.height, chain, start, higher, edges.darkening)
+    # Some timers tell nothing but that beams darken.
+    darkening = bool(edges.blocked.size and edges.blocked.all())
     return EdgeTrain(
         number,
         edges.times[mine],
         edges.blocked[mine],
         edges.burst[mine],
-        mine if edges.whole is None else edges.numbers[mine],
-        rods,
-        blocks,
-        levels,
+        edges.numbers[mine],
+        *_passages(gate.height, chain, start, higher, darkening),
         edges.count_thinned(gate.channel),
     )
 
@@ -274,41 +257,49 @@ def _passages(
     levels = np.stack([height - places + widths / 2, height - places - widths / 2], axis=1).ravel()
     rods = np.repeat(np.arange(places.size), 2)
     blocks = np.tile(np.array([True, False]), places.size)
-    seen = levels < start
+    seen = (levels < start) & (blocks | (not darkening))
     if higher is not None:
         seen &= levels > (np.array(higher) - places)[rods]
-    if darkening:
-        seen &= blocks
-    found = rods[seen], blocks[seen], levels[seen]
-    for one in found:
-        one.flags.writeable = False
-    return found
+    passages = rods[seen], blocks[seen], levels[seen]
+    for values in passages:
+        values.flags.writeable = False
+    return passages
 
 
 def thinned(drop: Drop, hz: float) -> Drop:
     """Return a drop without the middles of long flickers, for what reads it many times."""
-    edges = EdgeArrays.of(drop, hz)
-    if edges.whole is None:
-        return drop
-    return replace(drop, edges=tuple(drop.edges[n] for n in edges.numbers.tolist()))
+    numbers = np.sort(EdgeArrays.of(drop.edges, hz).numbers)
+    return replace(drop, edges=tuple(drop.edges[n] for n in numbers.tolist()))
 
 
 def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[ChainRecord]:
     """Collect each chain with the trains of its gates."""
-    found = []
+    records = []
     shares = air_shares(protocol)
-    for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop, hz)):
+    for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop.edges, hz)):
         air = np.array(shares[chain.name])
-        if role == "free":
-            found.append(ChainRecord(role, chain, trains, air=air[:1]))
-        else:
-            ratios, alpha = _ratios(protocol, chain.chain), _alpha(protocol, chain, run)
-            # Behind the last leg nothing falls any more, but edges are asked for all the same.
-            air = np.append(air, air[-1]) if np.ptp(air) else air[:1]
-            where = str(protocol.condition(run))
+        record = ChainRecord(role, chain, trains, air=air[:1])
+        if role == "impact":
+            assert protocol.surface is not None
+            # γ is the same at every incline, and level ground always in the domain of Eq. 13.
+            gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain.chain, 0.0)]
+            try:
+                alpha = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
+            except DomainError:
+                alpha = 0.0
             higher, clear = _contacts(protocol, run, chain)
-            found.append(ChainRecord(role, chain, trains, ratios, alpha, air, where, higher, clear))
-    return found
+            record = replace(
+                record,
+                ratios=np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gammas)),
+                alpha=alpha,
+                # Behind the last leg nothing falls any more, but edges are asked for all the same.
+                air=np.append(air, air[-1]) if np.ptp(air) else air[:1],
+                condition=str(protocol.condition(run)),
+                higher=higher,
+                clear=clear,
+            )
+        records.append(record)
+    return records
 
 
 def edge_trains(
@@ -323,14 +314,11 @@ def edge_trains(
     for role in ("impact", "free"):
         name = run.impact if role == "impact" else run.free
         gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
-        if name is None or not gates:
-            continue
-        chain = protocol.chains[name]
-        clear = None
-        if role == "impact":
-            clear = _contacts(protocol, run, chain)[1]
-        trains = (edge_train(n, gate, chain, edges, start, clear) for n, gate in gates)
-        yield role, chain, tuple(trains)
+        if name is not None and gates:
+            chain = protocol.chains[name]
+            clear = _contacts(protocol, run, chain)[1] if role == "impact" else None
+            trains = (edge_train(n, gate, chain, edges, start, clear) for n, gate in gates)
+            yield role, chain, tuple(trains)
 
 
 def _contacts(
@@ -344,18 +332,53 @@ def _contacts(
     return (*heights[:-1], 0.0), tuple(z + protocol.contact.strike.u for z in heights)
 
 
-def _ratios(protocol: Protocol, chain: Chain) -> Array:
-    """ΔV/V of each impact for α = 1, Eq. 9."""
-    assert protocol.surface is not None
-    # γ is the same at every incline, and level ground is always inside the domain of Eq. 13.
-    gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain, 0.0)]
-    return np.array(kicks(chain, [1.0] * chain.rods, gammas))
+def on_heap(protocol: Protocol, run: Run) -> Protocol | None:
+    """Return the protocol of a run whose rods may strike what lies there.
+
+    Parameters
+    ----------
+    protocol
+        With heights counted from the contact point, see `rig.protocol.contact.at_contact`.
+
+    Returns
+    -------
+    Protocol or None
+        With ``contact.heaped``, and the top rod's strike on it; `None` where by geometry less
+        than one rod lies there as the top rod strikes.
+    """
+    chain = None if run.impact is None else protocol.chains[run.impact]
+    if protocol.surface is None or chain is None or "diameter" in lacking_geometry(chain):
+        return None
+    top = strike_heights(protocol.surface, run.incline_deg, chain)[-1]
+    if top < max(chain.diameters):  # what is lower than one of its rods is no heap
+        return None
+    strike = protocol.contact.strike
+    higher = Quantity(strike.value + top, math.hypot(strike.u, UNEVEN * top))
+    return replace(protocol, contact=replace(protocol.contact, heaped=True, strike=higher))
 
 
-def _alpha(protocol: Protocol, chain: RodChain, run: Run) -> float:
-    """α that the model expects, all rods taken together; 0 where it has none."""
-    assert protocol.surface is not None
-    try:
-        return impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
-    except DomainError:
-        return 0.0
+@lru_cache(maxsize=64)  # a session asks for the same few again and again
+def strike_heights(
+    surface: Surface, incline_deg: float | None, chain: RodChain
+) -> tuple[float, ...]:
+    """How far above the contact point each rod strikes what lies there, m; bottom up."""
+    incline = incline_deg or 0.0
+    # How long rods are lifts all alike.
+    touching = np.array(touching_heights(replace(chain, rod_length=0.0), incline))
+    return tuple((touching - touching[-1] + heap_heights(chain, surface, incline)).tolist())
+
+
+def heap_heights(chain: RodChain, surface: Surface, incline_deg: float) -> Array:
+    """How high others lie as each rod strikes, m; shape ``(rods,)``.
+
+    Friction μ takes μ (1 + β) cos θ of the speed V with which a rod strikes, so that V (sin θ −
+    μ (1 + β) cos θ) is left down the board. As the next one comes, a distance p behind, it has
+    gone by that share of p. What of its thickness d is still there fills a square of side d in a
+    heap as high as half as wide.
+    """
+    angle, thick = math.radians(incline_deg), np.array(chain.diameters)
+    gaps = np.diff(chain.chain.heights, append=np.inf)
+    stopped = surface.friction.value * (1.0 + surface.restitution.value) * math.cos(angle)
+    gone = gaps[:-1] * max(0.0, math.sin(angle) - stopped)
+    lying = thick[:-1] * np.maximum(thick[:-1] - gone, 0.0)
+    return np.asarray(np.sqrt(np.cumsum(np.append(0.0, lying))))

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.chain_records import chain_records, thinned
+from rig.analysis.chain_records import chain_records, on_heap, thinned
 from rig.analysis.components import Components, stated
 from rig.analysis.diagnoses import FEW_GATES, silent
 from rig.analysis.drop_model import DropModel
@@ -16,7 +16,6 @@ from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise
 from rig.analysis.fit import timed
-from rig.analysis.heap import on_heap
 from rig.analysis.identified import IdentifiedByDrop, identified
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages

@@ -134,6 +134,14 @@ class DropModel:
             x[at] = 0.0
         return self.changed(components=components, clock_u=clock_u, guesses=guesses)
 
+    def begun(self, guesses: Mapping[str, Guess]) -> DropModel:
+        """Return the same drop with other first guesses."""
+        other = copy(self)
+        other.guesses = guesses
+        other.unknowns = Unknowns(other)
+        other._paths, other._seen = {}, {}
+        return other
+
     def under(self, protocol: Protocol) -> DropModel:
         """Return the same drop with the priors of another protocol, alike but for these."""
         # Its heights stay: they may be counted from a contact point that is this drop's own.

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from rig.analysis.annealing import MISSED, STRAYS, split
-from rig.analysis.chain_records import QUICK
-from rig.analysis.later_passages import later_passages
+from rig.analysis.chain_records import QUICK, WIDER
 from rig.analysis.plain_data import attributes
 
 if TYPE_CHECKING:
@@ -92,23 +91,23 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     """
     model, x = drop.model, drop.x
     assert model.protocol.gates is not None
-    clock = model.rate(x)
-    found: list[UnmatchedEdge] = []
+    clock, gates = model.rate(x), model.protocol.gates.gates
+    unmatched: list[UnmatchedEdge] = []
     for role, record in model.records.items():
         path = model.trajectory(role, x)
-        lowest = min(model.protocol.gates.gates[train.gate].height for train in record.trains)
+        lowest = min(gates[train.gate].height for train in record.trains)
         every = split(model.all_levels(role, x), model.expected[role].ends)
         for train, levels, match in zip(record.trains, every, drop.matches[role], strict=True):
-            gate = model.protocol.gates.gates[train.gate]
+            gate = gates[train.gate]
+            # Only the lowest beam is near enough to what bounces, and those beside what lies.
+            near = gate.height == lowest or record.is_beside_rods(gate)
+            hit = float(path.time[1]) / clock if near and record.ratios is not None else np.inf
             if (match < 0).any():
-                found += _absent(gate.channel, train, match, path.times(levels) / clock)
+                unmatched += _absent(gate.channel, train, match, path.times(levels) / clock)
             if train.times.size > (match >= 0).sum():
-                # Only the lowest beam is near enough to what bounces, and those beside what lies.
-                near = gate.height == lowest or record.is_beside_rods(gate)
-                after = _first_hit(record, path) / clock if near else np.inf
                 back = later_passages(record, train, match, path, model.protocol.gravity.value)
-                found += _surplus(gate.channel, train, match, after, back)
-    return tuple(sorted(found, key=lambda edge: edge.time_s))
+                unmatched += _surplus(gate.channel, train, match, hit, back)
+    return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
 def count_unexplained(unmatched: Iterable[UnmatchedEdge]) -> int:
@@ -116,32 +115,19 @@ def count_unexplained(unmatched: Iterable[UnmatchedEdge]) -> int:
     return sum(edge.kind == UNEXPLAINED for edge in unmatched)
 
 
-def _first_hit(record: ChainRecord, path: Trajectory) -> float:
-    """When the first rod strikes, s; never on the free side."""
-    return float(path.time[1]) if record.ratios is not None else np.inf
-
-
 def _absent(
     channel: int, train: EdgeTrain, match: Index, expected: Array
 ) -> Iterator[UnmatchedEdge]:
-    """Expected edges that nobody reported."""
-    for at in np.flatnonzero(match < 0).tolist():
-        blocks, when = bool(train.blocks[at]), float(expected[at])
-        yield UnmatchedEdge(
-            _why(train, when), channel, when, blocks, int(train.rods[at]), None, ABSENT
-        )
-
-
-def _why(train: EdgeTrain, when: float) -> EdgeClass:
-    """Say why there is no edge, by the level that the gate kept.
+    """Expected edges that nobody reported, explained by the level that the gate kept.
 
     While a rod leaves no trace the beam stays bright, while a gap leaves none it stays dark.
     """
-    if not train.times.size:
-        return "dead gate"
-    before = int(np.searchsorted(train.times, when))
-    dark = bool(train.blocked[before - 1]) if before else False
-    return "merged" if dark else "missed"
+    for at in np.flatnonzero(match < 0).tolist():
+        when, before = float(expected[at]), int(np.searchsorted(train.times, expected[at]))
+        kind: EdgeClass = "merged" if before and train.blocked[before - 1] else "missed"
+        kind = kind if train.times.size else "dead gate"
+        blocks, rod = bool(train.blocks[at]), int(train.rods[at])
+        yield UnmatchedEdge(kind, channel, when, blocks, rod, None, ABSENT)
 
 
 def _surplus(
@@ -153,16 +139,63 @@ def _surplus(
     # Edges that follow each other so quickly are of one flicker, and share its number.
     flicker = np.cumsum(np.diff(train.times, prepend=-np.inf) > QUICK)
     for at in np.flatnonzero(rods < 0).tolist():
-        when, blocked = float(train.times[at]), bool(train.blocked[at])
+        when = float(train.times[at])
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
-        kind = UNEXPLAINED
-        if near.size:
-            kind = "chatter"
-        elif train.burst[at] > 0.0:
-            kind = "string"
-        elif at in back:
-            kind = "later passage"
-        elif when > hit:
-            kind = "bounce"
-        rod = int(near[0]) if near.size else None
-        yield UnmatchedEdge(kind, channel, when, blocked, rod, int(train.edge[at]), SURPLUS)
+        kinds: dict[EdgeClass, bool] = {
+            "chatter": bool(near.size),
+            "string": bool(train.burst[at] > 0.0),
+            "later passage": at in back,
+            "bounce": when > hit,
+        }
+        kind = next((kind for kind, holds in kinds.items() if holds), UNEXPLAINED)
+        rod, edge = int(near[0]) if near.size else None, int(train.edge[at])
+        yield UnmatchedEdge(kind, channel, when, bool(train.blocked[at]), rod, edge, SURPLUS)
+
+
+def later_passages(
+    record: ChainRecord, train: EdgeTrain, match: Index, path: Trajectory, gravity: float
+) -> set[int]:
+    """Find the edges of what came back after it had passed a gate, and perhaps fell once more.
+
+    It rises through a gate and falls through it again, with at most the energy with which it first
+    passed at speed v. So each shadow lasts at least width/v, and the second of a pair follows the
+    first within the flight 2v/g. Neither holds for a pendulum, whose half period is longer than
+    that, nor for edges of lower gates on the same channel. The last shadow may stand alone: of a
+    turn in the beam, or because the recording ends.
+
+    Parameters
+    ----------
+    record, train, match
+        The chain, one of its gates, and which of its edges is which expected one (-1: none).
+    path
+        The chain's motion.
+    gravity
+        Acceleration of a free fall, or down the track, m/s².
+
+    Returns
+    -------
+    set of int
+        Numbers of the edges in the train; empty for a chain, whose rods too many would look alike.
+    """
+    if record.ratios is not None or record.chain.chain.rods > 1 or not (match >= 0).any():
+        return set()
+    times, later = train.times, np.arange(int(match.max()) + 1, train.times.size)
+    speed = float(path.heights(times[[match.max()]])[1][0])
+    if train.blocked.all():  # a timer that tells no ends of shadows
+        begins = ends = later
+    else:
+        # Each shadow begins as the beam darkens and ends with the very next edge.
+        begins = later[:-1][train.blocked[later[:-1]] & ~train.blocked[later[1:]]]
+        slow = np.diff(times)[begins] * speed * WIDER >= min(record.chain.widths)
+        begins = begins[slow]
+        ends = begins + 1
+    flight = 2.0 * speed * WIDER / gravity
+    back: set[int] = set()
+    at = 0
+    while at < begins.size:
+        pair = at + 1 < begins.size and times[begins[at + 1]] - times[ends[at]] < flight
+        if pair or at + 1 == begins.size:
+            shadows = slice(at, at + 1 + pair)
+            back |= {*begins[shadows].tolist(), *ends[shadows].tolist()}
+        at += 1 + pair
+    return back

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
+from rig.analysis.annealing import split
 from rig.analysis.equations import STRAY
 
 if TYPE_CHECKING:
@@ -27,10 +28,9 @@ CLOSE = 0.05
 enough by its square."""
 _FINE = 0.8e-3  # m: how far off an adjusted trajectory may, one standard deviation
 _NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
-_SAME = 0.1  # of a standard uncertainty: no edge is seen elsewhere
 _ROUNDS = 6
-_MEDIAN = 0.6745  # of |normal numbers|, in standard deviations
-_MOST = 1.5  # by which few edges may happen to scatter more
+_MEDIANS = 2.2
+"""1/0.6745 standard deviations, by half as much more as few edges may happen to scatter."""
 
 
 def count_matched(side: Sequence[Index]) -> int:
@@ -53,13 +53,14 @@ class Matched:
     @property
     def rods(self) -> dict[int, int]:
         """Rod of every matched edge of the drop."""
-        found: dict[int, int] = {}
-        for role, record in self.model.records.items():
-            for part, match in zip(record.trains, self.matches[role], strict=True):
-                seen = match >= 0
-                edges = part.edge[match[seen]]
-                found.update(zip(edges.tolist(), part.rods[seen].tolist(), strict=True))
-        return found
+        return {
+            edge: rod
+            for role, record in self.model.records.items()
+            for train, match in zip(record.trains, self.matches[role], strict=True)
+            for edge, rod in zip(
+                train.edge[match[match >= 0]].tolist(), train.rods[match >= 0].tolist(), strict=True
+            )
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,25 +89,17 @@ def settle(model: DropModel, matches: Matches | None = None, x: Array | None = N
     matches = match(model, x) if matches is None else matches
     # Not to the end where the matches are about to change.
     estimate = adjust(model, matches, x, done=_NEAR, rough=True)
-    for round_ in range(_ROUNDS):
-        x, before = estimate.x, matches
-        matches = without_strays(model, x, match(model, x), estimate.scatter)
-        if _alike(matches, before):
-            matches = before  # what was made for these is at hand
-            if round_:
-                break
-        estimate = adjust(model, matches, x, done=CLOSE)
-        if estimate.beyond(x) < _SAME:
+    for _ in range(_ROUNDS):
+        again = without_strays(model, estimate.x, match(model, estimate.x), estimate.scatter)
+        alike = all(
+            np.array_equal(np.concatenate(side), np.concatenate(again[role]))
+            for role, side in matches.items()
+        )
+        matches = matches if alike else again  # what was made for the same is at hand
+        estimate = adjust(model, matches, estimate.x, done=CLOSE)
+        if alike:
             break
     return Fit(model, matches, estimate)
-
-
-def _alike(one: Matches, other: Matches) -> bool:
-    return all(
-        np.array_equal(mine, its)
-        for role, found in one.items()
-        for mine, its in zip(found, other[role], strict=True)
-    )
 
 
 class Begun(NamedTuple):
@@ -133,19 +126,13 @@ def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
     return Fit(model, begun.matches, estimate.kept())
 
 
-def match(model: DropModel, x: Array, width: float = _FINE) -> Matches:
-    """Match all edges to rods, given where the chains are.
-
-    Parameters
-    ----------
-    width
-        How far off an edge may be, m.
-    """
-    found: Matches = {}
+def match(model: DropModel, x: Array) -> Matches:
+    """Match all edges to rods, given where the chains are."""
+    matches: Matches = {}
     for role, pairing in model.pairings.items():
         heights, speeds = model.trajectory(role, x).heights(pairing.times * model.rate(x))
-        found[role] = pairing.matched(model.all_levels(role, x), heights, speeds, width)
-    return found
+        matches[role] = pairing.matched(model.all_levels(role, x), heights, speeds, _FINE)
+    return matches
 
 
 def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float = 1.0) -> Matches:
@@ -156,33 +143,26 @@ def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float 
     scatter
         How much more the edges scatter than the model assumes.
     """
-    return {role: _kept(model, role, x, found, scatter) for role, found in matches.items()}
+    return {role: _kept(model, role, x, side, scatter) for role, side in matches.items()}
 
 
-def _kept(
-    model: DropModel, role: str, x: Array, matches: list[Index], scatter: float
-) -> list[Index]:
-    rows = model.residuals(role, x, matches)
+def _kept(model: DropModel, role: str, x: Array, side: list[Index], scatter: float) -> list[Index]:
+    rows = model.residuals(role, x, side)
     far = np.abs(rows.values) / rows.sigma
     # A few strays enlarge the scatter, and would hide behind it: most edges tell how much it is.
-    usual = max(1.0, _MOST * float(np.sort(far)[far.size // 2]) / _MEDIAN) if far.size else 1.0
+    usual = max(1.0, _MEDIANS * float(np.sort(far)[far.size // 2])) if far.size else 1.0
     limit = STRAY * min(scatter, usual)
     stray = far > limit
     # Of a rod's two sides that do not go together one is wrong, or both: the one that is further
     # off, and the other if it is far off too.
-    parted = model.parted(role, rows, matches)
+    parted = model.parted(role, rows, side)
     second = np.flatnonzero(np.abs(parted.values) > limit * parted.sigma)
     second = second[parted.sigma[second] < rows.sigma[second]]
     stray[second - (far[second - 1] > far[second])] = True
-    for side in (second, second - 1):
-        stray[side] |= far[side] > 0.5 * limit
+    for either in (second, second - 1):
+        stray[either] |= far[either] > 0.5 * limit
     if not stray.any():
-        return matches
-    kept, position = [], 0
-    for one in matches:
-        copy = one.copy()
-        chosen = np.flatnonzero(one >= 0)
-        copy[chosen[stray[position : position + chosen.size]]] = -1
-        position += chosen.size
-        kept.append(copy)
-    return kept
+        return side
+    line = np.concatenate(side)
+    line[np.flatnonzero(line >= 0)[stray]] = -1
+    return split(line, model.pairings[role].ends)

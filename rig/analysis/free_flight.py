@@ -1,13 +1,11 @@
-"""One leg of a fall: uniform acceleration, or that of g − κv² in air, and its derivatives.
+"""One leg of a fall with the acceleration g − κv², for arrays of legs, and its derivatives.
 
-The same formulas as in `rig.model.drag`, for arrays, and for κ below zero too: an adjustment tries
-what no air does. Where an array takes κ, it may differ by element, its sign never; with such an
-array g may differ too.
+The formulas are those of `rig.model.drag`, and hold below κ = 0 too, for an adjustment tries what
+no air does. κ may differ from leg to leg, its sign never, and it is nowhere 0: see `some_air`.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,51 +15,42 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_NONE = 1e-15  # 1/m: what takes less than an atom's width from a metre
-_FAINT = 1e-5  # 1/m: what still is in the last digits of a difference
-_SHORT = 0.02  # of y, up to which these terms of (1 − e^(−y))/y will do
-_SERIES = [(-1.0) ** n / math.factorial(n + 1) for n in reversed(range(7))]
-_NEVER = 1.0 - 1e-9  # tanh of a time: nothing falls longer
+NONE = 1e-15
+"""κ in place of none, 1/m: of a metre it takes less than an atom's width, and no digit."""
+FAINT = 1e-5
+"""κ below which its first orders are exact to 1e-10 while a difference over κ is not, 1/m."""
 
 
-def _largest(kappa: float | Array) -> float:
-    """The largest κ, with its sign."""
-    if isinstance(kappa, float):
-        return kappa
-    low, high = float(kappa.min(initial=0.0)), float(kappa.max(initial=0.0))
-    return high if high > -low else low
+def some_air(kappa: float | Array) -> Array:
+    """Return κ, or what does nothing in its place where it is zero."""
+    return np.asarray(kappa + NONE * (np.abs(kappa) < NONE), dtype=np.float64)
 
 
-def _rate(kappa: float | Array, gravity: float | Array) -> float | Array:
-    """√(|κ|g); of one κ a plain number, with which arrays are multiplied quicker."""
-    if isinstance(kappa, float) and isinstance(gravity, float):
-        return math.sqrt(abs(kappa) * gravity) if gravity > 0.0 else math.nan
-    found: Array = np.sqrt(np.abs(kappa) * gravity)
-    return found
+def _rate(gravity: float | Array, kappa: float | Array) -> float | Array:
+    """√(|κ|g), 1/s; no number where nothing falls."""
+    rate: float | Array = np.sqrt(np.abs(kappa) * gravity)
+    return rate
+
+
+def _is_faint(kappa: float | Array) -> bool:
+    return bool(np.all(np.abs(kappa) < FAINT))
+
+
+def _is_positive(kappa: float | Array) -> bool:
+    return bool(np.all(kappa > 0.0))
 
 
 def fall_for(
     since: Array, speed: Array, gravity: float | Array, kappa: float | Array
-) -> tuple[Array, Array]:
-    """Way fallen and speed, a time after the beginning of a leg."""
-    way, end, _ = _fall(since, speed, gravity, kappa)
-    return way, end
-
-
-def _fall(
-    since: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> tuple[Array, Array, Array]:
-    """Way, speed at its end, and the derivative of the way by the speed v at its beginning.
+    """Way z fallen and speed, a time t after the beginning of a leg at speed v, and ∂z/∂v.
 
-    The way is ln(1 + κw)/κ with w = 2g S(t/2)² + v S(t) and S(t) = sinh(√(κg) t)/√(κg), as in
+    z is ln(1 + κw)/κ with w = 2g S(t/2)² + v S(t) and S(t) = sinh(√(κg) t)/√(κg), as in
     `rig.model.drag.fallen`; below κ = 0 with the sine.
     """
-    largest = _largest(kappa)
-    if abs(largest) < _NONE:
-        return (speed + 0.5 * gravity * since) * since, speed + gravity * since, since
-    rate = _rate(kappa, gravity)
+    rate = _rate(gravity, kappa)
     # An edge long after the fall overflows no sinh, and meets no second period of the sine.
-    sinus, most = (np.sinh, 300.0) if largest > 0.0 else (np.sin, 1.2)
+    sinus, most = (np.sinh, 300.0) if _is_positive(kappa) else (np.sin, 1.2)
     half = sinus(np.minimum((0.5 * rate) * since, most)) / rate
     square = gravity * half * half
     whole = 2.0 * half * np.sqrt(1.0 + kappa * square)
@@ -72,75 +61,58 @@ def _fall(
     return np.log1p(grown) / kappa, end, whole * shrunk
 
 
-def fall_through(
-    distance: Array, speed: Array, gravity: float | Array, kappa: float | Array
+def fall_slopes(
+    since: Array,
+    speed: Array,
+    fall: tuple[Array, Array, Array],
+    gravity: float | Array,
+    kappa: float | Array,
 ) -> tuple[Array, Array]:
-    """Speed at the end of a leg and how long it takes, as in `rig.model.drag.drag_leg`."""
-    reach = reach_of(distance, kappa)
-    # An adjustment may try a rod that strikes above where the one before it did.
-    arrival = np.sqrt(np.maximum(_squared(reach, speed, gravity, kappa), 0.0))
-    return arrival, lasting(reach, speed, arrival, gravity, kappa)
+    """Derivatives by g and by κ of the way z that `fall_for` returns.
+
+    As z(λt; v/λ, g/λ², κ) and z(t; λv, λg, κ/λ)/λ are z, they follow from the others:
+    2g ∂z/∂g = t ∂z/∂t − v ∂z/∂v, and κ ∂z/∂κ = v ∂z/∂v + g ∂z/∂g − z.
+    """
+    way, end, by_speed = fall
+    slower = speed * by_speed
+    by_gravity = (since * end - slower) / (2.0 * gravity)
+    if _is_faint(kappa):  # −∫∫v² of a ballistic leg
+        half = 0.5 * speed * speed + (speed * gravity / 3.0 + gravity**2 * since / 12.0) * since
+        return by_gravity, -half * since * since
+    return by_gravity, (slower + gravity * by_gravity - way) / kappa
+
+
+def reach_of(distance: Array, kappa: float | Array) -> Array:
+    """(1 − e^(−2κd))/κ, which is twice the distance d where no air is."""
+    reach: Array = -np.expm1(-2.0 * kappa * distance) / kappa
+    return reach
+
+
+def reach_slopes(distance: Array, reach: Array, kappa: float | Array) -> Array:
+    """Return the derivative of a leg's reach by κ."""
+    y = 2.0 * kappa * distance
+    if _is_faint(kappa):
+        return np.asarray(-4.0 * distance**2 * (0.5 - y / 3.0 + y * y / 8.0))
+    return np.asarray((2.0 * distance * np.exp(-y) - reach) / kappa)
+
+
+def speed_slope(
+    since: Array, distance: Array, gravity: float | Array, kappa: float | Array
+) -> Array:
+    """Return ∂z/∂v of a leg that takes a time t for a way z: S(t) e^(−κz), see `fall_for`."""
+    rate = _rate(gravity, kappa)
+    sinus = np.sinh if _is_positive(kappa) else np.sin
+    return np.asarray(sinus(rate * since) / rate * np.exp(-kappa * distance))
 
 
 def lasting(
     reach: Array, speed: Array, arrival: Array, gravity: float | Array, kappa: float | Array
 ) -> Array:
     """How long a leg takes, by its `reach_of` and the speeds at both ends."""
-    tiny = np.finfo(float).tiny
-    largest = _largest(kappa)
-    if abs(largest) < _NONE:
-        return np.asarray(reach / np.maximum(speed + arrival, tiny))
-    rate = _rate(kappa, gravity)
-    slow = rate * reach / np.maximum(arrival + (1.0 - kappa * reach) * speed, tiny)
-    curve = np.arctanh(np.clip(slow, -_NEVER, _NEVER)) if largest > 0.0 else np.arctan(slow)
-    return np.asarray(curve / rate)
-
-
-def _squared(reach: Array, speed: Array, gravity: float | Array, kappa: float | Array) -> Array:
-    found: Array = (1.0 - kappa * reach) * speed * speed + gravity * reach
-    return found
-
-
-def reach_of(distance: Array, kappa: float | Array) -> Array:
-    """(1 − e^(−2κd))/κ, which is twice the distance d where no air is."""
-    if abs(_largest(kappa)) < _NONE:
-        return 2.0 * distance
-    found: Array = -np.expm1(-2.0 * kappa * distance) / kappa
-    return found
-
-
-def leg_slopes(
-    since: Array, speed: Array, gravity: float | Array, kappa: float | Array
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Way z fallen and speed, a time after the beginning of a leg, and derivatives of z.
-
-    By the speed v at the beginning, by g and by κ. As z(λt; v/λ, g/λ², κ) and z(t; λv, λg, κ/λ)/λ
-    are z, the last two follow from the others: 2g ∂z/∂g = t ∂z/∂t − v ∂z/∂v, and
-    κ ∂z/∂κ = v ∂z/∂v + g ∂z/∂g − z.
-    """
-    way, end, by_speed = _fall(since, speed, gravity, kappa)
-    by_gravity = (since * end - speed * by_speed) / (2.0 * gravity)
-    if abs(_largest(kappa)) < _FAINT:  # else that difference is nothing but rounding
-        return way, end, by_speed, by_gravity, -_slowed(since, speed, gravity)
-    by_kappa = (speed * by_speed + gravity * by_gravity - way) / kappa
-    return way, end, by_speed, by_gravity, by_kappa
-
-
-def _slowed(since: Array, speed: Array, gravity: float | Array) -> Array:
-    """∫∫v² of a ballistic leg, m²."""
-    half = 0.5 * speed * speed + (speed * gravity / 3.0 + gravity**2 * since / 12.0) * since
-    found: Array = half * since * since
-    return found
-
-
-def reach_slopes(distance: Array, kappa: float | Array) -> tuple[Array, Array]:
-    """(1 − e^(−2κd))/κ and its derivative by κ, by their series where these are short."""
-    y = 2.0 * kappa * distance
-    if np.abs(y).max() < _SHORT:
-        share, slope = np.zeros_like(y), np.zeros_like(y)
-        for term in _SERIES:  # Horner's rule, of the derivative too
-            slope = slope * y + share
-            share = share * y + term
-        return 2.0 * distance * share, 4.0 * distance**2 * slope
-    reach = reach_of(distance, kappa)
-    return reach, (2.0 * distance * np.exp(-y) - reach) / kappa
+    rate = _rate(gravity, kappa)
+    begin = arrival + (1.0 - kappa * reach) * speed
+    slow = rate * reach / np.maximum(begin, np.finfo(float).tiny)
+    if not _is_positive(kappa):
+        return np.asarray(np.arctan(slow) / rate)
+    never = 1.0 - np.finfo(float).eps  # nothing falls longer
+    return np.asarray(np.arctanh(np.clip(slow, -never, never)) / rate)

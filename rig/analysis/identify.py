@@ -12,41 +12,24 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import (
-    ALPHA,
-    CLOCK,
-    DRAG,
-    EVER,
-    GROWTH,
-    MISSED,
-    PULL,
-    RELEASE,
-    SLOWEST,
-    START,
-    STRAYS,
-    UNKNOWNS,
-    Guess,
-    SideFall,
-)
-from rig.analysis.discrepancy import STRETCHES
+from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, SideFall, log_density
 from rig.analysis.drop_model import DropModel, prior_air
-from rig.analysis.equations import HUBER, scaled
+from rig.analysis.equations import HUBER, STRAY, scaled
 from rig.analysis.fit import Fit, count_matched, settle
+from rig.protocol.gates import CLEARANCE_M
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from rig.analysis.annealing import Annealed, Span
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
-    from rig.analysis.fit import Matches
     from rig.protocol.protocol import Protocol
 
     Array = NDArray[np.float64]
@@ -54,19 +37,18 @@ if TYPE_CHECKING:
 
 Weighed = TypeVar("Weighed", "Annealed", "Reading")
 
-_ANY_ALPHA = 0.25  # standard deviation of α about what the model expects
-_CLEAR = 0.97  # share of all that could be matched with which no other start is tried
-_FAIR = 0.9  # and with which a side tells the other when it was let go
-_LEAST = 0.6  # and of all that is expected
-_MARGIN = 3  # edges by which votes may fall short of what is matched
-_CALM = 2.0  # scatter of edges above which a reading is none that ends the search
-_STRAINED = 6.0  # standard uncertainties of any unknown, likewise
-_OTHER = 0.02  # share of a side's edges at another rod that makes a different reading
-_FEW = 2  # edges that make none: a stray in place of a missed edge
-_CLOSE = 30.0  # log odds of annealed readings within which they are adjusted
-_PAIRS = 4  # of readings, adjusted
-_TOGETHER = 30e-3  # s: chains let go at once are not further apart, if it can be helped
-_TAIL = 8.0  # standard deviations beyond which a normal distribution's tail is its first term
+_CLEAR = 0.97
+"""Share of all that could be matched with which no other start is tried."""
+_FAIR = 0.9
+"""The same with which a reading is good."""
+_CALM = 2.0
+"""Scatter of edges above which a reading is none that ends the search."""
+_OTHER = 0.02
+"""Share of a side's edges at another rod that makes a different reading."""
+_FEW = 2
+"""Edges that make none: a stray in place of a missed edge."""
+_CLOSE = 30.0
+"""Log odds of annealed readings within which they are adjusted: what linear unknowns leave out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +104,7 @@ def identify(
     clock_u: float,
     components: Components,
     window: Span = EVER,
+    batches: int | None = None,
 ) -> Identification:
     """Find out which fall the edges are.
 
@@ -135,178 +118,97 @@ def identify(
         How much everything scatters.
     window
         Within which chains were let go, s since the release fired.
+    batches
+        How many batches of starts are tried at most, the likeliest first.
     """
-    sides: list[_Side] = []
-    # The free chain first: it tells when both were let go.
-    near = window
-    for record in reversed(records):
-        side = _Side(protocol, record, clock_u, components)
-        side.search(near)
-        if near != window and not side.convincing(_FAIR):
-            side.search(window)
-        if side.convincing(_FAIR):
-            near = _around([one.unknowns[RELEASE] for one in side.found], window)
-        sides.insert(0, side)
-    if not all(side.found for side in sides):
-        return Identification(None, {side.record.role: side.share for side in sides})
-    return _together(protocol, records, sides, clock_u, components)
+    model = stated_model(protocol, records, clock_u, components)
+    readings = {role: _read(SideFall.of(model, role), window, batches) for role in model.records}
+    # Likelier than that all edges are strays and every rod was missed.
+    if all(side and side[0].evidence > 0.0 for side in readings.values()):
+        return _together(model, readings)
+    matched = {
+        role: max((way.matched for way in side), default=0) for role, side in readings.items()
+    }
+    return Identification(None, _shares(model, matched))
 
 
 def read_quickly(
     protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
 ) -> Reading | None:
     """Read a drop like `identify`, but only near what is stated."""
-    sides = [_Side(protocol, record, clock_u, components) for record in records]
-    for side in sides:
-        side.search(EVER, batches=1)
-        if not side.found:
-            return None
-        del side.found[1:]
-    whole = _together(protocol, records, sides, clock_u, components)
-    return None if whole.fit is None else weighed(whole.fit)
+    found = identify(protocol, records, clock_u, components, batches=1)
+    return None if found.fit is None else weighed(found.fit)
 
 
 def most_votes(
     protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
 ) -> int:
     """Count the expected edges of a side that agree on one fall near the stated one, at most."""
-    return _Side(protocol, record, clock_u, components).fall.most_votes()
+    model = stated_model(protocol, [record], clock_u, components)
+    return SideFall.of(model, record.role).most_votes()
 
 
 def well_read(reading: Reading) -> bool:
     """Whether nearly all that could be is matched, with no more scatter or strain than usual."""
     fit = reading.fit
     most = sum(possible(record) for record in fit.model.records.values())
-    many = reading.share >= _LEAST and fit.matched >= _FAIR * most
-    return many and fit.estimate.scatter < _CALM and _strain(fit) < _STRAINED
-
-
-def _strain(fit: Fit) -> float:
-    """How far the unknown that is farthest off is, in standard uncertainties of its prior."""
-    return float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
+    many = reading.share >= LEAST and fit.matched >= _FAIR * most
+    strain = float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
+    return many and fit.estimate.scatter < _CALM and strain < STRAY
 
 
 def possible(record: ChainRecord) -> int:
     """Count the edges of a side that could be rods by their gates and polarities alone."""
-    count = 0
-    for train in record.trains:
-        dark, due = int(np.count_nonzero(train.blocked)), int(np.count_nonzero(train.blocks))
-        count += min(dark, due) + min(train.blocked.size - dark, train.blocks.size - due)
-    return count
-
-
-def _around(releases: Sequence[float], window: Span) -> Span:
-    """Return the part of a window that is near some releases; all of it where none is."""
-    first, last = min(releases) - _TOGETHER, max(releases) + _TOGETHER
-    if last < window[0] or first > window[1]:
-        return window
-    return max(window[0], first), min(window[1], last)
-
-
-class _Side:
-    """One chain's edges, to be read by themselves.
-
-    Attributes
-    ----------
-    found
-        Its readings, the likeliest first.
-    """
-
-    def __init__(
-        self,
-        protocol: Protocol,
-        record: ChainRecord,
-        clock_u: float,
-        components: Components,
-    ) -> None:
-        self.record = record
-        self.found: list[Annealed] = []
-        stated = Guess(0.0, protocol.drop.value, record.alpha, prior_air(protocol)[0])
-        self.model = DropModel(protocol, [record], {record.role: stated}, clock_u, components)
-        self._tried = np.zeros((0, UNKNOWNS))
-        self._most = 0
-
-    @cached_property
-    def fall(self) -> SideFall:
-        """Its falls, as the edges may tell them."""
-        model, record = self.model, self.record
-        protocol, components = model.protocol, model.components
-        kappa, kappa_u = prior_air(protocol)
-        sd = np.zeros(UNKNOWNS)
-        sd[START] = math.hypot(protocol.drop.u, components.hang)
-        sd[CLOCK], sd[DRAG] = model.clock_u, kappa_u
-        sd[PULL] = float(model.unknowns.sd[model.unknowns["gravity"]][0])
-        if record.ratios is not None:
-            sd[ALPHA], sd[GROWTH] = _ANY_ALPHA, protocol.priors.strings * abs(record.alpha)
-        return SideFall(
-            record,
-            model.pairings[record.role],
-            protocol.drop.value,
-            protocol.gravity.value,
-            kappa,
-            sd,
-            self._sigma(),
+    return sum(
+        min(
+            int(np.count_nonzero(train.blocked == dark)),
+            int(np.count_nonzero(train.blocks == dark)),
         )
-
-    def _sigma(self) -> Array:
-        """By how much every expected edge may be off a chain that falls as a whole, m."""
-        (role,), model = self.model.records, self.model
-        components, at, sd = model.components, model.unknowns, model.unknowns.sd
-        gate = sd[at["beams"]][model.expected[role].gate]
-        rod = sd[at[f"{role} rods"]][model.expected[role].rods]
-        variance = components.floor**2 + gate**2 + rod**2 + float(sd[at[f"{role} width"]][0]) ** 2
-        if self.record.ratios is not None:
-            variance += components.departure**2
-            stretch = model.discrepancy.stretch
-            for name in STRETCHES:
-                variance += (stretch * sd[at[name]]) ** 2 @ np.ones(stretch.shape[1])
-        return np.asarray(np.sqrt(variance))
-
-    @property
-    def share(self) -> float:
-        """Share of the expected edges that the best reading, or the most votes, explain."""
-        return self._most / max(1, self.record.expected)
-
-    def convincing(self, clear: float) -> bool:
-        """Whether the best reading matches a share of all that could be matched."""
-        if not self.found:
-            return False
-        best = self.found[0]
-        enough = max(_LEAST * self.record.expected, clear * possible(self.record))
-        return best.scatter < _CALM and best.matched >= enough
-
-    def search(self, window: Span, batches: int | None = None) -> None:
-        """Anneal from one batch of starts after another while none explains the edges."""
-        fall = self.fall
-        least = _LEAST * self.record.expected - _MARGIN
-        if not fall.pairing.times.size or possible(self.record) < least:
-            return
-        for starts, _ in itertools.islice(fall.starts(window, least), batches):
-            fresh = starts[fall.unlike(starts, self._tried, len(starts))]
-            if not len(fresh):
-                continue
-            self._tried = np.concatenate([self._tried, fresh])
-            annealed = fall.anneal(fresh)
-            self._most = max(self._most, *(one.matched for one in annealed))
-            # Likelier than that all edges are strays and every rod was missed.
-            likely = (one for one in annealed if one.evidence > 0.0)
-            self.found = _ranked([*self.found, *likely], lambda one: [one.edges])
-            if self.convincing(_CLEAR):
-                return
+        for train in record.trains
+        for dark in (True, False)
+    )
 
 
-def _ranked(readings: Iterable[Weighed], edges: Callable[[Weighed], list[Index]]) -> list[Weighed]:
+def stated_model(
+    protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
+) -> DropModel:
+    """Model a drop that begins as stated."""
+    kappa, _ = prior_air(protocol)
+    guesses: dict[str, Guess] = {
+        record.role: Guess(0.0, protocol.drop.value, record.alpha, kappa) for record in records
+    }
+    return DropModel(protocol, records, guesses, clock_u, components)
+
+
+def _read(fall: SideFall, window: Span, batches: int | None) -> list[Annealed]:
+    """Anneal from one batch of starts after another while none explains the edges."""
+    readings: list[Annealed] = []
+    least, most = LEAST * fall.record.expected, possible(fall.record)
+    if not fall.pairing.times.size or most < least:
+        return readings
+    for starts, _ in itertools.islice(fall.starts(window, least), batches):
+        if len(starts):
+            readings = _ranked([*readings, *fall.anneal(starts, _CLOSE)])
+            best = readings[0]
+            if best.scatter < _CALM and best.matched >= max(least, _CLEAR * most):
+                break
+    return readings
+
+
+def _edges(reading: Annealed | Reading) -> list[Index]:
+    """For each side the edge of every expected one."""
+    if isinstance(reading, Reading):
+        return [np.concatenate(side) for side in reading.fit.matches.values()]
+    return [reading.edges]
+
+
+def _ranked(readings: Iterable[Weighed]) -> list[Weighed]:
     """Order readings, the likeliest first, and leave out what is the same as a likelier one."""
-    found: list[Weighed] = []
+    ranked: list[Weighed] = []
     for reading in sorted(readings, key=lambda one: -one.evidence):
-        if all(any(map(_unlike, edges(reading), edges(other))) for other in found):
-            found.append(reading)
-    return found
-
-
-def _edges(fit: Fit) -> list[Index]:
-    """For each side the edge of every expected one, counted in its train."""
-    return [np.concatenate(side) for side in fit.matches.values()]
+        if all(any(map(_unlike, _edges(reading), _edges(other))) for other in ranked):
+            ranked.append(reading)
+    return ranked
 
 
 def _unlike(mine: Index, theirs: Index) -> bool:
@@ -327,12 +229,8 @@ def log_evidence(fit: Fit) -> float:
     for role, matches in fit.matches.items():
         rows = model.independent(role, estimate.x, matches)
         sigma = rows.sigma * estimate.scatter
-        far = np.abs(rows.values) / sigma
-        loss = np.where(far <= HUBER, 0.5 * far**2, HUBER * far - 0.5 * HUBER**2)
-        density = np.log(np.maximum(rows.speed, SLOWEST) / (sigma * math.sqrt(2.0 * math.pi)))
-        total += float(np.sum(density - loss))
-        # Relative to a reading in which all edges are strays and every rod was missed.
-        total += far.size * (math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS))
+        beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
+        total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
     y = scaled(estimate.x, estimate.sd)
     _, volume = np.linalg.slogdet(estimate.root)
     return total - 0.5 * float(y @ y) - float(volume) + held_back(fit)
@@ -346,60 +244,51 @@ def held_back(fit: Fit) -> float:
         return 0.0
     unit = np.eye(estimate.x.size)[at]
     u = float(np.linalg.norm(np.linalg.solve(estimate.root.T, unit)) * estimate.sd[at])
-    below = -model.kappa(estimate.x) / u
-    if below < _TAIL:
-        return math.log(math.erfc(below / math.sqrt(2.0)))
-    return -0.5 * below**2 - math.log(below * math.sqrt(math.pi / 2.0))
+    below = -model.kappa(estimate.x) / u / math.sqrt(2.0)
+    return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
 
 
 def adjusted(fit: Fit, role: str) -> Guess:
     """Return where an adjustment has a chain begin, as a guess for a further one."""
     at, x = fit.model.unknowns, fit.x
     path = fit.model.trajectory(role, x)
-    one = fit.model.guesses[role]
+    alpha = float(x[at["alpha"]][0]) if role == "impact" else 0.0
     return Guess(
         float(path.time[0]),
         float(path.height[0]),
-        one.alpha + (float(x[at["alpha"]][0]) if role == "impact" else 0.0),
-        path.kappa,
+        fit.model.guesses[role].alpha + alpha,
+        fit.model.kappa(x),
         float(x[at["clock"]][0]),
     )
 
 
-def _together(
-    protocol: Protocol,
-    records: Sequence[ChainRecord],
-    sides: Sequence[_Side],
-    clock_u: float,
-    components: Components,
-) -> Identification:
+def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> Identification:
     """Weigh the readings of all sides against each other, and adjust those that come near."""
-    ranked = sorted(
-        ((_likely(protocol, pair), pair) for pair in itertools.product(*(s.found for s in sides))),
-        key=lambda row: -row[0],
-    )
-    most = ranked[0][0]
-    close = [pair for likely, pair in ranked if most - likely < _CLOSE][:_PAIRS]
+    pairs = []
+    for pair in itertools.product(*readings.values()):
+        together = _simultaneous(model.protocol, [side.guess.release for side in pair])
+        pairs.append((sum(side.evidence for side in pair) + together, pair))
+    pairs.sort(key=lambda row: -row[0])
+    most = pairs[0][0]
+    close = [pair for likely, pair in pairs if most - likely < _CLOSE][:PEAKS]
     tried: list[Reading] = []
     for pair in close:
-        both = list(zip(sides, pair, strict=True))
-        begin: dict[str, Guess] = {
-            side.record.role: side.fall.guess(one.unknowns) for side, one in both
-        }
-        matches: Matches = {
-            side.record.role: side.fall.pairing.numbered(one.edges) for side, one in both
-        }
-        models = [side.model for side in sides]
-        model = DropModel(protocol, records, begin, clock_u, components, models)
-        tried.append(weighed(settle(model, matches)))
-    best, *rest = _ranked(tried, lambda one: _edges(one.fit))
+        sides = dict(zip(readings, pair, strict=True))
+        begun = model.begun({role: side.guess for role, side in sides.items()})
+        matches = {role: model.pairings[role].numbered(side.edges) for role, side in sides.items()}
+        tried.append(weighed(settle(begun, matches)))
+    best, *rest = _ranked(tried)
+    shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:
-        return Identification(None, _shares(best.fit))
+        return Identification(None, shares)
     odds = best.evidence - rest[0].evidence if rest else math.inf
-    if len(ranked) > len(close):
-        odds = min(odds, most - ranked[len(close)][0])
-    other = rest[0].fit if rest else None
-    return Identification(best.fit, _shares(best.fit), odds, best.evidence, other)
+    if len(pairs) > len(close):
+        odds = min(odds, most - pairs[len(close)][0])
+    return Identification(best.fit, shares, odds, best.evidence, rest[0].fit if rest else None)
+
+
+def _shares(model: DropModel, matched: Mapping[str, int]) -> dict[str, float]:
+    return {role: count / max(1, model.records[role].expected) for role, count in matched.items()}
 
 
 def weighed(fit: Fit) -> Reading:
@@ -409,19 +298,49 @@ def weighed(fit: Fit) -> Reading:
     return Reading(fit, evidence if math.isfinite(evidence) else -math.inf)
 
 
-def _shares(fit: Fit) -> dict[str, float]:
-    return {
-        role: count_matched(fit.matches[role]) / max(1, record.expected)
-        for role, record in fit.model.records.items()
-    }
-
-
-def _likely(protocol: Protocol, pair: Sequence[Annealed]) -> float:
-    releases = [float(one.unknowns[RELEASE]) for one in pair]
-    return sum(one.evidence for one in pair) + _simultaneous(protocol, releases)
-
-
 def _simultaneous(protocol: Protocol, releases: Sequence[float]) -> float:
     """Log prior of how far apart two releases are: a Cauchy of the skew that is accepted."""
     apart = (max(releases) - min(releases)) / protocol.accept.release_skew
     return -math.log1p(apart**2)
+
+
+def deciding_gate(one: Fit, other: Fit) -> tuple[str, float]:
+    """Find the beam that would see two falls differ most.
+
+    A beam tells no rod by itself: of each edge of one fall it is compared how far the chain is from
+    where the other fall has its nearest edge. On average over all edges that is most where rods
+    come by at unlike intervals, or first and last ones at unlike moments.
+
+    Parameters
+    ----------
+    one, other
+        Readings of the same drop.
+
+    Returns
+    -------
+    role, height
+        On which side, and how high above the zero of the protocol's heights, m. No hanging rod
+        blocks it.
+    """
+    best = ("", 0.0, -1.0)
+    protocol = one.model.protocol
+    zero = 0.0 if protocol.stated is None else protocol.stated.drop.value - protocol.drop.value
+    for role, record in one.model.records.items():
+        paths = [fit.model.trajectory(role, fit.x) for fit in (one, other)]
+        places, drop = np.array(record.chain.chain.heights), protocol.drop
+        start, blocked = drop.value, np.array(record.chain.widths) / 2.0 + max(CLEARANCE_M, drop.u)
+        for height in np.arange(4e-3, start + float(places.max()), 4e-3).tolist():
+            if np.any(np.abs(start + places - height) < blocked):
+                continue
+            levels = np.sort(height - places)[::-1]
+            levels = levels[levels < min(float(path.height[0]) for path in paths)]
+            if record.ratios is not None:
+                levels = levels[levels > -places.max()]
+            if levels.size == 0:
+                continue
+            mine, theirs = (path.times(levels) for path in paths)
+            apart = np.abs(mine[:, None] - theirs).min(axis=1)
+            mean = float(np.mean(apart * paths[0].heights(mine)[1]))
+            if mean > best[2]:
+                best = role, height, mean
+    return best[0], best[1] + zero

@@ -1,14 +1,13 @@
-"""A chain's way down as a function of everything that is unknown about it, with derivatives.
+"""Ways down of chains as functions of everything that is unknown about them, with derivatives.
 
 Between impacts the path is ballistic (section III.D), or that of g − κv² in air: the same legs as
 in `rig.model.fall` and `rig.model.drag`, but with release time, start, gravity, κ, the relative
 gain at each impact and the place of each rod all free, and with the derivative by each of them on
-request.
+request. One routine serves one fall and many falls of one chain at once.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,11 +16,12 @@ import numpy as np
 
 from rig.analysis.free_flight import (
     fall_for,
-    fall_through,
+    fall_slopes,
     lasting,
-    leg_slopes,
     reach_of,
     reach_slopes,
+    some_air,
+    speed_slope,
 )
 
 if TYPE_CHECKING:
@@ -34,10 +34,12 @@ ONE = np.ones(1)
 COMMON = 4
 RELEASE, START, GRAVITY, DRAG = range(COMMON)
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
+_NO_LESS = 1e-3
+"""Share of its speed that an impact leaves a chain: adjustments try to throw it back up."""
 
 
 class Hits(NamedTuple):
-    """The impacts of a fall, shape ``(rods,)`` each.
+    """The impacts of a fall, shape ``(…, rods)`` each.
 
     Attributes
     ----------
@@ -58,7 +60,7 @@ class Hits(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Derivatives of a trajectory by its parameters, see `Trajectory`."""
+    """Derivatives of a trajectory by its parameters, see `Trajectory`, or by anything else."""
 
     time: Array
     height: Array
@@ -68,18 +70,19 @@ class Slopes(NamedTuple):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Legs of a fall. Leg 0 begins at the release, leg k + 1 at the impact of rod k.
+    """Legs of a fall, or of many. Leg 0 begins at the release, leg k + 1 at the impact of rod k.
 
     Attributes
     ----------
     time, height, speed
-        At the beginning of each leg; speed after the impact, downward positive; shape ``(legs,)``.
+        At the beginning of each leg; speed after the impact, downward positive; shape ``(legs,)``,
+        or ``(falls, legs)``.
     gravity
-        m/s².
+        m/s²; of many falls shape ``(falls, 1)``.
     hits
         `None` where nothing is struck.
     kappa
-        κ of the air, 1/m; what an adjustment tries may be negative.
+        κ of the air, 1/m, likewise; what an adjustment tries may be negative.
     air
         κ of each leg in units of `kappa`, shape ``(legs,)``; of one element where all are alike.
     """
@@ -87,9 +90,9 @@ class Trajectory:
     time: Array
     height: Array
     speed: Array
-    gravity: float
+    gravity: float | Array
     hits: Hits | None = None
-    kappa: float = 0.0
+    kappa: float | Array = 0.0
     air: Array = field(default_factory=lambda: ONE)
 
     @property
@@ -98,10 +101,16 @@ class Trajectory:
         return 0.0 if self.hits is None else float(self.hits.arrival[-1])
 
     def heights(self, times: Array) -> tuple[Array, Array]:
-        """Height of the reference point and its speed (downward positive), shape of `times`."""
+        """Height of the reference point and its speed (downward positive).
+
+        Parameters
+        ----------
+        times
+            Shape ``(times,)``; of many falls also ``(falls, times)``.
+        """
         leg, since = self._legs(times)
-        fallen, speed = fall_for(since, self.speed[leg], self.gravity, self.kappas(leg))
-        return self.height[leg] - fallen, speed
+        fallen, speed, _ = fall_for(since, self.speed.take(leg), self.gravity, self.kappas(leg))
+        return self.height.take(leg) - fallen, speed
 
     def derivatives(self, times: Array, by: Array | None = None) -> Array:
         """Derivatives of the height at fixed times.
@@ -114,43 +123,49 @@ class Trajectory:
         Returns
         -------
         ndarray
-            Shape ``(times, parameters)``, or ``(times, others)``.
+            Shape ``(…, times, parameters)``, or ``(…, times, others)``.
         """
         return self.sights(times, by)[2]
 
     def sights(self, times: Array, by: Array | None = None) -> tuple[Array, Array, Array]:
         """What `heights` and `derivatives` say, with every leg gone through once."""
         leg, since = self._legs(times)
-        slopes = self.slopes
-        fallen, speed, by_speed, by_gravity, by_kappa = leg_slopes(
-            since, self.speed[leg], self.gravity, self.kappas(leg)
-        )
-        pull = by_gravity, by_kappa * self.shares(leg)
-        pulls = np.zeros((2, slopes.time.shape[1]))  # by gravity and by κ
-        pulls[0, GRAVITY] = pulls[1, DRAG] = 1.0
-        begin = [slopes.time, slopes.height, slopes.speed]
-        if by is not None:
-            begin, pulls = [one @ by for one in begin], by[[GRAVITY, DRAG]]
+        slopes = self.slopes if by is None else self.slopes_by(by)
+        flight = self.gravity, self.kappas(leg)
+        begin = self.speed.take(leg)
+        fall = fallen, speed, by_speed = fall_for(since, begin, *flight)
+        by_gravity, by_kappa = fall_slopes(since, begin, fall, *flight)
+        time, height, faster = (part.reshape(-1, part.shape[-1]) for part in slopes[:3])
         # In place: these are the largest arrays of an adjustment.
-        found = begin[0].take(leg, axis=0)
-        found *= speed[:, None]
-        part = begin[1].take(leg, axis=0)
-        found += part
-        begin[2].take(leg, axis=0, out=part, mode="clip")
-        part *= by_speed[:, None]
-        found -= part
-        pulled = np.flatnonzero(pulls.any(axis=0))
-        found[:, pulled] -= np.stack(pull, axis=1) @ pulls[:, pulled]
-        return self.height[leg] - fallen, speed, found
+        moved = time.take(leg, axis=0)
+        moved *= speed[..., None]
+        part = height.take(leg, axis=0)
+        moved += part
+        faster.take(leg, axis=0, out=part, mode="clip")
+        part *= by_speed[..., None]
+        moved -= part
+        pulls = self._every if by is None else by
+        pulled = np.flatnonzero(pulls[[GRAVITY, DRAG]].any(axis=0))
+        pull = np.stack([by_gravity, by_kappa * self.shares(leg)], axis=-1)
+        moved[..., pulled] -= pull @ pulls[[GRAVITY, DRAG]][:, pulled]
+        return self.height.take(leg) - fallen, speed, moved
+
+    def passages(self, heights: Array) -> tuple[Array, Array]:
+        """When the reference point comes down to each height, s, and how fast, m/s.
+
+        It is at higher ones at the release.
+        """
+        leg = self._last_before(-self.height, -heights)
+        kappa, speed = self.kappas(leg), self.speed.take(leg)
+        # An adjustment may try a rod that strikes above where the one before it did.
+        reach = reach_of(np.maximum(self.height.take(leg) - heights, 0.0), kappa)
+        arrival = np.sqrt(np.maximum((1.0 - kappa * reach) * speed**2 + self.gravity * reach, 0.0))
+        lasted = lasting(reach, speed, arrival, self.gravity, kappa)
+        return self.time.take(leg) + lasted, arrival
 
     def times(self, heights: Array) -> Array:
         """When the reference point comes down to each height, s; the release for higher ones."""
-        leg = np.searchsorted(-self.height, -heights, side="right") - 1
-        leg = np.maximum(leg, 0)
-        distance = np.maximum(self.height[leg] - heights, 0.0)
-        _, lasted = fall_through(distance, self.speed[leg], self.gravity, self.kappas(leg))
-        found: Array = self.time[leg] + lasted
-        return found
+        return self.passages(heights)[0]
 
     def squares(self, levels: Array) -> tuple[Array, Array, Array]:
         """Squares of the speeds with which the reference point comes down to some levels.
@@ -164,23 +179,23 @@ class Trajectory:
         begins = -self.height[: max(1, self.height.size - 1)]
         leg = np.maximum(np.searchsorted(begins, -levels, side="left") - 1, 0)
         kappa, share, distance = self.kappas(leg), self.shares(leg), self.height[leg] - levels
-        reach, by_kappa = reach_slopes(distance, kappa)
+        reach = reach_of(distance, kappa)
         begin, left = self.speed[leg], 1.0 - kappa * reach
         squares = np.maximum(left * begin**2 + self.gravity * reach, np.finfo(float).tiny)
         steeper = 2.0 * (self.gravity - kappa * squares)
         slopes = (2.0 * left * begin)[:, None] * self.slopes.speed[leg]
         slopes += steeper[:, None] * self.slopes.height[leg]
         slopes[:, GRAVITY] += reach
-        slopes[:, DRAG] += share * (self.gravity * by_kappa - 2.0 * distance * left * begin**2)
+        slopes[:, DRAG] += share * _by_kappa(distance, reach, begin, self.gravity, kappa)
         return squares, slopes, steeper
 
     def kappas(self, leg: Index) -> float | Array:
         """κ on each of some legs; one number where it is the same on all."""
-        return self.kappa * self.shares(leg)
+        return some_air(self.kappa * self.shares(leg))
 
     def shares(self, leg: Index) -> float | Array:
         """`air` of some legs, likewise."""
-        return float(self.air[0]) if self.air.size == 1 else self.air[leg]
+        return float(self.air[0]) if self.air.size == 1 else self.air.take(leg, mode="wrap")
 
     def loose(self, times: Array) -> Array:
         """How loose the chain is at each time: 1/M for M rods that still fall, 0 if none struck."""
@@ -190,45 +205,143 @@ class Trajectory:
         left: Array = np.maximum(self.time.size - 1 - struck, 1)
         return np.where(struck > 0, 1.0 / left, 0.0)
 
-    def _legs(self, times: Array) -> tuple[NDArray[np.intp], Array]:
-        leg = np.maximum(np.searchsorted(self.time, times, side="right") - 1, 0)
-        return leg, np.maximum(times - self.time[leg], 0.0)
+    def _legs(self, times: Array) -> tuple[Index, Array]:
+        """On which leg each fall is at each time, in the line of all legs, and for how long."""
+        leg = self._last_before(self.time, times)
+        return leg, np.maximum(times - self.time.take(leg), 0.0)
+
+    def _last_before(self, begins: Array, moments: Array) -> Index:
+        """Return the last leg that has begun, in the line of all falls' legs."""
+        if begins.ndim == 1:
+            return np.maximum(np.searchsorted(begins, moments, side="right") - 1, 0)
+        count, size = begins.shape
+        every = np.broadcast_to(moments, (count, moments.shape[-1]))
+        leg = [np.searchsorted(*row, side="right") for row in zip(begins, every, strict=True)]
+        found: Index = np.maximum(np.array(leg) - 1, 0) + size * np.arange(count)[:, None]
+        return found
+
+    @property
+    def _every(self) -> Array:
+        return np.eye(COMMON if self.hits is None else COMMON + 2 * self.hits.gain.shape[-1])
 
     @cached_property
     def slopes(self) -> Slopes:
         """All derivatives; whoever only asks where the chain is does without them."""
+        return self.slopes_by(self._every)
+
+    def slopes_by(self, by: Array) -> Slopes:
+        """Derivatives by anything that parameters depend on, shape ``(parameters, others)``.
+
+        Squared speeds before and after each impact are E_k and f_k²·E_k; with q_k = e^(−2κd_k),
+        E_k = q_k·f²_{k−1}·E_{k−1} + g·(1 − q_k)/κ, and so are its derivatives but for what each leg
+        adds.
+        """
+        common = by[:COMMON]
         if self.hits is None:
-            time, height, speed = (np.zeros((1, COMMON)) for _ in range(3))
-            time[0, RELEASE] = height[0, START] = 1.0
-            return Slopes(time, height, speed, np.zeros(COMMON))
-        return _struck_slopes(self)
+            nothing = np.zeros((*self.time.shape, by.shape[1]))
+            return Slopes(
+                nothing + common[RELEASE], nothing + common[START], nothing, nothing[..., 0, :]
+            )
+        gain, places = by[COMMON:].reshape(2, -1, by.shape[1])
+        distance, arrival, gains, ratio = self.hits
+        row = np.arange(arrival.shape[-1])
+        kappa, share = self.kappas(row), self.shares(row)
+        factor = _factors(gains)
+        d_factor = ratio[:, None] * gain
+        d_height = np.concatenate([common[[START]], -places])
+        way = d_height[:-1] - d_height[1:]
+        reach = reach_of(distance, kappa)
+        left, begin = 1.0 - kappa * reach, self.speed[..., :-1]
+        by_kappa = share * _by_kappa(distance, reach, begin, self.gravity, kappa)
+        alone = (2.0 * (self.gravity - kappa * arrival**2))[..., None] * way
+        alone += reach[..., None] * common[GRAVITY] + by_kappa[..., None] * common[DRAG]
+        kicked = 2.0 * left[..., 1:] * (factor * arrival**2)[..., :-1]
+        alone[..., 1:, :] += kicked[..., None] * d_factor[:-1]
+        d_arrival = _carried(left, factor, alone) / (2.0 * arrival)[..., None]
+        d_speed = np.zeros((*self.time.shape, by.shape[1]))
+        d_speed[..., 1:, :] = factor[..., None] * d_arrival + arrival[..., None] * d_factor
+        # A leg lasts until its way is done.
+        lasted = np.diff(self.time)
+        by_speed = speed_slope(lasted, distance, self.gravity, kappa)
+        fall = distance, arrival, by_speed
+        by_gravity, by_kappa = fall_slopes(lasted, begin, fall, self.gravity, kappa)
+        legs = way - by_speed[..., None] * d_speed[..., :-1, :]
+        legs -= by_gravity[..., None] * common[GRAVITY]
+        legs -= (share * by_kappa)[..., None] * common[DRAG]
+        legs /= arrival[..., None]
+        d_time = np.zeros_like(d_speed)
+        np.cumsum(legs, axis=-2, out=d_time[..., 1:, :])
+        d_time += common[RELEASE]
+        return Slopes(
+            d_time, np.broadcast_to(d_height, d_speed.shape), d_speed, d_arrival[..., -1, :]
+        )
+
+
+def _by_kappa(
+    distance: Array, reach: Array, speed: Array, gravity: float | Array, kappa: float | Array
+) -> Array:
+    """Derivative of the squared speed at the end of a leg by its κ."""
+    left = 1.0 - kappa * reach
+    slope: Array = gravity * reach_slopes(distance, reach, kappa) - 2.0 * distance * left * speed**2
+    return slope
+
+
+def _factors(gains: Array) -> Array:
+    """By what factor impacts make a chain faster."""
+    return np.maximum(1.0 + gains, _NO_LESS)
+
+
+def _carried(left: Array, factor: Array, alone: Array) -> Array:
+    """Sum up what each leg adds to a squared speed, and what is left of all legs before.
+
+    Parameters
+    ----------
+    left, factor
+        What is left of it at the end of a leg, and by what factor an impact makes a chain faster;
+        shape ``(…, rods)``.
+    alone
+        Shape ``(…, rods)`` or ``(…, rods, others)``.
+    """
+    product = np.ones_like(factor)
+    np.cumprod(left[..., 1:] * factor[..., :-1] ** 2, axis=-1, out=product[..., 1:])
+    product = np.maximum(product, np.finfo(float).tiny)
+    if alone.ndim > product.ndim:
+        return product[..., None] * np.cumsum(alone / product[..., None], axis=-2)
+    carried: Array = product * np.cumsum(alone / product, axis=-1)
+    return carried
 
 
 def free_trajectory(
-    release: float, start: float, gravity: float, kappa: float = 0.0, air: Array = ONE
+    release: float,
+    start: float | Array,
+    gravity: float | Array,
+    kappa: float | Array = 0.0,
+    air: Array = ONE,
 ) -> Trajectory:
-    """Fall from rest of a chain that strikes nothing; arguments as in `Trajectory`."""
-    return Trajectory(
-        np.array([release]), np.array([start]), np.zeros(1), gravity, kappa=kappa, air=air
-    )
+    """Fall from rest of a chain that strikes nothing; arguments as in `struck_trajectory`."""
+    height = start + np.zeros(1)
+    zero = np.zeros_like(height)
+    return Trajectory(release + zero, height, zero, gravity, kappa=kappa, air=air)
 
 
 def struck_trajectory(
     release: float,
-    start: float,
-    gravity: float,
+    start: float | Array,
+    gravity: float | Array,
     gains: Array,
     ratios: Array,
     places: Array,
-    kappa: float = 0.0,
+    kappa: float | Array = 0.0,
     air: Array = ONE,
 ) -> Trajectory:
-    """Fall of a chain whose rods strike the surface one after another.
+    """Fall of a chain whose rods strike the surface one after another, or many such falls.
 
     Parameters
     ----------
+    start, gravity
+        m, m/s²; of many falls shape ``(falls, 1)``.
     gains
-        α of each impact, shape ``(rods,)``.
+        α of each impact, shape ``(rods,)`` or ``(falls, rods)``.
     ratios
         ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, 0 for the top rod; shape ``(rods,)``.
     places
@@ -241,73 +354,17 @@ def struck_trajectory(
     Trajectory
         Its parameters are the common ones, then α of each rod, then the place of each rod.
     """
-    rods = len(places)
     gain = gains * ratios
-    height = np.empty(rods + 1)
-    height[0] = start
-    np.negative(places, out=height[1:])
-    distance = height[:-1] - height[1:]
-    kappas = kappa * (float(air[0]) if air.size == 1 else air[:rods])
-    reach = reach_of(distance, kappas)
-    # Each leg needs the speed after the one before: a loop over floats is quicker than numpy here.
-    speed, speeds, arrivals = 0.0, [0.0], []
-    legs = np.stack([1.0 - kappas * reach, gravity * reach, 1.0 + gain], axis=1).tolist()
-    for left, gained, factor in legs:
-        arrival = math.sqrt(max(left * speed * speed + gained, 0.0))
-        # What an adjustment tries may throw the chain back up: no chain does.
-        speed = arrival * max(factor, 1e-3)
-        speeds.append(speed)
-        arrivals.append(arrival)
-    begins, ends = np.array(speeds), np.array(arrivals)
-    lasted = lasting(reach, begins[:-1], ends, gravity, kappas)
-    time = np.cumsum(np.concatenate([[release], lasted]))
-    hits = Hits(distance, ends, gain, ratios)
-    return Trajectory(time, height, begins, gravity, hits, kappa, air)
-
-
-def _struck_slopes(path: Trajectory) -> Slopes:
-    """Derivatives of a struck chain's legs.
-
-    With squared speeds E_k before and f_k²·E_k after each impact, and q_k = e^(−2κd_k),
-    E_k = q_k·f²_{k−1}·E_{k−1} + g·(1 − q_k)/κ: its derivatives are sums of those of single legs,
-    each times the product of q f² from there on.
-    """
-    hits, gravity, speed = path.hits, path.gravity, path.speed
-    assert hits is not None
-    rods = hits.distance.size
-    size = COMMON + 2 * rods
-    row = np.arange(rods)
-    kappa, share = path.kappas(row), path.shares(row)
-    places, gain = COMMON + rods + row, COMMON + row
-    factor, arrival = 1.0 + hits.gain, hits.arrival
-    left = np.exp(-2.0 * kappa * hits.distance)
-    # In row k and column j of the product: what is left at impact k of E_j.
-    steps = np.ones((rods, rods))
-    kept = left[1:] * factor[:-1] ** 2
-    steps[1:] = np.where(row[1:, None] > row, kept[:, None], 1.0)
-    product = np.tril(np.cumprod(steps, axis=0))
-    steeper = 2.0 * (gravity - kappa * arrival**2)  # of E, by the way
-    alone = np.zeros((rods, size))
-    alone[0, START] = steeper[0]
-    alone[:, GRAVITY], by_kappa = reach_slopes(hits.distance, kappa)
-    alone[:, DRAG] = share * (gravity * by_kappa - 2.0 * hits.distance * left * speed[:-1] ** 2)
-    alone[row, places] = steeper
-    alone[row[1:], places[:-1]] = -steeper[1:]
-    alone[row[1:], gain[:-1]] = left[1:] * (2.0 * factor * arrival**2 * hits.ratio)[:-1]
-    d_arrival = (product @ alone) / (2.0 * arrival)[:, None]
-    d_speed = np.zeros((rods + 1, size))
-    d_speed[1:] = factor[:, None] * d_arrival
-    d_speed[1 + row, gain] += arrival * hits.ratio
-    d_height = np.zeros((rods + 1, size))
-    d_height[0, START] = 1.0
-    d_height[1 + row, places] = -1.0
-    # A leg lasts until its way is done.
-    lasted = np.diff(path.time)
-    _, _, by_speed, by_gravity, by_kappa = leg_slopes(lasted, speed[:-1], gravity, kappa)
-    legs = np.zeros((rods + 1, size))
-    legs[0, RELEASE] = 1.0
-    legs[1:] = d_height[:-1] - d_height[1:] - by_speed[:, None] * d_speed[:-1]
-    legs[1:, GRAVITY] -= by_gravity
-    legs[1:, DRAG] -= share * by_kappa
-    legs[1:] /= arrival[:, None]
-    return Slopes(np.cumsum(legs, axis=0), d_height, d_speed, d_arrival[-1])
+    height = np.empty((*gain.shape[:-1], gain.shape[-1] + 1))
+    height[..., :1], height[..., 1:] = start, -places
+    distance = height[..., :-1] - height[..., 1:]
+    kappas = some_air(kappa * (float(air[0]) if air.size == 1 else air[: len(places)]))
+    reach, factor = reach_of(distance, kappas), _factors(gain)
+    squares = _carried(1.0 - kappas * reach, factor, gravity * reach)
+    arrival = np.sqrt(np.maximum(squares, 0.0))
+    speed, time = np.zeros_like(height), np.zeros_like(height)
+    speed[..., 1:] = factor * arrival
+    lasted = lasting(reach, speed[..., :-1], arrival, gravity, kappas)
+    np.cumsum(lasted, axis=-1, out=time[..., 1:])
+    hits = Hits(distance, arrival, gain, ratios)
+    return Trajectory(release + time, height, speed, gravity, hits, kappa, air)

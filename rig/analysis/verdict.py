@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.annealing import MISSED
-from rig.analysis.deciding import deciding_gate
 from rig.analysis.diagnoses import IMPLAUSIBLE, diagnose
 from rig.analysis.distributions import most_by_chance
+from rig.analysis.identify import deciding_gate
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import disagreements
 from rig.reasons import Reason, make_reason

@@ -16,8 +16,7 @@ import numpy as np
 
 from rig.analysis.annealing import MISSED
 from rig.analysis.components import above, stated
-from rig.analysis.deciding import deciding_gate
-from rig.analysis.identify import identify
+from rig.analysis.identify import deciding_gate, identify
 from rig.analysis.verdict import pattern_faults
 from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, observed, records_of, trajectory
 from rig.protocol.contact import at_contact

@@ -152,7 +152,8 @@ class Contact:
         Whether heights are measured from the board: where rods touch it follows from what they
         are like, and `level` is what that leaves out.
     heaped
-        Whether rods strike others that lie there; no protocol says it, see `rig.analysis.heap`.
+        Whether rods strike others that lie there; no protocol says it, see
+            `rig.analysis.chain_records.heap_heights`.
     """
 
     level: Quantity = DEFAULTS["contact.level"]

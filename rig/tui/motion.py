@@ -118,7 +118,7 @@ def _table(edges: Table, hz: float, *, thin: bool) -> EdgeArrays:
         for channel in np.unique(table[:, 1]):  # where counting has to begin
             kept[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
         table = table[kept]
-    return EdgeArrays(table[:, 0] / hz, table[:, 1].astype(np.intp), table[:, 2].astype(np.bool_))
+    return EdgeArrays.of(table, hz)
 
 
 class Separation(NamedTuple):

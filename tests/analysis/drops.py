@@ -69,7 +69,7 @@ class Case:
         """One chain with the trains of its gates."""
         struck = role == "impact"
         chain = self.protocol.chains[self.run.impact if struck else self.run.free]
-        edges = EdgeArrays.of(self.drop, self.scale.hz)
+        edges = EdgeArrays.of(self.drop.edges, self.scale.hz)
         higher = (0.0,) * chain.chain.rods if struck else None
         trains = [
             edge_train(number, gate, chain, edges, self.protocol.drop.value, higher)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.analysis.annealing import ALPHA, RELEASE, START, UNKNOWNS, SideFall
-from rig.analysis.identify import _Side, adjusted
+from rig.analysis.identify import adjusted, stated_model
 from rig.analysis.verdict import LEAD, SUPPORT
 from rig.model.impact import impact_on
 from rig.protocol.protocol import Protocol
@@ -78,7 +78,8 @@ def test_alpha_is_found_far_from_what_the_model_expects(restitution):
 def falls_of(one: Case, protocol: Protocol | None = None) -> list[SideFall]:
     """What annealing knows of each side."""
     protocol = protocol or one.protocol
-    return [_Side(protocol, record, CLOCK_U, STATED).fall for record in one.records]
+    model = stated_model(protocol, one.records, CLOCK_U, STATED)
+    return [SideFall.of(model, role) for role in model.records]
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -93,7 +94,7 @@ def test_the_first_start_is_the_fall(scene):
         if fall.record.ratios is not None:
             chain = fall.record.chain.chain
             alpha = impact_on(one.protocol.surface, chain, one.run.incline_deg).alpha
-        assert abs(starts[0, ALPHA] - alpha) < 0.05
+        assert abs(starts[0, ALPHA] * fall.sd[ALPHA] + fall.stated.alpha - alpha) < 0.05
 
 
 def test_votes_are_only_counted_where_a_release_may_be():
@@ -102,8 +103,7 @@ def test_votes_are_only_counted_where_a_release_may_be():
         for begin, end in ((-0.01, 0.01), (0.02, 0.2)):
             window = best[RELEASE] + begin, best[RELEASE] + end
             starts, votes = next(fall.starts(window))
-            # Half the widest vote is a window's edge.
-            assert all(window[0] - 0.01 < one[RELEASE] < window[1] + 0.01 for one in starts)
+            assert all(window[0] - 0.01 < start[RELEASE] < window[1] + 0.01 for start in starts)
             assert (max(votes) > 0.95 * most) == (begin < 0.0)
         assert not next(fall.starts((-np.inf, -60.0)))[1].size
 
@@ -112,15 +112,15 @@ def test_no_chain_begins_below_what_it_strikes():
     """A drop stated so badly that some starts within its uncertainty are no starts."""
     low = replace(UNIFORM, drop=Quantity(0.01, 0.01))
     for fall in falls_of(RECORD, low):
-        nodes = fall.nodes()
-        assert len(np.unique(nodes[:, START])) > 1
-        assert (0.01 + nodes[:, START] > 0.0).all()
+        start = 0.01 + fall.nodes()[:, START] * fall.sd[START]
+        assert len(np.unique(start)) > 1
+        assert (start > 0.0).all()
 
 
 def test_what_is_likeliest_is_tried_first():
     """And nothing further off than any edge could tell."""
     for fall in falls_of(RECORD, replace(UNIFORM, drop=Quantity(0.18, 0.02))):
-        off = fall.nodes() / np.where(fall.sd > 0.0, fall.sd, 1.0)
+        off = fall.nodes()
         unlikely = (off**2).sum(axis=1)
         assert unlikely[0] < 1e-6  # in air there is no less than next to none
         assert (np.diff(unlikely) > -1e-9).all()
@@ -132,17 +132,15 @@ def test_derivatives_are_those_of_the_heights(scene):
     """Of every unknown, at falls that differ, beside differences of twice the size."""
     rng = np.random.default_rng(3)
     for fall in falls_of(case(SCENES[scene], Dials.quiet())):
-        sd = np.where(fall.sd > 0.0, fall.sd, 0.0)
-        x = 0.3 * sd * rng.uniform(0.1, 1.0, (4, UNKNOWNS))
-        x[:, RELEASE] = 0.02
-        times = fall.pairing.times
-        _, _, slopes = fall.sights(x, times)
-        for name in np.flatnonzero((sd > 0.0) | (np.arange(UNKNOWNS) == RELEASE)):
+        falls = 0.3 * rng.uniform(0.1, 1.0, (4, UNKNOWNS)) * (fall.sd > 0.0)
+        falls[:, RELEASE] = 0.02
+        slopes = fall.sights(falls)[2]
+        for name in np.flatnonzero(fall.sd > 0.0):
             step = np.zeros(UNKNOWNS)
-            step[name] = 2e-5 if name == RELEASE else 1e-3 * sd[name]
-            up, down = (fall.heights(x + sign * step, times)[0] for sign in (1, -1))
+            step[name] = 2e-5 if name == RELEASE else 1e-3
+            up, down = (fall.sights(falls + sign * step)[0] for sign in (1, -1))
             assert np.median(np.abs((up - down) / (2.0 * step[name]) - slopes[..., name])) < (
-                1e-3 * np.abs(slopes[..., name]).max() + 1e-9
+                1e-5 * np.abs(slopes[..., name]).max() + 1e-9
             )
 
 
@@ -150,8 +148,8 @@ def test_falls_together_are_as_each_alone():
     """However many begin at once, each finds what it would by itself."""
     for fall in falls_of(RECORD):
         starts, _ = next(fall.starts())
-        best = max(fall.anneal(starts), key=lambda one: one.evidence)
-        alone = max(fall.anneal(starts[:1]), key=lambda one: one.evidence)
+        best = max(fall.anneal(starts), key=lambda reading: reading.evidence)
+        alone = max(fall.anneal(starts[:1]), key=lambda reading: reading.evidence)
         np.testing.assert_array_equal(best.edges, alone.edges)
         assert best.evidence == pytest.approx(alone.evidence, abs=0.5)
 

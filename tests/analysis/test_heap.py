@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.chain_records import heap_heights, on_heap, strike_heights
 from rig.analysis.drop import fit_drop
-from rig.analysis.heap import heap_heights, on_heap, strike_heights
 from rig.bench.falls import Asked, falls, time_scale
 from rig.model.surface import Surface
 from rig.protocol.plan import runs as planned

@@ -12,7 +12,7 @@ from scipy.special import log_ndtr
 
 from rig.analysis import identify
 from rig.analysis.annealing import MISSED, STRAYS
-from rig.analysis.deciding import deciding_gate
+from rig.analysis.identify import deciding_gate
 from rig.analysis.verdict import LEAD, pattern_faults
 from rig.errors import InputError
 from rig.protocol import reader

@@ -45,8 +45,7 @@ def flickers(drop, channel):
 @given(GAPS)
 def test_of_each_long_flicker_both_ends_are_left_and_every_edge_is_counted(gaps):
     drop = drop_of([*gaps, *[(1, 1)] * 100])
-    edges = EdgeArrays.of(drop, HZ)
-    numbers = edges.numbers if edges.whole is not None else np.arange(len(drop.edges))
+    edges = EdgeArrays.of(drop.edges, HZ)
     left = {}
     for channel in range(3):
         ends = [
@@ -58,11 +57,11 @@ def test_of_each_long_flicker_both_ends_are_left_and_every_edge_is_counted(gaps)
         for group in flickers(drop, channel):
             long = (drop.edges[group[-1]].tick - drop.edges[group[0]].tick) / HZ
             left |= dict.fromkeys(group, long)
-        assert numbers[edges.of_channel(channel)].tolist() == ends
+        assert edges.numbers[edges.of_channel(channel)].tolist() == ends
         total = sum(edge.channel == channel for edge in drop.edges)
         assert edges.count_thinned(channel) == total - len(ends)
-    assert edges.burst == pytest.approx([left[n] for n in numbers.tolist()])
-    assert len(thinned(drop, HZ).edges) == numbers.size
+    assert edges.burst == pytest.approx([left[n] for n in edges.numbers.tolist()])
+    assert len(thinned(drop, HZ).edges) == edges.numbers.size
 
 
 @pytest.mark.parametrize("count", [1_000, 100_000])
