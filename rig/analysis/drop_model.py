@@ -51,7 +51,7 @@ class DropModel:
     ----------
     protocol
         The scene.
-    sides
+    records
         The chains with their trains.
     guesses
         First guess for each side, by role.
@@ -59,8 +59,6 @@ class DropModel:
         Relative standard uncertainty of the time scale.
     components
         How much everything scatters; as the protocol states it if not given.
-    sides
-        Models of these same records: what was made of their trains need not be made again.
 
     Attributes
     ----------
@@ -76,7 +74,6 @@ class DropModel:
         guesses: Mapping[str, Guess],
         clock_u: float,
         components: Components | None = None,
-        sides: Sequence[DropModel] = (),
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
@@ -89,23 +86,16 @@ class DropModel:
         self.components: Components = components or stated(protocol)
         self.suspects: tuple[Unknown, ...] = ()
         self.owners: Mapping[str, str] = {}
-        made = {role: model for model in sides for role in model.records}
-        self.expected: dict[str, Expected] = {}
-        self.pairings: dict[str, Pairing] = {}
-        for role, record in self.records.items():
-            model = made.get(role)
-            self.expected[role] = model.expected[role] if model else Expected.of(record, protocol)
-            self.pairings[role] = (
-                model.pairings[role] if model else Pairing.of(record.trains, _widths(record))
-            )
-        self.discrepancy: Discrepancy  # where a chain strikes
+        self.expected: dict[str, Expected] = {
+            role: Expected.of(record, protocol) for role, record in self.records.items()
+        }
+        self.pairings: dict[str, Pairing] = {
+            role: Pairing.of(record.trains, _widths(record))
+            for role, record in self.records.items()
+        }
         if "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
-            self.discrepancy = (
-                made["impact"].discrepancy
-                if "impact" in made
-                else Discrepancy.of(record, edges, protocol, self._kappa)
-            )
+            self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
         self._held: dict[tuple[str, str], tuple[object, Any]] = {}
         self.unknowns = Unknowns(self)
         self.slopes = {role: side_slopes(self, role) for role in self.records}
@@ -136,11 +126,7 @@ class DropModel:
 
     def begun(self, guesses: Mapping[str, Guess]) -> DropModel:
         """Return the same drop with other first guesses."""
-        other = copy(self)
-        other.guesses = guesses
-        other.unknowns = Unknowns(other)
-        other._paths, other._seen = {}, {}
-        return other
+        return self.changed(guesses=guesses)
 
     def under(self, protocol: Protocol) -> DropModel:
         """Return the same drop with the priors of another protocol, alike but for these."""
