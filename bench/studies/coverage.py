@@ -343,9 +343,8 @@ def _shared(
     rig: Rig, analysis: Analysis, drops: Mapping[int, SimulatedDrop]
 ) -> Iterator[tuple[str, Measured, float]]:
     """Yield what drops of one rig say together, and what is true: g, κ, and coefficients."""
-    protocol, scale = reader.parse(rig.text), time_scale(rig.seed)
-    runs = ((one, drops[one.run.number].drop, scale) for one in analysis.runs)
-    check = check_gravity(protocol, runs)
+    protocol = reader.parse(rig.text)
+    check = check_gravity(protocol, analysis.runs)
     if check is not None:
         true = next(iter(drops.values())).truth["gravity_m_s2"]
         yield "gravity_m_s2", check.measured, true
