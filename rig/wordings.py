@@ -562,6 +562,8 @@ WORDINGS: dict[str, Wording] = {
         "compare sessions that have at least one incline in common"),
     "option_for_one_session": _void(
         "{options}: for one session only", "name one session, or leave these options out"),
+    "option_for_several_sessions": _void(
+        "{options}: for several sessions only", "name more sessions, or leave these options out"),
     "session_repeated": _void(
         "{path} repeats {other}: {drops} drops are the same",
         "name each session once; a copy and its original are one session"),
