@@ -356,8 +356,7 @@ def _means(session: SimulatedSession, steady: Sequence[SimulatedDrop]) -> Iterat
 def _shared(rig: Rig, session: SimulatedSession) -> Iterator[Interval]:
     """Yield what drops of one rig say together, and what is true: g, κ, and coefficients."""
     protocol, analysis = session.protocol, session.analysis
-    results = [(result, fall.drop, scale) for result, fall, scale in session.results()]
-    check = check_gravity(protocol, results)
+    check = check_gravity(protocol, analysis.runs)
     if check is not None:
         true = next(fall.truth for fall, _ in session.drops.values())["gravity_m_s2"]
         yield Interval("gravity_m_s2", check.measured, true)

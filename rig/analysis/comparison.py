@@ -93,8 +93,8 @@ class Comparison:
 
     def json(self) -> dict[str, Any]:
         """One of ``comparison``."""
-        said = attributes(self, "quantity", "chi2", "degrees", "p")
-        return said | {"inclines": plain(self.differences)}
+        fields = attributes(self, "quantity", "chi2", "degrees", "p")
+        return fields | {"inclines": plain(self.differences)}
 
 
 def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[Comparison, ...]:
@@ -114,7 +114,7 @@ def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[
     tuple of Comparison
         One a measurand that is measured and predicted, and may differ at all.
     """
-    found = []
+    comparisons = []
     models = [predicted_run(protocol, runs[0].run) for runs in cases]
     slopes = [coefficient_slopes(protocol, runs[0].run) for runs in cases]
     for name in (row.name for row in averaged()):
@@ -130,8 +130,8 @@ def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[
         ]
         comparison = _compare(name, lines) if lines else None
         if comparison is not None:
-            found.append(comparison)
-    return tuple(found)
+            comparisons.append(comparison)
+    return tuple(comparisons)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,13 +145,14 @@ class _Line:
 
     @property
     def difference(self) -> float:
-        return fmean(one.value for one in self.values) - self.predicted
+        return fmean(measured.value for measured in self.values) - self.predicted
 
     @property
     def deviations(self) -> list[Deviation]:
         """Of each value; of what no fit has made its own uncertainty is all that is known."""
         return [
-            one.deviation or Deviation(one.u**2, one.degrees, (0.0,), (0.0,)) for one in self.values
+            measured.deviation or Deviation(measured.u**2, measured.degrees, (0.0,), (0.0,))
+            for measured in self.values
         ]
 
 
@@ -169,7 +170,7 @@ def _compare(name: str, lines: Sequence[_Line]) -> Comparison | None:
         Difference(line.difference, math.sqrt(u2), condition=line.condition, n=len(line.values))
         for line, u2 in zip((lines[n] for n in kept), np.diag(covariance).tolist(), strict=True)
     )
-    off = np.array([one.value for one in differences])
+    off = np.array([each.value for each in differences])
     return Comparison(name, float(off @ np.linalg.solve(covariance, off)), differences)
 
 
@@ -181,20 +182,20 @@ def _parts(lines: Sequence[_Line]) -> tuple[Array, Array]:
     """
     own, plus, minus = [], [], []
     seen, more, degrees = 0.0, 0, math.inf
-    alike = len({len(one.plus) for line in lines for one in line.deviations}) == 1
+    alike = len({len(drop.plus) for line in lines for drop in line.deviations}) == 1
     for line in lines:
-        drops = line.deviations if alike else [_by_size(one) for one in line.deviations]
-        gains, losses = (np.array([one[place] for one in drops]) for place in (2, 3))
+        drops = line.deviations if alike else [_by_size(drop) for drop in line.deviations]
+        gains, losses = (np.array([drop[place] for drop in drops]) for place in (2, 3))
         plus.append(gains.mean(axis=0))
         minus.append(losses.mean(axis=0))
-        alone = fmean(one.own for one in drops)
-        own.append(alone / len(drops))
-        degrees = min(degrees, *(one.degrees for one in drops))
+        single = fmean(drop.own for drop in drops)
+        own.append(single / len(drops))
+        degrees = min(degrees, *(drop.degrees for drop in drops))
         # Chains that change places bring their own rods: those differ within a condition.
         foretold = float(gains.var(axis=0).sum() - losses.var(axis=0).sum()) * len(drops)
-        foretold += alone * (len(drops) - 1)
+        foretold += single * (len(drops) - 1)
         if foretold > 0.0:
-            values = np.array([one.value for one in line.values])
+            values = np.array([drop.value for drop in line.values])
             seen += float(values.var()) * len(drops) * (len(drops) - 1) / foretold
             more += len(drops) - 1
     factor = (GUESSED + seen) / (GUESSED + more)
@@ -206,7 +207,7 @@ def _parts(lines: Sequence[_Line]) -> tuple[Array, Array]:
     return factor * np.array(own), gains @ gains.T - losses @ losses.T
 
 
-def _by_size(one: Deviation) -> Deviation:
+def _by_size(deviation: Deviation) -> Deviation:
     """Take what drops share as fully common: of drops by themselves no more is known."""
-    size = float(np.dot(one.plus, one.plus) - np.dot(one.minus, one.minus))
-    return one._replace(plus=(math.sqrt(max(0.0, size)),), minus=(0.0,))
+    size = float(np.dot(deviation.plus, deviation.plus) - np.dot(deviation.minus, deviation.minus))
+    return deviation._replace(plus=(math.sqrt(max(0.0, size)),), minus=(0.0,))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.analysis.distributions import coverage_factor
+from rig.measurands import SEPARATION, SPEED
 from rig.predictions import beside, predict_incline
 
 if TYPE_CHECKING:
@@ -39,22 +41,18 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
         for struck in protocol.strikers
         for incline in sorted(points)
     ]
-    found = [one for _, one in every if one.separation is not None]
-    segments = [
-        ("pile" if "pile" in one.model else "surface")
-        + (f", chain {struck}" if protocol.unlike_chains else "")
-        for struck, one in every
-        if one.separation is not None
-    ]
-    factor = coverage_factor(float("inf"))
+    found = [each for each in every if each[1].separation is not None]
     curves: dict[str, Any] = {
-        "incline_deg": [one.incline_deg for one in found],
-        "segments": segments,
-        "speed_m_s": [one.speed for one in found],
-        "speed_U95_m_s": [factor * (one.speed_u or 0.0) for one in found],
+        "incline_deg": [each.incline_deg for _, each in found],
+        "segments": [
+            ("pile" if "pile" in each.model else "surface")
+            + (f", chain {struck}" if protocol.unlike_chains else "")
+            for struck, each in found
+        ],
         "free_fall_speed_m_s": every[0][1].free_fall_speed,
     }
-    if protocol.two_chains:
-        curves["separation_m"] = [one.separation for one in found]
-        curves["separation_U95_m"] = [factor * (one.separation_u or 0.0) for one in found]
+    for row in (SPEED, SEPARATION) if protocol.two_chains else (SPEED,):
+        sizes = [getattr(each, f"{row.stem}_u") or 0.0 for _, each in found]
+        curves[row.name] = [getattr(each, row.stem) for _, each in found]
+        curves[row.key("U95")] = [coverage_factor(math.inf) * u for u in sizes]
     return curves

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import chain_records, on_heap, thinned
-from rig.analysis.components import Components, stated
+from rig.analysis.components import stated
 from rig.analysis.diagnoses import FEW_GATES, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise
 from rig.analysis.fit import timed
-from rig.analysis.identified import IdentifiedByDrop, identified
+from rig.analysis.gravity import free_gravity
+from rig.analysis.identified import identified
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
-from rig.analysis.result import Audit, DropResult
+from rig.analysis.result import GOOD, Audit, DropResult
 from rig.analysis.verdict import judge, judge_record, verdict_of
 from rig.protocol.contact import at_contact
 from rig.reasons import make_reason
@@ -27,26 +27,60 @@ from rig.threads import one_thread
 from rig.wordings import Severity
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from rig.analysis.chain_records import ChainRecord
+    from rig.analysis.components import Components
     from rig.analysis.fit import Fit
+    from rig.analysis.identified import Identified
+    from rig.analysis.result import Deviation
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
+    from rig.reasons import Reason
     from rig.records import Drop
 
 
-@one_thread
-def fit_drop(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    scale: TimeScale,
-    components: Components | None = None,
-    *,
-    explain: bool = True,
-    known: IdentifiedByDrop | None = None,
-) -> tuple[DropResult, Fit | None]:
-    """Find out what a drop says by itself; keep what a joint fit begins with, too.
+@dataclass(frozen=True, slots=True)
+class DropSummary:
+    """What a drop says by itself, without its equations: to be kept, or sent to another process.
 
-    Parameters
+    Attributes
+    ----------
+    scale
+        At which.
+    explained
+        Whether it was sought what else would explain it if it is void.
+    identified
+        Which rods its edges are; `None` of a damaged record.
+    heaped
+        Whether it is read as one whose rods strike those that lie there.
+    deviations
+        Those of the result's quantities, which are not kept with them.
+    """
+
+    scale: TimeScale
+    explained: bool
+    result: DropResult
+    identified: Identified | None
+    heaped: bool
+    deviations: Mapping[str, Deviation | None]
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether something else than the protocol might explain it, if it were sought."""
+        return self.result.verdict == "void" and not self.result.damaged
+
+    def whole(self) -> DropSummary:
+        """Return what was kept with its deviations in their places."""
+        found = self.result.quantities.items()
+        whole = {name: replace(one, deviation=self.deviations[name]) for name, one in found}
+        return replace(self, result=replace(self.result, quantities=whole))
+
+
+class DropCase(NamedTuple):
+    """A drop to be read.
+
+    Attributes
     ----------
     protocol
         The scene; it must have gates.
@@ -58,34 +92,186 @@ def fit_drop(
         Calibration of its ticks.
     components
         How much everything scatters; as the protocol states it if not given.
+    """
+
+    protocol: Protocol
+    run: Run
+    drop: Drop
+    scale: TimeScale
+    components: Components | None = None
+
+    @one_thread
+    def summary(self, before: DropSummary | None = None, *, explain: bool = True) -> DropSummary:
+        """Find out what the drop says by itself.
+
+        Parameters
+        ----------
+        before
+            What was found of it at any time scale. Results are the same without it.
+        explain
+            As for `fit_drop`.
+        """
+        known = None if before is None else before.identified
+        result, fit, identified = self.read(known, explain=explain)
+        if result.verdict in GOOD and self.protocol.track is None:  # friction is no clock's fault
+            gravity = free_gravity(self.protocol, result, self.drop, self.scale)
+            result = replace(result, gravity=gravity)
+        heaped = fit is not None and fit.model.protocol.contact.heaped
+        deviations = {name: value.deviation for name, value in result.quantities.items()}
+        return DropSummary(self.scale, explain, result, identified, heaped, deviations)
+
+    @one_thread
+    def fit(self, summary: DropSummary) -> Fit | None:
+        """Make again the fit that a summary was made from; `None` where nothing was fitted."""
+        at_level = self._at_contact()
+        case = at_level._on_heap() if summary.heaped else at_level
+        identified = summary.identified
+        if identified is not None and summary.heaped:
+            identified = identified.on_heap
+        if case is None or identified is None or identified.begun is None:
+            return None
+        records = chain_records(case.protocol, self.run, self.drop, self.scale.hz)
+        return case._timed(records, identified)
+
+    @one_thread
+    def read(
+        self, known: Identified | None = None, *, explain: bool = True
+    ) -> tuple[DropResult, Fit | None, Identified | None]:
+        """Read the drop as the protocol states it or, where that is void, as one on a heap."""
+        drop = self.drop
+        if drop.damage:  # the file's, and no finding about chains or gates
+            reasons = (make_reason("record_damaged", text=drop.damage),)
+            audit = Audit()
+            return (
+                DropResult(self.run, drop.attempt, "void", reasons, audit, damaged=True),
+                None,
+                None,
+            )
+        case = self._at_contact()
+        heaped = case._on_heap()
+        result, fit, identified = case._read(known, explain=explain and heaped is None)
+        wrong = _void_by(result) - {"release_skew"}
+        if heaped is None or not wrong:
+            return result, fit, identified
+        on_rods, fit_on_rods, on_heap = heaped._read(identified.on_heap, explain=False)
+        identified = replace(identified, on_heap=on_heap)
+        # That no beam sees the end is why edges are strange, not why others are missed.
+        hidden = {"rods_hide_end"} if wrong != {"edges_missed"} else set()
+        if _void_by(on_rods) <= {"release_skew"} | hidden:
+            return on_rods, fit_on_rods, identified
+        return case._read(identified, explain=True) if explain else (result, fit, identified)
+
+    def _at_contact(self) -> DropCase:
+        run, protocol = self.run, self.protocol
+        components = self.components or stated(protocol)
+        protocol = at_contact(protocol, run.incline_deg, run.impact)
+        return self._replace(protocol=protocol, components=components)
+
+    def _on_heap(self) -> DropCase | None:
+        heaped = on_heap(self.protocol, self.run)
+        return None if heaped is None else self._replace(protocol=heaped)
+
+    def _timed(self, records: Sequence[ChainRecord], identified: Identified) -> Fit:
+        """Adjust at this time scale what was identified at another."""
+        begun = identified.begun
+        assert begun is not None
+        model = DropModel(self.protocol, records, begun.guesses, self.scale.u, self.components)
+        return timed(model, begun, self.scale.hz / identified.scale.hz)
+
+    def _read(
+        self, known: Identified | None, *, explain: bool
+    ) -> tuple[DropResult, Fit | None, Identified]:
+        """Read a drop whose rods strike where the protocol, from the contact point, has them."""
+        protocol, run, drop, scale, components = self
+        assert components is not None
+        records = chain_records(protocol, run, drop, scale.hz)
+        audit = _blank_audit(drop, records)
+        rough = scale.rounded()
+        if known is None or known.scale != rough:
+            known = identified(protocol, run, drop, rough, components)
+        unlike = {reason.text: reason for reason in known.unlike.values()}.values()
+        doubts = silent(protocol, records) if known.unlike else ()
+        early = judge_record(drop, audit, [*unlike, *doubts])
+        if early.verdict == "void" or known.begun is None:
+            reasons = early.reasons
+            if known.unlike and explain:
+                if known.explained is None:
+                    known = replace(known, explained=self._unlike_fall(known, rough))
+                reasons = (*reasons, *(known.explained or ()))
+            return DropResult(run, drop.attempt, early.verdict, reasons, audit), None, known
+        fit = self._timed(records, known)
+        unmatched = unmatched_edges(fit)
+        audit = audit.count(fit.matched, count_unexplained(unmatched))
+        joint = by_itself(fit)
+        budgets = Budgets(joint)
+        measured = budgets.measured(joint.drops[0])
+        if not all(
+            math.isfinite(value) for each in measured.values() for value in (each.value, each.u)
+        ):
+            reasons = (make_reason("no_fall", protocol.vocabulary),)
+            return DropResult(run, drop.attempt, "void", reasons, audit), None, known
+        alone = last_passages(fit)
+        end = judge(protocol, run, drop, audit, measured, fit, alone, unmatched)
+        reasons = end.reasons
+        if not end.known and (explain or end.verdict != "void"):
+            explainer = self._explainer(scale, end.suspects)
+            if end.odd or explainer.asked(fit):
+                causes = [cause for cause in explainer.explain(fit) if cause.whole]
+                if why := explained(causes, protocol.vocabulary, end.accused):
+                    reasons = (*(each for each in reasons if each not in end.accused), *why)
+        result = DropResult(
+            run,
+            drop.attempt,
+            verdict_of(reasons),
+            reasons,
+            audit,
+            measured,
+            fit.rods,
+            fit.estimate.scatter,
+            unmatched=unmatched,
+            last_passages=alone,
+            gates=budgets.gates(joint.drops[0]),
+        )
+        return result, fit, known
+
+    def _unlike_fall(self, known: Identified, scale: TimeScale) -> tuple[Reason, ...]:
+        """Seek what else than the protocol would explain edges that are like no fall."""
+        assert self.protocol.gates is not None
+        gates = self.protocol.gates.gates
+        strange = [n for n, gate in enumerate(gates) if gate.side in known.poor]
+        if not strange and len(gates) <= FEW_GATES:
+            strange = [*range(len(gates))]  # each may see nearly what another should
+        causes = self._explainer(scale, strange).explain(None)
+        return tuple(explained(causes, self.protocol.vocabulary))
+
+    def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
+        assert self.components is not None
+        premise, short = Premise(self.protocol, self.run, scale.hz), thinned(self.drop, scale.hz)
+        return Explainer(premise, short, scale.u, self.components, suspects)
+
+
+def fit_drop(
+    protocol: Protocol,
+    run: Run,
+    drop: Drop,
+    scale: TimeScale,
+    components: Components | None = None,
+    *,
+    explain: bool = True,
+) -> tuple[DropResult, Fit | None]:
+    """Find out what a drop says by itself; keep what a joint fit begins with, too.
+
+    Parameters
+    ----------
+    protocol, run, drop, scale, components
+        As in `DropCase`.
     explain
         Whether to seek what else than the protocol would explain a drop that is void as it is: it
         takes many times as long as all the rest. Of others it is sought where they ask for it.
-    known
-        What was found out before about drops of this protocol, and is found out here. Results are
-        the same with it and without.
     """
-    if drop.damage:  # the file's, and no finding about chains or gates
-        damaged = (make_reason("record_damaged", text=drop.damage),)
-        return DropResult(run, drop.attempt, "void", damaged, Audit(), damaged=True), None
-    known = {} if known is None else known
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
-    heaped = on_heap(protocol, run)
-    fit = partial(_fit_drop, run=run, drop=drop, scale=scale, components=components)
-    as_stated = fit(protocol, explain=explain and heaped is None, known=known)
-    wrong = _void_by(as_stated[0]) - {"release_skew"}
-    if heaped is None or not wrong:
-        return as_stated
-    held = known.get(drop)
-    assert held is not None  # the first fit found it out
-    on_rods = {} if held.on_heap is None else {drop: held.on_heap}
-    as_heaped = fit(heaped, explain=False, known=on_rods)
-    known[drop] = replace(held, on_heap=on_rods[drop])
-    # That no beam sees the end is why edges are strange, not why others are missed.
-    hidden = {"rods_hide_end"} if wrong != {"edges_missed"} else set()
-    if _void_by(as_heaped[0]) <= {"release_skew"} | hidden:
-        return as_heaped
-    return fit(protocol, explain=True, known=known) if explain else as_stated
+    case = DropCase(protocol, run, drop, scale, components)
+    result, fit, _ = case.read(explain=explain)
+    return result, fit
 
 
 def _void_by(result: DropResult) -> set[str]:
@@ -93,83 +279,11 @@ def _void_by(result: DropResult) -> set[str]:
     return {reason.code for reason in result.reasons if reason.severity is Severity.VOID}
 
 
-def _fit_drop(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    scale: TimeScale,
-    components: Components | None,
-    *,
-    explain: bool,
-    known: IdentifiedByDrop,
-) -> tuple[DropResult, Fit | None]:
-    """Fit a drop whose rods strike where a protocol, counted from the contact point, has them."""
-    components = components or stated(protocol)
-    records = chain_records(protocol, run, drop, scale.hz)
+def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:
+    """Count the edges of a drop of which none is any rod's yet."""
     trains = [part for record in records for part in record.trains]
     left_out = sum(part.thinned for part in trains)
-    received = sum(part.times.size for part in trains) + left_out
+    seen = sum(part.times.size for part in trains)
     expected = sum(record.expected for record in records)
     lost = 0 if drop.certificate is None else drop.certificate.overflows
-    blank = Audit(received, 0, expected, received, lost, received - left_out, left_out)
-    rough = scale.rounded()
-    one = known.get(drop)
-    if one is None or one.scale != rough:
-        one = known[drop] = identified(protocol, run, drop, rough, components)
-    unlike = {reason.text: reason for reason in one.unlike.values()}.values()
-    early = judge_record(drop, blank, [*unlike, *(silent(protocol, records) if one.unlike else ())])
-    if early.verdict == "void" or one.begun is None:
-        reasons = early.reasons
-        if one.unlike and explain:
-            if one.explained is None:
-                assert protocol.gates is not None
-                gates = protocol.gates.gates
-                strange = [n for n, gate in enumerate(gates) if gate.side in one.poor]
-                if not strange and len(gates) <= FEW_GATES:
-                    strange = [*range(len(gates))]  # each may see nearly what another should
-                premise = Premise(protocol, run, rough.hz)
-                short = thinned(drop, rough.hz)
-                weigh = Explainer(premise, short, rough.u, components, strange)
-                why = explained(weigh.explain(None), protocol.vocabulary)
-                one = replace(one, explained=tuple(why))
-                known[drop] = one
-            reasons = (*reasons, *(one.explained or ()))
-        return DropResult(run, drop.attempt, early.verdict, reasons, blank), None
-    model = DropModel(protocol, records, one.begun.guesses, scale.u, components)
-    if one.begun.x.size != len(model.unknowns):  # it was found out where other things were unknown
-        known[drop] = identified(protocol, run, drop, rough, components)
-        return _fit_drop(protocol, run, drop, scale, components, explain=explain, known=known)
-    fit = timed(model, one.begun, scale.hz / rough.hz)
-    unmatched = unmatched_edges(fit)
-    audit = blank.count(fit.matched, count_unexplained(unmatched))
-    joint = by_itself(fit)
-    budgets = Budgets(joint)
-    found = budgets.measured(joint.drops[0])
-    if not all(math.isfinite(one.value) and math.isfinite(one.u) for one in found.values()):
-        nothing = (make_reason("no_fall", protocol.vocabulary),)
-        return DropResult(run, drop.attempt, "void", nothing, blank), None
-    alone = last_passages(fit)
-    end = judge(protocol, run, drop, audit, found, fit, alone, unmatched)
-    reasons = end.reasons
-    if not end.known and (explain or end.verdict != "void"):
-        premise = Premise(protocol, run, scale.hz)
-        short = thinned(drop, scale.hz)
-        weigh = Explainer(premise, short, scale.u, components, end.suspects)
-        if end.odd or weigh.asked(fit):
-            whole = [one for one in weigh.explain(fit) if one.whole]
-            if why := explained(whole, protocol.vocabulary, end.accused):
-                reasons = (*(one for one in reasons if one not in end.accused), *why)
-    result = DropResult(
-        run,
-        drop.attempt,
-        verdict_of(reasons),
-        reasons,
-        audit,
-        found,
-        fit.rods,
-        fit.estimate.scatter,
-        unmatched=unmatched,
-        last_passages=alone,
-        gates=budgets.gates(joint.drops[0]),
-    )
-    return result, fit
+    return Audit(seen + left_out, 0, expected, seen + left_out, lost, seen, left_out)

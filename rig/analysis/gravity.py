@@ -18,6 +18,7 @@ import numpy as np
 
 from rig.analysis.adjust import adjust
 from rig.analysis.annealing import Guess
+from rig.analysis.averages import average
 from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import Expected
@@ -25,7 +26,7 @@ from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import CLOSE
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import Adjusted
-from rig.analysis.result import GOOD, Measured, average
+from rig.analysis.result import GOOD, Measured
 from rig.analysis.trajectory import free_trajectory
 from rig.threads import one_thread
 
@@ -81,32 +82,26 @@ class GravityCheck:
         return said | attributes(self, "drops", "normalized_error", "agrees")
 
 
-@one_thread
-def check_gravity(
-    protocol: Protocol, cases: Iterable[tuple[DropResult, Drop, TimeScale]]
-) -> GravityCheck | None:
+def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityCheck | None:
     """Compare the free chain's fall with the protocol's gravity.
 
     Parameters
     ----------
-    protocol
-        The scene.
-    cases
-        Analysed drops; those that are void or rejected do not count.
+    results
+        Of drops; those that are void or rejected do not count.
 
     Returns
     -------
     GravityCheck or None
         `None` where no free chain passes gates.
     """
-    if protocol.gates is None or protocol.track is not None:  # friction is no fault of a clock
-        return None
-    found = [
-        gravity
-        for result, drop, scale in cases
+    # Without a surface it is what is measured, and a joint fit knows it better.
+    every = [
+        result.quantities.get("gravity_m_s2", result.gravity)
+        for result in results
         if result.verdict in GOOD
-        and (gravity := free_gravity(protocol, result, drop, scale)) is not None
     ]
+    found = [gravity for gravity in every if gravity is not None]
     if not found:
         return None
     # Beams, rods and clock are the same in every drop, so that no number of drops averages them.

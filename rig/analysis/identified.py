@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from rig.analysis.chain_records import chain_records
 from rig.analysis.fit import Begun
@@ -51,13 +51,6 @@ class Identified:
     begun: Begun | None = None
     explained: tuple[Reason, ...] | None = None
     on_heap: Identified | None = None
-
-
-class IdentifiedByDrop(Protocol):
-    """Where it is kept what was found out of drops, such as a dictionary."""
-
-    def get(self, drop: Drop, /) -> Identified | None: ...  # noqa: D102
-    def __setitem__(self, drop: Drop, found: Identified, /) -> None: ...
 
 
 def identified(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import chain, islice, repeat
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from rig.analysis.unknowns import ANYTHING
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    from numpy.random import Generator
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
@@ -69,9 +70,8 @@ class Propagated:
     def all(cls, drawn: Iterable[Mapping[str, float]]) -> dict[str, Propagated]:
         """Sum up trials of several quantities by name."""
         values: dict[str, list[float]] = {}
-        for one in drawn:
-            for name, value in one.items():
-                values.setdefault(name, []).append(value)
+        for name, value in chain.from_iterable(trial.items() for trial in drawn):
+            values.setdefault(name, []).append(value)
         return {name: cls.of(np.array(each)) for name, each in values.items()}
 
     def json(self) -> dict[str, float]:
@@ -115,16 +115,18 @@ def until_decided(
     -------
     found, trials
     """
-    drawn = _drawn(fit, seed)
-    every: list[Mapping[str, float]] = []
-    while True:
-        every += islice(drawn, min(max(first, len(every)), most - len(every)))
-        found = Propagated.all(every)
-        if len(every) >= most or all(
-            agreement(measured[name].value, measured[name].u, one, len(every)).decided
-            for name, one in found.items()
-        ):
-            return found, len(every)
+
+    def decided(found: Mapping[str, Propagated], _block: object, trials: int) -> bool:
+        return all(
+            agreement(measured[name].value, measured[name].u, drawn, trials).decided
+            for name, drawn in found.items()
+        )
+
+    sizes, done = [], 0
+    while done < most:
+        sizes.append(min(max(first, done), most - done))
+        done += sizes[-1]
+    return _draw_until(decided, _drawn(fit, seed), sizes)
 
 
 @one_thread
@@ -156,18 +158,33 @@ def until_stable(
     That is: until twice the standard errors of mean, u and both ends of the interval, from block to
     block, are within the tolerance δ.
     """
-    every: list[Mapping[str, float]] = []
-    blocks: list[dict[str, Propagated]] = []
-    while True:
-        new = list(islice(drawn, block))
-        every += new
-        blocks.append(Propagated.all(new))
-        found = Propagated.all(every)
-        if all(
-            _stable([one[name] for one in blocks if name in one], tolerance(whole.u, digits))
+    blocks: list[Mapping[str, Propagated]] = []
+
+    def stable(found: Mapping[str, Propagated], block: Mapping[str, Propagated], _: int) -> bool:
+        blocks.append(block)
+        return all(
+            _stable([each[name] for each in blocks if name in each], tolerance(whole.u, digits))
             for name, whole in found.items()
-        ):
-            return found, len(every)
+        )
+
+    return _draw_until(stable, drawn, repeat(block))
+
+
+def _draw_until(
+    enough: Callable[[Mapping[str, Propagated], Mapping[str, Propagated], int], bool],
+    drawn: Iterator[Mapping[str, float]],
+    sizes: Iterable[int],
+) -> tuple[dict[str, Propagated], int]:
+    """Draw blocks of trials until all of them, the last block and their number are enough."""
+    every: list[Mapping[str, float]] = []
+    found: dict[str, Propagated] = {}
+    for size in sizes:
+        block = list(islice(drawn, size))
+        every += block
+        found = Propagated.all(every)
+        if enough(found, Propagated.all(block), len(every)):
+            break
+    return found, len(every)
 
 
 def _stable(blocks: Sequence[Propagated], within: float) -> bool:
@@ -181,16 +198,13 @@ def _stable(blocks: Sequence[Propagated], within: float) -> bool:
 def _drawn(fit: Fit, seed: int) -> Iterator[dict[str, float]]:
     """Make one trial after another."""
     rng = np.random.default_rng(seed)
-    model, at = fit.model, fit.estimate.x
-    sd = model.unknowns.sd
+    at, sd = fit.estimate.x, _drawable(fit.model.unknowns.sd)
     # A restless drop was weighed by its own scatter, so that is what its edges are shaken by.
-    scatter = _scatters(fit, fit.estimate.scatter)
+    shake = _shaker(fit, fit.estimate.scatter)
     while True:
-        moved = {role: one.draw(rng) for role, one in scatter.items()}
-        centre = _stated(sd) * rng.normal(size=sd.size)
-        shaken = model.shaken(moved)
-        estimate = adjust(shaken, fit.matches, at, centre)
-        yield _values(shaken, estimate.x)
+        shaken = shake(rng)
+        centre = sd * rng.normal(size=sd.size)
+        yield _values(shaken, adjust(shaken, fit.matches, at, centre).x)
 
 
 @one_thread
@@ -206,22 +220,21 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
         For each jointly fitted drop, by JSON name.
     """
     rng = np.random.default_rng(seed)
-    scatters = [_scatters(drop) for drop in joint.drops]
-    found: list[list[dict[str, float]]] = [[] for _ in joint.drops]
+    shakers = [_shaker(drop) for drop in joint.drops]
+    values: list[list[dict[str, float]]] = [[] for _ in joint.drops]
     for _ in range(trials):
-        centre = _stated(joint.sd) * rng.normal(size=joint.sd.size)
+        centre = _drawable(joint.sd) * rng.normal(size=joint.sd.size)
         states, x = [], joint.x
-        for drop, scatter in zip(joint.drops, scatters, strict=True):
-            sd = drop.model.unknowns.sd[drop.own]
-            own = _stated(sd) * rng.normal(size=sd.size)
-            moved = {role: one.draw(rng) for role, one in scatter.items()}
-            states.append(replace(drop, model=drop.model.shaken(moved), centre=own))
+        for drop, shake in zip(joint.drops, shakers, strict=True):
+            sd = _drawable(drop.model.unknowns.sd[drop.own])
+            own = sd * rng.normal(size=sd.size)
+            states.append(replace(drop, model=shake(rng), centre=own))
         for _step in range(_SESSION_STEPS):
             root, states = joint_step(states, x, joint.sd, centre)
             x, states = take(states, x, joint.sd, root.step())
-        for one, values in zip(states, found, strict=True):
-            values.append(_values(one.model, one.x))
-    return [Propagated.all(values) for values in found]
+        for state, drawn in zip(states, values, strict=True):
+            drawn.append(_values(state.model, state.x))
+    return [Propagated.all(drawn) for drawn in values]
 
 
 def _values(model: DropModel, x: Array) -> dict[str, float]:
@@ -278,51 +291,26 @@ def agreement(value: float, u: float, drawn: Propagated, trials: int, digits: in
     )
 
 
-def _stated(sd: Array) -> Array:
+def _drawable(sd: Array) -> Array:
     """Leave out what is not known at all: there is nothing to draw."""
     return np.where(sd < ANYTHING, sd, 0.0)
 
 
-class _Scatter(NamedTuple):
-    """What the edges of one side are shaken by.
-
-    Attributes
-    ----------
-    all
-        Number of observed edges.
-    edges
-        Places of the matched ones; shape ``(matched,)`` as of all that follows.
-    speed
-        Of the chain, m/s: m at the beam are s in the stamp.
-    sigma, told
-        As of `rig.analysis.equations.Equations`.
-    """
-
-    all: int
-    edges: NDArray[np.intp]
-    speed: Array
-    sigma: Array
-    told: Array
-
-    def draw(self, rng: np.random.Generator) -> Array:
-        """Draw by how much every observed edge moves, s; what is not matched stays."""
-        off = self.sigma * rng.normal(size=self.sigma.size)
-        off[1:] += self.told[1:] * off[:-1]  # the one before is the first of its pair, or told is 0
-        found = np.zeros(self.all)
-        found[self.edges] = off / self.speed
-        return found
-
-
-def _scatters(drop: Fit | JointDrop, scale: float = 1.0) -> dict[str, _Scatter]:
-    found = {}
+def _shaker(drop: Fit | JointDrop, scale: float = 1.0) -> Callable[[Generator], DropModel]:
+    """Return what draws by how much every matched edge moves, with a scatter so much larger."""
+    sides = []
     for role, matches in drop.matches.items():
-        rows = drop.model.equations(role, drop.x, matches)
-        expected = drop.model.expected[role]
-        found[role] = _Scatter(
-            expected.times.size,
-            expected.chosen(matches)[1],
-            rows.residuals.speed,
-            rows.residuals.sigma * scale,
-            rows.told,
-        )
-    return found
+        rows, expected = drop.model.equations(role, drop.x, matches), drop.model.expected[role]
+        moved = expected.chosen(matches)[1], rows.residuals.speed, rows.residuals.sigma * scale
+        sides.append((role, expected.times.size, *moved, rows.told))
+
+    def shake(rng: Generator) -> DropModel:
+        times = {}
+        for role, size, edges, speed, sigma, told in sides:
+            off = sigma * rng.normal(size=sigma.size)
+            off[1:] += told[1:] * off[:-1]  # the one before is first of its pair, or told is 0
+            times[role] = np.zeros(size)
+            times[role][edges] = off / speed  # m at the beam are s in the stamp
+        return drop.model.shaken(times)
+
+    return shake

@@ -126,33 +126,6 @@ class Measured:
         return {"value": self.value, "u": self.u, "U95": self.expanded}
 
 
-def average(
-    value: float, own: float, seen: float, freedom: float, common: float, runs: Sequence[Measured]
-) -> Measured:
-    """Put a mean, or another sum with weights, and its uncertainty together.
-
-    Where runs happen to scatter less than each one's own uncertainty allows, the latter counts.
-    Degrees of freedom are effective ones (GUM G.4): what runs say of themselves is known no better
-    than they know it, however many they are.
-
-    Parameters
-    ----------
-    own, seen
-        Uncertainty by what the runs say of themselves, and by their scatter.
-    freedom
-        Degrees of freedom of the latter.
-    common
-        What all runs share, which averaging does not reduce.
-    runs
-        Of which the one that knows its own uncertainty least speaks for all.
-    """
-    single, known = max(own, seen), min(max(1.0, run.degrees) for run in runs)
-    u = math.hypot(single, common)
-    share = single**4 / (freedom if seen > own else known) + common**4 / known
-    degrees = u**4 / share if share > 0.0 else math.inf
-    return Measured(value, u, degrees, {"runs": single, "common": common})
-
-
 @dataclass(frozen=True, slots=True)
 class Audit:
     """What became of the edges of a drop.
@@ -224,6 +197,9 @@ class DropResult:
         How one object passed each gate.
     last_passages
         Some of the quantities by themselves, see `rig.analysis.last_passages`.
+    gravity
+        What the free chain says of gravity, m/s², see `rig.analysis.gravity`; `None` where nobody
+        asked it.
     """
 
     run: Run
@@ -240,6 +216,7 @@ class DropResult:
     damaged: bool = False
     last_passages: Mapping[str, Measured] = field(default_factory=dict)
     gates: tuple[GatePassage, ...] = ()
+    gravity: Measured | None = None
 
     @property
     def learned(self) -> bool:
@@ -248,20 +225,20 @@ class DropResult:
 
     def json(self) -> dict[str, Any]:
         """One member of ``runs``."""
-        found: dict[str, Any] = {"run": self.run.number, "attempt": self.attempt}
-        found |= {"incline_deg": self.run.incline_deg, "impact_chain": self.run.impact}
-        found |= {"damaged": True} if self.damaged else {}
-        found |= plain(self.quantities)
-        found |= {"edges": self.audit.json(), "unexplained_edges": self.audit.unexplained}
+        fields: dict[str, Any] = {"run": self.run.number, "attempt": self.attempt}
+        fields |= {"incline_deg": self.run.incline_deg, "impact_chain": self.run.impact}
+        fields |= {"damaged": True} if self.damaged else {}
+        fields |= plain(self.quantities)
+        fields |= {"edges": self.audit.json(), "unexplained_edges": self.audit.unexplained}
         if self.matches:
-            found["causes"] = plain(self.unmatched)
+            fields["causes"] = plain(self.unmatched)
         names = ("gates", "scatter", "last_passages", "alone")
-        found |= attributes(self, *(name for name in names if getattr(self, name)))
-        found |= attributes(self, "learned", "verdict") | reasons_json(self.reasons)
-        found["degrees"] = plain({name: one.degrees for name, one in self.quantities.items()})
-        found["budget"] = [
+        fields |= attributes(self, *(name for name in names if getattr(self, name)))
+        fields |= attributes(self, "learned", "verdict") | reasons_json(self.reasons)
+        fields["degrees"] = plain({name: one.degrees for name, one in self.quantities.items()})
+        fields["budget"] = [
             {"name": source, "quantity": name, "u": u}
             for name, value in self.quantities.items()
             for source, u in value.budget.items()
         ]
-        return found
+        return fields

@@ -64,14 +64,16 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
     }
     if analysis.joint is None:
         joints = [
-            by_itself(Fit(one.model, one.matches, adjust(one.model, one.matches, one.x.copy())))
-            for one in drops.values()
+            by_itself(
+                Fit(each.model, each.matches, adjust(each.model, each.matches, each.x.copy()))
+            )
+            for each in drops.values()
         ]
     else:
         joints = [joint_fit(list(drops.values()))]
         if not joints[0].settled:
             return None
-    results = (one.measured(drop) for one in map(Budgets, joints) for drop in one.joint.drops)
+    results = (each.measured(drop) for each in map(Budgets, joints) for drop in each.joint.drops)
     found = dict(zip(drops, results, strict=True))
     return summarize(
         protocol,
@@ -84,7 +86,9 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
 
 def _priors(protocol: Protocol) -> dict[str, tuple[str, ...]]:
     """Return where a protocol has each prior, by its key."""
-    places: dict[str, tuple[str, ...]] = {one.name: ("priors", one.name) for one in fields(Priors)}
+    places: dict[str, tuple[str, ...]] = {
+        prior.name: ("priors", prior.name) for prior in fields(Priors)
+    }
     places["height_uncertainty"] = ("gates", "height_u")
     places["datum_uncertainty"] = ("gates", "datum_u")
     places["position_uncertainty"] = ("chains", "position_u")

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from operator import length_hint
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import Protocol as Interface
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.joint_fit import FEWEST, joint_fit
 from rig.analysis.pairs import Effects, effects
 from rig.analysis.plain_data import attributes, plain
+from rig.analysis.processes import do_in_order
 from rig.analysis.result import GOOD
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
@@ -23,8 +26,8 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from rig.analysis.drop import DropSummary
     from rig.analysis.fit import Fit
-    from rig.analysis.identified import IdentifiedByDrop
     from rig.analysis.joint_fit import JointFit, RigEstimate
     from rig.analysis.joint_step import JointDrop
     from rig.analysis.result import DropResult
@@ -40,6 +43,13 @@ K = TypeVar("K")
 _EXPLAINED = 6  # void drops of a session, after which it is not sought what else the next ones are
 KEPT = 0.9
 """Share of its edges that a drop must keep among others: without them priors are all it has."""
+
+
+class SummaryByDrop(Interface):
+    """Where summaries of drops are kept, such as a dictionary."""
+
+    def get(self, drop: Drop, /) -> DropSummary | None: ...  # noqa: D102
+    def __setitem__(self, drop: Drop, summary: DropSummary, /) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +93,12 @@ class Analysis:
     @property
     def damaged(self) -> tuple[DropResult, ...]:
         """Drops whose stored record is damaged."""
-        return tuple(one for one in (*self.runs, *self.superseded) if one.damaged)
+        return tuple(result for result in (*self.runs, *self.superseded) if result.damaged)
 
     @property
     def damage(self) -> list[str]:
         """A line that counts and names the damaged drops; none where there are none."""
-        names = "; ".join(f"run {one.run.number}, attempt {one.attempt}" for one in self.damaged)
+        names = "; ".join(f"run {drop.run.number}, attempt {drop.attempt}" for drop in self.damaged)
         count = f"{len(self.damaged)} of {len(self.runs) + len(self.superseded)} drops"
         line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
         return [line] if names else []
@@ -110,11 +120,13 @@ class Analysis:
 @one_thread
 def analyze(
     protocol: Protocol,
-    drops: Sequence[Drop],
+    drops: Iterable[Drop],
     scale: Callable[[Drop], TimeScale],
     rejected: Mapping[tuple[int, int], Sequence[Reason]] | None = None,
     progress: Progress | None = None,
-    known: IdentifiedByDrop | None = None,
+    known: SummaryByDrop | None = None,
+    total: int | None = None,
+    processes: int = 1,
 ) -> Analysis:
     """Analyse every drop and sum up.
 
@@ -123,7 +135,7 @@ def analyze(
     protocol
         The scene and its plan.
     drops
-        Raw records, several attempts at a run allowed.
+        Raw records, several attempts at a run allowed; read as they are due.
     scale
         Calibration of each drop's ticks.
     rejected
@@ -131,7 +143,11 @@ def analyze(
     progress
         Called with the number of drops done and the number of all.
     known
-        As `rig.analysis.drop.fit_drop` takes it.
+        What is known of drops by themselves, and will be. Results are the same without.
+    total
+        Number of drops, where they have no length.
+    processes
+        That may be used, where it is worth it. Results do not depend on it.
 
     Raises
     ------
@@ -141,19 +157,40 @@ def analyze(
     check_gates(protocol)
     check_measurable(protocol)
     planned = {run.number: run for run in planned_runs(protocol)}
-    rejected = rejected or {}
+    known, rejected = {} if known is None else known, rejected or {}
+    total = length_hint(drops) if total is None else total
     results: list[DropResult] = []
     fits: list[Fit | None] = []
-    for number, drop in enumerate(drops, start=1):
-        run = planned_run(planned, drop)
+    unexplained = 0
+
+    def take(task: tuple[DropCase, DropSummary | None], summary: DropSummary) -> None:
+        nonlocal unexplained
+        case, before = task
         # What is wrong with a rig is wrong in drop after drop: some of them tell it.
-        told = sum(one.verdict == "void" and not one.damaged for one in results) >= _EXPLAINED
-        result, fit = fit_drop(protocol, run, drop, scale(drop), explain=not told, known=known)
-        results.append(overruled(result, rejected.get((drop.run, drop.attempt))))
-        fits.append(fit)
+        explain = unexplained < _EXPLAINED
+        if summary.unexplained and summary.explained != explain:
+            summary = case.summary(summary, explain=explain)
+        unexplained += summary.unexplained
+        if summary is not before:
+            known[case.drop] = summary
+        result = overruled(summary.result, rejected.get((case.run.number, case.drop.attempt)))
+        results.append(result)
+        fits.append(case.fit(summary) if joins(protocol, result) else None)
         if progress is not None:
-            progress(number, len(drops))
+            progress(len(results), total)
+
+    cases = (DropCase(protocol, planned_run(planned, drop), drop, scale(drop)) for drop in drops)
+    do_in_order(
+        _summarize, ((case, known.get(case.drop)) for case in cases), take, total, processes
+    )
     return gather(protocol, results, fits)
+
+
+def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
+    case, before = task
+    if before is not None and before.scale == case.scale:
+        return before
+    return case.summary(before, explain=False)
 
 
 def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
@@ -182,6 +219,11 @@ def overruled(result: DropResult, causes: Sequence[Reason] | None) -> DropResult
     return replace(result, verdict="rejected", reasons=reasons, limits=result.verdict)
 
 
+def joins(protocol: Protocol, result: DropResult) -> bool:
+    """Whether a drop that is so by itself may take part in a joint fit."""
+    return result.verdict in GOOD or nearly_in_time(result, protocol.accept.release_skew)
+
+
 @one_thread
 def gather(
     protocol: Protocol, results: Sequence[DropResult], fits: Sequence[Fit | None]
@@ -193,16 +235,9 @@ def gather(
     protocol
         The scene and its plan.
     results, fits
-        Of each drop, as `rig.analysis.drop.fit_drop` gives them.
+        Of each drop by itself; `None` for the fit of one that does not join.
     """
-    limit = protocol.accept.release_skew
-    good = {
-        n: fit
-        for n, (result, fit) in enumerate(zip(results, fits, strict=True))
-        if fit is not None
-        and fit.estimate.settled
-        and (result.verdict in GOOD or nearly_in_time(result, limit))
-    }
+    good = {n: fit for n, fit in enumerate(fits) if fit is not None and fit.estimate.settled}
     together = fit_together(dict(enumerate(results)), good)
     adjusted = {
         (result.run.number, result.attempt): drop
@@ -230,10 +265,10 @@ def sum_up(
     joint, adjusted
         As in `Analysis`.
     """
-    found = sorted(results, key=lambda result: (result.run.number, result.attempt))
-    last = {result.run.number: result for result in found}
+    ordered = sorted(results, key=lambda result: (result.run.number, result.attempt))
+    last = {result.run.number: result for result in ordered}
     latest = tuple(last.values())
-    earlier = tuple(result for result in found if last[result.run.number] is not result)
+    earlier = tuple(result for result in ordered if last[result.run.number] is not result)
     summary = tuple(summarize(protocol, latest))
     spared = any(result.limits in GOOD for result in latest)
     whole = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
@@ -307,7 +342,7 @@ def fit_together(
 def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> DropResult:
     """Give a drop the numbers that it has in the light of all."""
     unmatched, measured = unmatched_edges(drop), budgets.measured(drop)
-    reasons = [one for one in result.reasons if not one.code.startswith("release_skew")]
+    reasons = [reason for reason in result.reasons if not reason.code.startswith("release_skew")]
     reasons += release_reasons(drop.model.protocol, measured)
     return replace(
         result,

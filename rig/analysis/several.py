@@ -83,7 +83,7 @@ class SessionsFit:
 
 def same_owners(
     parts: Sequence[SessionPart], *, same_rig: bool | None
-) -> dict[str, list[list[int]]]:
+) -> dict[str, list[list[str]]]:
     """Sort sessions by what they have in common.
 
     Parameters
@@ -96,14 +96,14 @@ def same_owners(
     -------
     dict
         For ``rig``, ``posts``, ``beams``, ``start``, ``condition`` and each ``chain NAME`` the
-        places of those sessions that have it in common.
+        names of those sessions that have it in common, one list a rig.
     """
-    owners: dict[str, dict[tuple[object, str], list[int]]] = {}
+    owners: dict[str, dict[tuple[object, str], list[str]]] = {}
     for place, part in enumerate(parts):
         by_name = (part.protocol.title, part.board)
         rig: object = by_name if same_rig is None else same_rig or place
         for owner, statement in _statements(part.protocol).items():
-            owners.setdefault(owner, {}).setdefault((rig, repr(statement)), []).append(place)
+            owners.setdefault(owner, {}).setdefault((rig, repr(statement)), []).append(part.name)
     return {owner: list(groups.values()) for owner, groups in owners.items()}
 
 
@@ -139,18 +139,20 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
     """
     first = parts[0]
     for part in parts[1:]:
-        kinds = [(one.protocol.vocabulary.scene, stated(one.protocol)) for one in (first, part)]
+        kinds = [
+            (member.protocol.vocabulary.scene, stated(member.protocol)) for member in (first, part)
+        ]
         if kinds[0] != kinds[1]:
             raise make_error(InputError, "sessions_unlike", path=part.name, other=first.name)
     shared = same_owners(parts, same_rig=same_rig)
     drops = _own(parts, shared)
     together = fit_together(
         {
-            (place, (one.run.number, one.attempt)): replace(
-                one, quantities=_unshared(one.quantities)
+            (place, (member.run.number, member.attempt)): replace(
+                member, quantities=_unshared(member.quantities)
             )
             for place, part in enumerate(parts)
-            for one in (*part.analysis.runs, *part.analysis.superseded)
+            for member in (*part.analysis.runs, *part.analysis.superseded)
         },
         drops,
     )
@@ -161,14 +163,10 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
     for (place, _), result in together.results.items():
         results[place].append(result)
     fitted = tuple(
-        replace(part, analysis=sum_up(part.protocol, found, part.analysis.joint))
-        for part, found in zip(parts, results, strict=True)
+        replace(part, analysis=sum_up(part.protocol, members, part.analysis.joint))
+        for part, members in zip(parts, results, strict=True)
     )
-    names = {
-        owner: [[parts[place].name for place in group] for group in groups]
-        for owner, groups in shared.items()
-    }
-    return SessionsFit(fitted, together.joint, _pooled(fitted), names)
+    return SessionsFit(fitted, together.joint, _pooled(fitted), shared)
 
 
 def _unshared(quantities: Mapping[str, Measured]) -> dict[str, Measured]:
@@ -176,17 +174,17 @@ def _unshared(quantities: Mapping[str, Measured]) -> dict[str, Measured]:
     return {name: replace(value, shared=None, deviation=None) for name, value in quantities.items()}
 
 
-def _own(parts: Sequence[SessionPart], shared: Mapping[str, Sequence[Sequence[int]]]) -> Drops:
+def _own(parts: Sequence[SessionPart], shared: Mapping[str, Sequence[Sequence[str]]]) -> Drops:
     """Return the good drops, each with the names of its session's common unknowns."""
-    suffixes: list[dict[str, str]] = [{} for _ in parts]
+    suffixes: dict[str, dict[str, str]] = {part.name: {} for part in parts}
     for owner, groups in shared.items():
         for group in groups:
-            names = ", ".join(parts[place].name for place in group)
-            for place in group:
-                # What all have in common keeps the name that it has in one session.
-                suffixes[place][owner] = "" if len(group) == len(parts) else f" ({names})"
+            # What all have in common keeps the name that it has in one session.
+            suffix = "" if len(group) == len(parts) else f" ({', '.join(group)})"
+            for name in group:
+                suffixes[name][owner] = suffix
     return {
-        (place, job): replace(fit, model=fit.model.owned(suffixes[place]))
+        (place, job): replace(fit, model=fit.model.owned(suffixes[part.name]))
         for place, part in enumerate(parts)
         for job, fit in part.analysis.adjusted.items()
     }
@@ -196,9 +194,9 @@ def _pooled(parts: Sequence[SessionPart]) -> tuple[PooledMeans, ...]:
     """Average over all sessions of which the model says the same."""
     scenes: dict[str, list[SessionPart]] = {}
     for part in parts:
-        one = part.protocol
-        scene = (one.chains, one.surface, one.contact, one.drop, one.gravity, one.drag)
-        scenes.setdefault(repr((*scene, one.track, one.initial_speed)), []).append(part)
+        own = part.protocol
+        scene = (own.chains, own.surface, own.contact, own.drop, own.gravity, own.drag)
+        scenes.setdefault(repr((*scene, own.track, own.initial_speed)), []).append(part)
     return tuple(
         PooledMeans(
             tuple(part.name for part in alike),

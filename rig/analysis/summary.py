@@ -7,12 +7,11 @@ from dataclasses import dataclass, field, replace
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-
+from rig.analysis.averages import mean
 from rig.analysis.comparison import compare
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import COMMON
-from rig.analysis.result import GOOD, Measured, average
+from rig.analysis.result import GOOD
 from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
 from rig.protocol.protocol import Condition
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.comparison import Comparison, Difference
     from rig.analysis.gate_passages import GatePassage
-    from rig.analysis.result import DropResult
+    from rig.analysis.result import DropResult, Measured
     from rig.protocol.protocol import Protocol, Run
     from rig.units import Quantity
 
@@ -50,8 +49,8 @@ class GateMeans:
 
     def json(self) -> dict[str, Any]:
         """One member of ``gates`` of the summary."""
-        found = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd, "n": self.n}
-        return self.mean.json() | {name: sd for name, sd in found.items() if sd is not None}
+        scatter = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd, "n": self.n}
+        return self.mean.json() | {name: sd for name, sd in scatter.items() if sd is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,24 +94,24 @@ class Incline:
 
     def json(self) -> dict[str, Any]:
         """One member of ``summary``."""
-        found: dict[str, Any] = {**self.condition.json(), "n": self.n}
-        for name, mean in self.means.items():
-            found[name] = mean.json()
+        fields: dict[str, Any] = {**self.condition.json(), "n": self.n}
+        for name, value in self.means.items():
+            fields[name] = value.json()
             if name in self.deviations:
-                found[MEASURANDS[name].key("sd")] = self.deviations[name]
-                found[MEASURANDS[name].key("se")] = self.deviations[name] / math.sqrt(self.n)
-        found["common"] = [
+                fields[MEASURANDS[name].key("sd")] = self.deviations[name]
+                fields[MEASURANDS[name].key("se")] = self.deviations[name] / math.sqrt(self.n)
+        fields["common"] = [
             {"name": cause, "quantity": name, "u": u}
             for name, causes in self.causes.items()
             for cause, u in causes.items()
         ]
-        found |= attributes(self, "gates") if self.gates else {}
-        found["predicted"] = {name: model.value for name, model in self.predicted.items()}
-        found["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
+        fields |= attributes(self, "gates") if self.gates else {}
+        fields["predicted"] = {name: model.value for name, model in self.predicted.items()}
+        fields["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
         main, *others = self.means
         stems = {main: ""} | {name: f"_{MEASURANDS[name].stem}" for name in others}
         errors = {f"normalized_error{stem}": name for name, stem in stems.items()}
-        return found | {key: self.normalized_error(name) for key, name in errors.items()}
+        return fields | {key: self.normalized_error(name) for key, name in errors.items()}
 
 
 def summarize(
@@ -144,10 +143,10 @@ def good_cases(
 
 def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]) -> list[list[T]]:
     """Sort by incline and, where chains are unlike, by the one that strikes."""
-    found: dict[Condition, list[T]] = {}
-    for one in members:
-        found.setdefault(protocol.condition(run_of(one)), []).append(one)
-    return [group for _, group in sorted(found.items())]
+    groups: dict[Condition, list[T]] = {}
+    for member in members:
+        groups.setdefault(protocol.condition(run_of(member)), []).append(member)
+    return [group for _, group in sorted(groups.items())]
 
 
 def _incline(
@@ -160,17 +159,17 @@ def _incline(
     return Incline(
         run.incline_deg,
         len(results),
-        {name: mean(found) for name, found in values.items()},
-        {name: sd for name, found in values.items() if (sd := _scatter(found)) is not None},
+        {name: mean(runs) for name, runs in values.items()},
+        {name: sd for name, runs in values.items() if (sd := _scatter(runs)) is not None},
         {name: model for name, model in predicted_run(protocol, run).items() if name in names},
         condition.impact_chain,
         {
-            one.quantity: line
-            for one in compared
-            for line in one.differences
+            comparison.quantity: line
+            for comparison in compared
+            for line in comparison.differences
             if line.condition == condition
         },
-        {name: _causes(found) for name, found in values.items()},
+        {name: _causes(runs) for name, runs in values.items()},
         tuple(_gate_means(results)),
     )
 
@@ -178,11 +177,11 @@ def _incline(
 def _gate_means(results: Sequence[DropResult]) -> Iterator[GateMeans]:
     """Average what each gate saw, in the order of the object's way."""
     by_channel: dict[int, list[GatePassage]] = {}
-    for one in (gate for result in results for gate in result.gates):
-        by_channel.setdefault(one.channel, []).append(one)
+    for passage in (gate for result in results for gate in result.gates):
+        by_channel.setdefault(passage.channel, []).append(passage)
     for runs in sorted(by_channel.values(), key=lambda each: -each[0].height_m):
-        speeds = [one.speed for one in runs]
-        since = [one.interval for one in runs if one.interval is not None]
+        speeds = [passage.speed for passage in runs]
+        since = [passage.interval for passage in runs if passage.interval is not None]
         at = replace(runs[0], speed=mean(speeds), interval=mean(since) if since else None)
         yield GateMeans(at, len(runs), _scatter(speeds), _scatter(since))
 
@@ -193,34 +192,7 @@ def _scatter(values: Sequence[Measured]) -> float | None:
 
 def _causes(runs: Sequence[Measured]) -> dict[str, float]:
     """Return what of a mean each common line of the budget makes, the largest first."""
-    found = {
+    parts = {
         name: math.sqrt(fmean(run.budget.get(name, 0.0) ** 2 for run in runs)) for name in COMMON
     }
-    return dict(sorted((each for each in found.items() if each[1]), key=lambda each: -each[1]))
-
-
-def mean(runs: Sequence[Measured]) -> Measured:
-    """Mean of several runs: their scatter over √n, and what is common to all of them."""
-    common, each = common_part(runs)
-    # Of a run's u² what all share is taken out: averaging does not reduce it, and it is added last.
-    variance = fmean(max(0.0, run.u**2 - part**2) for run, part in zip(runs, each, strict=True))
-    values, n = [run.value for run in runs], len(runs)
-    if n == 1:
-        parts = {"runs": math.sqrt(variance), "common": common}
-        return replace(runs[0], budget=parts, shared=None, deviation=None)
-    own, seen = math.sqrt(variance / n), stdev(values) / math.sqrt(n)
-    return average(fmean(values), own, seen, n - 1.0, common, runs)
-
-
-def common_part(runs: Sequence[Measured]) -> tuple[float, list[float]]:
-    """What averaging leaves, of the mean and of each run.
-
-    Runs of one session share errors with known signs, which may cancel where chains change places.
-    Of runs by themselves only the sources are known.
-    """
-    shared = [run.shared for run in runs if run.shared is not None]
-    if len(shared) == len(runs):
-        together = np.mean(shared, axis=0)
-        return math.sqrt(together @ together), [math.sqrt(one @ one) for one in shared]
-    each = [math.hypot(*(u for name, u in run.budget.items() if name in COMMON)) for run in runs]
-    return math.sqrt(fmean(part**2 for part in each)), each
+    return dict(sorted((each for each in parts.items() if each[1]), key=lambda each: -each[1]))

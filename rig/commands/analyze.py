@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.video import VideoFall, video_fall
 from rig.cache.entry import recall
 from rig.commands.output import print_results, progress, show
+from rig.errors import InputError
 from rig.measurands import acceleration_in
+from rig.reasons import make_error
 from rig.report.columns import aligned
 from rig.report.numbers import plus_minus
 from rig.report.parts import effects_parts, gate_parts, prior_part, scatter_part
@@ -30,6 +32,10 @@ def main(arguments: Namespace) -> int:
         from rig.commands.compare import analyze_together  # noqa: PLC0415 - likewise
 
         return analyze_together(arguments)
+    given = {"--same-rig": arguments.same_rig is not None, "--unfinished": arguments.unfinished}
+    if any(given.values()):
+        options = ", ".join(name for name, is_given in given.items() if is_given)
+        raise make_error(InputError, "option_for_several_sessions", options=options)
     if arguments.budget is not None:
         from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
 

@@ -49,6 +49,7 @@ def veiled_drop(result: DropResult) -> DropResult:
         last_passages={},
         gates=(),
         alone={},
+        gravity=None,
     )
 
 

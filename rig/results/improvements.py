@@ -44,8 +44,8 @@ class Improvement(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One member of ``measure_next``."""
-        said = {"quantity": self.measurand.name, "measure": self.line, "times_better": _BETTER}
-        return said | {"U95": self.now, "U95_at_most": self.then}
+        names = {"quantity": self.measurand.name, "measure": self.line, "times_better": _BETTER}
+        return names | {"U95": self.now, "U95_at_most": self.then}
 
     @property
     def sentence(self) -> str:

@@ -1,4 +1,4 @@
-"""Which rods the edges of drops are: found out once of each, by whichever process comes first."""
+"""What drops say by themselves: found out once of each, by whichever process comes first."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.identified import Identified
+from rig.analysis.drop import DropSummary
 from rig.cache.entry import CacheEntry
 
 if TYPE_CHECKING:
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 class KnownDrops:
-    """The `known` of `rig.analysis.drop.fit_drop`, kept beyond this process.
+    """The `known` of `rig.analysis.session.analyze`, kept beyond this process.
 
     Parameters
     ----------
     protocol
         Of all drops, with the beams that its timer had.
     blind
-        Whether nothing may be kept.
+        Whether nothing may be kept but in memory.
     fresh
         Whether to forget what was kept.
     """
@@ -34,29 +34,32 @@ class KnownDrops:
         gates = () if protocol.gates is None else protocol.gates.gates
         self._content = None if blind else (protocol.text, [gate.channel for gate in gates])
         self._fresh = fresh
-        self._held: dict[str, Identified] = {}
-        self._last: tuple[Drop | None, str] = (None, "")
+        self._held: dict[str, DropSummary] = {}
 
-    def get(self, drop: Drop) -> Identified | None:
+    def get(self, drop: Drop) -> DropSummary | None:
         """Return what is known of a drop; `None` for nothing."""
-        digest = self._digest(drop)
-        identified = self._held.get(digest) or self._entry(digest).find()
-        if identified is not None:
-            self._held[digest] = identified
-        return identified
+        digest = digest_of(drop)
+        summary = self._held.get(digest)
+        if summary is None and (kept := self._entry(digest).find()) is not None:
+            summary = kept.whole()
+        return summary
 
-    def __setitem__(self, drop: Drop, identified: Identified) -> None:
-        digest = self._digest(drop)
-        self._held[digest] = identified
-        self._entry(digest).keep(identified)
+    def __setitem__(self, drop: Drop, summary: DropSummary) -> None:
+        digest = digest_of(drop)
+        if self._content is None:
+            self._held[digest] = summary
+        self._entry(digest).keep(summary)
 
-    def _entry(self, digest: str) -> CacheEntry[Identified]:
-        return CacheEntry(Identified, self._content, digest, fresh=self._fresh)
+    def _entry(self, digest: str) -> CacheEntry[DropSummary]:
+        return CacheEntry(DropSummary, self._content, digest, fresh=self._fresh)
 
-    def _digest(self, drop: Drop) -> str:
-        """SHA-256 of everything that a drop's record says."""
-        if self._last[0] is not drop:
-            head = repr(replace(drop, edges=())).encode()
-            edges = np.fromiter(chain.from_iterable(drop.edges), np.int64, 3 * len(drop.edges))
-            self._last = drop, sha256(head + edges.tobytes()).hexdigest()
-        return self._last[1]
+
+def digest_of(drop: Drop) -> str:
+    """SHA-256 of everything that a drop's record says."""
+    return sha256(f"{edges_digest(drop)} {replace(drop, edges=())}".encode()).hexdigest()
+
+
+def edges_digest(drop: Drop) -> str:
+    """SHA-256 of the edges of a drop, whichever run it was."""
+    edges = np.fromiter(chain.from_iterable(drop.edges), np.int64, 3 * len(drop.edges))
+    return sha256(edges.tobytes() + b"%d" % drop.tick_hz).hexdigest()

@@ -12,17 +12,17 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.analysis.curves import model_curves
-from rig.analysis.drop import fit_drop
-from rig.analysis.gravity import free_gravity
+from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
-from rig.analysis.session import gather, overruled, planned_run, sum_up
+from rig.analysis.session import gather, joins, overruled, planned_run, sum_up
+from rig.cache.entry import CacheEntry
 from rig.clock.calibration import Calibrator
 from rig.protocol.plan import runs as planned_runs
 from rig.records import Job
 from rig.results.blind import kept_back, veiled, veiled_drop
 from rig.results.known_drops import KnownDrops
-from rig.results.whole import protocol_of, rejected
+from rig.results.whole import Finished, protocol_of, rejected
 from rig.session.drop_check import ByteReplay
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from rig.analysis.fit import Fit
-    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.drop import DropSummary
+    from rig.analysis.result import DropResult
     from rig.analysis.session import Analysis
     from rig.clock.calibration import Calibration, TimeScale
     from rig.protocol.protocol import Protocol, Run
@@ -53,8 +53,6 @@ class SessionView:
         Which reading of the file this is: what is drawn from it changes with it.
     drops, results
         Every recorded attempt, and what it says by itself.
-    gravity
-        What each good drop's free chain says of gravity, m/s².
     analysis
         Of the drops that `fitted` counts, or, before there is a joint fit, of all of them by
         themselves.
@@ -81,7 +79,6 @@ class SessionView:
     drops: Mapping[Job, Drop]
     results: Mapping[Job, DropResult]
     scales: Mapping[Job, TimeScale]
-    gravity: Mapping[Job, Measured]
     analysis: Analysis
     fitted: int
     lagging: bool
@@ -105,34 +102,24 @@ class SessionView:
 
 
 class _Scene(NamedTuple):
-    """What is planned, and what is known of drops; `complete` once the timer's beams are known."""
+    """What is planned, and what is kept of drops; `complete` once the timer's beams are known."""
 
     protocol: Protocol
     plan: dict[int, Run]
-    known: KnownDrops
+    kept: KnownDrops
     complete: bool
-
-    def fit(self, drop: Drop, scale: TimeScale) -> tuple[DropResult, Fit | None]:
-        """Fit one drop by itself."""
-        run = planned_run(self.plan, drop)
-        return fit_drop(self.protocol, run, drop, scale, known=self.known)
-
-
-class _Analysed(NamedTuple):
-    """One drop by itself, at a tick rate."""
-
-    hz: float
-    result: DropResult
-    fit: Fit | None
-    gravity: Measured | None
 
 
 class _JointFit(NamedTuple):
-    """What drops say fitted together, `size` of them; `of` is who was there, and how."""
+    """What drops say fitted together; `of` is who was there, and how."""
 
     of: object
-    size: int
     analysis: Analysis
+
+    @property
+    def size(self) -> int:
+        analysis = self.analysis
+        return sum(result.learned for result in (*analysis.runs, *analysis.superseded))
 
 
 @dataclass(slots=True)
@@ -146,13 +133,12 @@ class LiveAnalysis:
     """
 
     path: Path
-    done: int = 0
-    """Drops that were read and analysed, for who waits for the first reading."""
-    _known: dict[Job, _Analysed] = field(default_factory=dict)
+    _summaries: dict[Job, DropSummary] = field(default_factory=dict)
     _log: Sequence[StateEntry] | None = None
     _drops: dict[Job, Drop] = field(default_factory=dict)
     _curves: dict[str, Any] | None = None
     _joint_fit: _JointFit | None = None
+    _digest: str | None = None
     _calibrator: Calibrator = field(default_factory=Calibrator)
     _replay: ByteReplay = field(default_factory=ByteReplay)
     _scene: _Scene | None = None
@@ -160,9 +146,14 @@ class LiveAnalysis:
     _lock: Lock = field(default_factory=Lock)
 
     @property
+    def done(self) -> int:
+        """Drops that were read and analysed, for who waits for the first reading."""
+        return len(self._summaries)
+
+    @property
     def known(self) -> KnownDrops | None:
-        """Which rods the edges of its drops are; `None` before it was asked for any."""
-        return None if self._scene is None else self._scene.known
+        """What its drops say by themselves; `None` before it was asked for any."""
+        return None if self._scene is None else self._scene.kept
 
     def clock(self, session: Reader) -> Calibration:
         """Calibrate the session's clock from everything it recorded until now."""
@@ -178,8 +169,8 @@ class LiveAnalysis:
         drop
             Recorded in it.
         """
-        scene = self._planned(session)
-        result, _ = scene.fit(drop, self.clock(session).scale(drop))
+        scene, scale = self._planned(session), self.clock(session).scale(drop)
+        result = self._summary(scene, drop, scale).result
         return veiled_drop(result) if kept_back(session, scene.protocol) else result
 
     def read(self) -> SessionView:
@@ -195,6 +186,9 @@ class LiveAnalysis:
                 scene = self._planned(session)
                 protocol = scene.protocol
                 clock, states = self.clock(session), tuple(session.states())
+                # An analysis is sought of new records, and as long as there is none.
+                fresh = states != self._log or self._joint_fit is None
+                digest = session.digest() if fresh else None
                 if states != self._log:  # records are only added, and that is logged
                     checked = session.drops(self._replay)
                     self._drops = {Job(drop.run, drop.attempt): drop for drop in checked}
@@ -202,13 +196,18 @@ class LiveAnalysis:
                 causes, blind = rejected(session), kept_back(session, protocol)
             drops = self._drops
             scales = {job: clock.scale(drop) for job, drop in drops.items()}
-            for job, drop in drops.items():
-                self._analyse(scene, job, drop, scales[job])
-            results = {job: overruled(self._known[job].result, causes.get(job)) for job in drops}
+            results = {
+                job: overruled(self._summary(scene, drop, scales[job]).result, causes.get(job))
+                for job, drop in drops.items()
+            }
             if self._curves is None:
                 self._curves = model_curves(protocol)
             self._readings += 1
             enough = sum(result.verdict in GOOD for result in results.values()) >= FEWEST
+            members = self._members(results)
+            behind = self._joint_fit is None or self._joint_fit.of != members
+            if enough and behind and not blind:  # what is kept of a blind session says nothing
+                self._look_for_kept(digest, members)
             joint = self._joint_fit if enough else None
             view = SessionView(
                 path=self.path,
@@ -220,10 +219,9 @@ class LiveAnalysis:
                 drops=drops,
                 results=results,
                 scales=scales,
-                gravity={job: g for job in drops if (g := self._known[job].gravity) is not None},
                 analysis=joint.analysis if joint else sum_up(protocol, results.values()),
                 fitted=joint.size if joint else 0,
-                lagging=enough and (joint is None or joint.of != self._members(results)),
+                lagging=enough and (joint is None or joint.of != members),
                 curves=self._curves,
                 clock=clock,
                 states=states,
@@ -243,22 +241,24 @@ class LiveAnalysis:
         view
             From `read`.
         """
-        of = self._members(view.results)
-        fits = [self._fit(view, job) for job in view.results]
-        found = gather(view.protocol, list(view.results.values()), fits)
-        size = sum(result.learned for result in (*found.runs, *found.superseded))
-        self._joint_fit = _JointFit(of, size, found)
+        fits = []
+        for job, result in view.results.items():
+            summary, drop = self._summaries[job], view.drops[job]
+            case = DropCase(view.protocol, view.plan[job.run], drop, summary.scale)
+            fits.append(case.fit(summary) if joins(view.protocol, result) else None)
+        analysis = gather(view.protocol, list(view.results.values()), fits)
+        self._joint_fit = _JointFit(self._members(view.results), analysis)
 
-    def _fit(self, view: SessionView, job: Job) -> Fit | None:
-        known = self._known[job]
-        if known.fit is None and known.result.verdict in GOOD:
-            assert self._scene is not None
-            _, fit = self._scene.fit(view.drops[job], view.scales[job])
-            self._known[job] = known = known._replace(fit=fit)
-        return known.fit
+    def _look_for_kept(self, digest: str | None, members: object) -> None:
+        """Take the analysis of these very records where one is kept."""
+        if digest not in {None, self._digest}:
+            finished = CacheEntry(Finished, digest).find()
+            if finished is not None:
+                self._joint_fit = _JointFit(members, finished.analysis)
+            self._digest = digest
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
-        return {job: (result.verdict, self._known[job].hz) for job, result in results.items()}
+        return {job: (one.verdict, self._summaries[job].scale.hz) for job, one in results.items()}
 
     def _planned(self, session: Reader) -> _Scene:
         scene = self._scene
@@ -266,20 +266,20 @@ class LiveAnalysis:
             protocol = protocol_of(session)
             if scene is None or scene.protocol != protocol:
                 plan = {run.number: run for run in planned_runs(protocol)}
-                known = KnownDrops(protocol, blind=kept_back(session, protocol))
-                scene = _Scene(protocol, plan, known, complete=False)
+                kept = KnownDrops(protocol, blind=kept_back(session, protocol))
+                scene = _Scene(protocol, plan, kept, complete=False)
             self._scene = scene = scene._replace(complete=bool(session.identities()))
         return scene
 
-    def _analyse(self, scene: _Scene, job: Job, drop: Drop, scale: TimeScale) -> None:
-        analysed = self._known.get(job)
-        if analysed is None or abs(analysed.hz / scale.hz - 1.0) > _SAME_SCALE:
-            result, fit = scene.fit(drop, scale)
-            protocol = scene.protocol
-            falls = result.verdict in GOOD and protocol.drag is None and protocol.track is None
-            gravity = free_gravity(protocol, result, drop, scale) if falls else None
-            self._known[job] = _Analysed(scale.hz, result, fit, gravity)
-        self.done = len(self._known)
+    def _summary(self, scene: _Scene, drop: Drop, scale: TimeScale) -> DropSummary:
+        """Return what a drop says by itself: known, kept or found out now."""
+        job = Job(drop.run, drop.attempt)
+        summary = self._summaries.get(job) or scene.kept.get(drop)
+        if summary is None or abs(summary.scale.hz / scale.hz - 1.0) > _SAME_SCALE:
+            case = DropCase(scene.protocol, planned_run(scene.plan, drop), drop, scale)
+            summary = scene.kept[drop] = case.summary(summary)
+        self._summaries[job] = summary
+        return summary
 
 
 def _veiled_view(view: SessionView) -> SessionView:
@@ -287,9 +287,7 @@ def _veiled_view(view: SessionView) -> SessionView:
     drops = {job: replace(drop, edges=()) for job, drop in view.drops.items()}
     results = {job: veiled_drop(result) for job, result in view.results.items()}
     told = veiled(view.analysis)
-    return replace(
-        view, drops=drops, results=results, analysis=told, gravity={}, fitted=0, lagging=False
-    )
+    return replace(view, drops=drops, results=results, analysis=told, fitted=0, lagging=False)
 
 
 def _pace(states: Sequence[StateEntry]) -> float | None:

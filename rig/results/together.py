@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.differences import difference
+from rig.analysis.averages import difference
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import GOOD
 from rig.analysis.several import SessionPart, fit_sessions
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Condition
     from rig.results.whole import SessionResults
     from rig.session.reading import Reader
+
+    Runs = Sequence[DropResult]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,43 +152,39 @@ class TogetherResults:
             No session has runs like those of the first.
         """
         first, *others = self.fit.parts
-        reference = _cases(first)
         differences = [
-            MeanDifference(name, part.name, first.name, condition, value)
+            MeanDifference(row.name, part.name, first.name, condition, difference(*values))
             for part in others
-            for condition, runs, reference_runs in _paired(_cases(part), reference)
-            for name, value in _differences(runs, reference_runs)
+            for condition, *sets in _pairs(part, first)
+            for row in averaged()
+            if (values := [_values(runs, row.name) for runs in sets]) and all(values)
         ]
         if not differences:
             raise make_error(InputError, "nothing_to_compare", path=first.name)
         return differences
 
 
-def _cases(part: SessionPart) -> dict[Condition, list[DropResult]]:
-    """Good runs of a session by condition."""
-    cases = good_cases(part.protocol, part.analysis.runs)
-    return {part.protocol.condition(case[0].run): case for case in cases}
-
-
-def _paired(
-    cases: Mapping[Condition, list[DropResult]], reference: Mapping[Condition, list[DropResult]]
-) -> Iterator[tuple[Condition, list[DropResult], list[DropResult]]]:
-    """Pair runs of like conditions."""
+def _pairs(part: SessionPart, first: SessionPart) -> Iterator[tuple[Condition, Runs, Runs]]:
+    """Yield good runs of a session with those of the first under a like condition."""
+    cases, reference = (
+        {member.protocol.condition(runs[0].run): runs for runs in _good_runs(member)}
+        for member in (part, first)
+    )
     for condition, runs in cases.items():
-        like = [one for one in reference if one.incline_deg == condition.incline_deg]
-        same = [one for one in like if one.impact_chain == condition.impact_chain] or like
+        like = [other for other in reference if other.incline_deg == condition.incline_deg]
+        same = [other for other in like if other.impact_chain == condition.impact_chain] or like
         if len(same) == 1:
             yield condition, runs, reference[same[0]]
 
 
-def _differences(
-    runs: Sequence[DropResult], reference: Sequence[DropResult]
-) -> Iterator[tuple[str, Measured]]:
-    """Differences of those measurands that all these runs have."""
-    for row in averaged():
-        if all(row.name in one.quantities for one in (*runs, *reference)):
-            sets = ([one.quantities[row.name] for one in some] for some in (runs, reference))
-            yield row.name, difference(*sets)
+def _good_runs(part: SessionPart) -> list[list[DropResult]]:
+    return good_cases(part.protocol, part.analysis.runs)
+
+
+def _values(runs: Runs, name: str) -> list[Measured]:
+    """Return a measurand of runs, which all must have it: else nothing."""
+    values = [run.quantities[name] for run in runs if name in run.quantities]
+    return values if len(values) == len(runs) else []
 
 
 def results_together(
@@ -215,17 +213,19 @@ def results_together(
     InputError, SessionError
         A session cannot be added to the others.
     """
-    _check_repeats(files)
-    parts, own = [], {}
+    parts, own = [], []
     for name, session in zip(_names(files), files, strict=True):
         protocol = protocol_of(session)
         check_open(session, protocol)
-        own[name] = found = results(session, progress, fresh=fresh, with_joint_fit=True)
+        found = results(session, progress, fresh=fresh, with_joint_fit=True)
+        own.append(found)
         _check_whole(session, found, len(planned_runs(protocol)), unfinished=unfinished)
         analysis = complete_analysis(session, found, progress)
         boards = [identity.get("unique_id", "") for _, identity in session.identities()]
         parts.append(SessionPart(name, protocol, analysis, str(boards[-1] if boards else "")))
-    return TogetherResults(own, fit_sessions(parts, same_rig=same_rig))
+    _check_repeats(files, own)
+    sessions = dict(zip(_names(files), own, strict=True))
+    return TogetherResults(sessions, fit_sessions(parts, same_rig=same_rig))
 
 
 def _names(files: Sequence[Reader]) -> list[str]:
@@ -234,18 +234,15 @@ def _names(files: Sequence[Reader]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(session.path) for session in files]
 
 
-def _check_repeats(files: Sequence[Reader]) -> None:
+def _check_repeats(files: Sequence[Reader], found: Sequence[SessionResults]) -> None:
     """Refuse to count drops more than once: a session named twice, its copy, or that continued."""
-    recorded = [
-        {(drop.tick_hz, drop.edges): drop.run for drop in session.drops() if drop.edges}
-        for session in files
-    ]
-    for one, other in combinations(range(len(files)), 2):
-        common = recorded[one].keys() & recorded[other].keys()
+    recorded = [(session.path, {*each.edges}) for session, each in zip(files, found, strict=True)]
+    for (path, edges), (other_path, other) in combinations(recorded, 2):
+        common = len(edges & other)
         # Of few edges and a coarse timer single drops may happen to be alike.
-        if common and len(common) == min(len(recorded[one]), len(recorded[other])):
-            paths = {"path": str(files[other].path), "other": str(files[one].path)}
-            raise make_error(InputError, "session_repeated", **paths, drops=len(common))
+        if common and common == min(len(edges), len(other)):
+            paths = {"path": str(other_path), "other": str(path)}
+            raise make_error(InputError, "session_repeated", **paths, drops=common)
 
 
 def _check_whole(session: Reader, found: SessionResults, planned: int, *, unfinished: bool) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.analysis.gravity import check_gravity
@@ -15,20 +18,23 @@ from rig.reasons import notes_in
 from rig.records import Job
 from rig.results.blind import check_open, kept_back, veiled
 from rig.results.improvements import improvements
-from rig.results.known_drops import KnownDrops
+from rig.results.known_drops import KnownDrops, edges_digest
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from rig.analysis.gravity import GravityCheck
     from rig.analysis.session import Analysis, Progress
     from rig.analysis.summary import Incline
-    from rig.clock.calibration import Calibration
+    from rig.clock.calibration import Calibration, TimeScale
     from rig.protocol.protocol import Protocol
     from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.reading import Reader
+
+_MOST_PROCESSES = 4
+"""Each takes 150 MB, and what is not done drop by drop is done by one."""
 
 
 class Finished(NamedTuple):
@@ -38,15 +44,15 @@ class Finished(NamedTuple):
     ----------
     analysis
         Of all drops, without what only a joint fit needs; veiled where the session is blind.
-    gravity
-        What the free chain says of it; `None` where there is none that can be asked.
     time_scales
         The calibration that each drop has, by run and attempt.
+    edges
+        A digest of the edges of each drop that has any.
     """
 
     analysis: Analysis
-    gravity: GravityCheck | None
     time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
+    edges: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +61,10 @@ class SessionResults:
 
     Attributes
     ----------
-    analysis, gravity, time_scales
+    analysis, time_scales, edges
         See `Finished`.
+    gravity
+        What the free chain says of it; `None` where there is none that can be asked.
     simulated
         Whether no chain ever fell.
     clock
@@ -70,8 +78,9 @@ class SessionResults:
     """
 
     analysis: Analysis
-    gravity: GravityCheck | None
     time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
+    edges: tuple[str, ...]
+    gravity: GravityCheck | None
     simulated: bool
     clock: Calibration
     blind: bool
@@ -81,7 +90,11 @@ class SessionResults:
     @property
     def calibration(self) -> dict[str, Any]:
         """``calibration`` of `json`: what is known of the clock, what free fall says included."""
-        return self.clock.said | _checked(self.clock.said["notes"], self.gravity)
+        said, check = self.clock.said, self.gravity
+        if check is None:
+            return said
+        doubts = [] if check.agrees else [_gravity_doubt(check)]
+        return said | {"gravity": check.json(), "notes": [*said["notes"], *doubts]}
 
     @property
     def summary(self) -> tuple[Incline, ...]:
@@ -94,8 +107,8 @@ class SessionResults:
 
     def records(self) -> list[dict[str, Any]]:
         """Return each drop as JSON has it, those with a later attempt last."""
-        found = self.json()
-        return [*found["runs"], *found.get("superseded", [])]
+        said = self.json()
+        return [*said["runs"], *said.get("superseded", [])]
 
     def json(self) -> dict[str, Any]:
         """As `rig analyze --json` prints it."""
@@ -104,8 +117,16 @@ class SessionResults:
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
         head = {"simulated": self.simulated, "clock": self.clock.details}
         head |= {"blind": True} if self.blind else {}
-        better = [one.json() for one in improvements(self.analysis.summary)]
+        better = [each.json() for each in improvements(self.analysis.summary)]
         return head | {"calibration": self.calibration} | said | {"measure_next": better}
+
+
+def _gravity_doubt(check: GravityCheck) -> str:
+    return (
+        f"free fall gives g = {check.measured.value:.4f} ± {check.measured.expanded:.4f} "
+        f"m/s², the protocol says {check.stated.value:.4f} (Eₙ {check.normalized_error:.1f}): "
+        "the clock, the beams' heights, the air or the protocol's gravity is not as stated"
+    )
 
 
 def protocol_of(session: Reader) -> Protocol:
@@ -114,7 +135,7 @@ def protocol_of(session: Reader) -> Protocol:
     Other timers may have had fewer than the protocol; a board's beams are those of the protocol.
     """
     protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
-    had = next((one["beams"] for _, one in session.identities() if "beams" in one), None)
+    had = next((named["beams"] for _, named in session.identities() if "beams" in named), None)
     return protocol if had is None else with_gates(protocol, had)
 
 
@@ -140,7 +161,7 @@ def results(
     progress
         Called with the number of drops done and the number of all.
     known
-        Which rods its edges are, where a live analysis has found that out.
+        What its drops say by themselves, where a live analysis has found that out.
     fresh
         Whether to analyse it in any case.
     with_joint_fit
@@ -153,28 +174,48 @@ def results(
         kept = CacheEntry(Finished, digest, fresh=fresh)
         clock = Calibrator().look(session, protocol.reference_u)
         finished = kept.find()
-        drops = [] if finished else list(session.drops())
-        causes = rejected(session)
-    if finished is None:
-        known = known or KnownDrops(protocol, blind=blind, fresh=fresh)
-        complete = analyze(protocol, drops, clock.scale, causes, progress, known)
-        finished = kept.keep(_finished(protocol, complete, drops, clock, blind=blind))
+        if finished is None:
+            known = known or KnownDrops(protocol, blind=blind, fresh=fresh)
+            complete, scales, edges = _analyze(session, protocol, clock, known, progress)
+            shown = veiled(complete) if blind else replace(complete, joint=None, adjusted={})
+            finished = kept.keep(Finished(shown, scales, edges))
+    gravity = check_gravity(protocol, finished.analysis.runs)
     held = complete if with_joint_fit and not blind else None
-    return SessionResults(*finished, session.simulated, clock, blind, digest, held)
+    return SessionResults(*finished, gravity, session.simulated, clock, blind, digest, held)
 
 
-def _finished(
-    protocol: Protocol, found: Analysis, drops: Iterable[Drop], clock: Calibration, *, blind: bool
-) -> Finished:
-    by_key = {(drop.run, drop.attempt): drop for drop in drops}
-    latest = [(run, by_key[run.run.number, run.attempt]) for run in found.runs]
-    return Finished(
-        veiled(found) if blind else replace(found, joint=None, adjusted={}),
-        None
-        if blind
-        else check_gravity(protocol, [(run, drop, clock.scale(drop)) for run, drop in latest]),
-        {key: clock.used(drop) for key, drop in by_key.items()},
-    )
+def _analyze(
+    session: Reader,
+    protocol: Protocol,
+    clock: Calibration,
+    known: KnownDrops,
+    progress: Progress | None,
+) -> tuple[Analysis, dict[tuple[int, int], dict[str, Any]], tuple[str, ...]]:
+    """Analyse all drops, read one by one, with their time scales and digests of their edges."""
+    scales: dict[tuple[int, int], dict[str, Any]] = {}
+    edges: list[str] = []
+
+    def scale(drop: Drop) -> TimeScale:
+        scales[drop.run, drop.attempt] = clock.used(drop)
+        edges.extend([edges_digest(drop)] if drop.edges else [])
+        return clock.scale(drop)
+
+    total = sum(entry.state is RunState.RECORDED for entry in session.states())
+    drops, causes = session.drops(), rejected(session)
+    found = analyze(protocol, drops, scale, causes, progress, known, total, _processors())
+    return found, scales, tuple(edges)
+
+
+def _processors() -> int:
+    """Return how many processors may be used.
+
+    Each process but the first runs the main program's file once more up to its guard, and only of
+    this program's own is it known that it has one.
+    """
+    program = getattr(sys.modules["__main__"], "__file__", None) or ""
+    if Path(program).stem != "rig" and Path(program).parent != Path(__file__).parents[1]:
+        return 1
+    return min(_MOST_PROCESSES, os.cpu_count() or 1)
 
 
 def complete_analysis(
@@ -190,20 +231,6 @@ def complete_analysis(
     return found.complete or detailed(session, progress)[0]
 
 
-def _checked(notes: list[str], check: GravityCheck | None) -> dict[str, Any]:
-    """Add to a calibration what free fall says of it."""
-    if check is None:
-        return {}
-    if not check.agrees:
-        notes = [
-            *notes,
-            f"free fall gives g = {check.measured.value:.4f} ± {check.measured.expanded:.4f} "
-            f"m/s², the protocol says {check.stated.value:.4f} (Eₙ {check.normalized_error:.1f}): "
-            "the clock, the beams' heights, the air or the protocol's gravity is not as stated",
-        ]
-    return {"gravity": check.json(), "notes": notes}
-
-
 def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:
     """Analyse a session and keep everything, each edge's rod too.
 
@@ -216,9 +243,7 @@ def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysi
     check_open(session, protocol)
     with session.snapshot():
         clock = Calibrator().look(session, protocol.reference_u)
-        drops = list(session.drops())
-        causes = rejected(session)
-    return analyze(protocol, drops, clock.scale, causes, progress, KnownDrops(protocol)), clock
+        return _analyze(session, protocol, clock, KnownDrops(protocol), progress)[0], clock
 
 
 def rejected(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:
@@ -230,8 +255,8 @@ def rejected(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:
 def notes(session: Reader) -> dict[Job, str]:
     """What operators noted to drops, of each the latest note, in order of recording."""
     last = {Job(entry.run, entry.attempt): entry for entry in session.states()}
-    found = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last.items()}
-    return {job: text for job, text in found.items() if text}
+    texts = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last.items()}
+    return {job: text for job, text in texts.items() if text}
 
 
 def tick_rates(session: Reader) -> dict[int, float]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from rig.analysis.result import GOOD
 from rig.measurands import RELEASE_SKEW, acceleration_in, averaged
-from rig.records import Job
 from rig.tui.motion import motions, separation
 from rig.tui.plotting import Picture, Series
 
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
+    from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.motion import ChainFall, Table
 
@@ -230,8 +230,8 @@ def control_pictures(view: SessionView) -> list[Picture]:
                  (-limit, "warning", ""))  # fmt: skip
         points = [(one, _point(one.quantities.get(row.name), row.scale)) for one in runs]
         found.append(_chart(f"{row.label} ({row.unit})", view, lines, points))
-    points = [(one, _gravity(view, one)) for one in runs]
-    if view.gravity or any(point for _, point in points):
+    points = [(one, _gravity(one)) for one in runs]
+    if any(point for _, point in points):
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
         what = "g in free fall" if view.protocol.track is None else "a along the track"
         found.append(_chart(f"{what} (m/s²)", view, expected, points))
@@ -258,10 +258,9 @@ def _point(measured: Measured | None, scale: float = 1.0) -> tuple[float, float]
     return None if measured is None else (measured.value * scale, measured.expanded * scale)
 
 
-def _gravity(view: SessionView, one: DropResult) -> tuple[float, float] | None:
+def _gravity(one: DropResult) -> tuple[float, float] | None:
     row = acceleration_in(one.quantities)
-    seen = view.gravity.get(Job(one.run.number, one.attempt))
-    return _point(seen if row is None else one.quantities[row.name])
+    return _point(one.gravity if row is None else one.quantities[row.name])
 
 
 def _chart(

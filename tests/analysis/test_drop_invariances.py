@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.drop import fit_drop
 from rig.analysis.result import DropResult
 from rig.model.chain import Chain
 from rig.records import Edge
@@ -119,12 +118,3 @@ def test_the_name_of_a_chain():
 def test_a_drop_analysed_again():
     one = case(UNIFORM, MILD, incline=40.0)
     assert one.analyze() == one.analyze()
-
-
-def test_what_was_found_out_where_less_was_unknown_is_found_out_anew():
-    one, known = case(UNIFORM, Dials.quiet()), {}
-    cold = fit_drop(one.protocol, one.run, one.drop, one.scale, known=known)[0]
-    ((job, kept),) = known.items()
-    known[job] = replace(kept, begun=kept.begun._replace(x=kept.begun.x[:-1]))
-    assert fit_drop(one.protocol, one.run, one.drop, one.scale, known=known)[0] == cold
-    assert known[job].begun.x.size == kept.begun.x.size

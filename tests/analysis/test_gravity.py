@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity, free_gravity
 from rig.clock.calibration import TimeScale
 from rig.units import Quantity
@@ -21,8 +22,9 @@ def gravity(one: Case, scale: TimeScale | None = None):
     return free_gravity(one.protocol, one.analyze(), one.drop, scale or one.scale)
 
 
-def check(one: Case, scale: TimeScale):
-    return check_gravity(one.protocol, [(one.analyze(), one.drop, scale)])
+def check(one: Case, scale: TimeScale, protocol=None):
+    protocol = protocol or one.protocol
+    return check_gravity(protocol, [replace(one.analyze(), gravity=gravity(one, scale))])
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -85,16 +87,15 @@ def test_a_protocols_own_uncertainty_counts():
     one = case(UNIFORM, QUIET, incline=40.0)
     off = replace(UNIFORM, gravity=Quantity(9.85, 0.0))
     unsure = replace(UNIFORM, gravity=Quantity(9.85, 0.05))
-    result = one.analyze()
-    assert not check_gravity(off, [(result, one.drop, one.scale)]).agrees
-    assert check_gravity(unsure, [(result, one.drop, one.scale)]).agrees
+    assert not check(one, one.scale, off).agrees
+    assert check(one, one.scale, unsure).agrees
 
 
 def test_the_same_rig_again_is_not_better_known():
     """What beams and rods are off by is the same in every drop."""
     dials, run = with_dials(rod_sd=0.3e-3, gate_sd=0.2e-3), first_run(UNIFORM, 40.0)
     drops = [case(UNIFORM, dials, run=run + n) for n in range(4)]
-    rows = [(one.analyze(), one.drop, one.scale) for one in drops]
+    rows = [DropCase(UNIFORM, one.run, one.drop, one.scale).summary().result for one in drops]
     alone, together = check_gravity(UNIFORM, rows[:1]), check_gravity(UNIFORM, rows)
     assert together.drops == 4
     assert together.measured.u > 0.9 * alone.measured.u

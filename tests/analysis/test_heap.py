@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.chain_records import heap_heights, on_heap, strike_heights
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase, fit_drop
 from rig.bench.falls import Asked, falls, time_scale
 from rig.model.surface import Surface
 from rig.protocol.plan import runs as planned
@@ -97,14 +97,15 @@ def test_drops_on_a_pile_are_marginal_with_results_at_strike(piled):
 
 
 def test_what_was_found_of_a_heap_is_kept_for_the_next_time(piled):
-    fall, known = piled[0], {}
-    run, scale = RUNS[fall.drop.run], time_scale(SEED)
-    first, _ = fit_drop(UNIFORM, run, fall.drop, scale, known=known)
-    (kept,) = known.values()
-    assert kept.on_heap is not None
-    again, _ = fit_drop(UNIFORM, run, fall.drop, scale, known=known)
-    assert again.quantities == first.quantities
-    assert json.dumps(again.json()) == json.dumps(first.json())
+    fall = piled[0]
+    one = DropCase(UNIFORM, RUNS[fall.drop.run], fall.drop, time_scale(SEED))
+    first = one.summary()
+    assert first.heaped
+    assert first.identified.on_heap is not None
+    again = one.summary(first)
+    assert again.result.quantities == first.result.quantities
+    assert json.dumps(again.result.json()) == json.dumps(first.result.json())
+    assert one.fit(first).rods == first.result.matches
 
 
 def test_a_beam_that_sees_no_end_of_the_fall_is_not_to_blame(piled):

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.analysis.averages import mean
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.quantities import effective_degrees
 from rig.analysis.result import Audit, DropResult, Measured
-from rig.analysis.summary import mean, summarize
+from rig.analysis.summary import summarize
 from rig.model.chain import Chain
 from rig.protocol.plan import runs
 from rig.units import Quantity

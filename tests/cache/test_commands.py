@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import rig
-from rig.analysis import session as analysis
+from rig.analysis.drop import DropCase
 from rig.cache.store import CacheFile
 from rig.cli import main
 from rig.session.schema import RunState
@@ -88,7 +88,7 @@ def test_what_is_kept_is_said_again_to_the_last_byte(session, tmp_path, capsys, 
     out = tmp_path / "out"
     cold = [ended(command, session, out, capsys) for command in COMMANDS]
     with monkeypatch.context() as patch:
-        for work in ("rig.analysis.session.fit_drop", "rig.analysis.session.joint_fit",
+        for work in ("rig.analysis.drop.DropCase.summary", "rig.analysis.session.joint_fit",
                      "rig.results.estimated.estimate", "rig.report.canvas.canvas",
                      "rig.commands.budget.fit_drop"):  # fmt: skip
             patch.setattr(work, refuse)
@@ -113,16 +113,16 @@ def counted(monkeypatch):
     """Whose drops were analysed."""
     drops = []
 
-    def fit_drop(protocol, run, drop, *arguments, **options):
-        drops.append(drop.run)
-        return work(protocol, run, drop, *arguments, **options)
+    def summary(case, *arguments, **options):
+        drops.append(case.run.number)
+        return work(case, *arguments, **options)
 
-    work = analysis.fit_drop
-    monkeypatch.setattr(analysis, "fit_drop", fit_drop)
+    work = DropCase.summary
+    monkeypatch.setattr(DropCase, "summary", summary)
     return drops
 
 
-def test_a_record_that_was_added_to_is_analysed_again(fence, counted):
+def test_of_a_record_that_was_added_to_only_what_is_new_is_analysed(fence, counted):
     with rig.open(fence) as session:
         before = session.analyze().json()
         assert session.analyze().json() == before
@@ -131,7 +131,8 @@ def test_a_record_that_was_added_to_is_analysed_again(fence, counted):
         session.add_state(3, 1, RunState.REJECTED, 0)
     with rig.open(fence) as session:
         again = session.analyze()
-    assert len(counted) == 10
+    assert len(counted) == 0
+    assert again.summary[0].n == before["summary"][0]["n"] - 1
     assert again.runs[2].verdict == "rejected"
 
 

@@ -7,13 +7,14 @@ import shutil
 import pytest
 
 from rig.analysis import identified
-from rig.analysis.drop import fit_drop
+from rig.analysis.comparison import compare
+from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.session import analyze
 from rig.clock.calibration import TimeScale
 from rig.reasons import plain_reason
 from rig.records import Job
-from rig.results import detailed
+from rig.results import detailed, results
 from rig.results.known_drops import KnownDrops
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
@@ -66,6 +67,22 @@ def test_all_drops_together_say_what_rig_analyze_says(session, rejected):
     assert bool(view.analysis.with_rejected) == bool(rejected)
 
 
+def test_the_first_reading_of_a_session_whose_results_are_kept_has_them_all(session, monkeypatch):
+    """Also what its single drops are compared with the model by."""
+    cold = LiveAnalysis(session).read()
+    with Session.open(session, readonly=True) as opened:
+        said = results(opened, fresh=True).analysis.json()
+    monkeypatch.setattr(DropCase, "read", None)
+    monkeypatch.setattr("rig.analysis.session.joint_fit", None)
+    view = LiveAnalysis(session).read()
+    assert (view.fitted, view.lagging) == (6, False)
+    assert view.analysis.json() == said
+    assert view.results == cold.results
+    for job in view.jobs:
+        pairs = [compare(one.protocol, [[one.results[job]]]) for one in (view, cold)]
+        assert pairs[0] == pairs[1]
+
+
 def test_a_rejected_drop_keeps_the_verdict_of_its_limits(session):
     reject(session, 6)
     view = LiveAnalysis(session).read()
@@ -91,7 +108,7 @@ def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monk
     for job, drop in view.drops.items():
         hz, u = view.scales[job]
         young = TimeScale(hz * (1.0 + 3e-6), 20.0 * u)
-        fit_drop(view.protocol, view.plan[job.run], drop, young, known=known)
+        known[drop] = DropCase(view.protocol, view.plan[job.run], drop, young).summary()
     monkeypatch.setattr(identified, "identify", None)
     scales = {id(drop): view.scales[job] for job, drop in view.drops.items()}
     for before in (known, KnownDrops(view.protocol)):

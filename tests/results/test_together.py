@@ -92,14 +92,14 @@ def test_of_one_rig_only_what_is_stated_alike_is_shared():
     assert moved != text
     parts = [SessionPart(name, reader.parse(t), None) for name, t in (("a", text), ("b", moved))]
     owners = same_owners(parts, same_rig=None)
-    assert owners["beams"] == [[0], [1]]
-    assert owners["posts"] == owners["chain A"] == owners["start"] == [[0, 1]]
+    assert owners["beams"] == [["a"], ["b"]]
+    assert owners["posts"] == owners["chain A"] == owners["start"] == [["a", "b"]]
     titled = reader.parse(text.replace("title: ", "title: Other "))
     parts[1] = SessionPart("b", titled, None)
-    assert same_owners(parts, same_rig=None)["posts"] == [[0], [1]]
-    assert same_owners(parts, same_rig=True)["posts"] == [[0, 1]]
+    assert same_owners(parts, same_rig=None)["posts"] == [["a"], ["b"]]
+    assert same_owners(parts, same_rig=True)["posts"] == [["a", "b"]]
     parts[1] = SessionPart("b", parts[0].protocol, None, board="another")
-    assert same_owners(parts, same_rig=None)["posts"] == [[0], [1]]
+    assert same_owners(parts, same_rig=None)["posts"] == [["a"], ["b"]]
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -176,10 +176,14 @@ def test_a_damaged_session_is_refused(two, tmp_path, sql):
     refused("records_damaged", InputError, two[1], copy)
 
 
-def test_options_of_one_session_are_refused(two, call):  # noqa: F811
-    done = call("analyze", *two, "--budget", "1")
+@pytest.mark.parametrize(
+    ("sessions", "options"),
+    [(2, ("--budget", "1")), (1, ("--same-rig",)), (1, ("--no-same-rig",)), (1, ("--unfinished",))],
+)
+def test_options_for_another_number_of_sessions_are_refused(two, call, sessions, options):  # noqa: F811
+    done = call("analyze", *two[:sessions], *options)
     assert done.code == 2
-    assert "--budget" in done.err
+    assert options[0].replace("--no-", "--") in done.err
 
 
 def test_two_sessions_are_added_in_python(two):

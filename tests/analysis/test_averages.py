@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_ind
 
-from rig.analysis.differences import difference
+from rig.analysis.averages import difference
 from rig.analysis.result import Measured
 
 
