@@ -578,12 +578,14 @@ class SideFall:
         path, rate = self.path(nodes), 1.0 + nodes[:, CLOCK, None] * self.sd[CLOCK]
         late, early = (path.times(self.levels + off) / rate for off in (-self.slack, self.slack))
         times, lasts = np.sort(self.pairing.times), (late - early)[late > early]
+        if not times.size or not lasts.size:
+            return nodes[:0], np.zeros(0, dtype=np.intp)
         # A record may last hours: a fall is where most of the edges are.
         until = np.searchsorted(times, times + _RECORD, side="right")
         first = int(np.argmax(until - np.arange(times.size)))
         begin = max(float(times[first] - late.max()), window[0])
         end = min(float(times[until[first] - 1] - early.min()), window[1])
-        if end < begin or not lasts.size:
+        if end < begin:
             return nodes[:0], np.zeros(0, dtype=np.intp)
         # At the fastest passages votes are two steps wide.
         step = float(lasts.min()) / 2.0
