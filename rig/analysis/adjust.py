@@ -28,8 +28,8 @@ STEPS = 60
 DONE = 1e-3
 """Of a standard uncertainty: a step so short is the last, for the next one is shorter again."""
 PATIENT = 6
-"""Steps after which one back is no part of finding the way: an edge at the very moment of an impact
-has a slope on either side, and steps go to and fro over the best place, which lies between them."""
+"""Steps refused in a row, after which a short one is no part of finding the way: an edge at the
+very moment of an impact has a slope on either side, and the best place lies between them."""
 _DAMPED = 1e-3  # λ of Levenberg and Marquardt with which shorter steps begin
 _FAINT = 1e-12  # λ that does nothing in a double's digits
 _FASTER = 10.0  # by which λ grows with each step taken back
@@ -170,13 +170,15 @@ def least_squares(
     here = search.look(scaled(x, sd))
     if not math.isfinite(here.loss):
         return Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
-    damping, previous, settled, step = 0.0, 0.0, False, np.zeros_like(x)
+    damping, previous, step = 0.0, 0.0, np.zeros_like(x)
+    settled, refusals = False, 0
     for _ in range(steps):
         step = search.step(here, damping)
         moved = length(step, here.root.matrix)
         near = here.size < here.usual
         # As long as steps get shorter alike, the next one is that of the last times their ratio.
-        short = near and (moved < done or (not damping and moved**2 < done * previous))
+        last = here.size < done or (moved < done and refusals > PATIENT)
+        short = near and (last or (not damping and moved**2 < done * previous))
         if short or (near and not rough):
             factor = search.scatter(here)
             if short and (rough or factor == 1.0):
@@ -186,11 +188,11 @@ def least_squares(
                 here, previous = search.weigh(here, factor), 0.0
                 continue
         there = search.look(here.y + step)
-        if there.loss <= here.loss - _GAIN * here.promised(step):
-            here, previous = there, moved
-            damping = damping / _SLOWER if damping > _FAINT else 0.0
-        else:
-            damping = damping * _FASTER or _DAMPED
+        if not there.loss <= here.loss - _GAIN * here.promised(step):
+            damping, refusals = damping * _FASTER or _DAMPED, refusals + 1
+            continue
+        here, previous, refusals = there, moved, 0
+        damping = damping / _SLOWER if damping > _FAINT else 0.0
     step = step if settled else np.zeros_like(x)
     rows = {role: rows.after(step * sd) for role, rows in here.seen.rows.items()}
     return Estimate(
