@@ -27,9 +27,9 @@ STEPS = 60
 """Of an adjustment, which a good one never needs."""
 DONE = 1e-3
 """Of a standard uncertainty: a step so short is the last, for the next one is shorter again."""
-PATIENT = 6
-"""Steps refused in a row, after which a short one is no part of finding the way: an edge at the
-very moment of an impact has a slope on either side, and the best place lies between them."""
+PATIENT = 4
+"""Short steps in a row that are no part of finding the way any more: an edge at the very moment of
+an impact has a slope on either side, and the best place lies between them."""
 _DAMPED = 1e-3  # λ of Levenberg and Marquardt with which shorter steps begin
 _FAINT = 1e-12  # λ that does nothing in a double's digits
 _FASTER = 10.0  # by which λ grows with each step taken back
@@ -171,13 +171,14 @@ def least_squares(
     if not math.isfinite(here.loss):
         return Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
     damping, previous, step = 0.0, 0.0, np.zeros_like(x)
-    settled, refusals = False, 0
+    settled, shorts = False, 0
     for _ in range(steps):
         step = search.step(here, damping)
         moved = length(step, here.root.matrix)
         near = here.size < here.usual
         # As long as steps get shorter alike, the next one is that of the last times their ratio.
-        last = here.size < done or (moved < done and refusals > PATIENT)
+        shorts = shorts + 1 if moved < done else 0
+        last = here.size < done or shorts > PATIENT
         short = near and (last or (not damping and moved**2 < done * previous))
         if short or (near and not rough):
             factor = search.scatter(here)
@@ -189,9 +190,9 @@ def least_squares(
                 continue
         there = search.look(here.y + step)
         if not there.loss <= here.loss - _GAIN * here.promised(step):
-            damping, refusals = damping * _FASTER or _DAMPED, refusals + 1
+            damping = damping * _FASTER or _DAMPED
             continue
-        here, previous, refusals = there, moved, 0
+        here, previous = there, moved
         damping = damping / _SLOWER if damping > _FAINT else 0.0
     step = step if settled else np.zeros_like(x)
     rows = {role: rows.after(step * sd) for role, rows in here.seen.rows.items()}

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.adjust import PATIENT
 from rig.analysis.components import stated
 from rig.analysis.equations import STRAY, scaled
 from rig.analysis.evidence import Evidence
@@ -44,6 +43,7 @@ FEWEST = 4
 """Drops that a session must have for a joint fit: one block of A, B, B, A."""
 IDENTIFIED = 0.5
 """Share of the prior variance that the edges must take away for an unknown to be found by them."""
+_PATIENT = 6  # rounds after which one back is no part of finding the way
 _ROUNDS = 60  # of which few drops need many, for they tell little of the scatter
 _REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
 _DONE = 0.02  # of a standard uncertainty
@@ -200,7 +200,7 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
         variance = np.sum(inverse**2, axis=1)
         ahead = step / np.sqrt(variance)
         last, moved = moved, damping * float(np.abs(ahead).max())
-        if round_ > PATIENT and ahead @ previous < 0.0:
+        if round_ > _PATIENT and ahead @ previous < 0.0:
             damping *= 0.5
         previous = ahead
         before = evidence.components
