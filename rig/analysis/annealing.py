@@ -399,8 +399,9 @@ class SideFall:
         low[PULL] = -0.9 * self.gravity
         low[DRAG] = FAINT - self.stated.kappa  # formulas for air and for none are not the same
         low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated.alpha, *ANY_ALPHA)
-        with np.errstate(divide="ignore"):
-            return low / self.sd, high / self.sd
+        known = self.sd == 0.0
+        unit = np.where(known, 1.0, self.sd)
+        return np.where(known, -np.inf, low / unit), np.where(known, np.inf, high / unit)
 
     @cached_property
     def _by(self) -> Array:

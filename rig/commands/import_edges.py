@@ -17,7 +17,6 @@ from rig.clock.calibration import TimeScale
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.host import SystemClock
 from rig.commands.output import say
-from rig.files import require_file
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable, with_gates
 from rig.protocol.plan import runs
@@ -43,7 +42,6 @@ _COMPARED = 3
 
 def main(arguments: Namespace) -> int:
     """Make a session from a file, or say how it would be read; returns the exit code."""
-    require_file(arguments.events)  # and no pipe: it is read more than once
     protocol = reader.read(arguments.protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
     imported = import_with_protocol(protocol, arguments)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from importlib import import_module
 from pathlib import Path
@@ -42,11 +43,18 @@ def main(arguments: Namespace) -> int:
 
 def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
     size, start = layout.grid.size, time.monotonic()
+    due = 1  # quarter of the points
 
     def show(done: int) -> None:
+        nonlocal due
         rate = done / (time.monotonic() - start)
         rest = (size - done) / rate
-        stage(f"{done / size:4.0%} of {size} points, {rate:.3g}/s, {rest:.0f} s left")
+        line = f"{done / size:4.0%} of {size} points, {rate:.3g}/s, {rest:.0f} s left"
+        if sys.stderr.isatty():
+            stage(line)
+        elif due <= 4 * done // size < 4:  # a log keeps every line: three are enough
+            due = 4 * done // size + 1
+            say(line)
 
     try:
         with executor(jobs, address) as (workers, count):

@@ -164,8 +164,8 @@ class Worker:
         watched = disk or (recorder is not None and not is_simulated(self._url))
         if late_s < STALL_S or not watched:
             return None
-        code = ("disk_slow" if disk else "held_up") + ("_armed" if self.controller.armed else "")
-        return make_error(SessionError, code, late_s=late_s)
+        codes = ("disk_slow", "disk_slow_armed") if disk else ("held_up", "held_up_armed")
+        return make_error(SessionError, codes[bool(self.controller.armed)], late_s=late_s)
 
     def at_rest(self) -> Future[bool]:
         """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.measurands import MEASURANDS
 from rig.reasons import sentences
 from rig.text_table import csv_text
-from rig.timers.edges_csv import edges_text
+from rig.timers.edge_rows import edges_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

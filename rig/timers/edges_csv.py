@@ -5,10 +5,8 @@ Times are read as decimals and kept to the picosecond, so what a file says is wh
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from rig.timers.events import seconds
 from rig.timers.layouts import FileLayout, read_drops
 from rig.timers.problems import ProblemList
 from rig.timers.table import HEADER
@@ -16,7 +14,6 @@ from rig.timers.timer_file import read_timer_file
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
 
     from rig.records import Drop
 
@@ -44,31 +41,3 @@ def read_edges(path: str | os.PathLike[str]) -> list[Drop]:
     if not file.is_own:
         ProblemList(str(path)).refuse(1, 1, "wrong_header", header=",".join(HEADER))
     return read_drops(file, FileLayout.own(file)).drops
-
-
-def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:
-    """Write drops in the import format; `read_edges` gives the same edges back.
-
-    Parameters
-    ----------
-    drops
-        At most one a run: the format does not know of attempts.
-    rates
-        Calibrated tick rate by run, Hz; runs left out use their nominal rate.
-
-    Raises
-    ------
-    ValueError
-        If two drops are of the same run.
-    """
-    rows, seen = [",".join(HEADER) + "\n"], set[int]()
-    for drop in drops:
-        if drop.run in seen:
-            raise ValueError(f"two drops of run {drop.run}")
-        seen.add(drop.run)
-        rate = Fraction((rates or {}).get(drop.run, drop.tick_hz))
-        rows += [
-            f"{drop.run},{edge.channel},{seconds(edge.tick, rate)},{int(edge.blocked)}\n"
-            for edge in drop.edges
-        ]
-    return "".join(rows)

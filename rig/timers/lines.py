@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.files import require_file
 from rig.timers.problems import ProblemList, refusal
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
     """
     problems = ProblemList(str(path))
     try:
+        require_file(path)  # and no pipe: it is read more than once
         size = Path(path).stat().st_size
         if size > MAX_BYTES:
             problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)

@@ -94,6 +94,8 @@ def rig(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
 def truth_of(session: Path) -> list[dict[str, Any]]:
     """Return the hidden truth, one drop that fell a line."""
     file = session.with_name(session.name + ".truth.jsonl")
+    if not file.exists():  # stopped before the simulation began
+        return []
     return [json.loads(line) for line in file.read_text("utf-8").splitlines()]
 
 

@@ -41,6 +41,7 @@ COMMANDS = {
     ("sweep", "protocol"): "X --vary drop=100mm..300mm:3 -o OUT.csv",
     ("tui", "keys"): "--keys X",
     ("unblind", "session"): "X",
+    ("selftest", "protocol"): "--port sim:// --protocol X",
 }
 WRITTEN = {("import", "session"), ("tui", "protocol"), ("tui", "session")}
 """A new file, and those that are only read on a terminal."""

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from rig.errors import InputError, Problem
 from rig.records import Drop, Edge
 from rig.timers import lines
-from rig.timers.edges_csv import edges_text, read_edges
+from rig.timers.edge_rows import edges_text
+from rig.timers.edges_csv import read_edges
 from rig.timers.events import TICK_HZ
 
 HEADER = "run,channel,time_s,state\n"

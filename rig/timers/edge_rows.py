@@ -1,0 +1,42 @@
+"""Drops as rows of the project's own format: ``run,channel,time_s,state``."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from rig.timers.events import seconds
+from rig.timers.table import HEADER
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from rig.records import Drop
+
+
+def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:
+    """Write drops in the import format, of which `rig.timers.edges_csv` reads the same edges.
+
+    Parameters
+    ----------
+    drops
+        At most one a run: the format does not know of attempts.
+    rates
+        Calibrated tick rate by run, Hz; runs left out use their nominal rate.
+
+    Raises
+    ------
+    ValueError
+        If two drops are of the same run.
+    """
+    rows, seen = [",".join(HEADER) + "\n"], set[int]()
+    for drop in drops:
+        if drop.run in seen:
+            raise ValueError(f"two drops of run {drop.run}")
+        seen.add(drop.run)
+        rate = Fraction((rates or {}).get(drop.run, drop.tick_hz))
+        rows += [
+            f"{drop.run},{edge.channel},{seconds(edge.tick, rate)},{int(edge.blocked)}\n"
+            for edge in drop.edges
+        ]
+    return "".join(rows)
