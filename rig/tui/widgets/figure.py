@@ -44,18 +44,19 @@ class Figure(SpanView):
 
     def step(self, by: int) -> None:
         """Move the cursor; the first step puts it into the middle."""
-        share = 0.5 if self._share is None else self._share + by / _STEPS
-        self._share = min(1.0, max(0.0, share))
-        self._draw()
+        self._put(0.5 if self._share is None else self._share + by / _STEPS)
 
     def point_at(self, value: float | None) -> None:
         """Put the cursor at a value of the horizontal axis, or take it away."""
         if self._picture is None:
             return
-        share = None
-        if value is not None:
-            low, high = spread(self._picture)
-            share = min(1.0, max(0.0, (value - low) / (high - low)))
+        low, high = spread(self._picture)
+        self._put(None if value is None else (value - low) / (high - low))
+
+    def _put(self, share: float | None) -> None:
+        """Put the cursor at a share of the horizontal axis, or at its end, or take it away."""
+        if share is not None:
+            share = min(1.0, max(0.0, share))
         if share != self._share:
             self._share = share
             self._draw()
@@ -69,8 +70,7 @@ class Figure(SpanView):
         offset = event.get_content_offset(self)
         margin, columns = self._across
         if offset is not None:
-            self._share = min(1.0, max(0.0, (offset.x - margin + 0.5) / columns))
-            self._draw()
+            self._put((offset.x - margin + 0.5) / columns)
 
     def _draw(self) -> None:
         if self._picture is None or not self.size:
