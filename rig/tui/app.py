@@ -15,11 +15,12 @@ from textual.widgets import ContentSwitcher, Input, Label
 
 from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
-from rig.tui import commands, selectors
+from rig.tui import commands
 from rig.tui.actions import BY_NAME, OFFLINE, Action, hindrance
 from rig.tui.client import ReconnectingClient
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
+from rig.tui.model import Model
 from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Dialog, Palette, Pick
 from rig.tui.stillness import Stillness
 from rig.tui.terminal import Terminal
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from rig.results.live import SessionView
     from rig.tui.context import Options
     from rig.tui.indicators import Indicators
-    from rig.tui.model import Model
     from rig.tui.screens.history import HistoryPage
     from rig.tui.screens.page import Page
     from rig.tui.screens.protocol import ProtocolPage
@@ -134,7 +134,7 @@ class RigApp(App[None], inherit_bindings=False):
         self.follower = Follower(self.client, self.begin)
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
-        self.driver = Driver(flow, self.client, self.follower, self.begin)
+        self.driver: Driver = Driver(flow, self.client, self.follower, self.begin)
         self.pages: dict[str, Page] = {}
         self._turning = asyncio.Lock()
         self._turned_to = ""
@@ -261,8 +261,25 @@ class RigApp(App[None], inherit_bindings=False):
     @property
     def model(self) -> Model:
         """What the pages are drawn from, now."""
-        driver = self.driver
-        return selectors.model(self.client, self.follower, driver.flow, driver.stop, self.page)
+        client, follower = self.client, self.follower
+        return Model(
+            state=follower.state,
+            flow=self.flow,
+            stop=self.driver.stop,
+            disk_s=client.disk_s if client else 0.0,
+            indicators=follower.indicators,
+            view=follower.view,
+            voids=follower.voids,
+            connected=client is None or client.up,
+            driving=self.driving,
+            now_s=monotonic(),
+            silence=client.silence if client else "",
+            port=client.port if client else "",
+            offline=client is None,
+            unreadable=follower.unreadable,
+            read=follower.done,
+            page=self.page,
+        )
 
     # ------------------------------------------------------------------ flow and pages
 
@@ -304,9 +321,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def _made(self, name: str) -> Page:
         if name not in self.pages:
-            options = self.options
-            given = (options.files, options.session, options.last) if name == "protocol" else ()
-            self.pages[name] = _page(name)(*given)
+            self.pages[name] = _page(name)(self.options)
         return self.pages[name]
 
     def turn(self, page: str) -> None:
@@ -432,7 +447,7 @@ class RigApp(App[None], inherit_bindings=False):
             self.action_do("go_on")  # which says so
         elif self._stillness.meant(self._face, at_s):
             model = self.model
-            self.driver.take(GoOn(selectors.next_job(model), model.settle_s))
+            self.driver.take(GoOn(model.next_job, model.settle_s))
         else:
             self.driver.take(Warned(_NOT_MEANT))
 

@@ -6,11 +6,12 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.result import GOOD
 from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopped, Try, Warned
 from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
-from rig.tui import picking, selectors
+from rig.tui import picking
 from rig.tui.choosing import labels
 from rig.tui.replay import Player
 from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Palette
@@ -21,8 +22,8 @@ from rig.tui.writing import write
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
+    from rig.tui.app import RigApp
     from rig.tui.client import ReconnectingClient
-    from rig.tui.context import CommandContext
 
 
 REASONS = (
@@ -35,7 +36,7 @@ REASONS = (
 """Frequent reasons to reject a drop that is within its limits; the operator may type another."""
 
 
-def do(app: CommandContext, name: str) -> None:
+def do(app: RigApp, name: str) -> None:
     """Do one action of the table; whether it makes sense now was asked before.
 
     At once: what comes of a key depends on what is there when the key is handled. Only what waits
@@ -47,7 +48,7 @@ def do(app: CommandContext, name: str) -> None:
         _DO[name](app)
 
 
-def _go_on(app: CommandContext) -> None:
+def _go_on(app: RigApp) -> None:
     """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp.arm`."""
     stage = app.driver.flow.stage
     if stage is Stage.PREPARE and app.page == "run":
@@ -56,15 +57,15 @@ def _go_on(app: CommandContext) -> None:
     elif stage is Stage.PREPARE:
         app.turn("run")
     elif stage is not Stage.PROTOCOL:
-        app.driver.take(GoOn(selectors.next_job(app.model)))
+        app.driver.take(GoOn(app.model.next_job))
     else:
         page = app.protocols
-        if page.file is not None and page.usable and page.session is not None:
-            files = str(page.file.resolve()), str(page.session.resolve())
+        if page.file is not None and page.usable and app.options.session is not None:
+            files = str(page.file.resolve()), str(app.options.session.resolve())
             app.begin(app.driver.open_session(*files, app.options.seed))
 
 
-def _control(app: CommandContext) -> None:
+def _control(app: RigApp) -> None:
     """Take control, or ask whether to give it back; who has it instead is said."""
     client = app.client
     assert client is not None
@@ -76,7 +77,7 @@ def _control(app: CommandContext) -> None:
         app.begin(_tried(app, client.take_control()))
 
 
-async def _tried(app: CommandContext, work: Coroutine[Any, Any, Any]) -> None:
+async def _tried(app: RigApp, work: Coroutine[Any, Any, Any]) -> None:
     """Wait for what the daemon does, and say what is wrong when it fails."""
     try:
         await work
@@ -90,7 +91,7 @@ async def _quietly(work: Coroutine[Any, Any, Any]) -> None:
         await work
 
 
-def _close(app: CommandContext) -> None:
+def _close(app: RigApp) -> None:
     """Ask, then close the session, so that another can be chosen."""
     client = app.client
     assert client is not None
@@ -103,19 +104,17 @@ def _close(app: CommandContext) -> None:
     _confirm(app, "Close the session?", question, "close", close)
 
 
-def _quit(app: CommandContext) -> None:
+def _quit(app: RigApp) -> None:
     """Ask, then leave."""
     question = "The rig keeps running after you quit." if app.client else ""
     _confirm(app, "Quit?", question, "quit", app.exit)
 
 
-def _confirm(
-    app: CommandContext, title: str, question: str, yes: str, act: Callable[[], object]
-) -> None:
+def _confirm(app: RigApp, title: str, question: str, yes: str, act: Callable[[], object]) -> None:
     app.ask(Confirm(title, question, yes), lambda _: act())
 
 
-def _try_release(app: CommandContext) -> None:
+def _try_release(app: RigApp) -> None:
     """Ask, then drive the release once."""
     app.turn("device")
     view = app.model.view
@@ -129,12 +128,12 @@ def _try_release(app: CommandContext) -> None:
     _confirm(app, "Test the release?", question, "test", lambda: app.driver.take(Try()))
 
 
-def _note(app: CommandContext) -> None:
+def _note(app: RigApp) -> None:
     text = " · ".join(notes_in(app.driver.flow.reasons))
     app.ask(Ask("Note on this drop:", text), lambda text: app.driver.take(Note(text)))
 
 
-def _filter(app: CommandContext) -> None:
+def _filter(app: RigApp) -> None:
     """Ask which drops are looked at."""
     app.turn("history")
     view = app.history.view
@@ -143,13 +142,13 @@ def _filter(app: CommandContext) -> None:
     app.ask(Ask(question, app.history.words), lambda words: app.history.sift(words.strip()))
 
 
-def _compare(app: CommandContext) -> None:
+def _compare(app: RigApp) -> None:
     """Lay drops over each other, or show one alone."""
     app.turn("history")
     app.history.comparing = not app.history.comparing
 
 
-def _write(app: CommandContext, command: str, option: str, suffix: str) -> None:
+def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
     """Ask, then have a command write files of the session that is looked at, beside it."""
     view = (app.history.view if app.page == "history" else None) or app.model.view
     if view is None:
@@ -160,7 +159,7 @@ def _write(app: CommandContext, command: str, option: str, suffix: str) -> None:
              lambda: app.begin(write(app, command, str(view.path), option, target)))  # fmt: skip
 
 
-def _step(app: CommandContext, by: int) -> None:
+def _step(app: RigApp, by: int) -> None:
     """Go a step in time, or with the cursor where nothing is played."""
     if app.page == "history":
         app.history.change(lambda tape, end_s: tape.moved(by, end_s))
@@ -168,7 +167,7 @@ def _step(app: CommandContext, by: int) -> None:
         app.pages[app.page].point(by)
 
 
-def _reject(app: CommandContext) -> None:
+def _reject(app: RigApp) -> None:
     """Ask why the drop is rejected; or whether a rejection is taken back."""
     model = app.model
     if model.flow.verdict == "rejected":
@@ -187,20 +186,20 @@ def _reject(app: CommandContext) -> None:
     app.ask(AskReason(question, REASONS), lambda reason: app.driver.take(Reject(reason)))
 
 
-def _repeat(app: CommandContext) -> None:
+def _repeat(app: RigApp) -> None:
     """Ask, then go back to a run for another attempt."""
     model = app.model
     job = model.flow.job or model.job
-    wanted = again(selectors.runs(model), job.run) if job else None
+    wanted = again(model.runs, job.run) if job else None
     if wanted is not None:
         title = f"Repeat run {wanted.run} (attempt {wanted.attempt})?"
         question = "This only prepares the run; nothing is armed yet."
-        if selectors.good(model, wanted.run):
+        if any(line.run == wanted.run and line.state in GOOD for line in model.runs):
             question += " The run has a good drop; the new attempt will count instead."
         _confirm(app, title, question, "prepare", lambda: app.driver.take(Again(wanted)))
 
 
-def _unblind(app: CommandContext) -> None:
+def _unblind(app: RigApp) -> None:
     """Ask, then have it recorded that the numbers may be seen."""
     client = app.client
     assert client is not None
@@ -212,16 +211,16 @@ def _unblind(app: CommandContext) -> None:
              lambda: app.begin(_tried(app, _unblinded(app, client))))  # fmt: skip
 
 
-async def _unblinded(app: CommandContext, client: ReconnectingClient) -> None:
+async def _unblinded(app: RigApp, client: ReconnectingClient) -> None:
     await client.call("unblind")
     await app.follower.read()
 
 
-def _begin_check(app: CommandContext) -> None:
+def _begin_check(app: RigApp) -> None:
     app.follower.indicators = app.follower.indicators.reset()
 
 
-_DO: dict[str, Callable[[CommandContext], object]] = {
+_DO: dict[str, Callable[[RigApp], object]] = {
     "stop": lambda app: app.driver.take(Stopped()),
     "reject": _reject,
     "note": _note,

@@ -1,26 +1,16 @@
-"""What the command line says, and what commands may use of the app that they do not know."""
+"""What the command line says."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 from rig.campaign.machine import COUNTDOWN_S
 from rig.tui.stillness import STILL_S
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
-
-    from rig.tui.actions import Action
-    from rig.tui.client import ReconnectingClient
-    from rig.tui.driver import Driver
-    from rig.tui.follow import Follower
-    from rig.tui.model import Model
-    from rig.tui.screens.dialogs import Dialog
-    from rig.tui.screens.history import HistoryPage
-    from rig.tui.screens.page import Page
-    from rig.tui.screens.protocol import ProtocolPage
 
 
 def ascii_only(environment: Mapping[str, str]) -> bool:
@@ -67,40 +57,3 @@ class Options:
     last: Path | None = None
     bell: bool = False
     ascii: bool = False
-
-
-class CommandContext(Protocol):
-    """The screens, and what is behind them. `rig.tui.app.RigApp` says what each of these is."""
-
-    options: Options
-    keys: Mapping[str, str]
-    client: ReconnectingClient | None
-    follower: Follower
-    driver: Driver
-    page: str
-    pages: dict[str, Page]
-
-    @property
-    def model(self) -> Model: ...
-
-    @property
-    def history(self) -> HistoryPage: ...
-
-    @property
-    def protocols(self) -> ProtocolPage: ...
-
-    def turn(self, page: str) -> None: ...
-
-    def begin(self, work: Coroutine[Any, Any, None]) -> object: ...
-
-    def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None: ...
-
-    def hindrance(self, action: Action) -> str: ...
-
-    def action_do(self, name: str) -> None: ...
-
-    def tell(self, text: str) -> None: ...
-
-    def next_theme(self) -> None: ...
-
-    def exit(self) -> None: ...

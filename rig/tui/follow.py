@@ -177,24 +177,24 @@ class Follower:
             if self._live is None:
                 self._live = await asyncio.to_thread(open_live, path)
             live = self._live
-            found = await asyncio.to_thread(live.read)
+            view = await asyncio.to_thread(live.read)
         finally:
             self._reading, self._read = False, wanted
         if path == self._path:
-            self._take(found)
-        if found.lagging and not self._fitting:
+            self._take(view)
+        if view.lagging and not self._fitting:
             self._fitting = True
-            self._begin(self._fit_jointly(live, found))
-        return found
+            self._begin(self._fit_jointly(live, view))
+        return view
 
-    def _take(self, found: SessionView) -> None:
-        self.view, self.unreadable = found, ""
-        self.voids = voids_of(found.states)
+    def _take(self, view: SessionView) -> None:
+        self.view, self.unreadable = view, ""
+        self.voids = voids_of(view.states)
         if self._client is not None:
             self._client.changed = True
         else:
-            self.state = state_of(found)
-            self.indicators = Indicators.of(found.channels)
+            self.state = state_of(view)
+            self.indicators = Indicators.of(view.channels)
 
     async def _read_quietly(self) -> None:
         try:
@@ -202,9 +202,9 @@ class Follower:
         except RigError as error:
             self.unreadable = f"{error.message}\n{error.hint}"
 
-    async def _fit_jointly(self, live: LiveAnalysis, found: SessionView) -> None:
+    async def _fit_jointly(self, live: LiveAnalysis, view: SessionView) -> None:
         try:
-            await asyncio.to_thread(live.fit_jointly, found)
+            await asyncio.to_thread(live.fit_jointly, view)
         finally:
             self._fitting = False
         if live is self._live:

@@ -130,7 +130,7 @@ def _is_key(key: str) -> bool:
         return False
     if len(last) == 1:
         return last.isalnum()  # others have names, such as question_mark
-    if last in {one.value for one in Keys}:
+    if last in {name.value for name in Keys}:
         return True
     try:
         return bool(unicodedata.lookup(last.replace("_", " ")))

@@ -1,4 +1,4 @@
-"""What the screens are drawn from, put together once a tick."""
+"""What the screens are drawn from: what daemon, session and campaign say, and what follows."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
+from rig.campaign import plan
 from rig.campaign.events import Stage
 from rig.campaign.machine import BEFORE_RELEASE
 from rig.campaign.voids import Voids
+from rig.records import Job
 from rig.vocabulary import ANY_SCENE
 
 if TYPE_CHECKING:
     from rig.campaign.machine import Flow
+    from rig.campaign.plan import RunLine
     from rig.protocol.protocol import Protocol, Run
     from rig.reasons import Reason
-    from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.indicators import Indicators
     from rig.tui.state import DaemonState
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 SLOW_DISK_S = 0.5
 """A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
 HOT = frozenset({*BEFORE_RELEASE, Stage.LIVE})
+_BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
 """Where a watcher is, by the state of the drop."""
 
@@ -54,8 +57,6 @@ class Model:
         Whether the daemon is heard.
     driving
         Whether this screen has control of the rig.
-    job
-        The attempt that `flow` is at, or would be at next.
     now_s
         A clock that only goes on.
     silence
@@ -70,26 +71,70 @@ class Model:
         What became of the latest STOP.
     disk_s
         How long the disk has been at one write.
+    page
+        The page that is shown.
     """
 
     state: DaemonState
     flow: Flow
     indicators: Indicators
-    protocol: Protocol | None = None
     view: SessionView | None = None
     voids: Voids = field(default_factory=Voids)
     connected: bool = False
     driving: bool = False
-    job: Job | None = None
     now_s: float = 0.0
     silence: str = ""
-    settle_s: float = 0.0
     port: str = ""
     offline: bool = False
     unreadable: str = ""
     read: int = 0
     stop: StopAnswer | None = None
     disk_s: float = 0.0
+    page: str = ""
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """The session's protocol; `None` before it is read."""
+        return self.view.protocol if self.view else None
+
+    @property
+    def runs(self) -> tuple[RunLine, ...]:
+        """The plan as it stands, our own latest verdict in it."""
+        flow, job = self.flow, self.flow.job
+        if flow.stage is not Stage.RESULT or job is None:
+            return self.state.runs
+        return tuple(
+            line._replace(state=flow.verdict, attempt=job.attempt) if line.run == job.run else line
+            for line in self.state.runs
+        )
+
+    @property
+    def next_job(self) -> Job | None:
+        """The attempt that comes next; `None` when the plan is done."""
+        if self.flow.stage is Stage.PREPARE and self.flow.job is not None:
+            return plan.again(self.runs, self.flow.job.run)
+        return plan.next_job(self.runs, self.voids.counts(self.runs))
+
+    @property
+    def job(self) -> Job | None:
+        """The attempt that the page is about: the one in hand, or that would be next."""
+        latest = self.view.jobs[-1] if self.view and self.view.jobs else None
+        if self.offline:
+            return latest
+        drop = self.state.section("drop")
+        if drop and not self.driving:
+            return Job(drop["run"], drop["attempt"])
+        if self.flow.stage in _BETWEEN:
+            return latest if self.page == "result" and latest else self.next_job
+        return self.flow.job
+
+    @property
+    def settle_s(self) -> float:
+        """How long the chains rest before the next drop."""
+        if self.view is None:
+            return 0.0
+        clock = self.view.clock.device
+        return plan.rest_s(self.view.protocol.plan.settle, clock.u if clock else None)
 
     @property
     def loading(self) -> str:
@@ -145,8 +190,11 @@ class Model:
         if self.view is None or self.job is None:
             return None
         run, attempt = self.job
-        earlier = [job for job, one in self.view.results.items()
-                   if job.run == run and job.attempt < attempt and one.verdict in GOOD]  # fmt: skip
+        earlier = [
+            job
+            for job, result in self.view.results.items()
+            if job.run == run and job.attempt < attempt and result.verdict in GOOD
+        ]
         return earlier[-1] if earlier else None
 
     @property

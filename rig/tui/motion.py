@@ -90,9 +90,11 @@ def motions(
     if protocol.gates is None:
         return ()
     protocol = at_contact(protocol, run.incline_deg, run.impact)
-    table = _table(edges, hz, thin=matches is None)
-    found = []
-    for role, _, parts in edge_trains(protocol, run, table):
+    table = edges if isinstance(edges, np.ndarray) else as_table(edges)
+    if matches is None:
+        table = _thinned(table)
+    falls = []
+    for role, _, parts in edge_trains(protocol, run, EdgeArrays.of(table, hz)):
         model = model_fall(protocol, run, role)
         if matches is not None:
             pairs = [_matched(part, matches) for part in parts]
@@ -101,8 +103,12 @@ def motions(
         times = np.concatenate([times for times, _ in pairs])
         heights = np.concatenate([heights for _, heights in pairs])
         order = np.argsort(times, kind="stable")
-        found.append(_motion(role, times[order], heights[order], model))
-    return tuple(found)
+        times, heights = times[order], heights[order]
+        delay = 0.0
+        if model is not None and times.size:
+            delay = float(np.median(times - model.times(heights)))
+        falls.append(ChainFall(role, times, heights, model, delay))
+    return tuple(falls)
 
 
 def as_table(edges: Iterable[Sequence[int]]) -> NDArray[np.int64]:
@@ -110,15 +116,15 @@ def as_table(edges: Iterable[Sequence[int]]) -> NDArray[np.int64]:
     return np.array([tuple(edge) for edge in edges], dtype=np.int64).reshape(-1, 3)
 
 
-def _table(edges: Table, hz: float, *, thin: bool) -> EdgeArrays:
-    """Take edges as arrays; of very many only as many as a picture can show."""
-    table = edges if isinstance(edges, np.ndarray) else as_table(edges)
-    if thin and len(table) > _MOST:
-        kept = np.arange(len(table)) % (1 + len(table) // _MOST) == 0
-        for channel in np.unique(table[:, 1]):  # where counting has to begin
-            kept[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
-        table = table[kept]
-    return EdgeArrays.of(table, hz)
+def _thinned(table: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Take of very many edges only as many as a picture can show."""
+    if len(table) <= _MOST:
+        return table
+    taken = np.arange(len(table)) % (1 + len(table) // _MOST) == 0
+    for channel in np.unique(table[:, 1]):  # where counting has to begin
+        taken[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
+    thinned: NDArray[np.int64] = table[taken]
+    return thinned
 
 
 class Separation(NamedTuple):
@@ -158,25 +164,24 @@ def separation(
     """
     nothing = np.empty(0)
     impact, free = pair
-    later = skew_s or 0.0
-    delay = free.delay_s if skew_s is None else impact.delay_s
-
-    def model(times: Array, heights: Array) -> Array:
-        if free.model is None:
-            return nothing
-        return free.model.heights(times - delay)[0] - heights
-
     times, gaps = nothing, nothing
     if free.times.size > 1 and impact.times.size:
-        at = impact.times + later
+        at = impact.times + (skew_s or 0.0)
         inside = (at >= free.times[0]) & (at <= free.times[-1])
         times = impact.times[inside]
         gaps = np.interp(at[inside], free.times, free.heights) - impact.heights[inside]
     if impact.model is None or free.model is None:
         return Separation(times, gaps, nothing, nothing, nothing)
-    there = impact.model.heights(times - impact.delay_s)[0]
+    delay = free.delay_s if skew_s is None else impact.delay_s
+    expected = impact.model.heights(times - impact.delay_s)[0]
     curve, heights = impact.curve(end_s)
-    return Separation(times, gaps, curve, model(curve, heights), model(times, there))
+    return Separation(
+        times,
+        gaps,
+        curve,
+        free.model.heights(curve - delay)[0] - heights,
+        free.model.heights(times - delay)[0] - expected,
+    )
 
 
 def _nearest(parts: Sequence[EdgeTrain], model: Trajectory | None) -> list[tuple[Array, Array]]:
@@ -190,15 +195,16 @@ def _nearest(parts: Sequence[EdgeTrain], model: Trajectory | None) -> list[tuple
     if not lags:
         return counted
     delay = float(np.median(np.concatenate(lags)))
-    found = []
+    pairs = []
     for part in parts:
-        there = model.heights(part.times - delay)[0]
-        off = np.abs(part.levels[None, :] - there[:, None])
+        if not part.levels.size:
+            pairs.append(_counted(part, 0))
+            continue
+        expected = model.heights(part.times - delay)[0]
+        off = np.abs(part.levels[None, :] - expected[:, None])
         off[part.blocks[None, :] != part.blocked[:, None]] = np.inf
-        best = off.argmin(axis=1) if part.levels.size else np.empty(0, dtype=np.intp)
-        count = best.size
-        found.append((part.times[:count], part.levels[best]))
-    return found
+        pairs.append((part.times, part.levels[off.argmin(axis=1)]))
+    return pairs
 
 
 def _counted(part: EdgeTrain, most: int) -> tuple[Array, Array]:
@@ -209,23 +215,15 @@ def _counted(part: EdgeTrain, most: int) -> tuple[Array, Array]:
 
 def _matched(part: EdgeTrain, matches: Mapping[int, int]) -> tuple[Array, Array]:
     """Times and heights of one gate's edges, each with the rod it was matched to."""
-    where = {(rod, blocks): at for at, (rod, blocks) in enumerate(
-        zip(part.rods.tolist(), part.blocks.tolist(), strict=True))}  # fmt: skip
-    kept, levels = [], []
+    levels = dict(zip(zip(part.rods.tolist(), part.blocks.tolist(), strict=True),
+                      part.levels.tolist(), strict=True))  # fmt: skip
     edges = zip(part.edge.tolist(), part.blocked.tolist(), strict=True)
-    for index, (edge, blocked) in enumerate(edges):
-        at = where.get((matches.get(edge, -1), blocked))
-        if at is not None:
-            kept.append(index)
-            levels.append(at)
-    return part.times[kept], part.levels[levels]
-
-
-def _motion(role: str, times: Array, heights: Array, model: Trajectory | None) -> ChainFall:
-    delay = 0.0
-    if model is not None and times.size:
-        delay = float(np.median(times - model.times(heights)))
-    return ChainFall(role, times, heights, model, delay)
+    heights = np.array(
+        [levels.get((matches.get(edge, -1), blocked), np.nan) for edge, blocked in edges],
+        dtype=np.float64,
+    )
+    matched = ~np.isnan(heights)
+    return part.times[matched], heights[matched]
 
 
 def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
@@ -244,12 +242,10 @@ def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
     kappas = air_of(protocol, name) or [0.0] * protocol.chains[name].chain.rods
     if role == "free" or protocol.surface is None:
         return free_trajectory(0.0, start, gravity, kappas[0])
-    found = predict_incline(protocol, run.incline_deg, name)
-    if found.alpha is None or found.gamma is None:
+    expected = predict_incline(protocol, run.incline_deg, name)
+    if expected.alpha is None or expected.gamma is None:
         return None
     chain = protocol.chains[name].chain
-    gains = kicks(chain, [found.alpha] * chain.rods, found.gamma)
-    places = np.array(chain.heights)
-    ratios = np.ones(places.size)
-    air = np.array([*kappas, kappas[-1]])
-    return struck_trajectory(0.0, start, gravity, np.array(gains), ratios, places, 1.0, air)
+    gains = np.array(kicks(chain, [expected.alpha] * chain.rods, expected.gamma))
+    places, air = np.array(chain.heights), np.array([*kappas, kappas[-1]])
+    return struck_trajectory(0.0, start, gravity, gains, np.ones(places.size), places, 1.0, air)

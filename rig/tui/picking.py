@@ -17,7 +17,7 @@ from rig.tui.widgets.banner import LOOKS
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
-    from rig.tui.context import CommandContext
+    from rig.tui.app import RigApp
 
 
 _MOST = 200
@@ -37,13 +37,13 @@ class SessionEntry(NamedTuple):
 
 def session_list(folder: Path) -> list[SessionEntry]:
     """List the sessions of a folder, the newest first."""
-    found = []
+    dated = []
     for path in folder.glob("*.session"):
         try:
-            found.append((path.stat().st_mtime_ns, path))
+            dated.append((path.stat().st_mtime_ns, path))
         except OSError:
             continue  # gone meanwhile
-    return [_look(path) for _, path in sorted(found, reverse=True)[:_MOST]]
+    return [_look(path) for _, path in sorted(dated, reverse=True)[:_MOST]]
 
 
 def _look(path: Path) -> SessionEntry:
@@ -59,7 +59,7 @@ def _look(path: Path) -> SessionEntry:
         return SessionEntry(path, trouble=error.message)
 
 
-async def sessions(app: CommandContext) -> None:
+async def sessions(app: RigApp) -> None:
     """Let one session of the folder be chosen, and play it."""
     view = app.model.view
     mine = view.path if view else app.options.session
@@ -67,24 +67,24 @@ async def sessions(app: CommandContext) -> None:
     entries = await asyncio.to_thread(session_list, folder)
     app.turn("history")
     now = app.history.view.path if app.history.view else mine
-    at = next((n for n, one in enumerate(entries) if now and _same(one.path, now)), 0)
+    at = next((n for n, entry in enumerate(entries) if now and _same(entry.path, now)), 0)
 
     title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
     question = Pick(title, [_line(entry) for entry in entries], at)
     app.ask(question, lambda number: app.begin(_open(app, entries[number])))
 
 
-def drops(app: CommandContext) -> None:
+def drops(app: RigApp) -> None:
     """Let one drop of the session that is played be chosen."""
-    found, history = app.history.view, app.history
-    if found is None:
+    view, history = app.history.view, app.history
+    if view is None:
         return
     lines = []
-    drop_labels = labels(found)
+    drop_labels = labels(view)
     for job in history.jobs:
-        verdict = found.results[job].verdict
+        verdict = view.results[job].verdict
         symbol, color = LOOKS.get(verdict, ("?", "$foreground"))
-        run = found.plan[job.run]
+        run = view.plan[job.run]
         lines.append(
             Content.assemble(f"run {job.run:3}, attempt {job.attempt}   {condition(run):28}",
                              (f"{symbol} {verdict:10}", color),
@@ -94,7 +94,7 @@ def drops(app: CommandContext) -> None:
     app.ask(Pick("Drops of this session", lines, at), history.choose)
 
 
-async def _open(app: CommandContext, entry: SessionEntry) -> None:
+async def _open(app: RigApp, entry: SessionEntry) -> None:
     history, live = app.history, app.model.view
     if live is not None and _same(live.path, entry.path):
         history.other = None

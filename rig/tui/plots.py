@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from rig.results.live import SessionView
     from rig.tui.motion import ChainFall, Table
 
+    Point = tuple[float, float, float]
+
 _MARKS = {"impact": ("×", "primary"), "free": ("+", "secondary")}
 _BEFORE_S = 0.02
 _WITH_BARS = 40  # numbers in a chart: the bars of more stand in each other's way
@@ -29,57 +31,56 @@ _TIME = "t (ms)"
 
 
 def chain_pictures(
-    found: tuple[ChainFall, ...], skew_s: float | None = None
+    falls: tuple[ChainFall, ...], skew_s: float | None = None
 ) -> tuple[Picture | None, Picture | None]:
     """Draw z(t) of each chain and Δz(t), with the model's curves; `None` for what is not there.
 
     Parameters
     ----------
-    found
+    falls
         The chains of a drop.
     skew_s
         What was measured of the release: Δz is then that of chains let go together, or else as it
         fell; z(t) always is as it fell.
     """
-    if not found:
+    if not falls:
         return None, None
-    measured = [float(fall.times[-1]) for fall in found if fall.times.size]
-    expected = [float(fall.model.time[-1]) for fall in found if fall.model is not None]
+    measured = [float(fall.times[-1]) for fall in falls if fall.times.size]
+    expected = [float(fall.model.time[-1]) for fall in falls if fall.model is not None]
     end = max(0.0, *measured, *expected) + _BEFORE_S
-    series, left, pair = [], [], len(found) > 1
-    for one in found:
-        times, heights = one.curve(end)
-        series.append(Series("line", times * 1e3, heights * 1e2, "accent",
-                             label=f"model, {one.role} side" if pair else "model"))  # fmt: skip
-    for one in reversed(found):  # the struck chain above the free one
-        mark, color = _MARKS[one.role]
-        thin = slice(None, None, 1 + one.times.size // _MOST)
-        times, heights = one.times[thin], one.heights[thin]
-        series.append(Series("dots", times * 1e3, heights * 1e2, color, mark,
-                             one.role if pair else "measured"))  # fmt: skip
-        if one.model is not None and times.size:
-            off = heights - one.model.heights(times - one.delay_s)[0]
-            left.append(Series("dots", times * 1e3, off * 1e3, color, mark))
-    limits = (0.0, end * 1e3)
-    chains = Picture("z (cm) as it fell", _TIME, tuple(series), limits,
-                     residuals=tuple(left), residual_label="minus model (mm)")  # fmt: skip
+    series, residuals, pair = [], [], len(falls) > 1
+    for fall in falls:
+        times, heights = fall.curve(end)
+        label = f"model, {fall.role} side" if pair else "model"
+        series.append(Series("line", times * 1e3, heights * 1e2, "accent", label=label))
+    for fall in reversed(falls):  # the struck chain above the free one
+        mark, color = _MARKS[fall.role]
+        thin = slice(None, None, 1 + fall.times.size // _MOST)
+        times, heights = fall.times[thin], fall.heights[thin]
+        label = fall.role if pair else "measured"
+        series.append(Series("dots", times * 1e3, heights * 1e2, color, mark, label))
+        if fall.model is not None and times.size:
+            off = heights - fall.model.heights(times - fall.delay_s)[0]
+            residuals.append(Series("dots", times * 1e3, off * 1e3, color, mark))
+    z = _against_time("z (cm) as it fell", series, residuals, end)
     if not pair:
-        return chains, None
-    gap = separation(found, end, skew_s)
-    how = "as it fell" if skew_s is None else "corrected"
+        return z, None
+    gap = separation(falls, end, skew_s)
     off = gap.gaps - gap.expected if gap.expected.size else gap.expected
-    apart = Picture(
-        f"Δz {how} (cm)",
-        _TIME,
-        (
-            Series("line", gap.curve * 1e3, gap.model * 1e2, "accent", label="model"),
-            Series("dots", gap.times * 1e3, gap.gaps * 1e2, "success", "+", "measured"),
-        ),
-        limits,
-        residuals=(Series("dots", gap.times[: off.size] * 1e3, off * 1e3, "success", "+"),),
-        residual_label="minus model (mm)",
-    )
-    return chains, apart
+    series = [
+        Series("line", gap.curve * 1e3, gap.model * 1e2, "accent", label="model"),
+        Series("dots", gap.times * 1e3, gap.gaps * 1e2, "success", "+", "measured"),
+    ]
+    residuals = [Series("dots", gap.times[: off.size] * 1e3, off * 1e3, "success", "+")]
+    label = "as it fell" if skew_s is None else "corrected"
+    return z, _against_time(f"Δz {label} (cm)", series, residuals, end)
+
+
+def _against_time(
+    label: str, series: Sequence[Series], residuals: Sequence[Series], end_s: float
+) -> Picture:
+    return Picture(label, _TIME, tuple(series), (0.0, end_s * 1e3),
+                   residuals=tuple(residuals), residual_label="minus model (mm)")  # fmt: skip
 
 
 def drop_pictures(
@@ -88,14 +89,14 @@ def drop_pictures(
     """Draw a recorded drop, or its first `edges`, with rods and skew as the analysis found them."""
     result, hz = view.results[job], view.scales[job].hz
     skew = result.quantities.get(RELEASE_SKEW.name)
-    found = motions(
+    falls = motions(
         view.protocol,
         view.plan[job.run],
         view.drops[job].edges if edges is None else edges,
         hz,
         result.matches or None,
     )
-    return chain_pictures(found, None if skew is None else skew.value)
+    return chain_pictures(falls, None if skew is None else skew.value)
 
 
 def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:
@@ -103,24 +104,21 @@ def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | Non
 
     `None` where nothing of it was measured. Of very many drops some are left out.
     """
-    others = [other for other in jobs[:: 1 + len(jobs) // _LAID] if other != job]
-    curves: list[Series] = []
-    for one in (*others, job):
-        apart = (
-            drop_pictures(view, one)[1]
-            if RELEASE_SKEW.name in view.results[one].quantities
-            else None
-        )
+    rest = [other for other in jobs[:: 1 + len(jobs) // _LAID] if other != job]
+    series: list[Series] = []
+    for drop in (*rest, job):
+        apart = None
+        if RELEASE_SKEW.name in view.results[drop].quantities:
+            apart = drop_pictures(view, drop)[1]
         if apart is None:
             continue
         model, dots = apart.series
-        if one == job:
-            curves += [model, dots._replace(label=f"run {one.run}")]
+        if drop == job:
+            series += [model, dots._replace(label=f"run {job.run}")]
         else:
-            some = f"{len(others)} others" if not curves else ""
-            curves.append(dots._replace(color="foreground", marker="·", label=some))
-    title = "Δz corrected (cm)"
-    return Picture(title, _TIME, tuple(curves)) if curves else None
+            label = f"{len(rest)} others" if not series else ""
+            series.append(dots._replace(color="foreground", marker="·", label=label))
+    return Picture("Δz corrected (cm)", _TIME, tuple(series)) if series else None
 
 
 def run_picture(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:
@@ -129,21 +127,21 @@ def run_picture(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | N
     if row is None:
         return None
     points = {
-        one: (one.run, *point)
-        for one in jobs
-        if (point := _point(view.results[one].quantities.get(row.name), row.scale))
+        drop: (drop.run, *_point(view.results[drop].quantities[row.name], row.scale))
+        for drop in jobs
+        if row.name in view.results[drop].quantities
     }
-    others = [point for one, point in points.items() if one != job]
-    mine = [point for one, point in points.items() if one == job]
-    series = (_bars(others, "secondary", "●", "others ± U"),
+    rest = [point for drop, point in points.items() if drop != job]
+    mine = [point for drop, point in points.items() if drop == job]
+    series = (_bars(rest, "secondary", "●", "others ± U"),
               _bars(mine, "primary", "●", f"run {job.run} ± U"))  # fmt: skip
     return _over_runs(f"{row.label} ({row.unit})", view, series)
 
 
-def _bars(points: Sequence[tuple[int, float, float]], color: str, mark: str, label: str) -> Series:
-    """Draw run, value and U95 of several runs."""
-    return Series("bars", [x for x, *_ in points], [y for _, y, _ in points], color, mark, label,
-                  [u for *_, u in points])  # fmt: skip
+def _bars(points: Sequence[Point], color: str, mark: str, label: str = "") -> Series:
+    """Draw values with their U95."""
+    x, y, errors = zip(*points, strict=True) if points else ((), (), ())
+    return Series("bars", x, y, color, mark, label, errors)
 
 
 def _over_runs(title: str, view: SessionView, series: Sequence[Series]) -> Picture:
@@ -160,57 +158,47 @@ def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
     curves
         The model, as `rig.analysis.curves.model_curves` gives it.
     """
-    found = []
-    runs = [one for one in analysis.runs if one.verdict in GOOD]
+    pictures = []
     for row in averaged():
-        name, scale = row.name, row.scale
-        curve = curves.get(name)
-        if curve is None:
+        name = row.name
+        if curves.get(name) is None:
             continue
-        dots = [
-            (one.run.incline_deg, one.quantities[name].value * scale)
-            for one in runs
-            if name in one.quantities
+        runs = [
+            (drop.run.incline_deg, *_point(drop.quantities[name], row.scale))
+            for drop in analysis.runs
+            if drop.verdict in GOOD and name in drop.quantities
         ]
-        means = [line for line in analysis.summary if name in line.means]
-        inclines = [line.incline_deg for line in means]
-        bars = [line.means[name].expanded for line in means]
-        beside = [line for line in means if name in line.predicted]
-        off = [line.means[name].value - line.predicted[name].value for line in beside]
-        found.append(
-            Picture(
-                f"{row.label} ({row.unit})",
-                "incline (°)",
-                (
-                    *_model_lines(curves, name, scale),
-                    Series("dots", [x for x, _ in dots], [y for _, y in dots],
-                           "secondary", "·", "runs"),
-                    Series("bars", inclines, [line.means[name].value * scale for line in means],
-                           "primary", "●", "mean ± U", [bar * scale for bar in bars]),
-                ),
-                residuals=(
-                    Series("bars", [line.incline_deg for line in beside],
-                           [one * row.fine_scale for one in off], "primary", "●",
-                           errors=[line.means[name].expanded * row.fine_scale for line in beside]),
-                ),
-                residual_label=f"means − model ({row.fine})",
-            )
+        means = [
+            (line.incline_deg, line.means[name], line.predicted.get(name))
+            for line in analysis.summary
+            if name in line.means
+        ]
+        bars = [(incline, *_point(mean, row.scale)) for incline, mean, _ in means]
+        off = [
+            (incline, (mean.value - model.value) * row.fine_scale, mean.expanded * row.fine_scale)
+            for incline, mean, model in means
+            if model is not None
+        ]
+        dots = _bars(runs, "secondary", "·", "runs")._replace(kind="dots", errors=())
+        series = (*_model_lines(curves, name, row.scale), dots,
+                  _bars(bars, "primary", "●", "mean ± U"))  # fmt: skip
+        pictures.append(
+            Picture(f"{row.label} ({row.unit})", "incline (°)", series,
+                    residuals=(_bars(off, "primary", "●"),),
+                    residual_label=f"means − model ({row.fine})")
         )  # fmt: skip
-    return found
+    return pictures
 
 
 def _model_lines(curves: Mapping[str, Any], name: str, scale: float) -> Iterator[Series]:
     """One line, or one for each of two unlike chains."""
-    chains = [segment.partition(", ")[2] for segment in curves["segments"]]
-    for chain in dict.fromkeys(chains):
-        at = [n for n, one in enumerate(chains) if one == chain]
-        yield Series(
-            "line",
-            [curves["incline_deg"][n] for n in at],
-            np.array([curves[name][n] for n in at], dtype=np.float64) * scale,  # none is nan
-            "accent",
-            label=f"model, {chain}" if chain else "model",
-        )
+    incline_deg = np.array(curves["incline_deg"], dtype=np.float64)
+    values = np.array(curves[name], dtype=np.float64) * scale  # none is nan
+    chains = np.array([segment.partition(", ")[2] for segment in curves["segments"]])
+    for chain in dict.fromkeys(chains.tolist()):
+        label = f"model, {chain}" if chain else "model"
+        part = chains == chain
+        yield Series("line", incline_deg[part], values[part], "accent", label=label)
 
 
 def control_pictures(view: SessionView) -> list[Picture]:
@@ -222,20 +210,20 @@ def control_pictures(view: SessionView) -> list[Picture]:
         Those of quantities that this scene has.
     """
     runs = view.analysis.runs
-    found = []
+    pictures = []
     if view.protocol.two_chains:
         row = RELEASE_SKEW
         limit = view.protocol.accept.release_skew * row.scale
-        lines = ((0.0, "foreground", ""), (limit, "warning", f"limit ±{limit:g}"),
-                 (-limit, "warning", ""))  # fmt: skip
-        points = [(one, _point(one.quantities.get(row.name), row.scale)) for one in runs]
-        found.append(_chart(f"{row.label} ({row.unit})", view, lines, points))
-    points = [(one, _gravity(one)) for one in runs]
-    if any(point for _, point in points):
+        levels = ((0.0, "foreground", ""), (limit, "warning", f"limit ±{limit:g}"),
+                  (-limit, "warning", ""))  # fmt: skip
+        skews = [(drop, drop.quantities.get(row.name)) for drop in runs]
+        pictures.append(_chart(f"{row.label} ({row.unit})", view, levels, skews, row.scale))
+    gravities = [(drop, _gravity(drop)) for drop in runs]
+    if any(gravity for _, gravity in gravities):
         expected = ((view.protocol.gravity.value, "accent", "protocol"),)
-        what = "g in free fall" if view.protocol.track is None else "a along the track"
-        found.append(_chart(f"{what} (m/s²)", view, expected, points))
-    return found
+        label = "g in free fall" if view.protocol.track is None else "a along the track"
+        pictures.append(_chart(f"{label} (m/s²)", view, expected, gravities))
+    return pictures
 
 
 def meaning(label: str) -> str:
@@ -253,37 +241,38 @@ def meaning(label: str) -> str:
     )
 
 
-def _point(measured: Measured | None, scale: float = 1.0) -> tuple[float, float] | None:
+def _point(measured: Measured, scale: float = 1.0) -> tuple[float, float]:
     """Value and U95."""
-    return None if measured is None else (measured.value * scale, measured.expanded * scale)
+    return measured.value * scale, measured.expanded * scale
 
 
-def _gravity(one: DropResult) -> tuple[float, float] | None:
-    row = acceleration_in(one.quantities)
-    return _point(one.gravity if row is None else one.quantities[row.name])
+def _gravity(drop: DropResult) -> Measured | None:
+    row = acceleration_in(drop.quantities)
+    return drop.gravity if row is None else drop.quantities[row.name]
 
 
 def _chart(
     title: str,
     view: SessionView,
-    lines: Sequence[tuple[float, str, str]],
-    points: Sequence[tuple[DropResult, tuple[float, float] | None]],
+    levels: Sequence[tuple[float, str, str]],
+    values: Sequence[tuple[DropResult, Measured | None]],
+    scale: float = 1.0,
 ) -> Picture:
     """Draw one number a run, with U95, in order of the runs."""
     ends = (0.5, len(view.plan) + 0.5)
     series = [Series("line", ends, (level, level), color, label=label)
-              for level, color, label in lines]  # fmt: skip
+              for level, color, label in levels]  # fmt: skip
     for counts, color, mark, label in ((True, "primary", "●", "counts ± U"),
                                        (False, "error", "×", "void")):  # fmt: skip
-        some = [
-            (one.run.number, *point)
-            for one, point in points
-            if point and (one.verdict in GOOD) is counts
+        points = [
+            (drop.run.number, *_point(value, scale))
+            for drop, value in values
+            if value and (drop.verdict in GOOD) is counts
         ]
-        drawn = _bars(some, color, mark, label)
-        if len(points) > _WITH_BARS:
-            drawn = drawn._replace(kind="dots", label=label.removesuffix(" ± U"), errors=())
-        series.append(drawn)
+        bars = _bars(points, color, mark, label)
+        if len(values) > _WITH_BARS:
+            bars = bars._replace(kind="dots", label=label.removesuffix(" ± U"), errors=())
+        series.append(bars)
     return _over_runs(title, view, series)
 
 

@@ -149,7 +149,7 @@ def plotted(picture: Picture, width: int, height: int, cursor: float | None = No
 def spread(picture: Picture) -> tuple[float, float]:
     """Take the horizontal ends that are given, or those of the data."""
     given_low, given_high = picture.x_limits
-    values = [float(value) for one in picture.series for value in one.x]
+    values = [float(value) for series in picture.series for value in series.x]
     low = min(values, default=0.0) if given_low is None else given_low
     high = max(values, default=1.0) if given_high is None else given_high
     return (low, high) if low < high else (low - 0.5, low + 0.5)

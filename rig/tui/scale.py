@@ -67,51 +67,46 @@ def drawing(
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
-    pitch = 2.4 * max(map(_rod_m, (protocol, protocol), (run.impact, run.free)))
+    names = {"impact": run.impact, "free": run.free}
+    pitch = 2.4 * max(_rod_m(protocol, name) for name in names.values())
+    half = 0.5 * pitch
     length = max(rods.chain.length for rods in protocol.chains.values())
-    blocked = set(indicators.blocked)
     for column, fall in enumerate(falls):
-        name = run.impact if fall.role == "impact" else run.free
+        side: Side = "impact" if fall.role == "impact" else "free"
+        name = names[side]
         assert name is not None
         left, right = pitch * (2 * column + 0.5), pitch * (2 * column + 1.5)
-        side: Side = "impact" if fall.role == "impact" else "free"
         model = _model(fall, time_s)
         if model is not None:
             strokes += _rods(protocol, name, side, right, model, "accent")
         if fall.times.size:
-            hangs = model is not None and time_s < fall.times[0]
-            height = model if hangs and model is not None else _measured(fall, time_s)
             color = "primary" if side == "impact" else "secondary"
             if film is not None and side == "impact":
                 strokes += _filmed(film, left, time_s - fall.delay_s, color)
             else:
+                hangs = model is not None and time_s < fall.times[0]
+                height = model if hangs and model is not None else _measured(fall, time_s)
                 strokes += _rods(protocol, name, side, left, height, color)
-        half = 0.5 * pitch
         for gate in protocol.gates.on(side) if protocol.gates else ():
-            lit = gate.channel in blocked
-            ends = (left - half, left + half) if lit else (left - half, left - 0.7 * half)
-            look = "warning" if lit else "foreground"
-            strokes.append(Stroke(ends[0], gate.height, ends[1], gate.height, look))
+            lit = gate.channel in indicators.blocked
+            end, color = (left + half, "warning") if lit else (left - 0.7 * half, "foreground")
+            strokes.append(Stroke(left - half, gate.height, end, gate.height, color))
         if side == "impact":
             fallen = half * math.tan(math.radians(run.incline_deg))
             strokes.append(Stroke(left - half, fallen, left + half, -fallen, "foreground"))
     width = 2.0 * pitch * max(1, len(falls))
     apart = None
-    seen = [fall for fall in falls if fall.times.size and fall.times[0] <= time_s]
-    if len(seen) == 2:
-        until_s = min(time_s, *(float(fall.times[-1]) for fall in seen))
-        tops = [
+    begun = [fall for fall in falls if fall.times.size and fall.times[0] <= time_s]
+    if len(begun) == 2:
+        until_s = min(time_s, *(float(fall.times[-1]) for fall in begun))
+        low, high = (
             _measured(fall, until_s) + protocol.chains[name].chain.length
-            for fall, name in zip(seen, (run.impact, run.free), strict=True)
+            for fall, name in zip(begun, names.values(), strict=True)
             if name is not None
-        ]
-        apart = tops[1] - tops[0]
-        at = 0.5 * width
-        for x, to_x, z, to_z in (
-            (at, at, tops[0], tops[1]), (at - 0.03, at + 0.03, tops[0], tops[0]),
-            (at - 0.03, at + 0.03, tops[1], tops[1]),
-        ):  # fmt: skip
-            strokes.append(Stroke(x, z, to_x, to_z, "success"))
+        )
+        apart, at = high - low, 0.5 * width
+        strokes.append(Stroke(at, low, at, high, "success"))
+        strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in (low, high)]
     top = protocol.drop.value + length + _MARGIN_M
     # A free chain that passes the contact point is shown as far down as one that struck it lies.
     return Drawing(tuple(strokes), width, -0.35 * length, top, apart)
@@ -156,8 +151,8 @@ def _filmed(film: Film, x: float, time_s: float, color: str) -> Iterator[Stroke]
     """Rods with their tilt, in the pile too, and the strings that are slack."""
     moment = film.nearest(time_s)
     both = film.left[moment], film.right[moment]
-    for one, other in zip(*both, strict=True):
-        yield Stroke(x + one[0], one[2], x + other[0], other[2], color)
+    for start, end in zip(*both, strict=True):
+        yield Stroke(x + start[0], start[2], x + end[0], end[2], color)
     for ends, slack in zip(both, film.slack(moment), strict=True):
         for low, high, loose in zip(ends, ends[1:], slack, strict=False):
             if loose:

@@ -43,8 +43,8 @@ class DaemonState:
 
     def section(self, name: str) -> Mapping[str, Any]:
         """Return one section, empty where the daemon says null."""
-        found = self.sections.get(name)
-        return found if isinstance(found, dict) else EMPTY
+        section = self.sections.get(name)
+        return section if isinstance(section, dict) else EMPTY
 
     @property
     def phase(self) -> str:

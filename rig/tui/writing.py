@@ -7,10 +7,10 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rig.tui.context import CommandContext
+    from rig.tui.app import RigApp
 
 
-async def write(app: CommandContext, *command: str) -> None:
+async def write(app: RigApp, *command: str) -> None:
     """Run a command, and say where its files are or what went wrong.
 
     A process of its own: what it computes takes nothing from STOP.

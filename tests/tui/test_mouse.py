@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rig.campaign.events import Stage
 from rig.tui.actions import OFFLINE
 from rig.tui.screens.dialogs import Ask, Confirm, Pick
@@ -86,7 +88,8 @@ def test_a_protocol_and_stop_are_clicked(lab, fence):
 
     async def work():
         async with lab.operator(files=(broken, lab.protocol, other)) as op:
-            op.app.protocols.last = lab.folder / "older.session"
+            options = replace(op.app.options, last=lab.folder / "older.session")
+            op.app.protocols.options = options
             # What can be used, and not the first of the list.
             await op.sees("A short fence", "Plan and limits", "last session:", "o older")
             await op.until(lambda: op.app.client and op.app.client.driving)

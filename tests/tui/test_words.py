@@ -25,7 +25,7 @@ def model(text):
     state = {"port": {"url": text, "simulated": True}, "session": {"title": text, "path": text},
              "control": {"client": text}, "link": {"state": "up"}}  # fmt: skip
     flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(plain_reason(text),))
-    return Model(typed(0, state), flow, Indicators(), connected=True, job=Job(1, 1), port=text)
+    return Model(typed(0, state), flow, Indicators(), connected=True, port=text)
 
 
 @pytest.mark.parametrize("text", NASTY, ids=range(len(NASTY)))

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 class DevicePage(Page):
     """What is connected, and what its gates see."""
 
-    NAME = "device"
     SCOPED_CSS = False
     DEFAULT_CSS = """
     DevicePage #facts { padding: 0 1 1 1; }
@@ -37,10 +36,10 @@ class DevicePage(Page):
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
-        self.query_one("#facts", Words).say(_facts(model))
+        self.say("facts", _facts(model))
         self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
-        self.query_one("#check", Words).say(_gate_check(model))
-        self.query_one("#release", Words).say(_release(model))
+        self.say("check", _gate_check(model))
+        self.say("release", _release(model))
 
 
 def _facts(model: Model) -> Content:

@@ -31,18 +31,16 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
 
-    from rig.films import Film
     from rig.records import Job
     from rig.results.live import SessionView
+    from rig.tui.context import Options
     from rig.tui.indicators import Indicators
     from rig.tui.model import Model
-    from rig.tui.motion import ChainFall
 
 
 class HistoryPage(Page):
     """A drop played again."""
 
-    NAME = "history"
     SCOPED_CSS = False
     DEFAULT_CSS = """
     HistoryPage #left, HistoryPage #right { width: 1fr; }
@@ -51,8 +49,8 @@ class HistoryPage(Page):
     .-low HistoryPage #numbers { display: none; }
     """
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, options: Options) -> None:
+        super().__init__(options)
         self.player = Player()
         self.other: SessionView | None = None
         """Of another session than the one in hand."""
@@ -60,12 +58,7 @@ class HistoryPage(Page):
         """Which drops are looked at, as `rig.tui.choosing` reads them."""
         self.comparing = False
         """Whether all drops that are looked at lie over each other."""
-        self._sifted: tuple[object, tuple[Job, ...]] = None, ()
         self._view: SessionView | None = None
-        self._of: object = None
-        self._told: object = None
-        self._falls: tuple[ChainFall, ...] = ()
-        self._film: Film | None = None
 
     def compose(self) -> ComposeResult:
         yield Words(id="which")
@@ -93,13 +86,11 @@ class HistoryPage(Page):
     @property
     def jobs(self) -> tuple[Job, ...]:
         """The drops that are looked at."""
-        found = self.view
-        if found is None:
+        view = self.view
+        if view is None:
             return ()
-        key = found.path, found.reading, self.words
-        if self._sifted[0] != key:
-            self._sifted = key, chosen(found, self.words)
-        return self._sifted[1]
+        key = view.path, view.reading, self.words
+        return self.latest("jobs", key, lambda: chosen(view, self.words))
 
     def sift(self, words: str) -> None:
         """Look at some drops only."""
@@ -135,15 +126,14 @@ class HistoryPage(Page):
         """Draw the drop at its moment."""
         self._view = self.other or model.view
         view, job = self.view, self.job
-        title = self.query_one("#which", Words)
         if view is None or job is None:
             self._blank()
             missing = model.loading or "No drop recorded yet. Press o to choose another session."
             if view is not None:
                 missing = f"No drop matches {plain(self.words, 40)}. Press f to change this."
-            title.say(missing)
+            self.say("which", missing)
             return
-        title.say(_which(view, job, self))
+        self.say("which", _which(view, job, self))
         drop, hz = view.drops[job], view.scales[job].hz
         seen = until(drop.edges, hz, self.player.time_s)
         indicators = indicators_at(view.channels, drop, seen)
@@ -159,28 +149,32 @@ class HistoryPage(Page):
             self.draw((view.path, job, hz, len(seen)), lambda: drop_pictures(view, job, seen))
         self.query_one("#z", Figure).point_at(None if self.comparing else now_ms)
         self.query_one("#dz", Figure).point_at(now_ms)
-        told = view.path, view.reading, job, self.comparing and self.jobs
-        if self._told != told:
-            self._told = told
-            table = comparison(view, self.jobs) if self.comparing else number_table(
-                view, job, wide=False)  # fmt: skip
-            self.query_one("#numbers", Words).say(table)
+        table = self.latest(
+            "numbers",
+            (view.path, view.reading, job, self.comparing and jobs),
+            lambda: comparison(view, jobs) if self.comparing
+            else number_table(view, job, wide=False),
+        )  # fmt: skip
+        self.say("numbers", table)
 
     def _draw_chains(self, view: SessionView, job: Job, indicators: Indicators) -> None:
         """Draw both chains at the moment of the tape, from all edges of the drop."""
         run, hz = view.plan[job.run], view.scales[job].hz
-        key = (view.path, job, hz)
-        if key != self._of:
-            drop, matches = view.drops[job], view.results[job].matches or None
-            self._of, self._falls = key, motions(view.protocol, run, drop.edges, hz, matches)
-            self._film = read_films(view.path).get(job)
-        at = drawing(view.protocol, run, self._falls, indicators, self.player.time_s, self._film)
-        self.query_one(ChainView).show(at)
+        edges, matches = view.drops[job].edges, view.results[job].matches or None
+        falls, film = self.latest(
+            "falls",
+            (view.path, job, hz),
+            lambda: (
+                motions(view.protocol, run, edges, hz, matches),
+                read_films(view.path).get(job),
+            ),
+        )
+        chains = drawing(view.protocol, run, falls, indicators, self.player.time_s, film)
+        self.query_one(ChainView).show(chains)
 
     def _blank(self) -> None:
-        self._told = None
         self.query_one(ChainView).show(None)
-        self.query_one("#numbers", Words).say("")
+        self.say("numbers", "")
         self.query_one(GateBoard).take([])
         self.draw(None, lambda: (None, None))
 

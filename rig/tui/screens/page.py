@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from textual.containers import Vertical
 
 from rig.tui.widgets.figure import Figure
+from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
+    from collections.abc import Callable
 
+    from textual.content import Content
+
+    from rig.tui.context import Options
     from rig.tui.model import Model
     from rig.tui.plotting import Picture
+    from rig.tui.widgets.text import Styled
+
+T = TypeVar("T")
 
 
 class Page(Vertical):
     """One page of the session.
 
     Pages set `SCOPED_CSS` off where their rules ask how large the screen is.
+
+    Parameters
+    ----------
+    options
+        What the command line says.
     """
 
     DEFAULT_CSS = """
@@ -26,7 +38,25 @@ class Page(Vertical):
     Page Words { padding: 0 1; }
     Page VerticalScroll Words { padding: 0; }
     """
-    NAME = ""
+
+    def __init__(self, options: Options) -> None:
+        super().__init__()
+        self.options = options
+        self._latest: dict[str, tuple[object, Any]] = {}
+
+    def latest(self, name: str, key: object, work: Callable[[], T]) -> T:
+        """Return what `work` gives, worked out anew only where `key` differs from the last time.
+
+        Pages are drawn many times a second, and what they show may take long.
+        """
+        if name not in self._latest or self._latest[name][0] != key:
+            self._latest[name] = key, work()
+        value: T = self._latest[name][1]
+        return value
+
+    def say(self, name: str, *parts: Styled | Content) -> None:
+        """Write one of the page's texts."""
+        self.query_one(f"#{name}", Words).say(*parts)
 
     def show(self, model: Model) -> None:
         """Draw what holds now; called on the app's tick when something changed."""
@@ -39,7 +69,7 @@ class Page(Vertical):
         """Show another quantity where there is a choice."""
 
     def draw(
-        self, key: Hashable, pictures: Callable[[], tuple[Picture | None, Picture | None]]
+        self, key: object, pictures: Callable[[], tuple[Picture | None, Picture | None]]
     ) -> None:
         """Draw figures z and dz, anew where what `key` stands for has changed."""
         z, dz = self.query_one("#z", Figure), self.query_one("#dz", Figure)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from textual.containers import Horizontal, VerticalScroll
 from textual.content import Content
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
 
     from rig.protocol.protocol import Protocol
+    from rig.tui.context import Options
     from rig.tui.model import Model
 
 
@@ -32,7 +33,6 @@ _FIRST = "Plan and limits"
 class ProtocolPage(Page):
     """Files left, the chosen one's scene and plan right."""
 
-    NAME = "protocol"
     SCOPED_CSS = False
     DEFAULT_CSS = """
     ProtocolPage #files { width: 30; height: 1fr; border-right: solid $border; }
@@ -40,18 +40,10 @@ class ProtocolPage(Page):
     ProtocolPage #scene { width: 1fr; }
     """
 
-    def __init__(
-        self, files: tuple[Path, ...], session: Path | None, last: Path | None = None
-    ) -> None:
-        super().__init__()
-        self.files = files
-        self.session = session
-        self.last = last
+    def __init__(self, options: Options) -> None:
+        super().__init__(options)
+        self.files = options.files
         self.chosen = -1  # none yet
-        self._read: tuple[Path, int] | None = None
-        self._protocol: Protocol | None = None
-        self._problem = ""
-        self._described: tuple[Protocol, Content] | None = None
 
     def compose(self) -> ComposeResult:
         with Horizontal():
@@ -67,7 +59,21 @@ class ProtocolPage(Page):
     @property
     def usable(self) -> bool:
         """Whether a session can be made with it."""
-        return self._protocol is not None and not self._problem
+        return not self._reading.problem
+
+    @property
+    def _reading(self) -> _Reading:
+        """The chosen file, read again when it changed: it may be open in an editor beside this."""
+        if self.file is None:
+            return _Reading(
+                None, "Leave this screen, write an experiment with rig new, and come back."
+            )
+        try:
+            changed_ns = self.file.stat().st_mtime_ns
+        except OSError:
+            changed_ns = -1
+        file = self.file
+        return self.latest("reading", (file, changed_ns), lambda: _read(file))
 
     def move(self, by: int) -> None:
         """Choose another file."""
@@ -84,11 +90,10 @@ class ProtocolPage(Page):
         running = None if model.flow.stage is Stage.PROTOCOL else model.protocol
         self.query_one("#files", Words).display = running is None
         if running is not None:
-            self.query_one("#scene", Words).say(self._description(running))
+            self.say("scene", self._description(running))
             return
         if self.chosen < 0:
             self._choose_usable()
-        self._look()
         rows = []
         for at, file in enumerate(self.files):
             mark = "▸ " if at == self.chosen else "  "
@@ -97,56 +102,49 @@ class ProtocolPage(Page):
             rows.append(pressed(row, f"app.choose('protocol', {at})"))
         if not rows:
             rows = [Content("no experiment in this folder")]
-        if self.last is not None:
+        if self.options.last is not None:
             last = Content.assemble("\nlast session:\n", ("o ", "bold $primary"),
-                                    plain(self.last.stem, 24))  # fmt: skip
+                                    plain(self.options.last.stem, 24))  # fmt: skip
             rows.append(pressed(last, "app.do('sessions')"))
-        self.query_one("#files", Words).say(Content("\n").join(rows))
-        if self._protocol is None or self._problem:
+        self.say("files", Content("\n").join(rows))
+        protocol, problem = self._reading
+        if protocol is None or problem:
             name = plain(self.file) if self.file else "no experiment in this folder"
-            self.query_one("#scene", Words).say((f"✗ {name}\n\n", "bold $error"), self._problem)
+            self.say("scene", (f"✗ {name}\n\n", "bold $error"), problem)
             return
-        session = plain(self.session) if self.session else ""
+        session = plain(self.options.session) if self.options.session else ""
         into = Content.assemble(("→ ", "$primary"), f"session file: {session}\n\n")
-        self.query_one("#scene", Words).say(
-            Content.assemble(into if session else "", self._description(self._protocol))
-        )
+        self.say("scene", Content.assemble(into if session else "", self._description(protocol)))
 
     def _choose_usable(self) -> None:
         """Begin with the first file that can be used here, or with the first if none can."""
         for at in range(len(self.files)):
             self.chosen = at
-            self._look()
             if self.usable:
                 return
         self.chosen = 0
 
     def _description(self, protocol: Protocol) -> Content:
-        """Describe a protocol, once: this is drawn many times a second, and predicts."""
-        if self._described is None or self._described[0] is not protocol:
-            self._described = protocol, _described(protocol)
-        return self._described[1]
+        return self.latest("description", protocol, lambda: _described(protocol))
 
-    def _look(self) -> None:
-        """Read the chosen file again when it changed: it may be open in an editor beside this."""
-        file = self.file
-        if file is None:
-            self._problem = "Leave this screen, write an experiment with rig new, and come back."
-            return
-        try:
-            stamp = file, file.stat().st_mtime_ns
-        except OSError:
-            stamp = file, -1
-        if stamp == self._read:
-            return
-        self._read, self._protocol, self._problem = stamp, None, ""
-        try:
-            self._protocol = reader.read(file)
-            check_gates(self._protocol)
-            check_recordable(self._protocol)
-        except InputError as error:
-            lines = [plain(problem, 300) for problem in error.problems]
-            self._problem = "\n".join(lines or [plain(error.message), plain(error.hint)])
+
+class _Reading(NamedTuple):
+    """A protocol, and what is wrong with its file; empty where it can be used."""
+
+    protocol: Protocol | None
+    problem: str = ""
+
+
+def _read(file: Path) -> _Reading:
+    protocol = None
+    try:
+        protocol = reader.read(file)
+        check_gates(protocol)
+        check_recordable(protocol)
+    except InputError as error:
+        lines = [plain(problem, 300) for problem in error.problems]
+        return _Reading(protocol, "\n".join(lines or [plain(error.message), plain(error.hint)]))
+    return _Reading(protocol)
 
 
 def _described(protocol: Protocol) -> Content:

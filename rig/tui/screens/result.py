@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 class ResultPage(Page):
     """Everything one drop says."""
 
-    NAME = "result"
     SCOPED_CSS = False
     DEFAULT_CSS = """
     ResultPage #banner { margin: 0 0 1 0; }
@@ -38,10 +37,6 @@ class ResultPage(Page):
     ResultPage.-unknown #why, .-low ResultPage #why { display: none; }
     ResultPage #figures { height: 1fr; }
     """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._told: object = None
 
     def compose(self) -> ComposeResult:
         yield Words(id="banner")
@@ -53,19 +48,17 @@ class ResultPage(Page):
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
-        self.query_one("#banner", Words).say(verdict_words(model))
+        self.say("banner", verdict_words(model))
         view, job = model.view, model.job
         ready = view is not None and job in view.results
-        numbers = self.query_one("#numbers", Words)
-        numbers.display = ready
+        self.query_one("#numbers").display = ready
         self.set_class(not ready, "-unknown")
         if not ready or view is None or job is None:
             self.draw(None, lambda: (None, None))
             return
-        if self._told != (view.path, view.reading, job):  # predicting takes its time
-            self._told = view.path, view.reading, job
-            numbers.say(number_table(view, job))
-            self.query_one("#why", Words).say(why_words(view, job))
+        key = view.path, view.reading, job
+        self.say("numbers", self.latest("numbers", key, lambda: number_table(view, job)))
+        self.say("why", self.latest("why", key, lambda: why_words(view, job)))
         self.draw((view.path, job, view.scales[job].hz), lambda: _pictures(view, job))
 
 
@@ -80,7 +73,7 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
     run = view.plan[job.run]
     expected = predicted_run(view.protocol, run)
     compared = compare(view.protocol, [[result]]) if wide else ()
-    errors = {one.quantity: one.differences[0].normalized_error for one in compared}
+    errors = {row.quantity: row.differences[0].normalized_error for row in compared}
     head = f"{'':15}{'measured ± U95':>20}"
     lines = [Content.styled(f"{head}{'model ± U95':>21}     Eₙ" if wide else head, "bold")]
     for row in listed():
@@ -96,10 +89,10 @@ def number_table(view: SessionView, job: Job, *, wide: bool = True) -> Content:
             limit = view.protocol.accept.release_skew * row.scale
             line += f"{f'limit ±{limit:g}':>16}"
         lines.append(Content(line))
-    for one in result.gates:
-        line = f"{f'at gate {one.channel}':15}{plus_minus(one.speed, 1.0):>20} m/s "
-        if wide and one.interval is not None:
-            line += f"{plus_minus(one.interval, 1e3):>16} ms since previous gate"
+    for gate in result.gates:
+        line = f"{f'at gate {gate.channel}':15}{plus_minus(gate.speed, 1.0):>20} m/s "
+        if wide and gate.interval is not None:
+            line += f"{plus_minus(gate.interval, 1e3):>16} ms since previous gate"
         lines.append(Content(line))
     counts = " · ".join(f"{kind} {count}" for kind, count in result.audit.json().items())
     lines.append(Content(f"{'edges':15}{counts}"))

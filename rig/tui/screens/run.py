@@ -21,14 +21,13 @@ from rig.tui.widgets.gates import GateBoard, named
 from rig.tui.widgets.text import Words, checked, duration, plain
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable
-
     from textual.app import ComposeResult
 
-    from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
+    from rig.tui.context import Options
     from rig.tui.model import Model
     from rig.tui.motion import ChainFall
+    from rig.tui.scale import Drawing
 
 _FALLING = (Stage.LIVE, Stage.JUDGING)
 _WAITING = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
@@ -37,7 +36,6 @@ _WAITING = (Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
 class RunPage(Page):
     """Before and during one drop."""
 
-    NAME = "run"
     SCOPED_CSS = False
     DEFAULT_CSS = """
     RunPage #left { width: 1fr; }
@@ -51,14 +49,10 @@ class RunPage(Page):
     .-low RunPage #checks { padding: 0 1; }
     """
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, options: Options) -> None:
+        super().__init__(options)
         self._of: Job | None = None
         self._table = as_table(())  # its edges
-        self._seen: Hashable = None
-        self._falls: tuple[ChainFall, ...] = ()
-        self._expects_of: tuple[Protocol | None, Run | None] = None, None
-        self._expects = ""
 
     def compose(self) -> ComposeResult:
         with Horizontal():
@@ -78,48 +72,40 @@ class RunPage(Page):
         self.set_class(stage in _FALLING, "-live")
         counting = stage is Stage.COUNTDOWN and model.driving
         self.set_class(counting, "-count")
-        self.query_one("#card", Words).say(
-            _card(model, self._expected(model), low=self.screen.has_class("-low"))
-        )
+        self.say("card", _card(model, self._expected(model), low=self.screen.has_class("-low")))
         if counting:
             self.query_one(Digits).update(f"{max(0.0, model.flow.left_s):.1f}")
-        self.query_one("#checks", Words).say(_checks(model))
+        self.say("checks", _checks(model))
         self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
         self._plots(model)
 
     def _expected(self, model: Model) -> str:
-        """Say what the model expects of the run in hand, worked out once."""
+        """Say what the model expects of the run in hand."""
         protocol, run = model.protocol, model.run
-        if protocol is not self._expects_of[0] or run != self._expects_of[1]:
-            self._expects_of = protocol, run
-            self._expects = expected_words(protocol, run) if protocol and run else ""
-        return self._expects
+        if protocol is None or run is None:
+            return ""
+        return self.latest("model", (protocol, run), lambda: expected_words(protocol, run))
 
     def _plots(self, model: Model) -> None:
+        protocol, run = model.protocol, model.run
         drop = model.state.section("drop")
         hz = float(drop.get("tick_hz") or 1e6)
         live = model.stage in _FALLING
         edges = model.state.edges if live else ()
-        key = (id(model.protocol), model.job, model.run, len(edges), live)
+        key = (protocol, model.job, run, len(edges), live)
         if model.job != self._of or len(edges) < len(self._table):
             self._of, self._table = model.job, as_table(())
         # Only what is new is taken over: there may be thousands, and they come every tick.
         self._table = np.concatenate([self._table, as_table(edges[len(self._table) :])])
-        if key != self._seen:
-            self._seen, self._falls = key, ()
-            if model.protocol is not None and model.run is not None:
-                self._falls = motions(model.protocol, model.run, self._table, hz)
-        self._chains(model, hz, live=live)
-        self.draw(key, lambda: chain_pictures(self._falls))
-
-    def _chains(self, model: Model, hz: float, *, live: bool) -> None:
-        """Draw both chains where the latest edge has them."""
-        view = self.query_one(ChainView)
-        if not live or model.protocol is None or model.run is None:
-            view.show(None)
-            return
-        time_s = float(self._table[-1, 0]) / hz if len(self._table) else 0.0
-        view.show(drawing(model.protocol, model.run, self._falls, model.indicators, time_s))
+        chains: Drawing | None = None
+        falls: tuple[ChainFall, ...] = ()
+        if protocol is not None and run is not None:
+            falls = self.latest("falls", key, lambda: motions(protocol, run, self._table, hz))
+            if live:  # where the latest edge has them
+                time_s = float(self._table[-1, 0]) / hz if len(self._table) else 0.0
+                chains = drawing(protocol, run, falls, model.indicators, time_s)
+        self.query_one(ChainView).show(chains)
+        self.draw(key, lambda: chain_pictures(falls))
 
 
 def _card(model: Model, expected: str, *, low: bool) -> Content:

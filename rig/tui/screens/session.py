@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.summary import Incline
     from rig.campaign.plan import RunLine
+    from rig.tui.context import Options
     from rig.tui.model import Model
 
 
@@ -37,7 +38,6 @@ _FIGURES = ("separation", "speed", "control", "second")
 class SessionPage(Page):
     """Plan, results against incline, control chart."""
 
-    NAME = "session"
     SCOPED_CSS = False
     DEFAULT_CSS = """
     SessionPage #plan { height: auto; max-height: 8; padding: 0 1; }
@@ -51,8 +51,8 @@ class SessionPage(Page):
     .-low SessionPage #plan { max-height: 5; }
     """
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, options: Options) -> None:
+        super().__init__(options)
         self._chart = 0
 
     def compose(self) -> ComposeResult:
@@ -66,8 +66,8 @@ class SessionPage(Page):
 
     def show(self, model: Model) -> None:
         """Draw what holds now."""
-        self.query_one("#progress", Words).say(_progress(model))
-        self.query_one("#lines", Words).say(_plan(model))
+        self.say("progress", _progress(model))
+        self.say("lines", _plan(model))
         figures = [self.query_one(f"#{name}", Figure) for name in _FIGURES]
         view = model.view
         if view is None:
@@ -82,9 +82,7 @@ class SessionPage(Page):
         turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
         speed = [] if low else means[1:2]  # no room for both; Δz says more
         charted = charts[:2] if wide else turned[:1]
-        self.query_one("#meaning", Words).say(
-            "\n".join(meaning(picture.y_label) for picture in charted)
-        )
+        self.say("meaning", "\n".join(meaning(picture.y_label) for picture in charted))
         for figure, shown in zip(
             figures, (means[:1], speed, charted[:1], charted[1:]), strict=True
         ):
@@ -130,7 +128,7 @@ def _plan(model: Model) -> Content:
 
     summary = {}
     if model.view is not None:
-        summary = {one.condition: one for one in model.view.analysis.summary}
+        summary = {line.condition: line for line in model.view.analysis.summary}
     ordered = sorted(model.state.runs, key=condition)
     groups = [list(group) for _, group in groupby(ordered, key=condition)]
     means = [_means(summary.get(condition(group[0]))) for group in groups]

@@ -35,9 +35,11 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
         (COLUMNS * width - 1) / drawing.width_m,
     )
     top, strokes = drawing.top_m, drawing.strokes
-    ends = np.array([[(one.x, top - one.z), (one.to_x, top - one.to_z)] for one in strokes])
+    ends = np.array(
+        [[(stroke.x, top - stroke.z), (stroke.to_x, top - stroke.to_z)] for stroke in strokes]
+    )
     sheet = Sheet(width, rows, _COLORS)
-    inks = np.array([_COLORS.index(one.color) for one in strokes], dtype=np.int64)
+    inks = np.array([_COLORS.index(stroke.color) for stroke in strokes], dtype=np.int64)
     sheet.strokes(scale * ends.reshape(-1, 2, 2), inks)
     apart = "" if drawing.apart_m is None else f"Δz {drawing.apart_m * 1e2:.1f} cm as it falls"
     words = [Span(apart, "success", bold=True)], [Span("left: measured  right: model", "accent")]

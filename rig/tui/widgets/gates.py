@@ -34,7 +34,7 @@ def board(
     """Draw the indicators in a width of characters."""
     if protocol is None or protocol.gates is None:
         return [[Span("no gates in this scene")]]
-    by_channel = {one.channel: one for one in indicators.gates}
+    by_channel = {gate.channel: gate for gate in indicators.gates}
     columns: list[tuple[str, list[Gate]]] = []
     for side in ("impact", "free"):
         gates = sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
