@@ -214,7 +214,10 @@ def doctor(capsys, monkeypatch, tmp_path):
 
 def test_a_board_at_a_terminal(doctor):
     with PtyBoard() as there:
-        code, out, err = doctor("--port", there.path)
+        for _ in range(3):  # answers are late where the computer is busy for a moment
+            code, out, err = doctor("--port", there.path)
+            if "answers take up to" not in out:
+                break
     assert code == 0, out
     assert f"permission for {there.path}: given" in out
     assert "flickering gates: none within 1 s" in out
