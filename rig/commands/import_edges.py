@@ -25,6 +25,7 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.events import TICK_HZ
 from rig.timers.importing import FallMatch, import_drops
+from rig.timers.lines import check_is_file
 from rig.timers.problems import refusal
 from rig.units import Dimension, UnitError, parse
 
@@ -42,6 +43,7 @@ _COMPARED = 3
 
 def main(arguments: Namespace) -> int:
     """Make a session from a file, or say how it would be read; returns the exit code."""
+    check_is_file(arguments.events)
     protocol = reader.read(arguments.protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
     imported = import_with_protocol(protocol, arguments)

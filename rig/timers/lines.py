@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Iterator
 
+    from rig.errors import InputError
+
 MAX_BYTES = 200_000_000
 LONGEST_LINE = 20_000
 """Characters: no text that people or timers write has a longer one."""
@@ -27,8 +29,8 @@ def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
         A file that cannot be read, is far too large, or is not text.
     """
     problems = ProblemList(str(path))
+    check_is_file(path)
     try:
-        require_file(path)  # and no pipe: it is read more than once
         size = Path(path).stat().st_size
         if size > MAX_BYTES:
             problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
@@ -41,7 +43,25 @@ def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
                     problems.refuse(number, 1, "not_text")
                 yield line.rstrip("\n")
     except OSError as error:
-        raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
+        raise _refusal(path, error) from error
+
+
+def check_is_file(path: str | os.PathLike[str]) -> None:
+    """Refuse what is no file, and a pipe too: a file is read more than once.
+
+    Raises
+    ------
+    InputError
+        It is none, or not there.
+    """
+    try:
+        require_file(path)
+    except OSError as error:
+        raise _refusal(path, error) from error
+
+
+def _refusal(path: str | os.PathLike[str], error: OSError) -> InputError:
+    return refusal(str(path), "unreadable", text=error.strerror or str(error))
 
 
 def _find_encoding(path: Path, problems: ProblemList) -> str:

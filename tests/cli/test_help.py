@@ -76,7 +76,10 @@ RUN = ["run", PROTOCOLS / "picket-fence.yaml"]
         ),
         (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
         (["selftest", "--port", "/dev"], "/dev: it is a folder"),
-        (["import", "/dev/zero", "--protocol", "p", "--session", "s"], "/dev/zero: it is a device"),
+        (
+            ["import", "/dev/zero", "--protocol", "p", "--session", "s"],
+            "/dev/zero: cannot read this file: it is a device",
+        ),
         ([*RUN, "--session", "s", "--port", "sim://?pace=-1"], "'-1' is not a whole number from 0"),
     ],
 )
