@@ -247,9 +247,7 @@ class Campaign:
         """Let go, and stay until the drop is recorded: preparing it took minutes."""
         with self.interrupts.held():
             try:
-                while self._effects and isinstance(
-                    self._effects[0], events.FireRelease | events.Collect | events.Stop
-                ):
+                while self._effects and isinstance(self._effects[0], _FALL):
                     self._do(self._effects.popleft())
             except KeyboardInterrupt:
                 self._stop("interrupted by the operator")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.equations import Linearization, linearize, scaled
-from rig.analysis.square_root import EquationRows, Root, square_root
+from rig.analysis.square_root import square_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
+    from rig.analysis.square_root import EquationRows, Root
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
@@ -38,10 +39,7 @@ _FORGOTTEN = 0.5  # of a column's length, with each step: by these lengths steps
 _GAIN = 0.25  # of what the slopes promise, which a step has to bring
 _TRIED = 0.01  # of a step, after which its bend is looked at
 _BENT = 0.75  # of a step's length: what bends more is shortened
-_UNSEEN = 1.0  # standard uncertainties: where a longer step leads is looked at
-_STEADY = 0.01  # relative change of chi2 below which it tells the scatter of the edges
 _MORE = 1.05  # times as much scatter as assumed, below which edges are weighed as they were
-_NO_ROOT = Root(np.zeros((0, 0)), np.zeros(0))
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,8 @@ class Components:
         How far off its chain a rod that passes a beam may be once rods have struck, m: strings
         bounce, rods turn, and none of that is in the equations.
     few
-        And how far besides where but few rods still fall: over their number.
+        And how far besides where but few rods still fall: over their number. A joint fit keeps it
+        in proportion to `departure`.
     impulse, impulse_floor
         Scatter of single impulses about α: relative to α, and where α is small.
     bounce

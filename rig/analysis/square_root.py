@@ -60,11 +60,6 @@ class Root(NamedTuple):
         """Return the step to the least sum of squares."""
         return np.asarray(np.linalg.solve(self.matrix, -self.left), dtype=np.float64)
 
-    def turns_back(self, step: Array, last: Array) -> bool:
-        """Whether a step takes back more than half of the last one."""
-        before = self.matrix @ last
-        return -float(self.matrix @ step @ before) > 0.5 * float(before @ before)
-
     def pulled(self, gradient: Array) -> Array:
         """Return the step that balances a further gradient."""
         found = np.linalg.solve(self.matrix, np.linalg.solve(self.matrix.T, -gradient))
