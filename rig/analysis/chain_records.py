@@ -173,6 +173,8 @@ class ChainRecord:
     clear
         Above which height of its middle nothing lies in each rod's way, m; as `higher` where
         nothing does.
+    aside
+        Trains of gates that are left out: so low that not every rod passes them.
     """
 
     role: Literal["impact", "free"]
@@ -184,6 +186,7 @@ class ChainRecord:
     condition: str = ""
     higher: tuple[float, ...] = ()
     clear: tuple[float, ...] = ()
+    aside: tuple[EdgeTrain, ...] = ()
 
     @property
     def strikes(self) -> Array:
@@ -272,8 +275,16 @@ def thinned(drop: Drop, hz: float) -> Drop:
     return replace(drop, edges=tuple(drop.edges[n] for n in numbers.tolist()))
 
 
-def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[ChainRecord]:
-    """Collect each chain with the trains of its gates."""
+def chain_records(
+    protocol: Protocol, run: Run, drop: Drop, hz: float, aside: int = 0
+) -> list[ChainRecord]:
+    """Collect each chain with the trains of its gates.
+
+    Parameters
+    ----------
+    aside
+        How many of the gates beside the chain that strikes are left out, the lowest first.
+    """
     records = []
     shares = air_shares(protocol)
     for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop.edges, hz)):
@@ -288,8 +299,11 @@ def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[C
             except DomainError:
                 alpha = 0.0
             higher, clear = _contacts(protocol, run, chain)
+            low = _lowest(protocol, trains)[:aside]
             record = replace(
                 record,
+                trains=tuple(train for n, train in enumerate(trains) if n not in low),
+                aside=tuple(trains[n] for n in low),
                 ratios=np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gammas)),
                 alpha=alpha,
                 # Behind the last leg nothing falls any more, but edges are asked for all the same.
@@ -300,6 +314,13 @@ def chain_records(protocol: Protocol, run: Run, drop: Drop, hz: float) -> list[C
             )
         records.append(record)
     return records
+
+
+def _lowest(protocol: Protocol, trains: Sequence[EdgeTrain]) -> list[int]:
+    """Number trains from the lowest gate up."""
+    assert protocol.gates is not None
+    heights = [protocol.gates.gates[train.gate].height for train in trains]
+    return sorted(range(len(trains)), key=heights.__getitem__)
 
 
 def edge_trains(

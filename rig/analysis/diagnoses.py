@@ -6,12 +6,13 @@ asked where something here, or in the adjustment itself, is odd.
 
 from __future__ import annotations
 
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.annealing import MISSED
+from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import scaled
 from rig.analysis.faults import gate_values
 from rig.reasons import Reason, make_reason
@@ -38,11 +39,6 @@ IMPLAUSIBLE = 6.0
 """Standard uncertainties beyond which a beam is not where the protocol says: by rods all alike and
 evenly spaced, an exchanged gate is fitted well at a wrong height."""
 RIGHT = 0.8
-_FIRST = 2  # rods that pass a gate before others lie under it
-_LAST = 3  # and last ones, which do not pass the lowest gate where others lie there
-_WHOLE = 0.9  # share of its edges that says that a gate sees every rod
-_ABOUT = 0.1  # by which a gate may see more rods than one above it
-_ENOUGH = 3  # gates that see every rod
 _SOME = 3  # edges expected of a gate that say too little when they are missing
 _PAIR = 2  # edges of a rod
 _BY_CHANCE = 1e-4  # probability below which a rod that nobody saw is none
@@ -78,13 +74,11 @@ def diagnose(fit: Fit) -> Diagnosis:
         seen = any(record.chain.chain.rods - 1 in train.rods for train in record.trains)
         code = "rods_lie" if seen else "rods_hide_end"
         doubts.append(make_reason(code, words, height_m=strike.value, U95_m=2.0 * strike.u))
+    if aside := [train for record in model.records.values() for train in record.aside]:
+        at = [_values(model.protocol, train) for train in aside]
+        doubts.append(make_reason("low_gates_miss_rods", words, at=at))
     reasons: list[Reason] = []
     alive = [one for one in gates if one.train.times.size]
-    under: list[_Seen] = []
-    if not any(one.strange for one in alive if one.role == "free"):  # where nothing piles up
-        under = _buried(model.protocol, [one for one in alive if one.role == "impact"])
-    if under:
-        return Diagnosis((_rods_missed(model.protocol, under), *doubts), known=True)
     absent = [
         reason
         for role, record in model.records.items()
@@ -242,31 +236,18 @@ def _counts_crossed(one: _Seen, other: _Seen) -> bool:
     return bool(fewer.unseen & fewer.ends) and more.extra >= _PAIR
 
 
-def _buried(protocol: Protocol, gates: Sequence[_Seen]) -> list[_Seen]:
-    """Find the lowest gates that do not see every rod, where all above them do.
+def low_gates_missing(fit: Fit) -> int:
+    """Count the lowest gates beside the chain that strikes that miss more edges than by chance.
 
-    The first rods pass them: so they are plugged in right, and it is later that something is there.
+    Not all rods pass them: some strike before, or lie there. The highest gate is none of them.
     """
-    assert protocol.gates is not None
-    heights = [gate.height for gate in protocol.gates.gates]
-    gates = sorted(gates, key=lambda one: heights[one.train.gate])
-    under = 0
-    while under < len(gates) and gates[under].strange:
-        under += 1
-    above = gates[under:]
-    whole = sum(one.share >= _WHOLE for one in above)
-    passed = all((one.match[: 2 * _FIRST] >= 0).any() for one in gates[:under])
-    fewer = all(a.share <= b.share + _ABOUT for a, b in pairwise(gates[:under]))
-    clear = whole >= _ENOUGH and not any(one.strange for one in above)
-    return gates[:under] if passed and fewer and clear else []
-
-
-def _rods_missed(protocol: Protocol, gates: Sequence[_Seen]) -> Reason:
-    # Of one of the last rods both edges may be missed: of the top rod, that its shadow is its own.
-    passed = np.count_nonzero(gates[0].match[-_PAIR * _LAST :] < 0) <= _PAIR
-    code = "low_gates_miss_rods" if passed else "rods_pile_up"
-    at = [_values(protocol, gate.train) for gate in gates]
-    return make_reason(code, protocol.vocabulary, at=at)
+    gates, placed = _gates(fit), fit.model.protocol.gates
+    assert placed is not None
+    heights = [gate.height for gate in placed.gates]
+    struck = [gate for gate in gates if gate.role == "impact"]
+    struck.sort(key=lambda gate: heights[gate.train.gate])
+    missing = [gate.missing > most_by_chance(gate.match.size, MISSED) for gate in struck[:-1]]
+    return next((n for n, low in enumerate(missing) if not low), len(missing))
 
 
 def _other_ends(gates: list[_Seen]) -> bool:

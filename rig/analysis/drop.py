@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import chain_records, on_heap, thinned
 from rig.analysis.components import stated
-from rig.analysis.diagnoses import FEW_GATES, silent
+from rig.analysis.diagnoses import FEW_GATES, low_gates_missing, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from rig.records import Drop
 
 
+_SKEW = {"release_skew"}  # no way to pass makes that better
+
+
 @dataclass(frozen=True, slots=True)
 class DropSummary:
     """What a drop says by itself, without its equations: to be kept, or sent to another process.
@@ -51,9 +54,9 @@ class DropSummary:
     explained
         Whether it was sought what else would explain it if it is void.
     identified
-        Which rods its edges are; `None` of a damaged record.
-    heaped
-        Whether it is read as one whose rods strike those that lie there.
+        Which rods its edges are, by how rods may pass; nothing of a damaged record.
+    passages
+        How they are taken to; `None` where nothing was fitted.
     deviations
         Those of the result's quantities, which are not kept with them.
     """
@@ -61,8 +64,8 @@ class DropSummary:
     scale: TimeScale
     explained: bool
     result: DropResult
-    identified: Identified | None
-    heaped: bool
+    identified: Mapping[Passages, Identified]
+    passages: Passages | None
     deviations: Mapping[str, Deviation | None]
 
     @property
@@ -75,6 +78,27 @@ class DropSummary:
         found = self.result.quantities.items()
         whole = {name: replace(one, deviation=self.deviations[name]) for name, one in found}
         return replace(self, result=replace(self.result, quantities=whole))
+
+
+class Passages(NamedTuple):
+    """How rods are taken to pass where the protocol's way makes no good drop.
+
+    Attributes
+    ----------
+    heaped
+        Whether they strike those that lie there.
+    aside
+        How many of the lowest gates they do not all pass, which are left out.
+    """
+
+    heaped: bool = False
+    aside: int = 0
+
+    @classmethod
+    def of(cls, fit: Fit) -> Passages:
+        """Return how they do in a fit."""
+        aside = sum(len(record.aside) for record in fit.model.records.values())
+        return cls(fit.model.protocol.contact.heaped, aside)
 
 
 class DropCase(NamedTuple):
@@ -92,6 +116,8 @@ class DropCase(NamedTuple):
         Calibration of its ticks.
     components
         How much everything scatters; as the protocol states it if not given.
+    passages
+        How rods are taken to pass.
     """
 
     protocol: Protocol
@@ -99,6 +125,7 @@ class DropCase(NamedTuple):
     drop: Drop
     scale: TimeScale
     components: Components | None = None
+    passages: Passages = Passages()
 
     @one_thread
     def summary(self, before: DropSummary | None = None, *, explain: bool = True) -> DropSummary:
@@ -111,55 +138,61 @@ class DropCase(NamedTuple):
         explain
             As for `fit_drop`.
         """
-        known = None if before is None else before.identified
-        result, fit, identified = self.read(known, explain=explain)
+        known = {} if before is None else {**before.identified}
+        result, fit = self.read(known, explain=explain)
         if result.verdict in GOOD and self.protocol.track is None:  # friction is no clock's fault
             gravity = free_gravity(self.protocol, result, self.drop, self.scale)
             result = replace(result, gravity=gravity)
-        heaped = fit is not None and fit.model.protocol.contact.heaped
+        passages = None if fit is None else Passages.of(fit)
         deviations = {name: value.deviation for name, value in result.quantities.items()}
-        return DropSummary(self.scale, explain, result, identified, heaped, deviations)
+        return DropSummary(self.scale, explain, result, known, passages, deviations)
 
     @one_thread
     def fit(self, summary: DropSummary) -> Fit | None:
         """Make again the fit that a summary was made from; `None` where nothing was fitted."""
-        at_level = self._at_contact()
-        case = at_level._on_heap() if summary.heaped else at_level
-        identified = summary.identified
-        if identified is not None and summary.heaped:
-            identified = identified.on_heap
-        if case is None or identified is None or identified.begun is None:
+        passages = summary.passages
+        if passages is None:
             return None
-        records = chain_records(case.protocol, self.run, self.drop, self.scale.hz)
-        return case._timed(records, identified)
+        case = self._at_contact()._with(passages)
+        assert case is not None
+        return case._timed(summary.identified[passages])
 
     @one_thread
     def read(
-        self, known: Identified | None = None, *, explain: bool = True
-    ) -> tuple[DropResult, Fit | None, Identified | None]:
-        """Read the drop as the protocol states it or, where that is void, as one on a heap."""
-        drop = self.drop
+        self, known: dict[Passages, Identified] | None = None, *, explain: bool = True
+    ) -> tuple[DropResult, Fit | None]:
+        """Read the drop as the protocol states it or, where that is void, as rods may pass besides.
+
+        Parameters
+        ----------
+        known
+            What its edges are where rods pass like that, as far as it is known, and will be.
+        explain
+            As for `fit_drop`.
+        """
+        drop, known = self.drop, {} if known is None else known
         if drop.damage:  # the file's, and no finding about chains or gates
             reasons = (make_reason("record_damaged", text=drop.damage),)
-            audit = Audit()
-            return (
-                DropResult(self.run, drop.attempt, "void", reasons, audit, damaged=True),
-                None,
-                None,
-            )
-        case = self._at_contact()
-        heaped = case._on_heap()
-        result, fit, identified = case._read(known, explain=explain and heaped is None)
-        wrong = _void_by(result) - {"release_skew"}
-        if heaped is None or not wrong:
-            return result, fit, identified
-        on_rods, fit_on_rods, on_heap = heaped._read(identified.on_heap, explain=False)
-        identified = replace(identified, on_heap=on_heap)
-        # That no beam sees the end is why edges are strange, not why others are missed.
-        hidden = {"rods_hide_end"} if wrong != {"edges_missed"} else set()
-        if _void_by(on_rods) <= {"release_skew"} | hidden:
-            return on_rods, fit_on_rods, identified
-        return case._read(identified, explain=True) if explain else (result, fit, identified)
+            return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
+        stated = self._at_contact()
+        result, fit = stated._read(known, explain=False)
+        wrong = _void_by(result)
+        if not wrong - _SKEW:
+            return result, fit
+        heaped = stated._with(Passages(heaped=True))
+        if heaped is not None:
+            on_heap = heaped._read(known, explain=False)
+            # That no beam sees the end is why edges are strange, not why others are missed.
+            hidden = {"rods_hide_end"} if wrong != {"edges_missed"} else set()
+            if _void_by(on_heap[0]) <= _SKEW | hidden:
+                return on_heap
+        case, last = stated, fit
+        while last is not None and (low := low_gates_missing(last)):
+            case = case._replace(passages=Passages(aside=case.passages.aside + low))
+            without = other, last = case._read(known, explain=False)
+            if not _void_by(other) - _SKEW:
+                return without
+        return stated._read(known, explain=True) if explain else (result, fit)
 
     def _at_contact(self) -> DropCase:
         run, protocol = self.run, self.protocol
@@ -167,28 +200,35 @@ class DropCase(NamedTuple):
         protocol = at_contact(protocol, run.incline_deg, run.impact)
         return self._replace(protocol=protocol, components=components)
 
-    def _on_heap(self) -> DropCase | None:
-        heaped = on_heap(self.protocol, self.run)
-        return None if heaped is None else self._replace(protocol=heaped)
+    def _with(self, passages: Passages) -> DropCase | None:
+        """Let rods pass otherwise; `None` where by geometry they cannot."""
+        protocol = on_heap(self.protocol, self.run) if passages.heaped else self.protocol
+        return None if protocol is None else self._replace(protocol=protocol, passages=passages)
 
-    def _timed(self, records: Sequence[ChainRecord], identified: Identified) -> Fit:
+    def _records(self) -> list[ChainRecord]:
+        aside = self.passages.aside
+        return chain_records(self.protocol, self.run, self.drop, self.scale.hz, aside)
+
+    def _timed(self, identified: Identified) -> Fit:
         """Adjust at this time scale what was identified at another."""
         begun = identified.begun
         assert begun is not None
-        model = DropModel(self.protocol, records, begun.guesses, self.scale.u, self.components)
+        records, clock_u = self._records(), self.scale.u
+        model = DropModel(self.protocol, records, begun.guesses, clock_u, self.components)
         return timed(model, begun, self.scale.hz / identified.scale.hz)
 
     def _read(
-        self, known: Identified | None, *, explain: bool
-    ) -> tuple[DropResult, Fit | None, Identified]:
+        self, every: dict[Passages, Identified], *, explain: bool
+    ) -> tuple[DropResult, Fit | None]:
         """Read a drop whose rods strike where the protocol, from the contact point, has them."""
-        protocol, run, drop, scale, components = self
+        protocol, run, drop, scale, components, passages = self
         assert components is not None
-        records = chain_records(protocol, run, drop, scale.hz)
+        records = self._records()
         audit = _blank_audit(drop, records)
-        rough = scale.rounded()
+        rough, known = scale.rounded(), every.get(passages)
         if known is None or known.scale != rough:
-            known = identified(protocol, run, drop, rough, components)
+            known = identified(protocol, run, drop, rough, components, passages.aside)
+            every[passages] = known
         unlike = {reason.text: reason for reason in known.unlike.values()}.values()
         doubts = silent(protocol, records) if known.unlike else ()
         early = judge_record(drop, audit, [*unlike, *doubts])
@@ -197,9 +237,10 @@ class DropCase(NamedTuple):
             if known.unlike and explain:
                 if known.explained is None:
                     known = replace(known, explained=self._unlike_fall(known, rough))
+                    every[passages] = known
                 reasons = (*reasons, *(known.explained or ()))
-            return DropResult(run, drop.attempt, early.verdict, reasons, audit), None, known
-        fit = self._timed(records, known)
+            return DropResult(run, drop.attempt, early.verdict, reasons, audit), None
+        fit = self._timed(known)
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.matched, count_unexplained(unmatched))
         joint = by_itself(fit)
@@ -209,7 +250,7 @@ class DropCase(NamedTuple):
             math.isfinite(value) for each in measured.values() for value in (each.value, each.u)
         ):
             reasons = (make_reason("no_fall", protocol.vocabulary),)
-            return DropResult(run, drop.attempt, "void", reasons, audit), None, known
+            return DropResult(run, drop.attempt, "void", reasons, audit), None
         alone = last_passages(fit)
         end = judge(protocol, run, drop, audit, measured, fit, alone, unmatched)
         reasons = end.reasons
@@ -232,7 +273,7 @@ class DropCase(NamedTuple):
             last_passages=alone,
             gates=budgets.gates(joint.drops[0]),
         )
-        return result, fit, known
+        return result, fit
 
     def _unlike_fall(self, known: Identified, scale: TimeScale) -> tuple[Reason, ...]:
         """Seek what else than the protocol would explain edges that are like no fall."""
@@ -270,8 +311,7 @@ def fit_drop(
         takes many times as long as all the rest. Of others it is sought where they ask for it.
     """
     case = DropCase(protocol, run, drop, scale, components)
-    result, fit, _ = case.read(explain=explain)
-    return result, fit
+    return case.read(explain=explain)
 
 
 def _void_by(result: DropResult) -> set[str]:
@@ -281,7 +321,7 @@ def _void_by(result: DropResult) -> set[str]:
 
 def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:
     """Count the edges of a drop of which none is any rod's yet."""
-    trains = [part for record in records for part in record.trains]
+    trains = [part for record in records for part in (*record.trains, *record.aside)]
     left_out = sum(part.thinned for part in trains)
     seen = sum(part.times.size for part in trains)
     expected = sum(record.expected for record in records)

@@ -41,8 +41,6 @@ class Identified:
         The fall, as it was adjusted; `None` where there is none.
     explained
         What else than the protocol would explain edges that are like no fall; `None` if not sought.
-    on_heap
-        The same where rods strike what lies there; `None` if not sought.
     """
 
     scale: TimeScale
@@ -50,15 +48,19 @@ class Identified:
     poor: tuple[str, ...] = ()
     begun: Begun | None = None
     explained: tuple[Reason, ...] | None = None
-    on_heap: Identified | None = None
 
 
 def identified(
-    protocol: scene.Protocol, run: Run, drop: Drop, scale: TimeScale, components: Components
+    protocol: scene.Protocol,
+    run: Run,
+    drop: Drop,
+    scale: TimeScale,
+    components: Components,
+    aside: int = 0,
 ) -> Identified:
-    """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.fit_drop`."""
+    """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`."""
     window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
-    records = chain_records(protocol, run, drop, scale.hz)
+    records = chain_records(protocol, run, drop, scale.hz, aside)
     found = identify(protocol, records, scale.u, components, window)
     unlike, fit = pattern_faults(found, protocol.vocabulary), found.fit
     if unlike or fit is None:
