@@ -176,10 +176,8 @@ class DropCase(NamedTuple):
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         stated = self._at_contact()
         result, fit = stated._read(known, explain=False)
-        wrong = _void_by(result)
-        if not wrong - _SKEW:
-            return result, fit
-        heaped = stated._with(Passages(heaped=True))
+        wrong = _void_by(result) - _SKEW
+        heaped = stated._with(Passages(heaped=True)) if wrong else None
         if heaped is not None:
             on_heap = heaped._read(known, explain=False)
             # That no beam sees the end is why edges are strange, not why others are missed.
@@ -192,7 +190,7 @@ class DropCase(NamedTuple):
             without = other, last = case._read(known, explain=False)
             if not _void_by(other) - _SKEW:
                 return without
-        return stated._read(known, explain=True) if explain else (result, fit)
+        return stated._read(known, explain=True) if wrong and explain else (result, fit)
 
     def _at_contact(self) -> DropCase:
         run, protocol = self.run, self.protocol

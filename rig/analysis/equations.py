@@ -147,11 +147,14 @@ class Expected(NamedTuple):
         alone &= levels < (
             -strikes[-2] if record.ratios is not None and strikes.size > 1 else -np.inf
         )
-        left = np.where(alone, levels + strikes[-1], np.inf)  # of the top rod's way
+        u = protocol.contact.strike.u
+        left = np.full(rods.size, np.inf)  # of each rod's way
         strike = np.full(rods.size, protocol.contact.strike.value)
+        if record.ratios is not None:
+            left = levels + strikes[rods]
         if record.is_on_heap:
             left = levels + np.array(record.chain.chain.heights)[rods]
-            strike = np.array(record.clear)[rods] - protocol.contact.strike.u
+            strike = np.array(record.clear)[rods] - u
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),
@@ -162,7 +165,7 @@ class Expected(NamedTuple):
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
-            _landed(strike, protocol.contact.strike.u, left),
+            _landed(strike, u, left),
             np.cumsum(observed) - observed,
             np.cumsum(expected),
         )
