@@ -410,7 +410,7 @@ class SideFall:
         by = np.zeros((COMMON + 2 * rods, UNKNOWNS))
         by[[1, GRAVITY, 3], [START, PULL, DRAG]] = 1.0
         by[COMMON : COMMON + rods, ALPHA] = 1.0
-        by[COMMON : COMMON + rods, GROWTH] = above(rods) ** -2.0
+        by[COMMON : COMMON + rods, GROWTH] = above(self.record.chain.chain)[:rods] ** -2.0
         return by * self.sd
 
     def path(self, falls: Array) -> Trajectory:
@@ -420,7 +420,7 @@ class SideFall:
         kappa = self.stated.kappa + off[DRAG]
         if record.ratios is None:
             return free_trajectory(0.0, start, gravity, kappa, record.air)
-        gains = record.alpha + off[ALPHA] + off[GROWTH] * above(record.ratios.size) ** -2.0
+        gains = record.alpha + off[ALPHA] + off[GROWTH] * above(record.chain.chain) ** -2.0
         strikes = record.strikes
         return struck_trajectory(
             0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air

@@ -13,6 +13,7 @@ from rig.protocol.protocol import Priors
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
 
 _DEFAULT = Priors()
@@ -92,9 +93,14 @@ class Components:
         return np.hypot(even, self.bounce * alpha / above)
 
 
-def above(rods: int) -> NDArray[np.float64]:
-    """Count the rods above each one, bottom up; 1 for the top rod, whose impact pulls nothing."""
-    return np.maximum(np.arange(rods)[::-1], 1).astype(float)
+def above(chain: Chain) -> NDArray[np.float64]:
+    """How many times a rod's mass hangs above it, bottom up.
+
+    Of rods that are alike it is their number; at least 1, as for the top rod, whose impact pulls
+    nothing.
+    """
+    masses = np.array(chain.masses)
+    return np.maximum((np.cumsum(masses[::-1])[::-1] - masses) / masses, 1.0)
 
 
 def stated(protocol: Protocol) -> Components:

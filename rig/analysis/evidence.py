@@ -99,7 +99,7 @@ class Evidence:
             # Back to α², for drops of different α have different units.
             squares = (y[block] * model.unknowns.sd[block]) ** 2
             size = np.full(squares.size, alpha**2)
-            alone = size / above(squares.size) ** 2
+            alone = size / above(model.records["impact"].chain.chain) ** 2
             self._impulses.append(np.stack([size, alone, squares, 1.0 - v[block]]))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:

@@ -175,13 +175,13 @@ def _swung(side: Side) -> Array:
 
 def _impulse_sd(side: Side) -> Array:
     components: Components = side.model.components
-    return components.impulses(side.alpha, above(side.rods))
+    return components.impulses(side.alpha, above(side.record.chain.chain))
 
 
 def _bounces(side: Side) -> Array:
     """Share of the variance of impulses that strings make by bouncing."""
     sd = _impulse_sd(side)
-    bounces = side.model.components.bounce * side.alpha / above(sd.size)
+    bounces = side.model.components.bounce * side.alpha / above(side.record.chain.chain)
     # Zero where impulses are known exactly: then none bounce either.
     share: Array = np.divide(bounces, sd, out=np.zeros_like(sd), where=sd > 0.0) ** 2
     return share
@@ -353,7 +353,7 @@ TABLE = (
         lambda side: side.protocol.priors.strings * abs(side.record.alpha),
         shared="condition",
         moves="gains",
-        path=lambda side: above(side.rods)[:, None] ** -2.0,
+        path=lambda side: above(side.record.chain.chain)[:, None] ** -2.0,
         absent=_all,
     ),
     _stretch("stretch"),

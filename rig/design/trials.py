@@ -137,7 +137,8 @@ def _path(
     release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
     alphas = model_alphas(protocol, record, run)
     if alphas.size:
-        scatter = stated(protocol).impulses(float(alphas.mean()), above(alphas.size))
+        known, heavier = stated(protocol), above(record.chain.chain)
+        scatter = known.impulses(float(alphas.mean()), heavier)
         alphas += scatter * rng.standard_normal(alphas.size)
     return trajectory(protocol, record, release, start, alphas, rods)
 
