@@ -193,7 +193,10 @@ class Explainer:
         """Weigh that it is no fault, but that this fall is not the equations'."""
         if "stretch" not in fit.model.unknowns:
             return
-        wider = replace(self.components, stretch=_BEYOND * self.components.stretch)
+        known = self.components
+        wider = replace(
+            known, stretch=_BEYOND * known.stretch, landed=_BEYOND * known.landed
+        )
         x = fit.x.copy()
         model = fit.model.informed(wider, self.clock_u, x)
         reading = weighed(settle(model, match(model, x), x=x))

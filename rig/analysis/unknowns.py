@@ -348,6 +348,12 @@ TABLE = (
         level=lambda side: -side.edges.landed * side.edges.alone,
     ),
     _struck(
+        "lying",
+        "contact",
+        lambda side: side.model.components.landed,
+        level=lambda side: -side.edges.landed * ~side.edges.alone,
+    ),
+    _struck(
         "strings",
         "single impulses",
         lambda side: side.protocol.priors.strings * abs(side.record.alpha),
