@@ -147,14 +147,18 @@ class Expected(NamedTuple):
         alone &= levels < (
             -strikes[-2] if record.ratios is not None and strikes.size > 1 else -np.inf
         )
-        u = protocol.contact.strike.u
+        u = np.full(rods.size, protocol.contact.strike.u)
+        if record.chain.diameters and protocol.contact.strike.u:
+            # Others but the top rod may strike the one before, which may be thicker.
+            before = np.append(0.0, record.chain.diameters[:-1])[rods]
+            u = np.where(rods < strikes.size - 1, np.maximum(u, before), u)
         left = np.full(rods.size, np.inf)  # of each rod's way
         strike = np.full(rods.size, protocol.contact.strike.value)
         if record.ratios is not None:
             left = levels + strikes[rods]
         if record.is_on_heap:
             left = levels + np.array(record.chain.chain.heights)[rods]
-            strike = np.array(record.clear)[rods] - u
+            strike = np.array(record.clear)[rods] - protocol.contact.strike.u
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),
@@ -187,16 +191,14 @@ class Expected(NamedTuple):
         return Seen(pick, self.times[edge], self.burst[edge], alone, landed, paired)
 
 
-def _landed(strike: Array, u: float, left: Array) -> Array:
+def _landed(strike: Array, u: Array, left: Array) -> Array:
     """See `Expected.landed`: normally distributed strikes, from which on a rod is slower."""
     found = np.zeros_like(left)
-    if u <= 0.0:
-        return found
-    for place in np.flatnonzero(np.isfinite(left)):
-        z = float(left[place] - strike[place]) / u
+    for place in np.flatnonzero(np.isfinite(left) & (u > 0.0)):
+        z = float(left[place] - strike[place]) / float(u[place])
         beyond = 0.5 * math.erfc(z / math.sqrt(2.0))
         square = (1.0 + z * z) * beyond - z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-        found[place] = SLOWED * u * math.sqrt(max(square, 0.0))
+        found[place] = SLOWED * u[place] * math.sqrt(max(square, 0.0))
     return found
 
 
