@@ -100,7 +100,8 @@ def above(chain: Chain) -> NDArray[np.float64]:
     nothing.
     """
     masses = np.array(chain.masses)
-    return np.maximum((np.cumsum(masses[::-1])[::-1] - masses) / masses, 1.0)
+    heavier: NDArray[np.float64] = (np.cumsum(masses[::-1])[::-1] - masses) / masses
+    return np.maximum(heavier, 1.0)
 
 
 def stated(protocol: Protocol) -> Components:

@@ -32,7 +32,15 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
 
 EdgeClass = Literal[
-    "missed", "merged", "dead gate", "chatter", "string", "bounce", "later passage", "extra"
+    "missed",
+    "merged",
+    "dead gate",
+    "chatter",
+    "string",
+    "bounce",
+    "later passage",
+    "left out",
+    "extra",
 ]
 ABSENT = -math.log(MISSED)
 """Cost of an expected edge that did not come: −ln of how probable that is beforehand."""
@@ -52,8 +60,8 @@ class UnmatchedEdge:
         ``missed``: the rod left no trace; ``merged``: its shadow ran into a neighbour's; ``dead
         gate``: nothing came from there. ``chatter``: of a flicker about a rod's edge; ``string``: a
         flicker between rods; ``bounce``: a shadow in the lowest beam after a rod has struck;
-        ``later passage``: what had passed came back, and perhaps fell once more; ``extra``: none of
-        these, so nothing explains it.
+        ``later passage``: what had passed came back, and perhaps fell once more; ``left out``: of a
+        gate that not every rod passes; ``extra``: none of these, so nothing explains it.
     channel
         Of the gate.
     time_s
@@ -65,7 +73,7 @@ class UnmatchedEdge:
     edge
         Its number in the drop; `None` for what did not come.
     cost
-        What it costs the likelihood: `ABSENT` or `SURPLUS`.
+        What it costs the likelihood: `ABSENT` or `SURPLUS`; nothing where the gate is left out.
     """
 
     kind: EdgeClass
@@ -107,6 +115,15 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
             if train.times.size > (match >= 0).sum():
                 back = later_passages(record, train, match, path, model.protocol.gravity.value)
                 unmatched += _surplus(gate.channel, train, match, hit, back)
+        for train in record.aside:
+            every_edge = zip(
+                train.times.tolist(), train.blocked.tolist(), train.edge.tolist(), strict=True
+            )
+            channel = gates[train.gate].channel
+            unmatched += [
+                UnmatchedEdge("left out", channel, when, dark, None, edge, 0.0)
+                for when, dark, edge in every_edge
+            ]
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 

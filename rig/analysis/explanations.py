@@ -194,9 +194,7 @@ class Explainer:
         if "stretch" not in fit.model.unknowns:
             return
         known = self.components
-        wider = replace(
-            known, stretch=_BEYOND * known.stretch, landed=_BEYOND * known.landed
-        )
+        wider = replace(known, stretch=_BEYOND * known.stretch, landed=_BEYOND * known.landed)
         x = fit.x.copy()
         model = fit.model.informed(wider, self.clock_u, x)
         reading = weighed(settle(model, match(model, x), x=x))

@@ -207,6 +207,12 @@ def _late_sd(side: Side) -> float:
     return bounce * priors.late_pull
 
 
+def _strike_sd(side: Side) -> float:
+    """Where not all rods pass the lowest beams, the top rod may strike as high as these are."""
+    lying = [side.gates.gates[train.gate].height for train in side.record.aside]
+    return max([side.protocol.contact.strike.u, *lying])
+
+
 def _contact(side: Side) -> Array:
     """Results are at the stated level: where the top rod would be if others struck elsewhere."""
     return np.append(-np.ones(side.rods - 1), 0.0)[:, None]
@@ -332,7 +338,7 @@ TABLE = (
         moves="places",
         path=_contact,
     ),
-    _struck("strike", "contact", lambda side: side.protocol.contact.strike.u),
+    _struck("strike", "contact", _strike_sd),
     _struck(
         "top",
         "top rod",
