@@ -72,8 +72,10 @@ def diagnose(fit: Fit) -> Diagnosis:
     if model.protocol.contact.heaped:
         strike, record = model.protocol.contact.strike, model.records["impact"]
         seen = any(record.chain.chain.rods - 1 in train.rods for train in record.trains)
-        code = "rods_lie" if seen else "rods_hide_end"
-        doubts.append(make_reason(code, words, height_m=strike.value, U95_m=2.0 * strike.u))
+        values = {"height_m": strike.value, "U95_m": 2.0 * strike.u}
+        if not seen:
+            return Diagnosis((make_reason("rods_hide_end", words, **values), *doubts), known=True)
+        doubts.append(make_reason("rods_lie", words, **values))
     if aside := [train for record in model.records.values() for train in record.aside]:
         at = [_values(model.protocol, train) for train in aside]
         doubts.append(make_reason("low_gates_miss_rods", words, at=at))
@@ -189,6 +191,16 @@ class _Seen(NamedTuple):
         return set(rods.tolist()) - set(rods[self.match >= 0].tolist())
 
     @property
+    def rods(self) -> int:
+        """How many rods should pass."""
+        return np.unique(self.train.rods).size
+
+    @property
+    def hidden(self) -> set[int]:
+        """Rods of which an edge was not seen."""
+        return set(self.train.rods[self.match < 0].tolist())
+
+    @property
     def ends(self) -> set[int]:
         """The first and the last rod that should pass."""
         return {int(self.train.rods[0]), int(self.train.rods[-1])}
@@ -237,17 +249,24 @@ def _counts_crossed(one: _Seen, other: _Seen) -> bool:
 
 
 def low_gates_missing(fit: Fit) -> int:
-    """Count the lowest gates beside the chain that strikes that miss more edges than by chance.
+    """Count the lowest gates beside the chain that strikes that miss more rods than by chance.
 
-    Not all rods pass them: some strike before, or lie there. The highest gate is none of them.
+    Some strike before, or lie there. The highest gate is none of them, and chance is as large as
+    all others miss.
     """
-    gates, placed = _gates(fit), fit.model.protocol.gates
+    placed = fit.model.protocol.gates
     assert placed is not None
-    heights = [gate.height for gate in placed.gates]
+    gates = [gate for gate in _gates(fit) if gate.train.times.size]
+    gates.sort(key=lambda gate: placed.gates[gate.train.gate].height)
+    low = 0
     struck = [gate for gate in gates if gate.role == "impact"]
-    struck.sort(key=lambda gate: heights[gate.train.gate])
-    missing = [gate.missing > most_by_chance(gate.match.size, MISSED) for gate in struck[:-1]]
-    return next((n for n, low in enumerate(missing) if not low), len(missing))
+    for gate in struck[:-1]:
+        others = [other for other in gates if other.role == "free"] + struck[low + 1 :]
+        missed = sum(len(other.hidden) for other in others) / sum(other.rods for other in others)
+        if len(gate.hidden) <= most_by_chance(gate.rods, max(MISSED, missed)):
+            break
+        low += 1
+    return low
 
 
 def _other_ends(gates: list[_Seen]) -> bool:

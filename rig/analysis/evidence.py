@@ -103,9 +103,15 @@ class Evidence:
             self._impulses.append(np.stack([size, alone, squares, 1.0 - v[block]]))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:
-        """Count what is left over of the edges that are no part of a flicker."""
+        """Count what is left over of the edges that are no part of a flicker.
+
+        Nor of rods that may have struck: most of what these are off is of another kind.
+        """
+        known = self.components
         for row in residuals:
+            usual = known.floor**2 + (row.speed * known.jitter) ** 2 + known.departures(row.loose)
             good = row.clean & (np.abs(row.values) <= STRAY * row.sigma)
+            good &= row.sigma**2 <= 2.0 * usual
             self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.loose[good]))
 
     def _count(self, kind: str, y: Array, v: Array) -> None:

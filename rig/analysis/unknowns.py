@@ -358,6 +358,7 @@ TABLE = (
         "contact",
         lambda side: side.model.components.landed,
         level=lambda side: -side.edges.landed * ~side.edges.alone,
+        absent=_all,
     ),
     _struck(
         "strings",

@@ -201,8 +201,8 @@ def test_a_rig_that_is_wrong_in_one_thing_is_told_what_it_is(name, layout, size,
         for fault_found in (*reason.values.get("candidates", ()), reason.json())
         if fault_found["code"] in fault.codes
     ]
-    assert len(named) == 1
-    if size_mm:
+    assert named
+    if size_mm:  # of the likeliest
         values = named[0]["values"]
         assert abs(abs(values["size_m"]) * 1e3 - size_mm) < 2e3 * values["U95_m"]
 

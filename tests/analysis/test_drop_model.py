@@ -126,7 +126,7 @@ def test_a_stamp_s_own_error_tells_nothing_of_the_clock(scene):
         scaled[at[f"{role} rods"]] += 2.0 * x[at[f"{role} rods"]]
         scaled[at[f"{role} width"]] = 2.0 * (record.chain.widths[0] + x[at[f"{role} width"]])
         powers = {"ripple": 2.0, "drag": -2.0, "contact": 2.0, "top": 2.0, f"{role} swing": 2.0}
-        powers |= dict.fromkeys(("landed", "stretch", "usual stretch"), 2.0)
+        powers |= dict.fromkeys(("landed", "lying", "stretch", "usual stretch"), 2.0)
         powers |= {f"{role} off centre": 2.0}
         for name, power in powers.items():
             if name in at:
@@ -206,9 +206,11 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
             off = np.where((times > hits[0]) & ~last, np.hypot(STATED.departure, further), 0.0)
             assert left[~last].min() == 2
             assert last.any()
+        edges = model.expected[role]
+        landed = np.where(edges.alone, 0.0, edges.landed)[np.concatenate(match) >= 0]
         expected = [
-            math.sqrt(STATED.floor**2 + v**2 * (STATED.jitter**2 + b**2) + d**2)
-            for v, b, d in zip(speed, burst, off, strict=True)
+            math.sqrt(STATED.floor**2 + v**2 * (STATED.jitter**2 + b**2) + d**2 + early**2)
+            for v, b, d, early in zip(speed, burst, off, landed, strict=True)
         ]
         np.testing.assert_allclose(found.sigma, expected, rtol=1e-12)
         assert (burst > 0.0).any()

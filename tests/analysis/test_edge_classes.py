@@ -27,7 +27,7 @@ def consistent(result: DropResult) -> None:
     surplus = [edge for edge in result.unmatched if edge.edge is not None]
     assert (len(absent), len(surplus)) == (result.audit.missed, result.audit.spurious)
     assert {edge.cost for edge in absent} <= {ABSENT}
-    assert {edge.cost for edge in surplus} <= {SURPLUS}
+    assert all(edge.cost == (0.0 if edge.kind == "left out" else SURPLUS) for edge in surplus)
     assert not {edge.edge for edge in surplus} & result.matches.keys()
     times = [edge.time_s for edge in result.unmatched]
     assert times == sorted(times)
@@ -54,7 +54,7 @@ def test_each_edge_has_the_cause_that_it_has(seed):
     consistent(result)
     hidden = Counter()
     for edge in result.unmatched:
-        if edge.edge is None:
+        if edge.edge is None or edge.kind == "left out":
             continue
         when, channel, blocked, rod = one.truth.edges[edge.edge]
         assert (edge.channel, edge.blocked) == (channel, blocked)

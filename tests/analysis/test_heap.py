@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.chain_records import heap_heights, on_heap, strike_heights
-from rig.analysis.drop import DropCase, fit_drop
+from rig.analysis.drop import DropCase, Passages, fit_drop
 from rig.bench.falls import Asked, falls, time_scale
 from rig.model.surface import Surface
 from rig.protocol.plan import runs as planned
@@ -100,8 +100,8 @@ def test_what_was_found_of_a_heap_is_kept_for_the_next_time(piled):
     fall = piled[0]
     one = DropCase(UNIFORM, RUNS[fall.drop.run], fall.drop, time_scale(SEED))
     first = one.summary()
-    assert first.heaped
-    assert first.identified.on_heap is not None
+    assert first.passages == Passages(heaped=True)
+    assert first.identified.keys() == {Passages(), Passages(heaped=True)}
     again = one.summary(first)
     assert again.result.quantities == first.result.quantities
     assert json.dumps(again.result.json()) == json.dumps(first.result.json())

@@ -110,7 +110,8 @@ def test_how_much_everything_scatters_is_found_whatever_was_stated(factor):
     components = fit_session(EIGHT, dials, 2).components
     # All at 60°, where α is 0.0689: only the sum of both parts shows.
     found = asdict(components) | {
-        "impulse": components.impulses(0.0689119616602868, above(25))[0] / 0.0689
+        "impulse": components.impulses(0.0689119616602868, above(UNIFORM.chains["A"].chain))[0]
+        / 0.0689
     }
     true = {
         "gates": dials.gate_sd / UNIFORM.gates.height_u,
@@ -362,10 +363,10 @@ def test_two_rods_have_too_few_impulses_to_learn_their_scatter_from():
     told = found.joint.degrees["impulse"] - STATED_WEIGHT  # a degree weighs as a member does
     # α may be anything, with a standard uncertainty of 1: it takes all but that of each impulse.
     alpha = impact_on(scene.surface, both["A"].chain, 40.0).alpha
-    scatter = STATED.impulses(alpha, above(2))[0]
+    scatter = STATED.impulses(alpha, above(both["A"].chain))[0]
     assert 0.0 < told < 8 * scatter**2
     # From the scale of a half-Cauchy prior a share of a member takes just that share.
-    found_scatter = found.joint.components.impulses(alpha, above(2))[0]
+    found_scatter = found.joint.components.impulses(alpha, above(both["A"].chain))[0]
     assert found_scatter == pytest.approx(scatter, rel=told)
     assert all(result.learned for result in found.runs)
 

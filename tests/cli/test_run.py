@@ -208,7 +208,7 @@ def test_what_is_put_right_is_gone_on_with_by_the_same_command(call, tmp_path):
 
 
 def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_path, protocol):
-    path, reasons = tmp_path / "s", ("edges_lost", "rods_pile_up", "crc_mismatch")
+    path, reasons = tmp_path / "s", ("edges_lost", "edges_missed", "crc_mismatch")
     Session.create(path, protocol.read_text("utf-8"), protocol.name, simulated=True,
                    origin="sim://?seed=1").close()  # fmt: skip
     with Session.open(path) as session:
