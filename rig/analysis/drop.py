@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import chain_records, on_heap, thinned
 from rig.analysis.components import stated
@@ -29,6 +31,8 @@ from rig.wordings import Severity
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.fit import Fit
@@ -38,6 +42,8 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, Run
     from rig.reasons import Reason
     from rig.records import Drop
+
+    Array = NDArray[np.float64]
 
 
 _SKEW = {"release_skew"}  # no way to pass makes that better
@@ -57,6 +63,8 @@ class DropSummary:
         Which rods its edges are, by how rods may pass; nothing of a damaged record.
     passages
         How they are taken to; `None` where nothing was fitted.
+    x
+        The unknowns, as they were adjusted; shape ``(unknowns,)``.
     deviations
         Those of the result's quantities, which are not kept with them.
     """
@@ -66,6 +74,7 @@ class DropSummary:
     result: DropResult
     identified: Mapping[Passages, Identified]
     passages: Passages | None
+    x: Array
     deviations: Mapping[str, Deviation | None]
 
     @property
@@ -143,9 +152,9 @@ class DropCase(NamedTuple):
         if result.verdict in GOOD and self.protocol.track is None:  # friction is no clock's fault
             gravity = free_gravity(self.protocol, result, self.drop, self.scale)
             result = replace(result, gravity=gravity)
-        passages = None if fit is None else Passages.of(fit)
+        passages, x = (None, np.zeros(0)) if fit is None else (Passages.of(fit), fit.x)
         deviations = {name: value.deviation for name, value in result.quantities.items()}
-        return DropSummary(self.scale, explain, result, known, passages, deviations)
+        return DropSummary(self.scale, explain, result, known, passages, x, deviations)
 
     @one_thread
     def fit(self, summary: DropSummary) -> Fit | None:
@@ -155,7 +164,7 @@ class DropCase(NamedTuple):
             return None
         case = self._at_contact()._with(passages)
         assert case is not None
-        return case._timed(summary.identified[passages])
+        return case._timed(summary.identified[passages], summary.x)
 
     @one_thread
     def read(
@@ -207,12 +216,14 @@ class DropCase(NamedTuple):
         aside = self.passages.aside
         return chain_records(self.protocol, self.run, self.drop, self.scale.hz, aside)
 
-    def _timed(self, identified: Identified) -> Fit:
-        """Adjust at this time scale what was identified at another."""
+    def _timed(self, identified: Identified, x: Array | None = None) -> Fit:
+        """Adjust at this time scale what was identified, or was adjusted before at this one."""
         begun = identified.begun
         assert begun is not None
         records, clock_u = self._records(), self.scale.u
         model = DropModel(self.protocol, records, begun.guesses, clock_u, self.components)
+        if x is not None:
+            return timed(model, begun._replace(x=x), 1.0)
         return timed(model, begun, self.scale.hz / identified.scale.hz)
 
     def _read(

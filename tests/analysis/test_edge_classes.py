@@ -41,7 +41,7 @@ def shadow_s(one: Case, number: int) -> float:
     return same[at + 1] - when if blocked else when - same[at - 1]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 3, 4])
 def test_each_edge_has_the_cause_that_it_has(seed):
     """Everything at once, every dial at its default but twice as many faults of edges."""
     one = case(
