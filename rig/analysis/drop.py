@@ -296,7 +296,8 @@ class DropCase(NamedTuple):
 
     def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
         assert self.components is not None
-        premise, short = Premise(self.protocol, self.run, scale.hz), thinned(self.drop, scale.hz)
+        premise = Premise(self.protocol, self.run, scale.hz, self.passages.aside)
+        short = thinned(self.drop, scale.hz)
         return Explainer(premise, short, scale.u, self.components, suspects)
 
 

@@ -217,7 +217,7 @@ class Explainer:
         )
 
     def _records(self, setting: Premise) -> list[ChainRecord]:
-        return chain_records(setting.protocol, setting.run, self.drop, setting.hz)
+        return chain_records(setting.protocol, setting.run, self.drop, setting.hz, setting.aside)
 
     def _voted(self, faults: Sequence[Fault], stated: float) -> Iterator[Explanation]:
         """Weigh faults of the sizes for which most edges vote: enough, not fewer than for none."""

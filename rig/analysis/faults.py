@@ -31,11 +31,12 @@ _WIDER = 0.5  # of its thinnest rod, by which rods may look thicker or thinner
 
 
 class Premise(NamedTuple):
-    """What a drop is read with."""
+    """What a drop is read with, see `rig.analysis.chain_records.chain_records`."""
 
     protocol: Protocol
     run: Run
     hz: float
+    aside: int = 0
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Shift:
             gates=replace(placed, gates=tuple(gates)),
             chains={**protocol.chains, **chains},
         )
-        return Premise(changed, stated.run, stated.hz * (1.0 - size * self.clock))
+        return stated._replace(protocol=changed, hz=stated.hz * (1.0 - size * self.clock))
 
     def _resized(self, chain: RodChain, size: float) -> RodChain:
         heights = tuple(height * (1.0 + size * self.length) for height in chain.chain.heights)
