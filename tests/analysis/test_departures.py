@@ -177,6 +177,14 @@ def test_a_low_gate_whose_rods_come_late_is_left_out():
     assert [gate["channel"] for gate in reason.values["at"]] == [LOWEST[0].channel]
 
 
+def test_a_fault_is_named_beside_gates_that_are_left_out():
+    thicker = replace(UNIFORM.chains["A"], widths=(16e-3,) * (TOP + 1))
+    one = case(replace(UNIFORM, chains={**UNIFORM.chains, "A": thicker}), MILD, incline=40.0)
+    result = replace(without(one, {LOWEST[0].channel: 8}), protocol=UNIFORM).analyze()
+    assert result.verdict == "void"
+    assert "thickness" in codes(result)
+
+
 def test_a_gate_that_goes_blind_above_others_is_not_left_out():
     one = case(UNIFORM, MILD, incline=40.0)
     result = without(one, {LOWEST[2].channel: 8}).analyze()

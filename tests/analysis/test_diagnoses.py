@@ -77,7 +77,7 @@ def test_gates_of_both_sides_exchanged_are_no_pile():
     one = case(parse(under(STANDARD, (0.12, 0.2, 0.4, 0.7), (0.11, 0.3, 0.6)).protocol()), MILD)
     result = exchanged(one, 0, 8).analyze()
     assert result.verdict == "void"
-    assert "rods_pile_up" not in codes(result)
+    assert "low_gates_miss_rods" not in codes(result)
     (exchange,) = (reason for reason in result.reasons if reason.code == "gates_exchanged")
     assert {gate["channel"] for gate in exchange.values["at"]} == {0, 8}
     assert "log_odds" in exchange.values
