@@ -7,7 +7,6 @@ where its rods strike the surface, or others that lie there.
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
@@ -20,15 +19,13 @@ from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.model.rods import rod_impacts
 from rig.predictions import air_shares
-from rig.protocol.contact import higher_contacts, lacking_geometry, touching_heights
-from rig.units import Quantity
+from rig.protocol.contact import higher_contacts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from rig.model.surface import Surface
     from rig.protocol.protocol import Gate, Protocol, RodChain, Run
     from rig.records import Drop
 
@@ -43,9 +40,6 @@ LONGEST = 64
 """Edges of one flicker from which on its middle says no more: a clean edge has 1, a rod in front of
 a receiver that flickers with the mains some ten. What is fitted takes time with each edge."""
 
-UNEVEN = 1 / 3
-"""Relative standard uncertainty of the height of a heap: tops of heaps of resolved rods scatter by
-27 % about `heap_heights`, from 16 to 36 rods and 0 to 30°."""
 WIDER = 1.2
 """By which a beam may see an object wider or narrower than stated: one that passes half its radius
 off the middle of a beam has a chord that is 13 % shorter."""
@@ -170,9 +164,6 @@ class ChainRecord:
     higher
         How high above the contact point each rod's middle is as its impact pulls, m; not given
         where nothing is struck. Results are at level: the top rod falls on as if nothing lay there.
-    clear
-        Above which height of its middle nothing lies in each rod's way, m; as `higher` where
-        nothing does.
     aside
         Trains of gates that are left out: so low that not every rod passes them.
     """
@@ -185,7 +176,6 @@ class ChainRecord:
     air: Array = field(default_factory=lambda: ONE)
     condition: str = ""
     higher: tuple[float, ...] = ()
-    clear: tuple[float, ...] = ()
     aside: tuple[EdgeTrain, ...] = ()
 
     @property
@@ -193,15 +183,6 @@ class ChainRecord:
         """How high the reference point is below the contact point as each rod strikes, m."""
         places = np.array(self.chain.chain.heights)
         return places - self.higher if self.higher else places
-
-    @property
-    def is_on_heap(self) -> bool:
-        """Whether rods strike others that lie there."""
-        return self.clear != self.higher
-
-    def is_beside_rods(self, gate: Gate) -> bool:
-        """Whether others may lie in a gate's beam as one of the rods passes it."""
-        return self.is_on_heap and gate.height < max(self.clear) + 0.5 * max(self.chain.widths)
 
     @property
     def expected(self) -> int:
@@ -298,7 +279,6 @@ def chain_records(
                 alpha = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
             except DomainError:
                 alpha = 0.0
-            higher, clear = _contacts(protocol, run, chain)
             low = _lowest(protocol, trains)[:aside]
             record = replace(
                 record,
@@ -309,8 +289,7 @@ def chain_records(
                 # Behind the last leg nothing falls any more, but edges are asked for all the same.
                 air=np.append(air, air[-1]) if np.ptp(air) else air[:1],
                 condition=str(protocol.condition(run)),
-                higher=higher,
-                clear=clear,
+                higher=higher_contacts(protocol, run.incline_deg, chain),
             )
         records.append(record)
     return records
@@ -337,69 +316,7 @@ def edge_trains(
         gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
         if name is not None and gates:
             chain = protocol.chains[name]
-            clear = _contacts(protocol, run, chain)[1] if role == "impact" else None
-            trains = (edge_train(n, gate, chain, edges, start, clear) for n, gate in gates)
+            struck = role == "impact"
+            higher = higher_contacts(protocol, run.incline_deg, chain) if struck else None
+            trains = (edge_train(n, gate, chain, edges, start, higher) for n, gate in gates)
             yield role, chain, tuple(trains)
-
-
-def _contacts(
-    protocol: Protocol, run: Run, chain: RodChain
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return `ChainRecord.higher` and `ChainRecord.clear`."""
-    if not protocol.contact.heaped or protocol.surface is None:
-        higher = higher_contacts(protocol, run.incline_deg, chain)
-        return higher, higher
-    heights = strike_heights(protocol.surface, run.incline_deg, chain)
-    return (*heights[:-1], 0.0), tuple(z + protocol.contact.strike.u for z in heights)
-
-
-def on_heap(protocol: Protocol, run: Run) -> Protocol | None:
-    """Return the protocol of a run whose rods may strike what lies there.
-
-    Parameters
-    ----------
-    protocol
-        With heights counted from the contact point, see `rig.protocol.contact.at_contact`.
-
-    Returns
-    -------
-    Protocol or None
-        With ``contact.heaped``, and the top rod's strike on it; `None` where by geometry less
-        than one rod lies there as the top rod strikes.
-    """
-    chain = None if run.impact is None else protocol.chains[run.impact]
-    if protocol.surface is None or chain is None or "diameter" in lacking_geometry(chain):
-        return None
-    top = strike_heights(protocol.surface, run.incline_deg, chain)[-1]
-    if top < max(chain.diameters):  # what is lower than one of its rods is no heap
-        return None
-    strike = protocol.contact.strike
-    higher = Quantity(strike.value + top, math.hypot(strike.u, UNEVEN * top))
-    return replace(protocol, contact=replace(protocol.contact, heaped=True, strike=higher))
-
-
-@lru_cache(maxsize=64)  # a session asks for the same few again and again
-def strike_heights(
-    surface: Surface, incline_deg: float | None, chain: RodChain
-) -> tuple[float, ...]:
-    """How far above the contact point each rod strikes what lies there, m; bottom up."""
-    incline = incline_deg or 0.0
-    # How long rods are lifts all alike.
-    touching = np.array(touching_heights(replace(chain, rod_length=0.0), incline))
-    return tuple((touching - touching[-1] + heap_heights(chain, surface, incline)).tolist())
-
-
-def heap_heights(chain: RodChain, surface: Surface, incline_deg: float) -> Array:
-    """How high others lie as each rod strikes, m; shape ``(rods,)``.
-
-    Friction μ takes μ (1 + β) cos θ of the speed V with which a rod strikes, so that V (sin θ −
-    μ (1 + β) cos θ) is left down the board. As the next one comes, a distance p behind, it has
-    gone by that share of p. What of its thickness d is still there fills a square of side d in a
-    heap as high as half as wide.
-    """
-    angle, thick = math.radians(incline_deg), np.array(chain.diameters)
-    gaps = np.diff(chain.chain.heights, append=np.inf)
-    stopped = surface.friction.value * (1.0 + surface.restitution.value) * math.cos(angle)
-    gone = gaps[:-1] * max(0.0, math.sin(angle) - stopped)
-    lying = thick[:-1] * np.maximum(thick[:-1] - gone, 0.0)
-    return np.asarray(np.sqrt(np.cumsum(np.append(0.0, lying))))

@@ -69,13 +69,6 @@ def diagnose(fit: Fit) -> Diagnosis:
     model = fit.model
     gates, words = _gates(fit), model.protocol.vocabulary
     doubts = silent(model.protocol, model.records.values())
-    if model.protocol.contact.heaped:
-        strike, record = model.protocol.contact.strike, model.records["impact"]
-        seen = any(record.chain.chain.rods - 1 in train.rods for train in record.trains)
-        values = {"height_m": strike.value, "U95_m": 2.0 * strike.u}
-        if not seen:
-            return Diagnosis((make_reason("rods_hide_end", words, **values), *doubts), known=True)
-        doubts.append(make_reason("rods_lie", words, **values))
     if aside := [train for record in model.records.values() for train in record.aside]:
         at = [_values(model.protocol, train) for train in aside]
         doubts.append(make_reason("low_gates_miss_rods", words, at=at))
@@ -191,16 +184,6 @@ class _Seen(NamedTuple):
         return set(rods.tolist()) - set(rods[self.match >= 0].tolist())
 
     @property
-    def rods(self) -> int:
-        """How many rods should pass."""
-        return np.unique(self.train.rods).size
-
-    @property
-    def hidden(self) -> set[int]:
-        """Rods of which an edge was not seen."""
-        return set(self.train.rods[self.match < 0].tolist())
-
-    @property
     def ends(self) -> set[int]:
         """The first and the last rod that should pass."""
         return {int(self.train.rods[0]), int(self.train.rods[-1])}
@@ -217,14 +200,13 @@ class _Seen(NamedTuple):
 
 
 def _gates(fit: Fit) -> list[_Seen]:
-    beams, gates = fit.model.unknowns["beams"], fit.model.protocol.gates
-    assert gates is not None
+    beams = fit.model.unknowns["beams"]
     off = np.abs(scaled(fit.estimate.x[beams], fit.model.unknowns.sd[beams]))
     return [
         _Seen(role, train, match, int((match >= 0).sum()), float(off[train.gate]))
         for role, record in fit.model.records.items()
         for train, match in zip(record.trains, fit.matches[role], strict=True)
-        if match.size and not record.is_beside_rods(gates.gates[train.gate])
+        if match.size
     ]
 
 
@@ -248,22 +230,38 @@ def _counts_crossed(one: _Seen, other: _Seen) -> bool:
     return bool(fewer.unseen & fewer.ends) and more.extra >= _PAIR
 
 
-def low_gates_missing(fit: Fit) -> int:
+def low_gates_missing(protocol: Protocol, records: Sequence[ChainRecord], fit: Fit | None) -> int:
     """Count the lowest gates beside the chain that strikes that miss more rods than by chance.
 
     Some strike before, or lie there. The highest gate is none of them, and chance is as large as
     all others miss.
+
+    Parameters
+    ----------
+    records
+        The chains with their trains.
+    fit
+        `None` where it is not known which rods edges are: then their number tells.
     """
-    placed = fit.model.protocol.gates
-    assert placed is not None
-    gates = [gate for gate in _gates(fit) if gate.train.times.size]
-    gates.sort(key=lambda gate: placed.gates[gate.train.gate].height)
+    assert protocol.gates is not None
+    struck: list[tuple[float, int, int]] = []
+    rods, hidden = 0, 0
+    for record in records:
+        for n, train in enumerate(record.trains):
+            due = np.unique(train.rods).size
+            if not due or not train.times.size:
+                continue
+            if fit is None:
+                unseen = max(0, due - train.times.size // _PAIR)
+            else:
+                unseen = np.unique(train.rods[fit.matches[record.role][n] < 0]).size
+            rods, hidden = rods + due, hidden + unseen
+            if record.role == "impact":
+                struck.append((protocol.gates.gates[train.gate].height, due, unseen))
     low = 0
-    struck = [gate for gate in gates if gate.role == "impact"]
-    for gate in struck[:-1]:
-        others = [other for other in gates if other.role == "free"] + struck[low + 1 :]
-        missed = sum(len(other.hidden) for other in others) / sum(other.rods for other in others)
-        if len(gate.hidden) <= most_by_chance(gate.rods, max(MISSED, missed)):
+    for _, due, unseen in sorted(struck)[:-1]:
+        rods, hidden = rods - due, hidden - unseen
+        if unseen <= most_by_chance(due, max(MISSED, hidden / rods)):
             break
         low += 1
     return low

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.chain_records import chain_records, on_heap, thinned
+from rig.analysis.chain_records import chain_records, thinned
 from rig.analysis.components import stated
 from rig.analysis.diagnoses import FEW_GATES, low_gates_missing, silent
 from rig.analysis.drop_model import DropModel
@@ -60,9 +60,9 @@ class DropSummary:
     explained
         Whether it was sought what else would explain it if it is void.
     identified
-        Which rods its edges are, by how rods may pass; nothing of a damaged record.
-    passages
-        How they are taken to; `None` where nothing was fitted.
+        Which rods its edges are, by how many gates are left out; nothing of a damaged record.
+    aside
+        How many are; `None` where nothing was fitted.
     x
         The unknowns, as they were adjusted; shape ``(unknowns,)``.
     deviations
@@ -72,8 +72,8 @@ class DropSummary:
     scale: TimeScale
     explained: bool
     result: DropResult
-    identified: Mapping[Passages, Identified]
-    passages: Passages | None
+    identified: Mapping[int, Identified]
+    aside: int | None
     x: Array
     deviations: Mapping[str, Deviation | None]
 
@@ -87,27 +87,6 @@ class DropSummary:
         found = self.result.quantities.items()
         whole = {name: replace(one, deviation=self.deviations[name]) for name, one in found}
         return replace(self, result=replace(self.result, quantities=whole))
-
-
-class Passages(NamedTuple):
-    """How rods are taken to pass where the protocol's way makes no good drop.
-
-    Attributes
-    ----------
-    heaped
-        Whether they strike those that lie there.
-    aside
-        How many of the lowest gates they do not all pass, which are left out.
-    """
-
-    heaped: bool = False
-    aside: int = 0
-
-    @classmethod
-    def of(cls, fit: Fit) -> Passages:
-        """Return how they do in a fit."""
-        aside = sum(len(record.aside) for record in fit.model.records.values())
-        return cls(fit.model.protocol.contact.heaped, aside)
 
 
 class DropCase(NamedTuple):
@@ -125,8 +104,8 @@ class DropCase(NamedTuple):
         Calibration of its ticks.
     components
         How much everything scatters; as the protocol states it if not given.
-    passages
-        How rods are taken to pass.
+    aside
+        How many of the lowest gates beside the chain that strikes are left out.
     """
 
     protocol: Protocol
@@ -134,7 +113,7 @@ class DropCase(NamedTuple):
     drop: Drop
     scale: TimeScale
     components: Components | None = None
-    passages: Passages = Passages()
+    aside: int = 0
 
     @one_thread
     def summary(self, before: DropSummary | None = None, *, explain: bool = True) -> DropSummary:
@@ -152,30 +131,31 @@ class DropCase(NamedTuple):
         if result.verdict in GOOD and self.protocol.track is None:  # friction is no clock's fault
             gravity = free_gravity(self.protocol, result, self.drop, self.scale)
             result = replace(result, gravity=gravity)
-        passages, x = (None, np.zeros(0)) if fit is None else (Passages.of(fit), fit.x)
+        aside, x = None, np.zeros(0)
+        if fit is not None:
+            aside, x = sum(len(record.aside) for record in fit.model.records.values()), fit.x
         deviations = {name: value.deviation for name, value in result.quantities.items()}
-        return DropSummary(self.scale, explain, result, known, passages, x, deviations)
+        return DropSummary(self.scale, explain, result, known, aside, x, deviations)
 
     @one_thread
     def fit(self, summary: DropSummary) -> Fit | None:
         """Make again the fit that a summary was made from; `None` where nothing was fitted."""
-        passages = summary.passages
-        if passages is None:
+        aside = summary.aside
+        if aside is None:
             return None
-        case = self._at_contact()._with(passages)
-        assert case is not None
-        return case._timed(summary.identified[passages], summary.x)
+        case = self._at_contact()._replace(aside=aside)
+        return case._timed(summary.identified[aside], summary.x)
 
     @one_thread
     def read(
-        self, known: dict[Passages, Identified] | None = None, *, explain: bool = True
+        self, known: dict[int, Identified] | None = None, *, explain: bool = True
     ) -> tuple[DropResult, Fit | None]:
-        """Read the drop as the protocol states it or, where that is void, as rods may pass besides.
+        """Read the drop, without the low gates that not all rods pass.
 
         Parameters
         ----------
         known
-            What its edges are where rods pass like that, as far as it is known, and will be.
+            What its edges are where so many gates are left out, as far as it is known, and will be.
         explain
             As for `fit_drop`.
         """
@@ -186,16 +166,9 @@ class DropCase(NamedTuple):
         stated = self._at_contact()
         result, fit = stated._read(known, explain=False)
         wrong = _void_by(result) - _SKEW
-        heaped = stated._with(Passages(heaped=True)) if wrong else None
-        if heaped is not None:
-            on_heap = heaped._read(known, explain=False)
-            # That no beam sees the end is why edges are strange, not why others are missed.
-            hidden = {"rods_hide_end"} if wrong != {"edges_missed"} else set()
-            if _void_by(on_heap[0]) <= _SKEW | hidden:
-                return on_heap
         case, last = stated, fit
-        while last is not None and (low := low_gates_missing(last)):
-            case = case._replace(passages=Passages(aside=case.passages.aside + low))
+        while low := low_gates_missing(self.protocol, case._records(), last):
+            case = case._replace(aside=case.aside + low)
             without = other, last = case._read(known, explain=False)
             if not _void_by(other) - _SKEW:
                 return without
@@ -207,14 +180,8 @@ class DropCase(NamedTuple):
         protocol = at_contact(protocol, run.incline_deg, run.impact)
         return self._replace(protocol=protocol, components=components)
 
-    def _with(self, passages: Passages) -> DropCase | None:
-        """Let rods pass otherwise; `None` where by geometry they cannot."""
-        protocol = on_heap(self.protocol, self.run) if passages.heaped else self.protocol
-        return None if protocol is None else self._replace(protocol=protocol, passages=passages)
-
     def _records(self) -> list[ChainRecord]:
-        aside = self.passages.aside
-        return chain_records(self.protocol, self.run, self.drop, self.scale.hz, aside)
+        return chain_records(self.protocol, self.run, self.drop, self.scale.hz, self.aside)
 
     def _timed(self, identified: Identified, x: Array | None = None) -> Fit:
         """Adjust at this time scale what was identified, or was adjusted before at this one."""
@@ -227,17 +194,17 @@ class DropCase(NamedTuple):
         return timed(model, begun, self.scale.hz / identified.scale.hz)
 
     def _read(
-        self, every: dict[Passages, Identified], *, explain: bool
+        self, every: dict[int, Identified], *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
         """Read a drop whose rods strike where the protocol, from the contact point, has them."""
-        protocol, run, drop, scale, components, passages = self
+        protocol, run, drop, scale, components, aside = self
         assert components is not None
         records = self._records()
         audit = _blank_audit(drop, records)
-        rough, known = scale.rounded(), every.get(passages)
+        rough, known = scale.rounded(), every.get(aside)
         if known is None or known.scale != rough:
-            known = identified(protocol, run, drop, rough, components, passages.aside)
-            every[passages] = known
+            known = identified(protocol, run, drop, rough, components, aside)
+            every[aside] = known
         unlike = {reason.text: reason for reason in known.unlike.values()}.values()
         doubts = silent(protocol, records) if known.unlike else ()
         early = judge_record(drop, audit, [*unlike, *doubts])
@@ -246,7 +213,7 @@ class DropCase(NamedTuple):
             if known.unlike and explain:
                 if known.explained is None:
                     known = replace(known, explained=self._unlike_fall(known, rough))
-                    every[passages] = known
+                    every[aside] = known
                 reasons = (*reasons, *(known.explained or ()))
             return DropResult(run, drop.attempt, early.verdict, reasons, audit), None
         fit = self._timed(known)
@@ -296,7 +263,7 @@ class DropCase(NamedTuple):
 
     def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
         assert self.components is not None
-        premise = Premise(self.protocol, self.run, scale.hz, self.passages.aside)
+        premise = Premise(self.protocol, self.run, scale.hz, self.aside)
         short = thinned(self.drop, scale.hz)
         return Explainer(premise, short, scale.u, self.components, suspects)
 

@@ -107,9 +107,9 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
         every = split(model.all_levels(role, x), model.expected[role].ends)
         for train, levels, match in zip(record.trains, every, drop.matches[role], strict=True):
             gate = gates[train.gate]
-            # Only the lowest beam is near enough to what bounces, and those beside what lies.
-            near = gate.height == lowest or record.is_beside_rods(gate)
-            hit = float(path.time[1]) / clock if near and record.ratios is not None else np.inf
+            # Only the lowest beam is near enough to what bounces.
+            near = gate.height == lowest and record.ratios is not None
+            hit = float(path.time[1]) / clock if near else np.inf
             if (match < 0).any():
                 unmatched += _absent(gate.channel, train, match, path.times(levels) / clock)
             if train.times.size > (match >= 0).sum():

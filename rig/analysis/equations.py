@@ -156,9 +156,6 @@ class Expected(NamedTuple):
         strike = np.full(rods.size, protocol.contact.strike.value)
         if record.ratios is not None:
             left = levels + strikes[rods]
-        if record.is_on_heap:
-            left = levels + np.array(record.chain.chain.heights)[rods]
-            strike = np.array(record.clear)[rods] - protocol.contact.strike.u
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),

@@ -151,15 +151,11 @@ class Contact:
     from_board
         Whether heights are measured from the board: where rods touch it follows from what they
         are like, and `level` is what that leaves out.
-    heaped
-        Whether rods strike others that lie there; no protocol says it, see
-            `rig.analysis.chain_records.heap_heights`.
     """
 
     level: Quantity = DEFAULTS["contact.level"]
     strike: Quantity = DEFAULTS["contact.strike"]
     from_board: bool = False
-    heaped: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,49 @@
+"""Rods that lie where others strike: drops of the resolved world on flat boards."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rig.analysis.drop import DropCase
+from rig.bench.falls import Asked, falls, time_scale
+from rig.protocol.plan import runs as planned
+from tests.analysis.drops import PROTOCOLS, UNIFORM, codes
+
+SEED = 3
+RUNS = {run.number: run for run in planned(UNIFORM)}
+
+
+@pytest.fixture(scope="module")
+def piled():
+    """Drops of the resolved world, and what is true of them."""
+    inclines = {run.incline_deg: number for number, run in reversed(RUNS.items())}
+    numbers = [inclines[incline] for incline in (0.0, 10.0, 20.0)]
+    url = f"sim://?dynamics=resolved&stated=1&protocol={PROTOCOLS / 'inclined-uniform.yaml'}"
+    falling = falls([Asked(url, [SEED], [numbers])])
+    return [(DropCase(UNIFORM, RUNS[one.drop.run], one.drop, time_scale(SEED)), one)
+            for one in falling]  # fmt: skip
+
+
+def test_drops_on_a_pile_are_read_without_the_beams_in_it(piled):
+    for case, fall in piled:
+        result, _ = case.read()
+        assert result.verdict == "marginal", fall.drop.run
+        assert "low_gates_miss_rods" in codes(result)
+        assert not {"gate_disagrees", "gate_off", "gate_height"} & set(codes(result))
+        assert fall.rods(result.matches)[0] == 0
+        for name in ("separation_m", "separation_strike_m", "speed_m_s", "release_skew_s"):
+            measured = result.quantities[name]
+            assert abs(measured.value - fall.truth[name]) < 1.5 * measured.expanded, name
+
+
+def test_what_was_found_of_it_is_kept_for_the_next_time(piled):
+    case, _ = piled[0]
+    first = case.summary()
+    assert first.aside
+    assert {0, first.aside} <= first.identified.keys()
+    again = case.summary(first)
+    assert again.result.quantities == first.result.quantities
+    assert json.dumps(again.result.json()) == json.dumps(first.result.json())
+    assert case.fit(first).rods == first.result.matches
