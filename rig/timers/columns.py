@@ -48,7 +48,7 @@ _MEANINGS = {
 }
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, slots=True)
 class TimerColumn:
     """What a column is.
 

@@ -9,17 +9,21 @@ is dark, which unit) is left to `rig.timers.layouts`.
 from __future__ import annotations
 
 import itertools
+from array import array
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rig.reasons import make_reason
 from rig.timers.columns import columns_of
-from rig.timers.events import TICK_HZ, FilePart, RowReader, split_at_jumps
+from rig.timers.events import FilePart, RowReader, split_at_jumps
 from rig.timers.lines import read_lines
+from rig.timers.moments import TICK_HZ
 from rig.timers.problems import ProblemList
-from rig.timers.samples import read_samples
+from rig.timers.signals import find_threshold, volts_of
 from rig.timers.table import HEADER, RowBlock, Table, find_time_base
-from rig.timers.vcd import is_vcd, read_vcd
+from rig.timers.vcd import is_vcd, vcd_columns, vcd_rows
 from rig.timers.vocabulary import number_of, recognise_format
 
 if TYPE_CHECKING:
@@ -55,18 +59,18 @@ class TimerFile:
         What each column was taken for, by its heading.
     parts
         Events of each run, or of each gate where these stand one below the other.
-    begins
-        The level that each input begins with, where samples say.
     period_s
         Of samples: no edge is known better than that; `None` for stamps.
+    is_regular
+        Whether samples are all as far apart, so that a row may have several changes.
     has_unit
         Whether the file says the unit of its times; without it they are read as seconds.
     rows
         How many lines of data there are.
     silent
         Of them, how many only say that nothing changes: samples, and states as they were.
-    sampled
-        Lines of samples that have a change, of an input that may be no gate.
+    is_sampled
+        Whether it has samples: a level that changes may be of an input that is no gate.
     unread
         Lines of data that say nothing, the first of them.
     notes
@@ -77,14 +81,21 @@ class TimerFile:
     is_own: bool = False
     columns: dict[str, str] = field(default_factory=dict)
     parts: list[FilePart] = field(default_factory=list)
-    begins: dict[str, str] = field(default_factory=dict)
     period_s: float | None = None
+    is_regular: bool = False
     has_unit: bool = True
     rows: int = 0
     silent: int = 0
-    sampled: set[int] = field(default_factory=set)
+    is_sampled: bool = False
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
+
+    def add(self, reader: RowReader) -> None:
+        """Count the rows of a block."""
+        self.rows += reader.rows
+        self.silent += reader.silent
+        self.unread += reader.unread
+        self.is_sampled |= reader.is_sampled
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -113,11 +124,30 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
     head = list(itertools.islice(lines, 50))
     lines = itertools.chain(head, lines)
     if is_vcd(head):
-        events, file.begins, scale = read_vcd(lines, problems)
-        file.period_s, file.parts = scale / TICK_HZ, [FilePart(events=events)]
-        file.rows = len({event.line for event in events})
+        numbered = enumerate(lines, 1)
+        columns = vcd_columns(numbered, problems)
+        if len(columns) == 1:
+            problems.refuse(1, 1, "no_edges")
+        reader = RowReader(columns, [], problems)
+        reader.read(vcd_rows(numbered, columns, problems))
+        file.add(reader)
+        file.parts += reader.parts.values()
+        file.period_s = 10.0 ** -(columns[0].power or 0)
     else:
-        _read_table(file, Table(lines), unit, problems)
+        table = Table(lines)
+        file.is_own = table.is_own
+        problems.hint = "" if table.is_own else _HINT  # its faults are told each
+        file.kind = f"the project's own format: {','.join(HEADER)}"
+        if not table.is_own:
+            name = recognise_format(table.head[:40])
+            file.kind = f"a table, its cells separated by {_SEPARATORS[table.separator]}"
+            file.kind += f"; it looks like {name}" if name else ""
+        above = RowBlock()
+        for n, (block, rows) in enumerate(table.blocks()):
+            _read_block(file, table, block, above, n, rows, path, unit, problems)
+            above = block
+        file.rows += table.stray_count
+        file.unread += table.strays
     problems.raise_if_any()
     file.parts = [part for part in file.parts if part.events]
     if not file.parts:
@@ -126,90 +156,114 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
     return file
 
 
-def _read_table(file: TimerFile, table: Table, unit: str | None, problems: ProblemList) -> None:
-    name = recognise_format(table.head[:40])
-    file.kind = f"a table, its cells separated by {_SEPARATORS[table.separator]}"
-    file.kind += f"; it looks like {name}" if name else ""
-    file.is_own = table.is_own
-    if file.is_own:  # its faults are told each
-        problems.hint = ""
-        file.kind = f"the project's own format: {','.join(HEADER)}"
-    above = RowBlock()
-    for block, rows in table.blocks():
-        sample = list(itertools.islice(rows, _SAMPLE))
-        width = max(len(row.texts) for row in sample)
-        if width > MAX_COLUMNS:
-            values = {"columns": width, "limit": MAX_COLUMNS}
-            problems.refuse(sample[0].line, 1, "too_many_columns", **values)
-        own = block.headings
-        if not any(len(row.texts) > 1 or width == 1 for row in own) or (
-            above.headings and not any(len(row.texts) == width for row in own)
-        ):
-            block.headings = [*own, *above.headings]
-        above = block
-        if table.is_own and tuple(text.lower() for text in own[0].texts) != HEADER:
-            problems.refuse(own[0].line, 1, "wrong_header", header=",".join(HEADER))
-        columns = columns_of(block, sample, table, unit, problems)
-        problems.raise_if_any()
-        file.columns |= {column.name: column.meaning for column in columns}
-        file.has_unit &= all(column.power is not None for column in columns)
-        roles = {column.role for column in columns}
-        if roles & {"level", "volts"}:
-            is_timed = "time" in roles
-            base = None if is_timed else find_time_base([*table.remarks, *block.headings])
-            if base is None and not is_timed:
-                problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
-            read_samples(file, itertools.chain(sample, rows), columns, base, problems)
-        elif "time" in roles:
-            _add_rows(file, block, sample, rows, columns, table, problems)
-        else:
-            durations = [repr(column.name) for column in columns if column.role == "duration"]
-            heading = block.headings[0].line if block.headings else sample[0].line
-            code = "durations" if durations else "no_time_column"
-            problems.refuse(heading, 1, code, numbers=", ".join(durations))
-    file.rows += table.stray_count
-    file.unread += table.strays
-
-
-def _add_rows(
+def _read_block(
     file: TimerFile,
-    block: RowBlock,
-    sample: Sequence[Row],
-    rows: Iterator[Row],
-    columns: Sequence[TimerColumn],
     table: Table,
+    block: RowBlock,
+    above: RowBlock,
+    n: int,
+    rows: Iterator[Row],
+    path: str | os.PathLike[str],
+    unit: str | None,
     problems: ProblemList,
 ) -> None:
-    reader = RowReader(columns, sample, problems, is_own=table.is_own)
+    """Add what the n-th block of a table says."""
+    sample = list(itertools.islice(rows, _SAMPLE))
+    width, own = max(len(row.texts) for row in sample), block.headings
+    if width > MAX_COLUMNS:
+        problems.refuse(sample[0].line, 1, "too_many_columns", columns=width, limit=MAX_COLUMNS)
+    if not any(len(row.texts) > 1 or width == 1 for row in own) or (
+        above.headings and not any(len(row.texts) == width for row in own)
+    ):
+        block.headings = [*own, *above.headings]
+    if table.is_own and tuple(text.lower() for text in own[0].texts) != HEADER:
+        problems.refuse(own[0].line, 1, "wrong_header", header=",".join(HEADER))
+    columns = columns_of(block, sample, table, unit, problems)
+    problems.raise_if_any()
+    roles, base = {column.role for column in columns}, (0.0, 1.0)
+    if "time" not in roles and roles & {"level", "volts"}:
+        stated = find_time_base([*table.remarks, *block.headings])
+        base = stated or base
+        if stated is None:
+            problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
+    elif "time" not in roles:
+        durations = [repr(column.name) for column in columns if column.role == "duration"]
+        heading = own[0].line if own else sample[0].line
+        code = "durations" if durations else "no_time_column"
+        problems.refuse(heading, 1, code, numbers=", ".join(durations))
+    file.columns |= {column.name: column.meaning for column in columns}
+    file.has_unit &= all(column.power is not None for column in columns)
+    reader = RowReader(columns, sample, problems, base, is_own=table.is_own)
+    _set_thresholds(file, reader, path, n)
     reader.read(itertools.chain(sample, rows))
     problems.raise_if_any()
-    file.rows += reader.rows
-    file.silent += reader.silent
-    file.unread += reader.unread
+    file.add(reader)
+    if reader.is_sampled:
+        parts = list(reader.parts.values())
+        file.period_s = reader.period_s()
+        file.is_regular = file.period_s is not None
+        for signal in reader.signals:
+            if signal.threshold:
+                values = {"input": signal.label, "level": signal.threshold.centre}
+                count = sum(e.label == signal.label for part in parts for e in part.events)
+                file.notes.append(make_reason("crossings", crossings=count, **values))
+        file.parts += parts
+    else:
+        _add_parts(file, reader, block, sample[0].line, columns, problems)
+
+
+def _set_thresholds(
+    file: TimerFile, reader: RowReader, path: str | os.PathLike[str], n: int
+) -> None:
+    """Find the levels of volts, for which all rows of the n-th block are read beforehand."""
+    signals = [(s, s.value.at) for s in reader.signals if s.value and s.value.role == "volts"]
+    if not signals:
+        return
+    _, rows = next(itertools.islice(Table(read_lines(path)).blocks(), n, None))
+    values = [array("f") for _ in signals]
+    for row in rows:
+        for (_, at), volts in zip(signals, values, strict=True):
+            value = volts_of(row.cell(at))
+            if value is not None:
+                volts.append(value)
+    for (signal, _), volts in zip(signals, values, strict=True):
+        signal.threshold = find_threshold(np.asarray(volts))
+        if signal.threshold is None:
+            low, high = min(volts), max(volts)
+            file.notes.append(make_reason("no_passage", input=signal.label, low=low, high=high))
+
+
+def _add_parts(
+    file: TimerFile,
+    reader: RowReader,
+    block: RowBlock,
+    line: int,
+    columns: Sequence[TimerColumn],
+    problems: ProblemList,
+) -> None:
+    """Add passages, divided where times begin anew; refuse what is no moment of a passage."""
     roles = {column.role for column in columns}
-    stated = {"edge", "state", "gate", "run"} & roles
-    unused = [column.name for column in columns if column.role in {"other", "duration"}]
+    is_stated = bool({"edge", "state", "gate", "run"} & roles)
+    unused = ", ".join(c.name for c in columns if c.role in {"other", "duration"})
     for part in reader.parts.values():
         lines = [event.line for event in part.events]
         if len(set(lines)) == 1:  # columns of a row may stand in any order
             part.events.sort(key=lambda event: event.tick)
-        ticks = [event.tick for event in part.events]
-        steps = [b - a for a, b in itertools.pairwise(ticks)]
+        steps = [b.tick - a.tick for a, b in itertools.pairwise(part.events)]
         backwards = sum(step < 0 for step in steps)
-        if not stated and backwards > 1 and backwards * 4 > len(ticks):
-            numbers = "these numbers go up and down: they"
-            problems.refuse(sample[0].line, 1, "durations", numbers=numbers)
-        if "other" in roles and not stated and len(steps) > 3 and max(steps) < 1.5 * min(steps):
-            problems.refuse(sample[0].line, 1, "regular_samples", columns=", ".join(unused))
+        if not is_stated and backwards > 1 and backwards * 4 > len(lines):
+            problems.refuse(line, 1, "durations", numbers="these numbers go up and down: they")
+        if "other" in roles and not is_stated and len(steps) > 3 and max(steps) < 1.5 * min(steps):
+            problems.refuse(line, 1, "regular_samples", columns=unused)
         in_order = len(set(lines)) == len(lines)
-        parts = [part] if reader.has_runs else split_at_jumps(part, in_order=in_order)
-        short = [k for k, piece in enumerate(parts) if len(piece.events) < 2]
-        if len(parts) > 1 and short:
-            event = parts[max(1, short[-1])].events[0]
+        pieces = [part] if reader.has_runs else split_at_jumps(part, in_order=in_order)
+        short = [k for k, piece in enumerate(pieces) if len(piece.events) < 2]
+        if len(pieces) > 1 and short:
+            event = pieces[max(1, short[-1])].events[0]
             problems.add(event.line, 1, "time", "backwards", text=f"{event.tick / TICK_HZ:.9g}")
-        mark = " ".join(block.headings[0].texts) if block.headings and not part.name else ""
-        for piece in parts:
-            piece.name = piece.name or mark
-        file.parts += parts
+        mark = " ".join(block.headings[0].texts) if block.headings else ""
+        for piece in pieces:
+            piece.name = piece.name or part.name or mark
+        file.parts += pieces
     if unused:
-        file.notes.append(make_reason("columns_unused", columns=", ".join(unused)))
+        file.notes.append(make_reason("columns_unused", columns=unused))

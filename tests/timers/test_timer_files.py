@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.records import Drop
-from rig.timers import events, vcd
-from rig.timers.events import TICK_HZ
+from rig.timers import events
 from rig.timers.layouts import find_layouts, read_drops
 from rig.timers.lines import read_lines
+from rig.timers.moments import TICK_HZ
 from rig.timers.table import Table
 from rig.timers.timer_file import read_timer_file
 from tests.examples import examples
@@ -321,7 +321,6 @@ def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, t
     "#0 0!\n#1 1!\n#2 0!\n#3 1!\n"])  # fmt: skip
 def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
     monkeypatch.setattr(events, "MAX_EVENTS", 2)
-    monkeypatch.setattr(vcd, "MAX_EVENTS", 2)
     assert faults(tmp_path, content)
 
 
