@@ -121,20 +121,24 @@ def columns_of(
     width = max(len(row.texts) for row in rows)
     cells = [[text for row in rows if (text := row.cell(n))] for n in range(width)]
     facts = {n: _facts_of_values(texts) for n, texts in enumerate(cells) if texts}
-    if all(len(texts) == len(rows) for texts in cells):
-        block.headings += _name_levels(list(facts.values()), block, table)
     heading = _find_heading(block, facts)
+    if all("levels" in each for each in facts.values()):
+        heading = _name_levels(len(facts), block, table) or heading
+    bare = set() if heading else {"bare", *({"single"} if len(facts) == 1 else set())}
+    is_rising = [n for n, each in facts.items() if {"rises", "fractions"} <= each - {"levels"}]
+    for each in facts.values():
+        each.update(bare, {"rival"} if is_rising and "fractions" not in each else ())
+    columns = [_read_heading(block, heading or Row(0, []), n, each) for n, each in facts.items()]
     if heading is None:
-        columns = _read_bare(block, facts, rows[0], problems)
-    else:
-        columns = [_read_heading(block, heading, n, facts[n]) for n in facts]
+        _check_bare(block, columns, rows[0], problems)
     for column in columns:
         texts = cells[column.at]
         if column.role == "level" and len(texts) < len(rows):
             column.role = "state"  # of samples, each row has every level
         if column.role == "time" and column.power is None:
             column.power = POWERS[unit] if unit else _plain_power(texts)
-        _check(column, columns, heading, facts[column.at], problems)
+        if heading:
+            _check(column, columns, heading, facts[column.at], problems)
     # Of columns that say the same times in other units, the finest is kept.
     finest: dict[tuple[str, str, bool | None], TimerColumn] = {}
     times = [column for column in columns if column.role == "time" and not column.numbered]
@@ -145,19 +149,34 @@ def columns_of(
     return columns
 
 
-def _name_levels(facts: Sequence[set[str]], block: RowBlock, table: Table) -> list[Row]:
+def _name_levels(width: int, block: RowBlock, table: Table) -> Row | None:
     """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
-    last = block.headings[-1].texts if block.headings else []
-    named = {text.casefold() for text in last} - {"logic", "analog"}
-    has_rate = find_time_base([*table.remarks, *block.headings]) is not None
-    if named or not has_rate or not all("levels" in each for each in facts):
-        return []
-    lists = [row.raw.partition(":")[2].split(",") for row in table.remarks
-             if "channels" in row.raw.lower()]  # fmt: skip
-    numbered = [f"D{n}" for n in range(len(facts))]
-    names = next((names for names in lists if len(names) == len(facts)), numbered)
+    named = {text.casefold() for row in block.headings[-1:] for text in row.texts}
+    if named - {"logic", "analog"} or not find_time_base([*table.remarks, *block.headings]):
+        return None
+    lists = [row.raw.partition(":")[2].split(",") for row in table.remarks]
+    names = next((n for n in lists if len(n) == width), [f"D{n}" for n in range(width)])
     texts = (text.strip() for text in names)
-    return [Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])]
+    return Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])
+
+
+def _check_bare(
+    block: RowBlock, columns: Sequence[TimerColumn], first: Row, problems: ProblemList
+) -> None:
+    """Refuse columns without a heading that may be something else."""
+    at = [column.at for column in columns]
+    for row in block.headings:  # one that says nothing
+        named = [n for n, text in enumerate(row.texts) if text and not is_value(text)]
+        if named == at and len(named) > 1:
+            problems.refuse(row.line, row.column(0), "no_time_column")
+    counts = Counter(column.role for column in columns)
+    repeated = any(counts[role] > 1 for role in ("state", "edge", "gate"))
+    if repeated or counts["other"] or counts["time"] != 1:
+        place = first.column(at[min(2, len(at) - 1)])
+        problems.add(first.line, place, "", "no_heading", columns=len(at))
+    labels = [find_label(text, "gate") for row in block.headings for text in row.texts]
+    for column in columns:
+        column.gate = next(filter(None, labels), "") if column.role == "volts" else ""
 
 
 def _find_heading(block: RowBlock, filled: Collection[int]) -> Row | None:
@@ -176,7 +195,7 @@ def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> Tim
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
     name, beside = heading.cell(n), [r.cell(n) for r in block.headings if r.line != heading.line]
     prefix, colon, rest = name.partition(":")
-    column = TimerColumn(n, name, "", run=find_label(name, "run"))
+    column = TimerColumn(n, name or f"column {n + 1}", "", run=find_label(name, "run"))
     name = name.replace(column.run, " ") if column.run else name
     if colon and rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
@@ -232,35 +251,6 @@ def _check(
     unit = unit_of(column.name)
     if column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
         problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
-
-
-def _read_bare(
-    block: RowBlock, facts: dict[int, set[str]], first: Row, problems: ProblemList
-) -> list[TimerColumn]:
-    """Without a heading: a column of times, and others that can be nothing else."""
-    for row in block.headings:  # one that says nothing
-        named = [n for n, text in enumerate(row.texts) if text and not is_value(text)]
-        if named == list(facts) and len(named) > 1:
-            problems.add(row.line, row.column(0), "", "no_time_column")
-            return []
-    facts = {n: each | {"bare"} for n, each in facts.items()}
-    rival = any(_find_role(each) == "time" and "fractions" in each for each in facts.values())
-    for each in facts.values():
-        each.update({"single"} if len(facts) == 1 else set())
-        each.update({"rival"} if rival and "fractions" not in each else set())
-    roles = {n: _find_role(each) for n, each in facts.items()}
-    counts = Counter(roles.values())
-    repeated = any(counts[role] > 1 for role in ("state", "edge", "gate"))
-    if repeated or counts["other"] or counts["time"] != 1:
-        at = list(facts)[min(2, len(facts) - 1)]
-        problems.add(first.line, first.column(at), "", "no_heading", columns=len(facts))
-    labels = [find_label(text, "gate") for row in block.headings for text in row.texts]
-    label = next(filter(None, labels), "")
-    columns = [TimerColumn(n, f"column {n + 1}", role) for n, role in roles.items()]
-    for column in columns:
-        column.power = None if column.role == "time" else 0
-        column.gate = label if column.role == "volts" else ""
-    return columns
 
 
 def _plain_power(texts: Sequence[str]) -> int | None:

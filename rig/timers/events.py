@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import groupby, pairwise
-from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from rig.boards import GATES
@@ -30,8 +29,6 @@ _LISTED = 100
 """Lines that are named, at most."""
 _DAY_S, _HOUR_S = 86400, 3600
 """How long a recording may be, and a run: an hour in a run means a wrong unit or a wrong run."""
-_SAMPLE = 200
-"""Steps from one sample to the next that show which is usual."""
 _ANY = ".*"
 _ACCEPTED = {
     "run": (_ANY, "a whole number"),
@@ -103,13 +100,15 @@ class RowReader:
         What each column is.
     sample
         The first rows, which tell whether a row is a run.
-    base
-        Of samples without times: when the first was taken, and the time between them, s.
+    problems
+        Where faults are noted.
     is_own
         Whether the rows are of the project's own format.
 
     Attributes
     ----------
+    base
+        Of samples without times: when the first was taken, and the time between them, s.
     signals
         What is read, and whether it is sampled.
     parts
@@ -118,8 +117,8 @@ class RowReader:
         How many rows there are, and how many of them only say that nothing changes.
     unread
         Lines of the first rows that say neither.
-    has_runs
-        Whether the file says of which run a row is, or each row is a run.
+    row_is_run, has_runs
+        Whether each row is a run, and whether the file says of which run a row is.
     """
 
     def __init__(
@@ -127,43 +126,37 @@ class RowReader:
         columns: Sequence[TimerColumn],
         sample: Sequence[Row],
         problems: ProblemList,
-        base: tuple[float, float] = (0.0, 1.0),
-        *,
-        is_own: bool = False,
+        is_own: bool,
     ) -> None:
+        self.base = (0.0, 1.0)
         self.signals = find_signals(columns)
         self.is_sampled = any(signal.is_sampled for signal in self.signals)
         self.parts: dict[object, FilePart] = {}
         self.rows = self.silent = self._events = 0
         self.unread: list[int] = []
         self._columns = {column.role: column for column in columns}
-        self._problems, self._base, self._is_own = problems, base, is_own
+        self._problems, self._is_own = problems, is_own
+        self._forms = _OWN if is_own else _ACCEPTED
         self._last: dict[object, TimerEvent] = {}
         self._before: dict[TimerColumn | None, tuple[int, list[str]]] = {}
-        self._steps: list[int] = []
         self._several = len(self.signals) > 1 and any(s.value for s in self.signals)
-        self._row_is_run = self._is_row_a_run(sample)
-        self.has_runs = self._row_is_run or "run" in self._columns
+        self.row_is_run = self._is_row_a_run(sample)
+        self.has_runs = self.row_is_run or "run" in self._columns
         by_clock = groupby(self.signals, key=lambda signal: signal.clock)
         self._clocks = [(clock, list(signals)) for clock, signals in by_clock]
-        self._is_plain = self.is_sampled and len(self._clocks) == 1
+        self._skips_blanks = not is_own and not (self.is_sampled and len(self._clocks) == 1)
 
     def read(self, rows: Iterable[Row]) -> None:
         """Read rows; each gives events, or says that nothing changes, or is unread."""
         for row in rows:
-            before, is_faulty = self._events, self._is_own and not self._is_readable(row)
-            silent = not is_faulty and self._read_row(row)
+            before, is_faulty = self._events, self._is_own and self._has_fault(row)
+            is_silent = not is_faulty and self._read_row(row)
             self.rows += 1
             if self._events == before:
-                self.silent += silent
-                self.unread += [row.line] * (not silent and len(self.unread) < _LISTED)
+                self.silent += is_silent
+                self.unread += [row.line] * (not is_silent and len(self.unread) < _LISTED)
             elif self._events > MAX_EVENTS:
                 self._problems.refuse(row.line, 1, "too_many_events", limit=MAX_EVENTS)
-
-    def period_s(self) -> float | None:
-        """Return the time between samples, if all are as far apart as most of the first."""
-        usual = median(self._steps[:_SAMPLE]) if self._steps else 0
-        return usual / TICK_HZ if max(self._steps, default=0) < 1.5 * usual else None
 
     def _is_row_a_run(self, sample: Sequence[Row]) -> bool:
         """Whether times that stand side by side are one drop: a row each, gate after gate."""
@@ -177,53 +170,48 @@ class RowReader:
         firsts = [picoseconds(text) or 0 for row in sample if (text := row.cell(times[0].at))]
         return any(t.numbered and not t.gate for t in times) or firsts != sorted(firsts)
 
-    def _is_readable(self, row: Row) -> bool:
-        """Whether a row of the project's own format has four values."""
-        code, values = "", dict[str, object]()
+    def _has_fault(self, row: Row) -> bool:
+        """Whether a row of the project's own format has other than four values."""
+        values = {"values": len(row.texts), "needed": len(_OWN), "header": ",".join(HEADER)}
         if row.raw.count('"') % 2:
-            code = "open_quote"
+            self._problems.add(row.line, 1, "", "open_quote")
         elif len(row.texts) != len(_OWN):
-            code, values = "wrong_width", {"values": len(row.texts), "needed": len(_OWN)}
-            values["header"] = ",".join(HEADER)
-        if code:
-            self._problems.add(row.line, 1, "", code, **values)
-        return not code
+            self._problems.add(row.line, 1, "", "wrong_width", **values)
+        return row.raw.count('"') % 2 > 0 or len(row.texts) != len(_OWN)
 
     def _read_row(self, row: Row) -> bool:
         """Add the events of a row; return whether it says that something is as it was."""
         run, gate = self._columns.get("run"), self._columns.get("gate")
         number = self._read_cell(row, run, number_of) if run else 0
-        label = self._read_cell(row, gate, str) if gate and not self.is_sampled else None
-        silent = False
+        label = self._read_cell(row, gate, str) if gate and not self.is_sampled else ""
+        is_silent = False
         for clock, signals in self._clocks:
-            text = row.cell(clock.at) if clock else str(self.rows)
-            is_later = self._row_is_run and signals[0] is not self.signals[0]
-            if not (text or self._is_own or self._is_plain) or (is_later and not picoseconds(text)):
+            text = row.cell(clock.at) if clock else ""
+            is_later = self.row_is_run and signals[0] is not self.signals[0]
+            if (self._skips_blanks and not text) or (is_later and not picoseconds(text)):
                 continue
             tick = self._read_tick(row, clock)
-            if tick is None and not self._is_own:  # all faults of its rows are told
-                continue
             words = [row.cell(signal.value.at) if signal.value else "" for signal in signals]
-            if self.is_sampled and not self._is_news(row, clock, tick or 0, words):
-                silent = True
+            if self.is_sampled and (tick is None or not self._is_news(row, clock, tick, words)):
+                is_silent = True
                 continue
             is_whole = self._several and all(words)
             for signal, word in zip(signals, words, strict=True):
                 level: str | None = signal.state
-                if signal.value and (word or self.is_sampled or not self._several):
+                if signal.value and self._several and not (word or self.is_sampled):
+                    continue  # another input's row
+                if signal.value:
                     level = self._read_state(row, signal, word, tick or 0)
-                elif signal.value:
-                    level = None  # another input's row
                 if self.is_sampled and not signal.is_news(level):
-                    silent = True
-                elif None not in (number, tick, level):
+                    is_silent = True
+                elif None not in (number, label, tick, level):
                     event = TimerEvent(tick or 0, label or signal.label, level or "", row.line)
-                    silent |= not self._add(row, signal, event, number or 0, is_whole=is_whole)
-        return silent
+                    is_silent |= not self._add(row, signal, event, number or 0, is_whole)
+        return is_silent
 
     def _read_cell(self, row: Row, column: TimerColumn, read: Callable[[str], Any]) -> Any:
         """Return a cell's value; `None`, and a fault is noted, where it is not accepted."""
-        form, accepted = (_OWN if self._is_own else _ACCEPTED)[column.role]
+        form, accepted = self._forms[column.role]
         text = row.texts[column.at] if column.at < len(row.texts) else ""
         value = read(row.cell(column.at)) if form == _ANY or re.fullmatch(form, text) else None
         if value is None:
@@ -232,10 +220,10 @@ class RowReader:
         return value
 
     def _read_tick(self, row: Row, clock: TimerColumn | None) -> int | None:
-        if clock and clock.role == "time":
-            return self._read_cell(row, clock, partial(moment, power=clock.power or 0))
-        sample = self._read_cell(row, clock, picoseconds) if clock else self.rows * TICK_HZ
-        return None if sample is None else round(TICK_HZ * self._base[0] + sample * self._base[1])
+        read = partial(moment, power=(clock and clock.power) or 0)
+        tick: int | None = self._read_cell(row, clock, read) if clock else self.rows * TICK_HZ
+        start, step = self.base
+        return tick if tick is None or step == 1.0 else round(TICK_HZ * start + tick * step)
 
     def _is_news(self, row: Row, clock: TimerColumn | None, tick: int, words: list[str]) -> bool:
         """Whether a sample says more than the one before, which has to be earlier."""
@@ -243,8 +231,6 @@ class RowReader:
         if tick < before and clock:
             text = row.cell(clock.at)
             self._problems.add(row.line, row.column(clock.at), "time", "backwards", text=text)
-        if len(self._steps) < _SAMPLE or tick - before > self._steps[-1]:
-            self._steps.append(tick - before)
         self._before[clock] = tick, words
         return words != last or "volts" in self._columns
 
@@ -257,28 +243,27 @@ class RowReader:
         return cast("str | None", self._read_cell(row, column, partial(_state_in, column.role)))
 
     def _add(
-        self, row: Row, signal: Signal, event: TimerEvent, number: int, *, is_whole: bool
+        self, row: Row, signal: Signal, event: TimerEvent, number: int, is_whole: bool
     ) -> bool:
         """Add an event; return whether it is one, and no state as it was."""
-        clock, label, threshold = signal.clock, event.label, signal.threshold
-        key: tuple[object, ...] = (number, signal.run)
-        if self._row_is_run and clock:
-            key = (number, row.line)
-            label = label or (clock.name if clock.numbered and clock.name[:1] in "tTZ" else "")
-        elif clock and not label and not signal.run:
-            key = (number, clock.at)
-        part = FilePart(signal.run, number or number_of(signal.run) or 0)
-        part = self.parts.setdefault(key, part)
-        last = self._last.get((key, label))
-        begins = not part.events and event.state == "clear" and not event.tick and not self._is_own
-        # Where each row has the states of all inputs, most of them are as they were.
-        if begins or (is_whole and event.state == (last.state if last else "clear")):
-            return False
+        clock, threshold, key = signal.clock, signal.threshold, (number, signal.run, "")
+        if self.row_is_run and clock:
+            is_passage = clock.numbered and clock.name[:1] in "tTZ"
+            event = event._replace(label=event.label or clock.name * is_passage)
+            key = (number, "", f"row {row.line}")
+        elif clock and not event.label and not signal.run:
+            key = (number, "", f"column {clock.at}")
         if threshold:
             event = event._replace(tick=threshold.tick, line=threshold.line)
-        event = event._replace(label=label)
+        part = FilePart(signal.run, number or number_of(signal.run) or 0)
+        part = self.parts.setdefault(key, part)
+        last = self._last.get((key, event.label))
+        is_start = not (part.events or event.tick or self._is_own) and event.state == "clear"
+        # Where each row has the states of all inputs, most of them are as they were.
+        if is_start or (is_whole and event.state == (last.state if last else "clear")):
+            return False
         if self.is_sampled or self._is_in_time(row, signal, event, part, last or event):
-            self._last[key, label] = event
+            self._last[key, event.label] = event
             part.events.append(event)
             self._events += 1
         return True
@@ -287,19 +272,16 @@ class RowReader:
         self, row: Row, signal: Signal, event: TimerEvent, part: FilePart, last: TimerEvent
     ) -> bool:
         """Whether a time can be of its run; within a numbered one, those of an input go on."""
-        column = cast("TimerColumn", signal.clock)
+        column, run = cast("TimerColumn", signal.clock), part.number
+        lasting_s = abs(event.tick - (part.events or [event])[0].tick) / TICK_HZ
+        limit_s, recording = (_HOUR_S, f"run {run}") if self._is_own else (_DAY_S, "the recording")
         code, values = "", dict[str, object]()
-        lasting_s = abs(event.tick - part.events[0].tick) / TICK_HZ if part.events else 0.0
-        limit_s, recording = _DAY_S, "the recording"
-        if self._is_own:
-            limit_s, recording = _HOUR_S, f"run {part.number}"
         if column.power is not None and lasting_s > limit_s:
-            code = "too_long"
-            values = {"recording": recording, "lasting_s": lasting_s, "limit_s": limit_s}
-        elif event.tick < last.tick and self.has_runs and not self._row_is_run:
-            code = "before_last"
-            values = {"last": seconds(last.tick, Fraction(TICK_HZ)), "text": row.cell(column.at)}
-            values |= {"channel": event.label, "run": part.number}
+            code, values = "too_long", {"recording": recording, "lasting_s": lasting_s}
+            values["limit_s"] = limit_s
+        elif event.tick < last.tick and self.has_runs and not self.row_is_run:
+            code, values = "before_last", {"last": seconds(last.tick, Fraction(TICK_HZ))}
+            values |= {"channel": event.label, "run": run, "text": row.cell(column.at)}
         if code:
             key = column.name if self._is_own else column.role
             self._problems.add(row.line, row.column(column.at), key, code, **values)

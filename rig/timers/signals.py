@@ -31,7 +31,7 @@ VALUES = (("level", "volts"), ("state",), ("edge",), ())
 """Roles that say what happened; of a table that has several, the first are read."""
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, slots=True)
 class Signal:
     """A column of times with the column that says what happened, of an input and of a run.
 
@@ -125,12 +125,12 @@ def find_signals(columns: Sequence[TimerColumn]) -> list[Signal]:
     chosen = ([c for c in columns if c.role in roles] for roles in VALUES)
     values = next(filter(None, chosen), [])
     times = [column for column in columns if column.role == "time"]
-    counts: list[TimerColumn | None] = [c for c in columns if c.role == "index"][:1]
+    count = next((column for column in columns if column.role == "index"), None)
     signals = [
         Signal(clock, value, "", clock.run or value.run if value else clock.run)
         for clock in times
-        for value in _values_of(clock, times, values) or [None]
-    ] or [Signal(clock, value, "", value.run) for clock in counts or [None] for value in values]
+        for value in _values_of(clock, times, values) or (None,)
+    ] or [Signal(count, value, "", value.run) for value in values]
     if any(signal.is_sampled for signal in signals):
         signals = [signal for signal in signals if signal.value]
     for signal in signals:

@@ -9,6 +9,7 @@ is dark, which unit) is left to `rig.timers.layouts`.
 from __future__ import annotations
 
 import itertools
+import statistics
 from array import array
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ from rig.reasons import make_reason
 from rig.timers.columns import columns_of
 from rig.timers.events import FilePart, RowReader, split_at_jumps
 from rig.timers.lines import read_lines
-from rig.timers.moments import TICK_HZ
+from rig.timers.moments import TICK_HZ, moment
 from rig.timers.problems import ProblemList
 from rig.timers.signals import find_threshold, volts_of
 from rig.timers.table import HEADER, RowBlock, Table, find_time_base
@@ -28,7 +29,7 @@ from rig.timers.vocabulary import number_of, recognise_format
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from rig.reasons import Reason
     from rig.timers.columns import TimerColumn
@@ -90,8 +91,9 @@ class TimerFile:
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
 
-    def add(self, reader: RowReader) -> None:
-        """Count the rows of a block."""
+    def add(self, reader: RowReader, parts: Iterable[FilePart]) -> None:
+        """Add the parts of a block, and count its rows."""
+        self.parts += parts
         self.rows += reader.rows
         self.silent += reader.silent
         self.unread += reader.unread
@@ -126,28 +128,12 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
     if is_vcd(head):
         numbered = enumerate(lines, 1)
         columns = vcd_columns(numbered, problems)
-        if len(columns) == 1:
-            problems.refuse(1, 1, "no_edges")
-        reader = RowReader(columns, [], problems)
+        reader = RowReader(columns, [], problems, is_own=False)
         reader.read(vcd_rows(numbered, columns, problems))
-        file.add(reader)
-        file.parts += reader.parts.values()
+        file.add(reader, reader.parts.values())
         file.period_s = 10.0 ** -(columns[0].power or 0)
     else:
-        table = Table(lines)
-        file.is_own = table.is_own
-        problems.hint = "" if table.is_own else _HINT  # its faults are told each
-        file.kind = f"the project's own format: {','.join(HEADER)}"
-        if not table.is_own:
-            name = recognise_format(table.head[:40])
-            file.kind = f"a table, its cells separated by {_SEPARATORS[table.separator]}"
-            file.kind += f"; it looks like {name}" if name else ""
-        above = RowBlock()
-        for n, (block, rows) in enumerate(table.blocks()):
-            _read_block(file, table, block, above, n, rows, path, unit, problems)
-            above = block
-        file.rows += table.stray_count
-        file.unread += table.strays
+        _TableReader(path, lines, problems, file, unit).read()
     problems.raise_if_any()
     file.parts = [part for part in file.parts if part.events]
     if not file.parts:
@@ -156,114 +142,142 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
     return file
 
 
-def _read_block(
-    file: TimerFile,
-    table: Table,
-    block: RowBlock,
-    above: RowBlock,
-    n: int,
-    rows: Iterator[Row],
-    path: str | os.PathLike[str],
-    unit: str | None,
-    problems: ProblemList,
-) -> None:
-    """Add what the n-th block of a table says."""
-    sample = list(itertools.islice(rows, _SAMPLE))
-    width, own = max(len(row.texts) for row in sample), block.headings
-    if width > MAX_COLUMNS:
-        problems.refuse(sample[0].line, 1, "too_many_columns", columns=width, limit=MAX_COLUMNS)
-    if not any(len(row.texts) > 1 or width == 1 for row in own) or (
-        above.headings and not any(len(row.texts) == width for row in own)
-    ):
-        block.headings = [*own, *above.headings]
-    if table.is_own and tuple(text.lower() for text in own[0].texts) != HEADER:
-        problems.refuse(own[0].line, 1, "wrong_header", header=",".join(HEADER))
-    columns = columns_of(block, sample, table, unit, problems)
-    problems.raise_if_any()
-    roles, base = {column.role for column in columns}, (0.0, 1.0)
-    if "time" not in roles and roles & {"level", "volts"}:
-        stated = find_time_base([*table.remarks, *block.headings])
-        base = stated or base
-        if stated is None:
-            problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
-    elif "time" not in roles:
-        durations = [repr(column.name) for column in columns if column.role == "duration"]
-        heading = own[0].line if own else sample[0].line
-        code = "durations" if durations else "no_time_column"
-        problems.refuse(heading, 1, code, numbers=", ".join(durations))
-    file.columns |= {column.name: column.meaning for column in columns}
-    file.has_unit &= all(column.power is not None for column in columns)
-    reader = RowReader(columns, sample, problems, base, is_own=table.is_own)
-    _set_thresholds(file, reader, path, n)
-    reader.read(itertools.chain(sample, rows))
-    problems.raise_if_any()
-    file.add(reader)
-    if reader.is_sampled:
-        parts = list(reader.parts.values())
-        file.period_s = reader.period_s()
-        file.is_regular = file.period_s is not None
+class _TableReader:
+    """Reads the blocks of a table one after the other; the parameters are of `read_timer_file`."""
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        lines: Iterator[str],
+        problems: ProblemList,
+        file: TimerFile,
+        unit: str | None,
+    ) -> None:
+        self._path, self._problems, self._file, self._unit = path, problems, file, unit
+        self._table = table = Table(lines)
+        file.is_own = table.is_own
+        if table.is_own:
+            problems.hint = ""  # its faults are told each
+            file.kind = f"the project's own format: {','.join(HEADER)}"
+        else:
+            name = recognise_format(table.head[:40])
+            file.kind = f"a table, its cells separated by {_SEPARATORS[table.separator]}"
+            file.kind += f"; it looks like {name}" if name else ""
+
+    def read(self) -> None:
+        """Add what all blocks say."""
+        above = RowBlock()
+        for n, (block, rows) in enumerate(self._table.blocks()):
+            sample = list(itertools.islice(rows, _SAMPLE))
+            columns = self._read_columns(block, above, sample)
+            reader = RowReader(columns, sample, self._problems, is_own=self._table.is_own)
+            self._set_base(reader, block, sample, columns)
+            self._set_thresholds(reader, n)
+            reader.read(itertools.chain(sample, rows))
+            self._problems.raise_if_any()
+            if reader.is_sampled:
+                self._add_samples(reader, sample)
+            else:
+                self._add_passages(reader, block, columns)
+            above = block
+        self._file.rows += self._table.stray_count
+        self._file.unread += self._table.strays
+
+    def _read_columns(
+        self, block: RowBlock, above: RowBlock, sample: Sequence[Row]
+    ) -> list[TimerColumn]:
+        """Return the columns of a block; one without a heading has that of the block above."""
+        width, own = max(len(row.texts) for row in sample), block.headings
+        if width > MAX_COLUMNS:
+            values = {"columns": width, "limit": MAX_COLUMNS}
+            self._problems.refuse(sample[0].line, 1, "too_many_columns", **values)
+        if self._table.is_own and tuple(text.lower() for text in own[0].texts) != HEADER:
+            self._problems.refuse(own[0].line, 1, "wrong_header", header=",".join(HEADER))
+        is_named = any(len(row.texts) > 1 or width == 1 for row in own)
+        if not is_named or (above.headings and all(len(row.texts) != width for row in own)):
+            block.headings = [*own, *above.headings]
+        columns = columns_of(block, sample, self._table, self._unit, self._problems)
+        self._problems.raise_if_any()
+        self._file.columns |= {column.name: column.meaning for column in columns}
+        self._file.has_unit &= all(column.power is not None for column in columns)
+        return columns
+
+    def _set_base(
+        self, reader: RowReader, block: RowBlock, sample: list[Row], columns: list[TimerColumn]
+    ) -> None:
+        """Set when samples without times begin, and the time between them; refuse other rows."""
+        if any(column.role == "time" for column in columns):
+            return
+        stated = find_time_base([*self._table.remarks, *block.headings])
+        durations = ", ".join(repr(c.name) for c in columns if c.role == "duration")
+        if reader.is_sampled and stated is None:
+            lacks = "a column of times or a rate"
+            self._problems.refuse(sample[0].line, 1, "no_rate", lacks=lacks)
+        elif not reader.is_sampled:
+            code = "durations" if durations else "no_time_column"
+            self._problems.refuse((block.headings or sample)[0].line, 1, code, numbers=durations)
+        reader.base = stated or reader.base
+
+    def _set_thresholds(self, reader: RowReader, n: int) -> None:
+        """Find the levels of volts, for which all rows of the n-th block are read beforehand."""
+        volts = {s: array("f") for s in reader.signals if s.value and s.value.role == "volts"}
+        blocks = Table(read_lines(self._path)).blocks() if volts else iter(())
+        for _, rows in itertools.islice(blocks, n, n + 1):
+            places = [(s.value.at, values) for s, values in volts.items() if s.value]
+            for row in rows:
+                for at, values in places:
+                    value = volts_of(row.cell(at))
+                    if value is not None:
+                        values.append(value)
+        for signal, values in volts.items():
+            signal.threshold = find_threshold(np.asarray(values))
+            if signal.threshold is None:
+                span = {"low": min(values), "high": max(values)}
+                self._file.notes.append(make_reason("no_passage", input=signal.label, **span))
+
+    def _add_samples(self, reader: RowReader, sample: list[Row]) -> None:
+        """Add what samples say, and the time between them where it is always the same."""
+        file, parts, clock = self._file, list(reader.parts.values()), reader.signals[0].clock
+        file.add(reader, parts)
+        power = (clock.power or 0) if clock else 0
+        ticks = [moment(row.cell(clock.at), power) or 0 if clock else 0 for row in sample]
+        steps = [b - a for a, b in itertools.pairwise(ticks)] if clock else [TICK_HZ]
+        file.is_regular = max(steps, default=0) < 1.5 * statistics.median(steps or [0])
+        if file.is_regular:
+            file.period_s = statistics.median(steps) / TICK_HZ * reader.base[1]
         for signal in reader.signals:
             if signal.threshold:
-                values = {"input": signal.label, "level": signal.threshold.centre}
                 count = sum(e.label == signal.label for part in parts for e in part.events)
+                values = {"input": signal.label, "level": signal.threshold.centre}
                 file.notes.append(make_reason("crossings", crossings=count, **values))
-        file.parts += parts
-    else:
-        _add_parts(file, reader, block, sample[0].line, columns, problems)
 
-
-def _set_thresholds(
-    file: TimerFile, reader: RowReader, path: str | os.PathLike[str], n: int
-) -> None:
-    """Find the levels of volts, for which all rows of the n-th block are read beforehand."""
-    signals = [(s, s.value.at) for s in reader.signals if s.value and s.value.role == "volts"]
-    if not signals:
-        return
-    _, rows = next(itertools.islice(Table(read_lines(path)).blocks(), n, None))
-    values = [array("f") for _ in signals]
-    for row in rows:
-        for (_, at), volts in zip(signals, values, strict=True):
-            value = volts_of(row.cell(at))
-            if value is not None:
-                volts.append(value)
-    for (signal, _), volts in zip(signals, values, strict=True):
-        signal.threshold = find_threshold(np.asarray(volts))
-        if signal.threshold is None:
-            low, high = min(volts), max(volts)
-            file.notes.append(make_reason("no_passage", input=signal.label, low=low, high=high))
-
-
-def _add_parts(
-    file: TimerFile,
-    reader: RowReader,
-    block: RowBlock,
-    line: int,
-    columns: Sequence[TimerColumn],
-    problems: ProblemList,
-) -> None:
-    """Add passages, divided where times begin anew; refuse what is no moment of a passage."""
-    roles = {column.role for column in columns}
-    is_stated = bool({"edge", "state", "gate", "run"} & roles)
-    unused = ", ".join(c.name for c in columns if c.role in {"other", "duration"})
-    for part in reader.parts.values():
-        lines = [event.line for event in part.events]
-        if len(set(lines)) == 1:  # columns of a row may stand in any order
-            part.events.sort(key=lambda event: event.tick)
-        steps = [b.tick - a.tick for a, b in itertools.pairwise(part.events)]
-        backwards = sum(step < 0 for step in steps)
-        if not is_stated and backwards > 1 and backwards * 4 > len(lines):
-            problems.refuse(line, 1, "durations", numbers="these numbers go up and down: they")
-        if "other" in roles and not is_stated and len(steps) > 3 and max(steps) < 1.5 * min(steps):
-            problems.refuse(line, 1, "regular_samples", columns=unused)
-        in_order = len(set(lines)) == len(lines)
-        pieces = [part] if reader.has_runs else split_at_jumps(part, in_order=in_order)
-        short = [k for k, piece in enumerate(pieces) if len(piece.events) < 2]
-        if len(pieces) > 1 and short:
-            event = pieces[max(1, short[-1])].events[0]
-            problems.add(event.line, 1, "time", "backwards", text=f"{event.tick / TICK_HZ:.9g}")
+    def _add_passages(
+        self, reader: RowReader, block: RowBlock, columns: Sequence[TimerColumn]
+    ) -> None:
+        """Add passages, divided where times begin anew; refuse what is no moment of a passage."""
+        roles = {column.role for column in columns}
+        is_stated = bool({"edge", "state", "gate", "run"} & roles)
+        unused = ", ".join(c.name for c in columns if c.role in {"other", "duration"})
         mark = " ".join(block.headings[0].texts) if block.headings else ""
-        for piece in pieces:
-            piece.name = piece.name or part.name or mark
-        file.parts += pieces
-    if unused:
-        file.notes.append(make_reason("columns_unused", columns=unused))
+        for part in reader.parts.values():
+            lines = [event.line for event in part.events]
+            if len(set(lines)) == 1:  # columns of a row may stand in any order
+                part.events.sort(key=lambda event: event.tick)
+            steps = [b.tick - a.tick for a, b in itertools.pairwise(part.events)]
+            backwards = sum(step < 0 for step in steps)
+            if not is_stated and backwards > 1 and backwards * 4 > len(lines):
+                numbers = "these numbers go up and down: they"
+                self._problems.refuse(lines[0], 1, "durations", numbers=numbers)
+            is_regular = len(steps) > 3 and max(steps) < 1.5 * min(steps)
+            if "other" in roles and not is_stated and is_regular:
+                self._problems.refuse(lines[0], 1, "regular_samples", columns=unused)
+            part.name, in_order = part.name or mark, len(set(lines)) == len(lines)
+            pieces = [part] if reader.has_runs else split_at_jumps(part, in_order=in_order)
+            for before, piece in itertools.pairwise(pieces):
+                if min(len(before.events), len(piece.events)) == 1:
+                    first, text = piece.events[0], f"{piece.events[0].tick / TICK_HZ:.9g}"
+                    self._problems.add(first.line, 1, "time", "backwards", text=text)
+            self._file.parts += pieces
+        self._file.add(reader, [])
+        if unused:
+            self._file.notes.append(make_reason("columns_unused", columns=unused))

@@ -42,6 +42,8 @@ def vcd_columns(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list
         problems.refuse(1, 1, "no_rate", lacks="a $timescale")
     if scale is None:
         problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
+    if not _WIRE.search(head):
+        problems.add(1, 1, "", "no_edges")
     problems.raise_if_any()
     power = _POWERS[scale[2]] - scale[1].count("0") if scale else 0
     wires = enumerate(_WIRE.findall(head), 1)
