@@ -48,6 +48,10 @@ _MEANINGS = {
 }
 
 
+_FEWEST_TIMES = 4
+"""Columns, each later than the one before, that are times side by side."""
+
+
 @dataclass(eq=False, slots=True)
 class TimerColumn:
     """What a column is.
@@ -124,6 +128,8 @@ def columns_of(
     heading = _find_heading(block, facts)
     if all("levels" in each for each in facts.values()):
         heading = _name_levels(len(facts), block, table) or heading
+    if heading is None and _is_each_row_rising(rows, width):
+        heading = Row(0, [f"moment {n}" for n in range(1, width + 1)])
     bare = set() if heading else {"bare", *({"single"} if len(facts) == 1 else set())}
     is_rising = [n for n, each in facts.items() if {"rises", "fractions"} <= each - {"levels"}]
     for each in facts.values():
@@ -149,6 +155,14 @@ def columns_of(
     return columns
 
 
+def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
+    """Whether each row is a list of times, one after the other, as programs print them."""
+    numbers = [[float(text) for text in row.texts if is_number(text)] for row in rows]
+    return width >= _FEWEST_TIMES and all(
+        len(row) == width and all(a < b for a, b in pairwise(row)) for row in numbers
+    )
+
+
 def _name_levels(width: int, block: RowBlock, table: Table) -> Row | None:
     """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
     named = {text.casefold() for row in block.headings[-1:] for text in row.texts}
@@ -171,12 +185,15 @@ def _check_bare(
             problems.refuse(row.line, row.column(0), "no_time_column")
     counts = Counter(column.role for column in columns)
     repeated = any(counts[role] > 1 for role in ("state", "edge", "gate"))
-    if repeated or counts["other"] or counts["time"] != 1:
+    # Two traces of an oscilloscope stand beside each other, each with its times.
+    is_paired = counts["time"] == max(1, counts["volts"])
+    if repeated or counts["other"] or not (counts["time"] == 1 or is_paired):
         place = first.column(at[min(2, len(at) - 1)])
         problems.add(first.line, place, "", "no_heading", columns=len(at))
-    labels = [find_label(text, "gate") for row in block.headings for text in row.texts]
     for column in columns:
-        column.gate = next(filter(None, labels), "") if column.role == "volts" else ""
+        beside = [text for row in block.headings for text in row.texts[: column.at]]
+        labels = [label for text in beside if (label := find_label(text, "gate"))]
+        column.gate = labels[-1] if labels and column.role == "volts" else ""
 
 
 def _find_heading(block: RowBlock, filled: Collection[int]) -> Row | None:
@@ -204,7 +221,7 @@ def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> Tim
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     column.gate = next(filter(None, map(_find_gate, [name, *beside])), "")
     facts = facts | {role for role in words() if has_role(name, role)}
-    facts |= {"timed"} if unit in POWERS else {"volt"} if unit == "v" else set()
+    facts |= {"timed" if unit in POWERS else "volt" if unit == "v" else unit or "unitless"}
     facts |= {"labelled"} if column.gate else set()
     if unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]:
         facts |= {"time"}

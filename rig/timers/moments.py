@@ -7,7 +7,7 @@ from datetime import date
 from decimal import ROUND_HALF_EVEN, Context
 from typing import TYPE_CHECKING
 
-from rig.timers.vocabulary import CLOCK
+from rig.timers.vocabulary import CLOCK, POWERS, TIMED, unit_of
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -19,7 +19,7 @@ _EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
 
 
 def moment(text: str, power: int = 0) -> int | None:
-    """Read a time as picoseconds: a number, or a date with its time of day.
+    """Read a time as picoseconds: a number, perhaps with its unit, or a date with its time of day.
 
     Parameters
     ----------
@@ -31,6 +31,8 @@ def moment(text: str, power: int = 0) -> int | None:
     int or None
         `None` for what is no such time.
     """
+    if text[-1:] == "s" and (timed := TIMED.fullmatch(text)):
+        text, power = timed[1].replace(",", "."), POWERS[unit_of(timed[2])]
     match = CLOCK.fullmatch(text) if ":" in text else None
     if match is None:
         return picoseconds(text, -power)

@@ -155,7 +155,10 @@ def _label_of(signal: Signal, signals: Sequence[Signal]) -> str:
     clock, value = signal.clock, signal.value
     if value is None:
         gate = clock.gate if clock else ""
-        is_own = clock is not None and gate in clock.name and not (clock.run or signal.state)
+        alike = [s for s in signals if s.clock and s.clock.gate == gate]
+        is_own = (
+            len(alike) == 1 and clock and gate in clock.name and not (clock.run or signal.state)
+        )
         return clock.name if clock and gate and is_own else gate
     if signal.is_sampled:
         return value.name if value.gate in value.name or not value.gate else value.gate

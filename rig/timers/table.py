@@ -35,9 +35,12 @@ _LISTED = 100
 """Lines that are named, at most."""
 _PLAIN = re.compile(r"[-+0-9.,;eE\t ]*[0-9][-+0-9.,;eE\t ]*")
 _DECIMAL = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]{1,2})?")
-_MONITOR = re.compile(r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> ")
-"""What Arduino's serial monitor writes before a line."""
-_KEYED = re.compile(r"([^\W\d][\w ]{0,40})\"?\s?[=:]\s?\"?([^\s,;=:\"{}]{1,60})")
+_AROUND = re.compile(
+    r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> "
+    r"|^\s*[\[(]{1,3}(?=[-+0-9.][^\[\]():]*[\])]{1,3},?\s*$)|(?<=[\w.])\s*[\])]{1,3},?\s*$"
+)
+"""What Arduino's serial monitor writes before a line, and Python around a list of numbers."""
+_KEYED = re.compile(r"([^\W\d][\w ]{0,40})[\"']?\s?[=:]\s?[\"']?([^\s,;=:\"'{}]{1,60})")
 """A name with its value: ``gate=1``, ``gate: 1`` or, of JSON, ``"gate": 1``."""
 _SENTENCE = re.compile(
     r"(?:gate|pin|sensor|channel|beam)[\s#_-]*([0-9]{1,4})\b.*?\b(un|not )?(block|clear|dark)\w*"
@@ -111,9 +114,12 @@ class Table:
         self.remarks: list[Row] = []
         self.strays: list[int] = []
         self.stray_count = 0
-        head = [_MONITOR.sub("", line) for line in itertools.islice(lines, _SAMPLE)]
+        head = list(itertools.islice(lines, _SAMPLE))
+        if any(_AROUND.search(line[:LONGEST]) for line in head):
+            head = [_AROUND.sub("", line) for line in head]
+            lines = (_AROUND.sub("", line) for line in lines)
         self.head = [line[:LONGEST] for line in head]
-        self._lines = itertools.chain(head, (_MONITOR.sub("", line) for line in lines))
+        self._lines = itertools.chain(head, lines)
         plain = [line for line in head if line.strip() and not _REMARK.match(line[:LONGEST])]
         first = re.sub(r"\s", "", plain[0][:LONGEST].lower()).split(",") if plain else []
         self.is_own = first[:2] == list(HEADER[:2])
@@ -123,9 +129,9 @@ class Table:
         shapes = Counter({shape: n for shape, n in shapes.items() if any(map(all, shape))})
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
-        margin = next((n for n, (filled, _) in enumerate(usual) if filled), 0)
+        filled = [n for n, (is_filled, _) in enumerate(usual) if is_filled]
         is_beside = count > max(_FEWEST_BESIDE, 0.9 * shapes.total())
-        self._margin = margin if margin > 1 and is_beside else 0
+        self._beside = filled if is_beside and filled[0] > 1 else []
 
     def blocks(self) -> Iterator[tuple[RowBlock, Iterator[Row]]]:
         """Yield blocks of rows; the rows of each are to be taken before the next."""
@@ -158,7 +164,7 @@ class Table:
         for number, line in enumerate(self._lines, 1):
             if not line or line.isspace():
                 continue
-            if block.width and not self._margin and _PLAIN.fullmatch(line):
+            if block.width and not self._beside and _PLAIN.fullmatch(line):
                 yield block, Row(number, self.split(line), line, self.separator)
             elif mark := _REMARK.match(line[:LONGEST]):
                 remark = Row(number, self.split(line[mark.end() :].rstrip('" ')), line)
@@ -180,11 +186,13 @@ class Table:
                     return
 
     def _without_settings(self, number: int, line: str, block: RowBlock) -> Row:
-        """Return a row; settings that stand to the left of its samples go to the headings."""
-        row, n = Row(number, self.split(line), line, self.separator), self._margin
-        if n and any(row.texts[:n]) and self._is_data(row.texts[n:]):
-            block.headings.append(row._replace(texts=row.texts[:n]))
-            row = row._replace(texts=[""] * n + row.texts[n:])
+        """Return a row; settings that stand beside its samples go to the headings."""
+        row = Row(number, self.split(line), line, self.separator)
+        samples = [text if n in self._beside else "" for n, text in enumerate(row.texts)]
+        settings = ["" if n in self._beside else text for n, text in enumerate(row.texts)]
+        if self._beside and any(settings) and self._is_data(samples):
+            block.headings.append(row._replace(texts=settings))
+            row = row._replace(texts=samples)
         return row
 
     def _put_aside(self, row: Row, block: RowBlock) -> bool:

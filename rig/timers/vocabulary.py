@@ -21,6 +21,8 @@ CLOCK = re.compile(
     r"(?:([0-9]{1,2}):)?([0-9]{1,3}):([0-9]{1,2}(?:[.,][0-9]{1,15})?)(?:Z|[+-][0-9:]{4,6})?"
 )
 """A time of day, perhaps with its date."""
+TIMED = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s?(s|ms|us|µs|μs|ns)")
+"""A time with its unit."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,2})?")
 _NAME = re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}")
 _BRACKETED = re.compile(r"[\[({]\s*([^\W\d_]{1,20})\s*[\])}]")
@@ -125,7 +127,7 @@ def is_value(text: str) -> bool:
     if len(text) > LONGEST or has_role(text, "start"):
         return False
     unknown = text.casefold() in {"x", "z", *words()["missing"]}
-    return unknown or bool(_NAME.fullmatch(text) or CLOCK.fullmatch(text))
+    return unknown or any(form.fullmatch(text) for form in (_NAME, CLOCK, TIMED))
 
 
 def number_of(label: str) -> int | None:
