@@ -221,8 +221,10 @@ def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> Tim
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     column.gate = next(filter(None, map(_find_gate, [name, *beside])), "")
     facts = facts | {role for role in words() if has_role(name, role)}
-    facts |= {"timed" if unit in POWERS else "volt" if unit == "v" else unit or "unitless"}
+    named = dict.fromkeys(POWERS, "timed") | {"v": "volt", "": "unitless"}
+    facts |= {named[unit]} if unit in named else set()
     facts |= {"labelled"} if column.gate else set()
+    facts |= {"numbered"} if column.run else set()
     if unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]:
         facts |= {"time"}
     column.role = _find_role(facts)

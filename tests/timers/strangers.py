@@ -121,7 +121,7 @@ def strangers() -> dict[str, Shape]:
 NOT_READ = {
     "Runs by a word alone", "Written by hand",
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
-    "Durations", "A summary below", "A column for each run", "A word below",
+    "Durations", "A summary below", "A word below",
     "Rows out of order", "Newest first", "A clock that overflows", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart", "JSON in a line",
     "Thousands by points", "Microseconds as if they were seconds",
