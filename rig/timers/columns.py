@@ -20,7 +20,6 @@ from rig.timers.vocabulary import (
     find_label,
     has_role,
     is_number,
-    is_value,
     normal,
     number_of,
     read_rows,
@@ -125,7 +124,7 @@ def columns_of(
     width = max(len(row.texts) for row in rows)
     cells = [[text for row in rows if (text := row.cell(n))] for n in range(width)]
     facts = {n: _facts_of_values(texts) for n, texts in enumerate(cells) if texts}
-    heading = _find_heading(block, facts)
+    heading = _find_heading(block, facts, width)
     if all("levels" in each for each in facts.values()):
         heading = _name_levels(len(facts), block, table) or heading
     if heading is None and _is_each_row_rising(rows, width):
@@ -146,11 +145,11 @@ def columns_of(
         if heading:
             _check(column, columns, heading, facts[column.at], problems)
     # Of columns that say the same times in other units, the finest is kept.
-    finest: dict[tuple[str, str, bool | None], TimerColumn] = {}
-    times = [column for column in columns if column.role == "time" and not column.numbered]
-    for column in sorted(times, key=lambda column: -(column.power or 0)):
-        other = finest.setdefault((column.gate, column.run, column.blocked), column)
-        if column.power != other.power and None not in {column.power, other.power}:
+    times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
+    for column in times:
+        key = column.gate, column.run, column.blocked
+        alike = [c.power or 0 for c in times if (c.gate, c.run, c.blocked) == key]
+        if (column.power or 0) < max(alike):
             column.role = "coarse"
     return columns
 
@@ -158,9 +157,8 @@ def columns_of(
 def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
     """Whether each row is a list of times, one after the other, as programs print them."""
     numbers = [[float(text) for text in row.texts if is_number(text)] for row in rows]
-    return width >= _FEWEST_TIMES and all(
-        len(row) == width and all(a < b for a, b in pairwise(row)) for row in numbers
-    )
+    rising = all(len(row) == width and sorted(set(row)) == row for row in numbers)
+    return rising and width >= _FEWEST_TIMES
 
 
 def _name_levels(width: int, block: RowBlock, table: Table) -> Row | None:
@@ -179,10 +177,6 @@ def _check_bare(
 ) -> None:
     """Refuse columns without a heading that may be something else."""
     at = [column.at for column in columns]
-    for row in block.headings:  # one that says nothing
-        named = [n for n, text in enumerate(row.texts) if text and not is_value(text)]
-        if named == at and len(named) > 1:
-            problems.refuse(row.line, row.column(0), "no_time_column")
     counts = Counter(column.role for column in columns)
     repeated = any(counts[role] > 1 for role in ("state", "edge", "gate"))
     # Two traces of an oscilloscope stand beside each other, each with its times.
@@ -196,16 +190,25 @@ def _check_bare(
         column.gate = labels[-1] if labels and column.role == "volts" else ""
 
 
-def _find_heading(block: RowBlock, filled: Collection[int]) -> Row | None:
-    """Return the row with most cells that are known; above and below may stand symbols, units."""
+def _find_heading(block: RowBlock, filled: Collection[int], width: int) -> Row | None:
+    """Return the row with most cells that are known; above and below may stand symbols, units.
+
+    A row with a measured number, or with more names than there are columns, is a setting.
+    """
     rows = [
         row
         for row in block.headings
         if count_known(row)
         and (len(row.texts) > 1 or len(filled) == 1)
         and any(text and not is_number(text) and n in filled for n, text in enumerate(row.texts))
+        and not any(text and not _is_setting(text) for text in row.texts[width:])
+        and not any(is_number(text) and not text.isdecimal() for text in row.texts[:width])
     ]
     return max(rows, key=lambda row: (count_known(row), len("".join(row.texts))), default=None)
+
+
+def _is_setting(text: str) -> bool:
+    return is_number(text) or any(has_role(text, role) for role in ("start", "step", "rate"))
 
 
 def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> TimerColumn:

@@ -161,23 +161,23 @@ class RowReader:
     def _is_row_a_run(self, sample: Sequence[Row]) -> bool:
         """Whether times that stand side by side are one drop: a row each, gate after gate."""
         times = [signal.clock for signal in self.signals if signal.clock]
-        if len(times) < 2 or {"gate", "edge"} & set(self._columns) or self._several:
+        is_open = any(t.run or not (t.gate or t.numbered or t.blocked is not None) for t in times)
+        if len(times) < 2 or {"gate", "edge"} & set(self._columns) or self._several or is_open:
             return False
-        if any(t.run or not (t.gate or t.numbered or t.blocked is not None) for t in times):
-            return False
-        if len(sample) == 1 or "run" in self._columns:
-            return True
+        is_counted = "run" in self._columns or any(t.numbered and not t.gate for t in times)
         firsts = [picoseconds(text) or 0 for row in sample if (text := row.cell(times[0].at))]
-        return any(t.numbered and not t.gate for t in times) or firsts != sorted(firsts)
+        return len(sample) == 1 or is_counted or firsts != sorted(firsts)
 
     def _has_fault(self, row: Row) -> bool:
         """Whether a row of the project's own format has other than four values."""
-        values = {"values": len(row.texts), "needed": len(_OWN), "header": ",".join(HEADER)}
         if row.raw.count('"') % 2:
             self._problems.add(row.line, 1, "", "open_quote")
-        elif len(row.texts) != len(_OWN):
-            self._problems.add(row.line, 1, "", "wrong_width", **values)
-        return row.raw.count('"') % 2 > 0 or len(row.texts) != len(_OWN)
+        elif len(row.texts) != len(HEADER):
+            values = {"needed": len(HEADER), "header": ",".join(HEADER)}
+            self._problems.add(row.line, 1, "", "wrong_width", values=len(row.texts), **values)
+        else:
+            return False
+        return True
 
     def _read_row(self, row: Row) -> bool:
         """Add the events of a row; return whether it says that something is as it was."""
@@ -192,7 +192,10 @@ class RowReader:
                 continue
             tick = self._read_tick(row, clock)
             words = [row.cell(signal.value.at) if signal.value else "" for signal in signals]
-            if self.is_sampled and (tick is None or not self._is_news(row, clock, tick, words)):
+            is_early = clock not in self._before and not any(words)  # before the first sample
+            if self.is_sampled and (
+                tick is None or is_early or not self._is_news(row, clock, tick, words)
+            ):
                 is_silent = True
                 continue
             is_whole = self._several and all(words)
@@ -275,17 +278,16 @@ class RowReader:
         column, run = cast("TimerColumn", signal.clock), part.number
         lasting_s = abs(event.tick - (part.events or [event])[0].tick) / TICK_HZ
         limit_s, recording = (_HOUR_S, f"run {run}") if self._is_own else (_DAY_S, "the recording")
-        code, values = "", dict[str, object]()
+        key = column.name if self._is_own else column.role
+        note = partial(self._problems.add, row.line, row.column(column.at), key)
         if column.power is not None and lasting_s > limit_s:
-            code, values = "too_long", {"recording": recording, "lasting_s": lasting_s}
-            values["limit_s"] = limit_s
+            note("too_long", recording=recording, lasting_s=lasting_s, limit_s=limit_s)
         elif event.tick < last.tick and self.has_runs and not self.row_is_run:
-            code, values = "before_last", {"last": seconds(last.tick, Fraction(TICK_HZ))}
-            values |= {"channel": event.label, "run": run, "text": row.cell(column.at)}
-        if code:
-            key = column.name if self._is_own else column.role
-            self._problems.add(row.line, row.column(column.at), key, code, **values)
-        return not code
+            before, text = seconds(last.tick, Fraction(TICK_HZ)), row.cell(column.at)
+            note("before_last", last=before, channel=event.label, run=run, text=text)
+        else:
+            return True
+        return False
 
 
 @lru_cache(1000)

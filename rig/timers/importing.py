@@ -229,7 +229,7 @@ def _assumptions(file: TimerFile, reading: FileReading, gates: Sequence[int]) ->
     if absent := [str(n) for n in gates if n not in channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))
     if layout.dark in {"high", "low"}:
-        other = "low" if layout.dark == "high" else "high"
+        other = {"high": "low", "low": "high"}[layout.dark]
         yield make_reason("blocked_level", level=layout.dark, other=other)
     idle = [label for label in file.labels if label not in channels]
     if idle and layout.groups != "passing":
@@ -268,11 +268,10 @@ def _read_map(
     }.get(stated.get("groups", ""), list(file.labels) or ["input"])
     channels = {label: channel for label, channel in pairs if label not in settings}
     for label, channel in channels.items():
-        accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
         if label not in labels:
-            accepted = f"an input of the file: {', '.join(labels)}"
-            raise refusal(place, "not_accepted", text=label, accepted=accepted)
+            raise refusal(place, "input_unknown", text=label, inputs=", ".join(labels))
         if channel not in map(str, gates):
+            accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
             raise refusal(place, "not_accepted", text=f"{label}={channel}", accepted=accepted)
     numbers = {"" if labels == ["input"] else x: int(n) for x, n in channels.items()}
     return {**stated, **({"channels": numbers} if numbers else {})}

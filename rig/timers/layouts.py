@@ -203,19 +203,18 @@ def find_layouts(
 
 def _darkness(file: TimerFile, bars: int) -> list[str]:
     inputs = Counter((n, e.label) for n, part in enumerate(file.parts) for e in part.events)
-    first = [(e.label, e.state) for part in file.parts for e in
-             {e.label: e for e in reversed(part.events)}.values()]  # fmt: skip
-    states = {state for _, state in first}
+    firsts = [{e.label: e.state for e in reversed(part.events)} for part in file.parts]
+    first = [state for states in firsts for state in states.values()]
+    states = set(first)
     if states <= {"blocked", "clear"}:
         return ["states", "inverted"]
     if states == {""}:
         turns = ["turns", "turns-clear"]
         return [*turns, "each"] if max(inputs.values()) > bars else ["each", *turns]
-    before = [state == "low" for _, state in first]
-    order = ["low", "high"] if sum(before) * 2 > len(before) else ["high", "low"]
+    order = ["low", "high"] if first.count("low") * 2 > len(first) else ["high", "low"]
     # A protocol has all beams clear before the release: where all inputs begin alike, that level
     # is the clear one.
-    return order[:1] if file.is_sampled and len(set(before)) == 1 else order
+    return order[:1] if file.is_sampled and len(states) == 1 else order
 
 
 def _is_part_a_gate(file: TimerFile) -> bool:

@@ -79,7 +79,6 @@ class Threshold:
     half: float
     tick: int = 0
     line: int = 0
-    crossings: int = 0
     _last: tuple[int, float] | None = None
 
     def follow(self, tick: int, volts: float, line: int) -> str:
@@ -115,9 +114,8 @@ def find_threshold(volts: NDArray[np.float32]) -> Threshold | None:
     levels = ((above, high), (~above, low))
     noise = max(float(np.median(np.abs(volts[mask] - level))) for mask, level in levels)
     swing = high - low
-    if swing <= 0.0 or swing < _CLEAR_SWING * _SCATTER * noise:
-        return None
-    return Threshold(0.5 * (low + high), 0.5 * _HYSTERESIS * swing)
+    is_clear = swing >= _CLEAR_SWING * _SCATTER * noise
+    return Threshold(0.5 * (low + high), 0.5 * _HYSTERESIS * swing) if is_clear else None
 
 
 def find_signals(columns: Sequence[TimerColumn]) -> list[Signal]:

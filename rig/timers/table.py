@@ -17,6 +17,7 @@ from rig.timers.vocabulary import (
     LONGEST,
     POWERS,
     has_role,
+    is_clock,
     is_number,
     is_value,
     normal,
@@ -73,11 +74,11 @@ class Row(NamedTuple):
 
     def column(self, at: int) -> int:
         """Return the column, from 1, at which a cell begins; 1 where the row ends before it."""
-        place, raw = 0, self.raw if self.separator == "," else self.raw.replace(",", ".")
-        cells = self.texts if self.separator == "," else [t.replace(",", ".") for t in self.texts]
+        mark, place = self.separator, 0
+        raw, *cells = [t if mark == "," else t.replace(",", ".") for t in (self.raw, *self.texts)]
         for text in cells[:at]:
             end = max(0, raw.find(text, place)) + len(text)
-            place = raw.find(self.separator, end) + 1 or end
+            place = raw.find(mark, end) + 1 or end
         return max(0, raw.find(cells[at], place)) + 1 if at < len(cells) else 1
 
 
@@ -118,7 +119,6 @@ class Table:
         if any(_AROUND.search(line[:LONGEST]) for line in head):
             head = [_AROUND.sub("", line) for line in head]
             lines = (_AROUND.sub("", line) for line in lines)
-        self.head = [line[:LONGEST] for line in head]
         self._lines = itertools.chain(head, lines)
         plain = [line for line in head if line.strip() and not _REMARK.match(line[:LONGEST])]
         first = re.sub(r"\s", "", plain[0][:LONGEST].lower()).split(",") if plain else []
@@ -236,12 +236,12 @@ class Table:
         """Whether cells hold values only, and at least one number or date."""
         filled = [text for text in texts if text]
         return all(map(is_value, filled)) and any(
-            is_number(text) or (":" in text and is_value(text)) for text in filled
+            is_number(text) or is_clock(text) for text in filled
         )
 
     def _shape(self, texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
         """Return which cells are filled, and numbers; of most rows of data it is the same."""
-        return tuple((text != "", is_number(text)) for text in texts)
+        return tuple((text != "", is_number(text) or is_clock(text)) for text in texts)
 
 
 def _find_names(lines: Sequence[str]) -> list[str]:
@@ -269,32 +269,25 @@ def _split_named(line: str, names: Sequence[str]) -> list[str]:
 
 
 def find_separator(lines: Sequence[str]) -> str:
-    """Find what stands between the cells of most lines with a number."""
+    """Find what stands between the cells: what leaves most values in the lines with a number."""
     rows = [line[:1000].strip() for line in lines if re.search("[0-9]", line[:1000])]
-    for separator in ("\t", ";", "|"):
+    for separator in "\t;|":
         if sum(separator in row for row in rows) * 2 > len(rows):
             return separator
-    if rows and all(re.fullmatch("[01xX](?:,[01xX])+", row) for row in rows):
-        return ","  # levels of inputs
-    heading = any("," in line and re.search("[A-Za-z][A-Za-z0-9]", line) for line in lines[:200])
-    numbers = [row for row in rows if all(map(_is_any_number, row.split()))]
-    if numbers and len(numbers) * 2 > len(rows) and not heading:
-        # 1 0,25 are two numbers, and 0,25 in a column of its own is a single one.
-        parts = [row.split() for row in numbers]
-        if any(part.endswith(",") for row in parts for part in row):
-            return ","
-        if sum(len(row) > 1 for row in parts) * 2 > len(parts):
-            return " "
-        # 0,25 below 1,5 is no decimal comma: times go on.
-        values = [float(row[0].replace(",", ".")) for row in parts]
-        return ";" if values == sorted(values) or "," not in numbers[0] else ","
-    blanks = [row for row in rows if len(row.split()) > 1 and "," not in row]
-    values_only = sum(all(map(is_value, row.split())) for row in blanks)
-    return " " if len(blanks) * 2 > len(rows) and values_only * 2 > len(blanks) else ","
+    is_blank = sum(_has_values(row.split()) for row in rows) * 2 > len(rows)
+    is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
+    numbers = [row.replace(",", ".") for row in rows if _DECIMAL.fullmatch(row)]
+    if not is_named and len(numbers) * 2 > len(rows):
+        # 0,25 below 1,5 is no decimal comma: times go on. Levels of inputs are 0 and 1.
+        values = [float(number) for number in numbers]
+        is_rising = values == sorted(values) and set("".join(rows)) - set("01,")
+        return ";" if is_rising else ","
+    return " " if is_blank else ","
 
 
-def _is_any_number(text: str) -> bool:
-    return is_number(text.replace(",", ".", 1))
+def _has_values(cells: Sequence[str]) -> bool:
+    """Whether blanks part values; a comma behind one parts them, too."""
+    return len(cells) > 1 and all(text[-1] != "," and is_value(text) for text in cells)
 
 
 def count_known(row: Row) -> int:

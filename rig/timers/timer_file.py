@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import statistics
 from array import array
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ from rig.timers.problems import ProblemList
 from rig.timers.signals import find_threshold, volts_of
 from rig.timers.table import HEADER, RowBlock, Table, find_time_base
 from rig.timers.vcd import is_vcd, vcd_columns, vcd_rows
-from rig.timers.vocabulary import number_of, recognise_format
+from rig.timers.vocabulary import LONGEST, number_of, recognise_format
 
 if TYPE_CHECKING:
     import os
@@ -43,6 +44,7 @@ _HINT = (
     "samples of inputs (0 and 1, or volts) with times; and value change dumps; see "
     "rig import --list-formats"
 )
+_UNORDERED = "these numbers go up and down: they"
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks", "|": "bars"}
 
 
@@ -134,6 +136,8 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
         file.period_s = 10.0 ** -(columns[0].power or 0)
     else:
         _TableReader(path, lines, problems, file, unit).read()
+        name = "" if file.is_own else recognise_format(line[:LONGEST] for line in head)
+        file.kind += f"; it looks like {name}" if name else ""
     problems.raise_if_any()
     file.parts = [part for part in file.parts if part.events]
     if not file.parts:
@@ -160,9 +164,7 @@ class _TableReader:
             problems.hint = ""  # its faults are told each
             file.kind = f"the project's own format: {','.join(HEADER)}"
         else:
-            name = recognise_format(table.head[:40])
             file.kind = f"a table, its cells separated by {_SEPARATORS[table.separator]}"
-            file.kind += f"; it looks like {name}" if name else ""
 
     def read(self) -> None:
         """Add what all blocks say."""
@@ -175,10 +177,15 @@ class _TableReader:
             self._set_thresholds(reader, n)
             reader.read(itertools.chain(sample, rows))
             self._problems.raise_if_any()
+            unused = ", ".join(
+                column.name for column in columns if column.role in {"other", "duration"}
+            )
             if reader.is_sampled:
                 self._add_samples(reader, sample)
             else:
-                self._add_passages(reader, block, columns)
+                self._add_passages(reader, block, columns, unused)
+            if unused:
+                self._file.notes.append(make_reason("columns_unused", columns=unused))
             above = block
         self._file.rows += self._table.stray_count
         self._file.unread += self._table.strays
@@ -237,27 +244,27 @@ class _TableReader:
 
     def _add_samples(self, reader: RowReader, sample: list[Row]) -> None:
         """Add what samples say, and the time between them where it is always the same."""
-        file, parts, clock = self._file, list(reader.parts.values()), reader.signals[0].clock
-        file.add(reader, parts)
-        power = (clock.power or 0) if clock else 0
-        ticks = [moment(row.cell(clock.at), power) or 0 if clock else 0 for row in sample]
-        steps = [b - a for a, b in itertools.pairwise(ticks)] if clock else [TICK_HZ]
-        file.is_regular = max(steps, default=0) < 1.5 * statistics.median(steps or [0])
+        file, clock, steps = self._file, reader.signals[0].clock, [TICK_HZ]
+        file.add(reader, reader.parts.values())
+        if clock:
+            ticks = [moment(row.cell(clock.at), clock.power or 0) or 0 for row in sample]
+            steps = [b - a for a, b in itertools.pairwise(ticks)] or [0]
+        file.is_regular = max(steps) < 1.5 * statistics.median(steps)
         if file.is_regular:
             file.period_s = statistics.median(steps) / TICK_HZ * reader.base[1]
+        counts = Counter(event.label for part in reader.parts.values() for event in part.events)
         for signal in reader.signals:
             if signal.threshold:
-                count = sum(e.label == signal.label for part in parts for e in part.events)
                 values = {"input": signal.label, "level": signal.threshold.centre}
-                file.notes.append(make_reason("crossings", crossings=count, **values))
+                crossings = counts[signal.label]
+                file.notes.append(make_reason("crossings", crossings=crossings, **values))
 
     def _add_passages(
-        self, reader: RowReader, block: RowBlock, columns: Sequence[TimerColumn]
+        self, reader: RowReader, block: RowBlock, columns: Sequence[TimerColumn], unused: str
     ) -> None:
         """Add passages, divided where times begin anew; refuse what is no moment of a passage."""
         roles = {column.role for column in columns}
         is_stated = bool({"edge", "state", "gate", "run"} & roles)
-        unused = ", ".join(c.name for c in columns if c.role in {"other", "duration"})
         mark = " ".join(block.headings[0].texts) if block.headings else ""
         for part in reader.parts.values():
             lines = [event.line for event in part.events]
@@ -266,8 +273,7 @@ class _TableReader:
             steps = [b.tick - a.tick for a, b in itertools.pairwise(part.events)]
             backwards = sum(step < 0 for step in steps)
             if not is_stated and backwards > 1 and backwards * 4 > len(lines):
-                numbers = "these numbers go up and down: they"
-                self._problems.refuse(lines[0], 1, "durations", numbers=numbers)
+                self._problems.refuse(lines[0], 1, "durations", numbers=_UNORDERED)
             is_regular = len(steps) > 3 and max(steps) < 1.5 * min(steps)
             if "other" in roles and not is_stated and is_regular:
                 self._problems.refuse(lines[0], 1, "regular_samples", columns=unused)
@@ -275,9 +281,7 @@ class _TableReader:
             pieces = [part] if reader.has_runs else split_at_jumps(part, in_order=in_order)
             for before, piece in itertools.pairwise(pieces):
                 if min(len(before.events), len(piece.events)) == 1:
-                    first, text = piece.events[0], f"{piece.events[0].tick / TICK_HZ:.9g}"
-                    self._problems.add(first.line, 1, "time", "backwards", text=text)
+                    line, text = piece.events[0].line, f"{piece.events[0].tick / TICK_HZ:.9g}"
+                    self._problems.add(line, 1, "time", "backwards", text=text)
             self._file.parts += pieces
         self._file.add(reader, [])
-        if unused:
-            self._file.notes.append(make_reason("columns_unused", columns=unused))

@@ -25,8 +25,7 @@ _LONGEST_HEAD = 1_000_000
 
 def is_vcd(head: list[str]) -> bool:
     """Whether a file begins as a value change dump does."""
-    first = next((line.strip() for line in head if line.strip()), "")
-    return first.startswith(_BEGINNINGS)
+    return "".join(head).lstrip().startswith(_BEGINNINGS)
 
 
 def vcd_columns(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[TimerColumn]:
@@ -36,18 +35,15 @@ def vcd_columns(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list
         head += line[:200] + " "
         if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
             break
-    stated = _SCALE.search(head)
-    scale = _ACCEPTED.fullmatch(stated[1]) if stated else None
-    if stated is None:
-        problems.refuse(1, 1, "no_rate", lacks="a $timescale")
+    stated, wires = _SCALE.search(head), _WIRE.findall(head)
+    scale = _ACCEPTED.fullmatch(stated[1] if stated else "")
+    if stated is None or not wires:
+        problems.refuse(1, 1, "no_edges" if stated else "no_rate", lacks="a $timescale")
     if scale is None:
         problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
-    if not _WIRE.search(head):
-        problems.add(1, 1, "", "no_edges")
     problems.raise_if_any()
     power = _POWERS[scale[2]] - scale[1].count("0") if scale else 0
-    wires = enumerate(_WIRE.findall(head), 1)
-    columns = [TimerColumn(n, mark, "level", gate=name) for n, (mark, name) in wires]
+    columns = [TimerColumn(n, mark, "level", gate=name) for n, (mark, name) in enumerate(wires, 1)]
     return [TimerColumn(0, "time", "time", power), *columns]
 
 

@@ -120,6 +120,11 @@ def is_number(text: str) -> bool:
     return len(text) <= LONGEST and _NUMBER.fullmatch(text) is not None
 
 
+def is_clock(text: str) -> bool:
+    """Whether a text is a time of day, perhaps with its date."""
+    return ":" in text and len(text) <= LONGEST and CLOCK.fullmatch(text) is not None
+
+
 def is_value(text: str) -> bool:
     """Whether a word is a number, a date, a state or the name of an input."""
     if is_number(text.replace(",", ".", 1)) or state_of(text):

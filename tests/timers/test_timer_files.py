@@ -23,10 +23,6 @@ VERNIER = (
     "Vernier Format 2\nfence.cmbl\nRun 1\nTime\tGateState\tDistance\nT\tS\tD\ns\t\tm\n\n"
     "0.25\t1\t0\n0.26\t0\t\n0.275\t1\t0.05\n"
 )
-PASCO = (
-    '"Time (s) Run #1";"State Run #1";"Time (s) Run #2";"State Run #2"\n'
-    "0,25;1;1,5;1\n0,26;0;1,51;0\n0,275;1;;\n"
-)
 
 
 def drops_of(file, channels: dict[str, int], bars: int, dark: str | None = None) -> list[Drop]:
@@ -46,19 +42,6 @@ def told(drop: Drop) -> list[tuple[float, bool]]:
     assert drop.tick_hz == TICK_HZ
     assert all(edge.channel == 3 for edge in drop.edges)
     return [(edge.tick / TICK_HZ, edge.blocked) for edge in drop.edges]
-
-
-def test_a_vernier_table(tmp_path):
-    (drop,) = read(tmp_path, VERNIER)
-    assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
-    assert (drop.run, drop.attempt, drop.certificate) == (1, 1, None)
-
-
-def test_a_pasco_table_with_decimal_commas_and_two_runs(tmp_path):
-    first, second = read(tmp_path, PASCO)
-    assert told(first) == [(0.25, True), (0.26, False), (0.275, True)]
-    assert told(second) == [(0.5, True), (0.51, False)]
-    assert (first.run, second.run) == (1, 2)
 
 
 @pytest.mark.parametrize(
