@@ -38,7 +38,7 @@ _PLAIN = re.compile(r"[-+0-9.,;eE\t ]*[0-9][-+0-9.,;eE\t ]*")
 _DECIMAL = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]{1,2})?")
 _AROUND = re.compile(
     r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> "
-    r"|^\s*[\[(]{1,3}(?=[-+0-9.][^\[\]():]*[\])]{1,3},?\s*$)|(?<=[\w.])\s*[\])]{1,3},?\s*$"
+    r"|^\s*[\[(]{1,3}([-+0-9.][^\[\]():]*)[\])]{1,3},?\s*$"
 )
 """What Arduino's serial monitor writes before a line, and Python around a list of numbers."""
 _KEYED = re.compile(r"([^\W\d][\w ]{0,40})[\"']?\s?[=:]\s?[\"']?([^\s,;=:\"'{}]{1,60})")
@@ -117,8 +117,8 @@ class Table:
         self.stray_count = 0
         head = list(itertools.islice(lines, _SAMPLE))
         if any(_AROUND.search(line[:LONGEST]) for line in head):
-            head = [_AROUND.sub("", line) for line in head]
-            lines = (_AROUND.sub("", line) for line in lines)
+            head = [_AROUND.sub(r"\1", line) for line in head]
+            lines = (_AROUND.sub(r"\1", line) for line in lines)
         self._lines = itertools.chain(head, lines)
         plain = [line for line in head if line.strip() and not _REMARK.match(line[:LONGEST])]
         first = re.sub(r"\s", "", plain[0][:LONGEST].lower()).split(",") if plain else []

@@ -44,7 +44,6 @@ _HINT = (
     "samples of inputs (0 and 1, or volts) with times; and value change dumps; see "
     "rig import --list-formats"
 )
-_UNORDERED = "these numbers go up and down: they"
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks", "|": "bars"}
 
 
@@ -273,7 +272,9 @@ class _TableReader:
             steps = [b.tick - a.tick for a, b in itertools.pairwise(part.events)]
             backwards = sum(step < 0 for step in steps)
             if not is_stated and backwards > 1 and backwards * 4 > len(lines):
-                self._problems.refuse(lines[0], 1, "durations", numbers=_UNORDERED)
+                self._problems.refuse(
+                    lines[0], 1, "durations", numbers="these numbers go up and down: they"
+                )
             is_regular = len(steps) > 3 and max(steps) < 1.5 * min(steps)
             if "other" in roles and not is_stated and is_regular:
                 self._problems.refuse(lines[0], 1, "regular_samples", columns=unused)

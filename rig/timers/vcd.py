@@ -37,10 +37,12 @@ def vcd_columns(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list
             break
     stated, wires = _SCALE.search(head), _WIRE.findall(head)
     scale = _ACCEPTED.fullmatch(stated[1] if stated else "")
-    if stated is None or not wires:
-        problems.refuse(1, 1, "no_edges" if stated else "no_rate", lacks="a $timescale")
+    if stated is None:
+        problems.refuse(1, 1, "no_rate", lacks="a $timescale")
     if scale is None:
         problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
+    elif not wires:
+        problems.add(1, 1, "", "no_edges")
     problems.raise_if_any()
     power = _POWERS[scale[2]] - scale[1].count("0") if scale else 0
     columns = [TimerColumn(n, mark, "level", gate=name) for n, (mark, name) in enumerate(wires, 1)]
