@@ -157,8 +157,9 @@ def columns_of(
 def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
     """Whether each row is a list of times, one after the other, as programs print them."""
     numbers = [[float(text) for text in row.texts if is_number(text)] for row in rows]
-    rising = all(len(row) == width and sorted(set(row)) == row for row in numbers)
-    return rising and width >= _FEWEST_TIMES
+    return width >= _FEWEST_TIMES and all(
+        len(row) == width and sorted(set(row)) == row for row in numbers
+    )
 
 
 def _name_levels(width: int, block: RowBlock, table: Table) -> Row | None:
@@ -268,6 +269,8 @@ def _check(
         readings = "a gate's number or its state"
     elif column.role == "other" and "few" in facts and not has_role(column.name, "derived"):
         readings = "the gate or the run of a row, or its state"
+    elif column.role == "other" and _is_setting(column.name):
+        readings = "a setting of the file or a signal"
     if readings:
         problems.add(*place, column.name, "ambiguous", column=column.name, readings=readings)
     unit = unit_of(column.name)

@@ -173,8 +173,8 @@ class RowReader:
         if row.raw.count('"') % 2:
             self._problems.add(row.line, 1, "", "open_quote")
         elif len(row.texts) != len(HEADER):
-            values = {"needed": len(HEADER), "header": ",".join(HEADER)}
-            self._problems.add(row.line, 1, "", "wrong_width", values=len(row.texts), **values)
+            accepted = {"needed": len(HEADER), "header": ",".join(HEADER)}
+            self._problems.add(row.line, 1, "", "wrong_width", values=len(row.texts), **accepted)
         else:
             return False
         return True

@@ -195,8 +195,7 @@ def find_layouts(
         maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, layout)
         layouts += [
             replace(layout, pause_s=pause, channels=channels)
-            for channels in maps
-            for pause in pauses
+            for channels, pause in itertools.product(maps, pauses)
         ]
     return layouts
 
@@ -225,10 +224,10 @@ def _is_part_a_gate(file: TimerFile) -> bool:
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    parts, named = len(file.parts), any(part.number for part in file.parts)
+    parts = len(file.parts)
     if parts > 1 and _is_part_a_gate(file):
         return ["gates", "runs"]
-    if not file.labels and 1 < parts == len(gates) and not named:
+    if not (file.labels or any(part.number for part in file.parts)) and 1 < parts == len(gates):
         return ["runs", "gates"]
     single = len(file.labels) < 2 and bars == 1 and len(gates) > 1
     return ["runs", "passing"] if single else ["runs"]

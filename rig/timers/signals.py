@@ -67,8 +67,8 @@ class Signal:
     @property
     def state(self) -> str:
         """What the heading says of all times: ``blocked``, ``clear``, or nothing."""
-        is_blocked = self.clock.blocked if self.clock else None
-        return "" if is_blocked is None else "blocked" if is_blocked else "clear"
+        states = {None: "", True: "blocked", False: "clear"}
+        return states[self.clock.blocked] if self.clock else ""
 
 
 @dataclass(slots=True)

@@ -135,7 +135,7 @@ def read_timer_file(path: str | os.PathLike[str], unit: str | None = None) -> Ti
         file.period_s = 10.0 ** -(columns[0].power or 0)
     else:
         _TableReader(path, lines, problems, file, unit).read()
-        name = "" if file.is_own else recognise_format(line[:LONGEST] for line in head)
+        name = recognise_format(line[:LONGEST] for line in head)
         file.kind += f"; it looks like {name}" if name else ""
     problems.raise_if_any()
     file.parts = [part for part in file.parts if part.events]
@@ -217,8 +217,7 @@ class _TableReader:
         stated = find_time_base([*self._table.remarks, *block.headings])
         durations = ", ".join(repr(c.name) for c in columns if c.role == "duration")
         if reader.is_sampled and stated is None:
-            lacks = "a column of times or a rate"
-            self._problems.refuse(sample[0].line, 1, "no_rate", lacks=lacks)
+            self._problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
         elif not reader.is_sampled:
             code = "durations" if durations else "no_time_column"
             self._problems.refuse((block.headings or sample)[0].line, 1, code, numbers=durations)
