@@ -179,16 +179,18 @@ def _check_bare(
     """Refuse columns without a heading that may be something else."""
     at = [column.at for column in columns]
     counts = Counter(column.role for column in columns)
-    repeated = any(counts[role] > 1 for role in ("state", "edge", "gate"))
+    repeated = max(counts["state"], counts["edge"], counts["gate"]) > 1
     # Two traces of an oscilloscope stand beside each other, each with its times.
-    is_paired = counts["time"] == max(1, counts["volts"])
-    if repeated or counts["other"] or not (counts["time"] == 1 or is_paired):
+    if repeated or counts["other"] or counts["time"] not in {1, counts["volts"] or 1}:
         place = first.column(at[min(2, len(at) - 1)])
         problems.add(first.line, place, "", "no_heading", columns=len(at))
-    for column in columns:
-        beside = [text for row in block.headings for text in row.texts[: column.at]]
-        labels = [label for text in beside if (label := find_label(text, "gate"))]
-        column.gate = labels[-1] if labels and column.role == "volts" else ""
+    texts = sorted((n, text) for row in block.headings for n, text in enumerate(row.texts))
+    labels = [(n, label) for n, text in texts if (label := find_label(text, "gate"))]
+    traces = list(zip([c for c in columns if c.role == "volts"], labels, strict=False))
+    # Settings name traces if each name is equally far to the left of its trace.
+    is_named = len({trace.at - n for trace, (n, _) in traces}) == 1
+    for trace, (_, label) in traces:
+        trace.gate = label if is_named else ""
 
 
 def _find_heading(block: RowBlock, filled: Collection[int], width: int) -> Row | None:
@@ -226,9 +228,7 @@ def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> Tim
     column.gate = next(filter(None, map(_find_gate, [name, *beside])), "")
     facts = facts | {role for role in words() if has_role(name, role)}
     named = dict.fromkeys(POWERS, "timed") | {"v": "volt", "": "unitless"}
-    facts |= {named[unit]} if unit in named else set()
-    facts |= {"labelled"} if column.gate else set()
-    facts |= {"numbered"} if column.run else set()
+    facts |= {named.get(unit, ""), "labelled" * bool(column.gate), "numbered" * bool(column.run)}
     if unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]:
         facts |= {"time"}
     column.role = _find_role(facts)
@@ -256,13 +256,11 @@ def _find_gate(text: str) -> str:
 def _check(
     column: TimerColumn,
     columns: Sequence[TimerColumn],
-    heading: Row | None,
+    heading: Row,
     facts: set[str],
     problems: ProblemList,
 ) -> None:
     """Refuse what may be this or that, and times in another unit."""
-    if heading is None:
-        return
     readings, place = "", (heading.line, heading.column(column.at))
     stated = any(other.role in {"edge", "state"} for other in columns)
     if column.role == "gate" and not stated and "binary" in facts:

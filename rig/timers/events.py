@@ -200,11 +200,9 @@ class RowReader:
                 continue
             is_whole = self._several and all(words)
             for signal, word in zip(signals, words, strict=True):
-                level: str | None = signal.state
                 if signal.value and self._several and not (word or self.is_sampled):
                     continue  # another input's row
-                if signal.value:
-                    level = self._read_state(row, signal, word, tick or 0)
+                level = self._read_state(row, signal, word, tick or 0)
                 if self.is_sampled and not signal.is_news(level):
                     is_silent = True
                 elif None not in (number, label, tick, level):
@@ -225,8 +223,9 @@ class RowReader:
     def _read_tick(self, row: Row, clock: TimerColumn | None) -> int | None:
         read = partial(moment, power=(clock and clock.power) or 0)
         tick: int | None = self._read_cell(row, clock, read) if clock else self.rows * TICK_HZ
-        start, step = self.base
-        return tick if tick is None or step == 1.0 else round(TICK_HZ * start + tick * step)
+        if tick is not None and self.base != (0.0, 1.0):
+            return round(TICK_HZ * self.base[0] + tick * self.base[1])
+        return tick
 
     def _is_news(self, row: Row, clock: TimerColumn | None, tick: int, words: list[str]) -> bool:
         """Whether a sample says more than the one before, which has to be earlier."""
@@ -239,7 +238,9 @@ class RowReader:
 
     def _read_state(self, row: Row, signal: Signal, word: str, tick: int) -> str | None:
         """Return what begins: nothing where that is unknown, `None` where it is no state."""
-        column = cast("TimerColumn", signal.value)
+        column = signal.value
+        if column is None:
+            return signal.state
         volts = volts_of(word) if column.role == "volts" else None
         if volts is not None:
             return signal.threshold.follow(tick, volts, row.line) if signal.threshold else ""

@@ -93,7 +93,7 @@ class Threshold:
         return "high" if volts > self.centre else "low"
 
 
-@lru_cache(10_000)
+@lru_cache(100_000)
 def volts_of(text: str) -> float | None:
     """Read a voltage; `None` for another text. Those of a converter are few, again and again."""
     return float(text) if is_number(text) else None

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 HEADER = ("run", "channel", "time_s", "state")
 """Of the project's own format, in which every line is a row."""
-_SAMPLE = 2000
+_SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
 _LISTED = 100
 """Lines that are named, at most."""
@@ -70,6 +70,8 @@ class Row(NamedTuple):
     def cell(self, at: int) -> str:
         """Return what a column, from 0, has; nothing where the row ends before it."""
         text = self.texts[at] if at < len(self.texts) else ""
+        if text[:1].isdigit():  # most are numbers
+            return text
         return "" if len(text) < 6 and text.casefold() in words()["missing"] else text
 
     def column(self, at: int) -> int:
