@@ -147,12 +147,12 @@ def test_samples_are_read_within_a_second_and_little_memory_for_each_megabyte(tm
     path = tmp_path / "scope.csv"
     path.write_bytes(shapes()["Digilent"].content[:600_000].rpartition(b"\n")[0])
     megabytes = path.stat().st_size / 1e6
-    start = time.process_time()
-    read_timer_file(path)
-    assert time.process_time() - start < 1.0 * megabytes
     tracemalloc.start()
     try:
         read_timer_file(path)
         assert tracemalloc.get_traced_memory()[1] < 20e6 * megabytes
     finally:
         tracemalloc.stop()
+    start = time.process_time()
+    read_timer_file(path)
+    assert time.process_time() - start < 1.0 * megabytes
