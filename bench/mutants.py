@@ -16,7 +16,6 @@ from rig.errors import RigError
 from rig.protocol import reader
 from rig.recorder.controller import Controller
 from rig.session.store import Session
-from rig.timers.edges_csv import read_edges
 from rig.timers.timer_file import read_timer_file
 
 if TYPE_CHECKING:
@@ -184,8 +183,6 @@ def read_text_as(kind: str, text: str, path: Path) -> None:
     path.write_bytes(text.encode("utf-8", "surrogateescape" if "\ud800" not in text else "replace"))
     if kind == "protocol":
         reader.read(str(path))
-    elif kind == "edges":
-        read_edges(path)
     else:
         read_timer_file(path)
 

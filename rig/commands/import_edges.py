@@ -23,9 +23,9 @@ from rig.protocol.plan import runs
 from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.timers.events import TICK_HZ
 from rig.timers.importing import FallMatch, import_drops
 from rig.timers.lines import check_is_file
+from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
 from rig.units import Dimension, UnitError, parse
 

@@ -20,7 +20,6 @@ from rig.timers.vocabulary import (
     find_label,
     has_role,
     is_number,
-    is_value,
     normal,
     number_of,
     read_rows,
@@ -48,7 +47,11 @@ _MEANINGS = {
 }
 
 
-@dataclass(slots=True)
+_FEWEST_TIMES = 4
+"""Columns, each later than the one before, that are times side by side."""
+
+
+@dataclass(eq=False, slots=True)
 class TimerColumn:
     """What a column is.
 
@@ -121,62 +124,101 @@ def columns_of(
     width = max(len(row.texts) for row in rows)
     cells = [[text for row in rows if (text := row.cell(n))] for n in range(width)]
     facts = {n: _facts_of_values(texts) for n, texts in enumerate(cells) if texts}
-    if all(len(texts) == len(rows) for texts in cells):
-        block.headings += _name_levels(list(facts.values()), block, table)
-    heading = _find_heading(block, facts)
+    heading = _find_heading(block, facts, width)
+    if all("levels" in each for each in facts.values()):
+        heading = _name_levels(len(facts), block, table) or heading
+    if heading is None and _is_each_row_rising(rows, width):
+        heading = Row(0, [f"moment {n}" for n in range(1, width + 1)])
+    bare = set() if heading else {"bare", *({"single"} if len(facts) == 1 else set())}
+    is_rising = [n for n, each in facts.items() if {"rises", "fractions"} <= each - {"levels"}]
+    for each in facts.values():
+        each.update(bare, {"rival"} if is_rising and "fractions" not in each else ())
+    columns = [_read_heading(block, heading or Row(0, []), n, each) for n, each in facts.items()]
     if heading is None:
-        columns = _read_bare(block, facts, rows[0], problems)
-    else:
-        columns = [_read_heading(block, heading, n, facts[n]) for n in facts]
+        _check_bare(block, columns, rows[0], problems)
     for column in columns:
         texts = cells[column.at]
         if column.role == "level" and len(texts) < len(rows):
             column.role = "state"  # of samples, each row has every level
         if column.role == "time" and column.power is None:
             column.power = POWERS[unit] if unit else _plain_power(texts)
-        _check(column, columns, heading, facts[column.at], problems)
+        if heading:
+            _check(column, columns, heading, facts[column.at], problems)
     # Of columns that say the same times in other units, the finest is kept.
-    finest: dict[tuple[str, str, bool | None], TimerColumn] = {}
-    times = [column for column in columns if column.role == "time" and not column.numbered]
-    for column in sorted(times, key=lambda column: -(column.power or 0)):
-        other = finest.setdefault((column.gate, column.run, column.blocked), column)
-        if column.power != other.power and None not in {column.power, other.power}:
+    times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
+    for column in times:
+        key = column.gate, column.run, column.blocked
+        alike = [c.power or 0 for c in times if (c.gate, c.run, c.blocked) == key]
+        if (column.power or 0) < max(alike):
             column.role = "coarse"
     return columns
 
 
-def _name_levels(facts: Sequence[set[str]], block: RowBlock, table: Table) -> list[Row]:
+def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
+    """Whether each row is a list of times, one after the other, as programs print them."""
+    numbers = [[float(text) for text in row.texts if is_number(text)] for row in rows]
+    return width >= _FEWEST_TIMES and all(
+        len(row) == width and sorted(set(row)) == row for row in numbers
+    )
+
+
+def _name_levels(width: int, block: RowBlock, table: Table) -> Row | None:
     """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
-    last = block.headings[-1].texts if block.headings else []
-    named = {text.casefold() for text in last} - {"logic", "analog"}
-    has_rate = find_time_base([*table.remarks, *block.headings]) is not None
-    if named or not has_rate or not all("levels" in each for each in facts):
-        return []
-    lists = [row.raw.partition(":")[2].split(",") for row in table.remarks
-             if "channels" in row.raw.lower()]  # fmt: skip
-    numbered = [f"D{n}" for n in range(len(facts))]
-    names = next((names for names in lists if len(names) == len(facts)), numbered)
+    named = {text.casefold() for row in block.headings[-1:] for text in row.texts}
+    if named - {"logic", "analog"} or not find_time_base([*table.remarks, *block.headings]):
+        return None
+    lists = [row.raw.partition(":")[2].split(",") for row in table.remarks]
+    names = next((n for n in lists if len(n) == width), [f"D{n}" for n in range(width)])
     texts = (text.strip() for text in names)
-    return [Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])]
+    return Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])
 
 
-def _find_heading(block: RowBlock, filled: Collection[int]) -> Row | None:
-    """Return the row with most cells that are known; above and below may stand symbols, units."""
+def _check_bare(
+    block: RowBlock, columns: Sequence[TimerColumn], first: Row, problems: ProblemList
+) -> None:
+    """Refuse columns without a heading that may be something else."""
+    at = [column.at for column in columns]
+    counts = Counter(column.role for column in columns)
+    repeated = max(counts["state"], counts["edge"], counts["gate"]) > 1
+    # Two traces of an oscilloscope stand beside each other, each with its times.
+    if repeated or counts["other"] or counts["time"] not in {1, counts["volts"] or 1}:
+        place = first.column(at[min(2, len(at) - 1)])
+        problems.add(first.line, place, "", "no_heading", columns=len(at))
+    texts = sorted((n, text) for row in block.headings for n, text in enumerate(row.texts))
+    labels = [(n, label) for n, text in texts if (label := find_label(text, "gate"))]
+    traces = list(zip([c for c in columns if c.role == "volts"], labels, strict=False))
+    # Settings name traces if each name is equally far to the left of its trace.
+    is_named = len({trace.at - n for trace, (n, _) in traces}) == 1
+    for trace, (_, label) in traces:
+        trace.gate = label if is_named else ""
+
+
+def _find_heading(block: RowBlock, filled: Collection[int], width: int) -> Row | None:
+    """Return the row with most cells that are known; above and below may stand symbols, units.
+
+    A row with a measured number, or with more names than there are columns, is a setting.
+    """
     rows = [
         row
         for row in block.headings
         if count_known(row)
         and (len(row.texts) > 1 or len(filled) == 1)
         and any(text and not is_number(text) and n in filled for n, text in enumerate(row.texts))
+        and not any(text and not _is_setting(text) for text in row.texts[width:])
+        and not any(is_number(text) and not text.isdecimal() for text in row.texts[:width])
     ]
     return max(rows, key=lambda row: (count_known(row), len("".join(row.texts))), default=None)
+
+
+def _is_setting(text: str) -> bool:
+    return is_number(text) or any(has_role(text, role) for role in ("start", "step", "rate"))
 
 
 def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> TimerColumn:
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
     name, beside = heading.cell(n), [r.cell(n) for r in block.headings if r.line != heading.line]
     prefix, colon, rest = name.partition(":")
-    column = TimerColumn(n, name, "", run=find_label(name, "run"))
+    column = TimerColumn(n, name or f"column {n + 1}", "", run=find_label(name, "run"))
     name = name.replace(column.run, " ") if column.run else name
     if colon and rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
@@ -185,8 +227,8 @@ def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> Tim
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     column.gate = next(filter(None, map(_find_gate, [name, *beside])), "")
     facts = facts | {role for role in words() if has_role(name, role)}
-    facts |= {"timed"} if unit in POWERS else {"volt"} if unit == "v" else set()
-    facts |= {"labelled"} if column.gate else set()
+    named = dict.fromkeys(POWERS, "timed") | {"v": "volt", "": "unitless"}
+    facts |= {named.get(unit, ""), "labelled" * bool(column.gate), "numbered" * bool(column.run)}
     if unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]:
         facts |= {"time"}
     column.role = _find_role(facts)
@@ -214,53 +256,24 @@ def _find_gate(text: str) -> str:
 def _check(
     column: TimerColumn,
     columns: Sequence[TimerColumn],
-    heading: Row | None,
+    heading: Row,
     facts: set[str],
     problems: ProblemList,
 ) -> None:
     """Refuse what may be this or that, and times in another unit."""
-    if heading is None:
-        return
     readings, place = "", (heading.line, heading.column(column.at))
     stated = any(other.role in {"edge", "state"} for other in columns)
     if column.role == "gate" and not stated and "binary" in facts:
         readings = "a gate's number or its state"
     elif column.role == "other" and "few" in facts and not has_role(column.name, "derived"):
         readings = "the gate or the run of a row, or its state"
+    elif column.role == "other" and _is_setting(column.name):
+        readings = "a setting of the file or a signal"
     if readings:
         problems.add(*place, column.name, "ambiguous", column=column.name, readings=readings)
     unit = unit_of(column.name)
     if column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
         problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
-
-
-def _read_bare(
-    block: RowBlock, facts: dict[int, set[str]], first: Row, problems: ProblemList
-) -> list[TimerColumn]:
-    """Without a heading: a column of times, and others that can be nothing else."""
-    for row in block.headings:  # one that says nothing
-        named = [n for n, text in enumerate(row.texts) if text and not is_value(text)]
-        if named == list(facts) and len(named) > 1:
-            problems.add(row.line, row.column(0), "", "no_time_column")
-            return []
-    facts = {n: each | {"bare"} for n, each in facts.items()}
-    rival = any(_find_role(each) == "time" and "fractions" in each for each in facts.values())
-    for each in facts.values():
-        each.update({"single"} if len(facts) == 1 else set())
-        each.update({"rival"} if rival and "fractions" not in each else set())
-    roles = {n: _find_role(each) for n, each in facts.items()}
-    counts = Counter(roles.values())
-    repeated = any(counts[role] > 1 for role in ("state", "edge", "gate"))
-    if repeated or counts["other"] or counts["time"] != 1:
-        at = list(facts)[min(2, len(facts) - 1)]
-        problems.add(first.line, first.column(at), "", "no_heading", columns=len(facts))
-    labels = [find_label(text, "gate") for row in block.headings for text in row.texts]
-    label = next(filter(None, labels), "")
-    columns = [TimerColumn(n, f"column {n + 1}", role) for n, role in roles.items()]
-    for column in columns:
-        column.power = None if column.role == "time" else 0
-        column.gate = label if column.role == "volts" else ""
-    return columns
 
 
 def _plain_power(texts: Sequence[str]) -> int | None:

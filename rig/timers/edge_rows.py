@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from rig.timers.events import seconds
+from rig.timers.moments import seconds
 from rig.timers.table import HEADER
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:
-    """Write drops in the import format, of which `rig.timers.edges_csv` reads the same edges.
+    """Write drops in the import format, of which the same edges are read again.
 
     Parameters
     ----------

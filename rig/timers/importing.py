@@ -6,15 +6,13 @@ decides is asked, and rows of which no edge is made are refused.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rig.boards import GATES
 from rig.reasons import make_reason
 from rig.timers.layouts import (
     SETTINGS,
@@ -44,7 +42,8 @@ _FINALISTS = 6
 _EXCESS = 4
 """Edges for each bar, twice as many as it has, beyond which several gates are on one wire: a beam
 that flickers makes a few more than two."""
-_CHANNELS = set(map(str, range(GATES)))
+LONGEST_MAP = 100_000
+"""Characters of a saved map; one of 200 inputs has a tenth of it."""
 
 
 class FallMatch(NamedTuple):
@@ -137,8 +136,7 @@ def import_drops(
         notes.append(make_reason("reading_chosen", option=str(layout), fit=match.text))
     notes += _assumptions(file, reading, gates)
     if options.map_file is not None and not Path(options.map_file).exists():
-        text = json.dumps(asdict(layout), indent=2, ensure_ascii=False)
-        Path(options.map_file).write_text(text + "\n", "utf-8")
+        Path(options.map_file).write_text(f"{layout.text}\n", "utf-8")
     lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
     lines += [f"input {x} is the gate at channel {n}" for x, n in layout.channels.items() if x]
     lines += [str(layout), *([match.text] if match.text else [])]
@@ -196,21 +194,23 @@ def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter((event.line, event.tick) for part in file.parts for event in part.events)
     line = next((line for (line, _), count in changes.items() if count > 1), 0)
-    if line and not (file.sampled and file.period_s):  # regular samples see changes together
+    if line and not file.is_regular:  # regular samples see changes together
         raise refusal(place, "at_once", line=line)
 
 
 def _account(file: TimerFile, reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
     lines = {event.line for part in file.parts for event in part.events}
-    unused = sorted(lines.union(file.unread) - reading.lines - file.sampled)
+    # A level that changes may be of an input that is no gate.
+    unused = set[int]() if file.is_sampled else lines - reading.lines
+    missing = file.rows - file.silent - len(lines) + len(unused)
     edges = sum(len(drop.edges) for drop in reading.drops)
     counts = {"runs": len(reading.drops), "rows": file.rows, "edges": edges}
-    silent = file.silent + len(file.sampled - reading.lines)
-    missing = file.rows - silent - len(reading.lines)
     if not missing:
+        silent = file.rows - len(reading.lines)
         return make_reason("rows_used", silent=silent, **counts)
-    listed = ", ".join(map(str, unused[:8])) + (" …" if len(unused) > 8 else "")
+    unread = sorted(unused.union(file.unread))
+    listed = ", ".join(map(str, unread[:8])) + (" …" if len(unread) > 8 else "")
     rest = {"unused": missing, "lines": listed}
     if not options.allow_unused:
         raise refusal(options.events, "rows_unused", **counts, **rest)
@@ -229,7 +229,7 @@ def _assumptions(file: TimerFile, reading: FileReading, gates: Sequence[int]) ->
     if absent := [str(n) for n in gates if n not in channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))
     if layout.dark in {"high", "low"}:
-        other = "low" if layout.dark == "high" else "high"
+        other = {"high": "low", "low": "high"}[layout.dark]
         yield make_reason("blocked_level", level=layout.dark, other=other)
     idle = [label for label in file.labels if label not in channels]
     if idle and layout.groups != "passing":
@@ -240,56 +240,38 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     """Return what is decided by a saved layout and by options, which come before it."""
     stated: dict[str, Any] = {}
     if options.map_file is not None and Path(options.map_file).exists():
-        stated = _check_settings(_read_map(options.map_file), options.map_file)
+        with Path(options.map_file).open(encoding="utf-8", errors="replace") as saved:
+            stated = _read_map(saved.read(LONGEST_MAP).strip(), options.map_file, file, gates, {})
     given = {"unit": None if file.has_unit else options.unit, "dark": options.dark}
     stated |= {name: value for name, value in given.items() if value is not None}
-    text = options.map
-    if text is None and options.channel is not None and len(file.labels) < 2:
+    if options.map is not None:
+        stated = _read_map(options.map, "--map", file, gates, stated)
+    elif options.channel is not None and len(file.labels) < 2:
         text = f"{next(iter(file.labels), 'input')}={options.channel}"
-    if text is None:
-        return stated
+        stated = _read_map(text, "--channel", file, gates, stated)
+    return stated
+
+
+def _read_map(
+    text: str, place: str, file: TimerFile, gates: Sequence[int], stated: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Read what a dry run prints: settings, and the gate's channel of each input."""
     pairs = re.findall(r"\s*([^=]+?)\s*(?:=\s*([^\s,=]*)[\s,]*|$)", text) or [(text, "")]
-    names = {*SETTINGS, "pause_s"} - set(file.labels)
-    settings = {name: value for name, value in pairs if name in names}
-    stated |= _check_settings(settings, "--map")
+    settings = {name: value for name, value in pairs if name in set(SETTINGS) - set(file.labels)}
+    for name, value in settings.items():
+        if not re.fullmatch(SETTINGS[name], value):
+            raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
+    stated = {**stated, **settings}
     labels = {
         "gates": part_names(file),
         "passing": [f"gate {n}" for n in range(1, len(gates) + 1)],
     }.get(stated.get("groups", ""), list(file.labels) or ["input"])
-    channels = {}
-    for label, channel in pairs:
-        if label in settings:
-            continue
-        accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
-        wrong = None if channel in map(str, gates) else f"{label}={channel}"
+    channels = {label: channel for label, channel in pairs if label not in settings}
+    for label, channel in channels.items():
         if label not in labels:
-            wrong, accepted = label, f"an input of the file: {', '.join(labels)}"
-        if wrong is not None:
-            option = "--map" if options.map is not None else "--channel"
-            raise refusal(option, "not_accepted", text=wrong, accepted=accepted)
-        channels["" if labels == ["input"] else label] = int(channel)
-    return stated | ({"channels": channels} if channels else {})
-
-
-def _read_map(path: str) -> object:
-    try:
-        return json.loads(Path(path).read_bytes()[:1_000_000].decode("utf-8"))
-    except OSError as error:
-        raise refusal(path, "unreadable", text=error.strerror or "") from error
-    except (ValueError, RecursionError):
-        return None
-
-
-def _check_settings(content: object, place: str) -> dict[str, Any]:
-    """Return settings that a layout may have; refuse others, with what is accepted."""
-    settings = content if isinstance(content, dict) else {"content": content}
-    for name, value in settings.items():
-        good = value in SETTINGS.get(name, ())
-        if name == "channels":
-            good = isinstance(value, dict) and set(map(repr, value.values())) <= _CHANNELS
-        elif name == "pause_s" and re.fullmatch(r"[0-9]{1,9}(?:\.[0-9]{0,20})?", str(value)):
-            good = float(str(value)) <= 3600
-            settings = {**settings, name: float(str(value))}
-        if not good:
-            raise refusal(place, "layout_unclear", text=f"{name}: {value!s:.40}")
-    return settings
+            raise refusal(place, "input_unknown", text=label, inputs=", ".join(labels))
+        if channel not in map(str, gates):
+            accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
+            raise refusal(place, "not_accepted", text=f"{label}={channel}", accepted=accepted)
+    numbers = {"" if labels == ["input"] else x: int(n) for x, n in channels.items()}
+    return {**stated, **({"channels": numbers} if numbers else {})}

@@ -12,7 +12,8 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.records import Drop, Edge
-from rig.timers.events import TICK_HZ, TimerEvent, widest_pause
+from rig.timers.events import TimerEvent, widest_pause
+from rig.timers.moments import TICK_HZ
 from rig.timers.vocabulary import POWERS, number_of
 
 if TYPE_CHECKING:
@@ -25,9 +26,10 @@ _LONGEST_S = 60
 _MOST_MAPS = 200
 
 SETTINGS = {
-    "unit": ("", *POWERS),
-    "dark": ("high", "low", "states", "inverted", "turns", "turns-clear", "each"),
-    "groups": ("runs", "gates", "passing"),
+    "unit": "|".join(POWERS),
+    "dark": "high|low|states|inverted|turns|turns-clear|each",
+    "groups": "runs|gates|passing",
+    "pause_s": r"[0-9]{1,3}(?:\.[0-9]{0,20})?",
 }
 """What each setting may be."""
 
@@ -77,14 +79,19 @@ class FileLayout:
             return (event.state == "high") is (self.dark != "low")
         return self.dark == "each" or (n % 2 == 0) is (self.dark != "turns-clear")
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
+        """What ``--map`` accepts."""
         settings = [
             f"{name}={value}"
             for name, value in asdict(self).items()
             if name != "channels" and value and value not in {"states", "runs"}
         ]
         inputs = [f"{label or 'input'}={channel}" for label, channel in self.channels.items()]
-        return f"--map '{','.join([*settings, *inputs])}'"
+        return ",".join([*settings, *inputs])
+
+    def __str__(self) -> str:
+        return f"--map '{self.text}'"
 
 
 class FileReading(NamedTuple):
@@ -184,32 +191,29 @@ def find_layouts(
     choices |= {name: [value] for name, value in stated.items() if name in choices}
     layouts = []
     for layout in itertools.starmap(FileLayout, itertools.product(*choices.values())):
-        pauses = [stated["pause_s"]] if "pause_s" in stated else _pauses(file, layout)
+        pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, layout)
         maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, layout)
         layouts += [
             replace(layout, pause_s=pause, channels=channels)
-            for channels in maps
-            for pause in pauses
+            for channels, pause in itertools.product(maps, pauses)
         ]
     return layouts
 
 
 def _darkness(file: TimerFile, bars: int) -> list[str]:
     inputs = Counter((n, e.label) for n, part in enumerate(file.parts) for e in part.events)
-    first = [(e.label, e.state) for part in file.parts for e in
-             {e.label: e for e in reversed(part.events)}.values()]  # fmt: skip
-    states = {state for _, state in first}
+    firsts = [{e.label: e.state for e in reversed(part.events)} for part in file.parts]
+    first = [state for states in firsts for state in states.values()]
+    states = set(first)
     if states <= {"blocked", "clear"}:
         return ["states", "inverted"]
     if states == {""}:
         turns = ["turns", "turns-clear"]
         return [*turns, "each"] if max(inputs.values()) > bars else ["each", *turns]
-    begins = [file.begins.get(label, "low" if state == "high" else "high")
-              for label, state in first]  # fmt: skip
-    order = ["low", "high"] if begins.count("high") * 2 > len(begins) else ["high", "low"]
+    order = ["low", "high"] if first.count("low") * 2 > len(first) else ["high", "low"]
     # A protocol has all beams clear before the release: where all inputs begin alike, that level
     # is the clear one.
-    return order[:1] if file.begins and len(set(begins)) == 1 else order
+    return order[:1] if file.is_sampled and len(states) == 1 else order
 
 
 def _is_part_a_gate(file: TimerFile) -> bool:
@@ -220,10 +224,10 @@ def _is_part_a_gate(file: TimerFile) -> bool:
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    parts, named = len(file.parts), any(part.number for part in file.parts)
+    parts = len(file.parts)
     if parts > 1 and _is_part_a_gate(file):
         return ["gates", "runs"]
-    if not file.labels and 1 < parts == len(gates) and not named:
+    if not (file.labels or any(part.number for part in file.parts)) and 1 < parts == len(gates):
         return ["runs", "gates"]
     single = len(file.labels) < 2 and bars == 1 and len(gates) > 1
     return ["runs", "passing"] if single else ["runs"]

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Iterator
 
-    from rig.errors import InputError
 
 MAX_BYTES = 200_000_000
 LONGEST_LINE = 20_000
@@ -30,10 +29,10 @@ def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
     """
     problems = ProblemList(str(path))
     check_is_file(path)
+    size = Path(path).stat().st_size
+    if size > MAX_BYTES:
+        problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
     try:
-        size = Path(path).stat().st_size
-        if size > MAX_BYTES:
-            problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
         encoding = _find_encoding(Path(path), problems)
         with Path(path).open(encoding=encoding, errors="replace") as stream:
             number = 0
@@ -43,7 +42,7 @@ def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
                     problems.refuse(number, 1, "not_text")
                 yield line.rstrip("\n")
     except OSError as error:
-        raise _refusal(path, error) from error
+        raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
 
 
 def check_is_file(path: str | os.PathLike[str]) -> None:
@@ -57,11 +56,7 @@ def check_is_file(path: str | os.PathLike[str]) -> None:
     try:
         require_file(path)
     except OSError as error:
-        raise _refusal(path, error) from error
-
-
-def _refusal(path: str | os.PathLike[str], error: OSError) -> InputError:
-    return refusal(str(path), "unreadable", text=error.strerror or str(error))
+        raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
 
 
 def _find_encoding(path: Path, problems: ProblemList) -> str:

@@ -17,6 +17,7 @@ from rig.timers.vocabulary import (
     LONGEST,
     POWERS,
     has_role,
+    is_clock,
     is_number,
     is_value,
     normal,
@@ -29,15 +30,18 @@ if TYPE_CHECKING:
 
 HEADER = ("run", "channel", "time_s", "state")
 """Of the project's own format, in which every line is a row."""
-_SAMPLE = 2000
+_SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
 _LISTED = 100
 """Lines that are named, at most."""
 _PLAIN = re.compile(r"[-+0-9.,;eE\t ]*[0-9][-+0-9.,;eE\t ]*")
 _DECIMAL = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]{1,2})?")
-_MONITOR = re.compile(r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> ")
-"""What Arduino's serial monitor writes before a line."""
-_KEYED = re.compile(r"([^\W\d][\w ]{0,40})\"?\s?[=:]\s?\"?([^\s,;=:\"{}]{1,60})")
+_AROUND = re.compile(
+    r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> "
+    r"|^\s*[\[(]{1,3}([-+0-9.][^\[\]():]*)[\])]{1,3},?\s*$"
+)
+"""What Arduino's serial monitor writes before a line, and Python around a list of numbers."""
+_KEYED = re.compile(r"([^\W\d][\w ]{0,40})[\"']?\s?[=:]\s?[\"']?([^\s,;=:\"'{}]{1,60})")
 """A name with its value: ``gate=1``, ``gate: 1`` or, of JSON, ``"gate": 1``."""
 _SENTENCE = re.compile(
     r"(?:gate|pin|sensor|channel|beam)[\s#_-]*([0-9]{1,4})\b.*?\b(un|not )?(block|clear|dark)\w*"
@@ -66,15 +70,17 @@ class Row(NamedTuple):
     def cell(self, at: int) -> str:
         """Return what a column, from 0, has; nothing where the row ends before it."""
         text = self.texts[at] if at < len(self.texts) else ""
+        if text[:1].isdigit():  # most are numbers
+            return text
         return "" if len(text) < 6 and text.casefold() in words()["missing"] else text
 
     def column(self, at: int) -> int:
         """Return the column, from 1, at which a cell begins; 1 where the row ends before it."""
-        place, raw = 0, self.raw if self.separator == "," else self.raw.replace(",", ".")
-        cells = self.texts if self.separator == "," else [t.replace(",", ".") for t in self.texts]
+        mark, place = self.separator, 0
+        raw, *cells = [t if mark == "," else t.replace(",", ".") for t in (self.raw, *self.texts)]
         for text in cells[:at]:
             end = max(0, raw.find(text, place)) + len(text)
-            place = raw.find(self.separator, end) + 1 or end
+            place = raw.find(mark, end) + 1 or end
         return max(0, raw.find(cells[at], place)) + 1 if at < len(cells) else 1
 
 
@@ -111,9 +117,11 @@ class Table:
         self.remarks: list[Row] = []
         self.strays: list[int] = []
         self.stray_count = 0
-        head = [_MONITOR.sub("", line) for line in itertools.islice(lines, _SAMPLE)]
-        self.head = [line[:LONGEST] for line in head]
-        self._lines = itertools.chain(head, (_MONITOR.sub("", line) for line in lines))
+        head = list(itertools.islice(lines, _SAMPLE))
+        if any(_AROUND.search(line[:LONGEST]) for line in head):
+            head = [_AROUND.sub(r"\1", line) for line in head]
+            lines = (_AROUND.sub(r"\1", line) for line in lines)
+        self._lines = itertools.chain(head, lines)
         plain = [line for line in head if line.strip() and not _REMARK.match(line[:LONGEST])]
         first = re.sub(r"\s", "", plain[0][:LONGEST].lower()).split(",") if plain else []
         self.is_own = first[:2] == list(HEADER[:2])
@@ -123,9 +131,9 @@ class Table:
         shapes = Counter({shape: n for shape, n in shapes.items() if any(map(all, shape))})
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
-        margin = next((n for n, (filled, _) in enumerate(usual) if filled), 0)
+        filled = [n for n, (is_filled, _) in enumerate(usual) if is_filled]
         is_beside = count > max(_FEWEST_BESIDE, 0.9 * shapes.total())
-        self._margin = margin if margin > 1 and is_beside else 0
+        self._beside = filled if is_beside and filled[0] > 1 else []
 
     def blocks(self) -> Iterator[tuple[RowBlock, Iterator[Row]]]:
         """Yield blocks of rows; the rows of each are to be taken before the next."""
@@ -158,7 +166,7 @@ class Table:
         for number, line in enumerate(self._lines, 1):
             if not line or line.isspace():
                 continue
-            if block.width and not self._margin and _PLAIN.fullmatch(line):
+            if block.width and not self._beside and _PLAIN.fullmatch(line):
                 yield block, Row(number, self.split(line), line, self.separator)
             elif mark := _REMARK.match(line[:LONGEST]):
                 remark = Row(number, self.split(line[mark.end() :].rstrip('" ')), line)
@@ -180,11 +188,13 @@ class Table:
                     return
 
     def _without_settings(self, number: int, line: str, block: RowBlock) -> Row:
-        """Return a row; settings that stand to the left of its samples go to the headings."""
-        row, n = Row(number, self.split(line), line, self.separator), self._margin
-        if n and any(row.texts[:n]) and self._is_data(row.texts[n:]):
-            block.headings.append(row._replace(texts=row.texts[:n]))
-            row = row._replace(texts=[""] * n + row.texts[n:])
+        """Return a row; settings that stand beside its samples go to the headings."""
+        row = Row(number, self.split(line), line, self.separator)
+        samples = [text if n in self._beside else "" for n, text in enumerate(row.texts)]
+        settings = ["" if n in self._beside else text for n, text in enumerate(row.texts)]
+        if self._beside and any(settings) and self._is_data(samples):
+            block.headings.append(row._replace(texts=settings))
+            row = row._replace(texts=samples)
         return row
 
     def _put_aside(self, row: Row, block: RowBlock) -> bool:
@@ -228,12 +238,12 @@ class Table:
         """Whether cells hold values only, and at least one number or date."""
         filled = [text for text in texts if text]
         return all(map(is_value, filled)) and any(
-            is_number(text) or (":" in text and is_value(text)) for text in filled
+            is_number(text) or is_clock(text) for text in filled
         )
 
     def _shape(self, texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
         """Return which cells are filled, and numbers; of most rows of data it is the same."""
-        return tuple((text != "", is_number(text)) for text in texts)
+        return tuple((text != "", is_number(text) or is_clock(text)) for text in texts)
 
 
 def _find_names(lines: Sequence[str]) -> list[str]:
@@ -261,32 +271,25 @@ def _split_named(line: str, names: Sequence[str]) -> list[str]:
 
 
 def find_separator(lines: Sequence[str]) -> str:
-    """Find what stands between the cells of most lines with a number."""
+    """Find what stands between the cells: what leaves most values in the lines with a number."""
     rows = [line[:1000].strip() for line in lines if re.search("[0-9]", line[:1000])]
-    for separator in ("\t", ";", "|"):
+    for separator in "\t;|":
         if sum(separator in row for row in rows) * 2 > len(rows):
             return separator
-    if rows and all(re.fullmatch("[01xX](?:,[01xX])+", row) for row in rows):
-        return ","  # levels of inputs
-    heading = any("," in line and re.search("[A-Za-z][A-Za-z0-9]", line) for line in lines[:200])
-    numbers = [row for row in rows if all(map(_is_any_number, row.split()))]
-    if numbers and len(numbers) * 2 > len(rows) and not heading:
-        # 1 0,25 are two numbers, and 0,25 in a column of its own is a single one.
-        parts = [row.split() for row in numbers]
-        if any(part.endswith(",") for row in parts for part in row):
-            return ","
-        if sum(len(row) > 1 for row in parts) * 2 > len(parts):
-            return " "
-        # 0,25 below 1,5 is no decimal comma: times go on.
-        values = [float(row[0].replace(",", ".")) for row in parts]
-        return ";" if values == sorted(values) or "," not in numbers[0] else ","
-    blanks = [row for row in rows if len(row.split()) > 1 and "," not in row]
-    values_only = sum(all(map(is_value, row.split())) for row in blanks)
-    return " " if len(blanks) * 2 > len(rows) and values_only * 2 > len(blanks) else ","
+    is_blank = sum(_has_values(row.split()) for row in rows) * 2 > len(rows)
+    is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
+    numbers = [row.replace(",", ".") for row in rows if _DECIMAL.fullmatch(row)]
+    if not is_named and len(numbers) * 2 > len(rows):
+        # 0,25 below 1,5 is no decimal comma: times go on. Levels of inputs are 0 and 1.
+        values = [float(number) for number in numbers]
+        is_rising = values == sorted(values) and set("".join(rows)) - set("01,")
+        return ";" if is_rising else ","
+    return " " if is_blank else ","
 
 
-def _is_any_number(text: str) -> bool:
-    return is_number(text.replace(",", ".", 1))
+def _has_values(cells: Sequence[str]) -> bool:
+    """Whether blanks part values; a comma behind one parts them, too."""
+    return len(cells) > 1 and all(text[-1] != "," and is_value(text) for text in cells)
 
 
 def count_known(row: Row) -> int:

@@ -1,11 +1,12 @@
-"""Value change dumps (IEEE 1364, clause 18), as logic analysers write them."""
+"""Value change dumps (IEEE 1364, clause 18) as a table: a row for each time, a column a wire."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING
 
-from rig.timers.events import MAX_EVENTS, TimerEvent
+from rig.timers.columns import TimerColumn
+from rig.timers.table import Row
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,69 +14,58 @@ if TYPE_CHECKING:
     from rig.timers.problems import ProblemList
 
 _SCALE = re.compile(r"\$timescale\s+(.{0,40}?)\s*(?:\$end|$)")
-_ACCEPTED = re.compile(r"(10{0,2})\s*([munp]?)s")
+_ACCEPTED = re.compile(r"(1|10|100)\s*([munp]?)s")
 _WIRE = re.compile(r"\$var\s+\w+\s+1\s+(\S+)\s+(\S+)")
 """A wire of one bit: ``$var wire 1 ! D0``."""
-LONGEST = 30
-"""Digits of a time: more would be no number that a computer reads at once."""
-_PS = {"": 10**12, "m": 10**9, "u": 10**6, "n": 10**3, "p": 1}
+_POWERS = {"": 0, "m": 3, "u": 6, "n": 9, "p": 12}
+_BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
+_LONGEST_HEAD = 1_000_000
+"""Characters, before which the wires have to be listed."""
 
 
 def is_vcd(head: list[str]) -> bool:
     """Whether a file begins as a value change dump does."""
-    first = next((line.strip() for line in head if line.strip()), "")
-    return first.startswith(("$date", "$version", "$timescale", "$comment", "$scope", "$var"))
+    return "".join(head).lstrip().startswith(_BEGINNINGS)
 
 
-def read_vcd(
-    lines: Iterator[str], problems: ProblemList
-) -> tuple[list[TimerEvent], dict[str, str], int]:
-    """Read the changes of all wires of one bit.
-
-    Returns
-    -------
-    list of TimerEvent, dict, int
-        Changes, the level that each wire begins with, and the unit of time in ps.
-    """
-    numbered, head = enumerate(lines, 1), ""
-    for _, line in numbered:
+def vcd_columns(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[TimerColumn]:
+    """Read the head of a dump: which wires there are, and the unit of time."""
+    head = ""
+    for _, line in lines:
         head += line[:200] + " "
-        if "$enddefinitions" in line or len(head) > 1_000_000:
+        if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
             break
-    names, unit, time, stamp = dict(_WIRE.findall(head)), _read_scale(head, problems), 0, 0
-    first: dict[str, str] = {}
-    current: dict[str, tuple[str, int]] = {}
-    events: list[TimerEvent] = []
-    for number, line in numbered:
-        for word in line.split() if not line.startswith("$comment") else ():
-            if word[0] == "#" and word[1:].isdecimal():
-                if len(word) > LONGEST:
-                    problems.reject(number, 1, "time", word, "a time that a drop can have")
-                    continue
-                last, time, stamp = time, int(word[1:]) * unit, number
-                if time < last:
-                    problems.add(number, 1, "time", "backwards", text=word)
-            elif word[0] in "01" and word[1:] in names:
-                name, state = names[word[1:]], "high" if word[0] == "1" else "low"
-                before, since = current.get(name, (state, -1))
-                if before != state:
-                    events.append(TimerEvent(time, name, state, stamp))
-                    if since == time:
-                        accepted = "a change: this wire has another value at this time already"
-                        problems.reject(number, 1, name, word, accepted)
-                first.setdefault(name, state)
-                current[name] = state, time
-        if len(events) > MAX_EVENTS:
-            problems.refuse(number, 1, "too_many_events", limit=MAX_EVENTS)
-    return events, first, unit
-
-
-def _read_scale(head: str, problems: ProblemList) -> int:
-    """Return the unit of time, ps."""
-    stated = _SCALE.search(head)
-    scale = _ACCEPTED.fullmatch(stated[1]) if stated else None
+    stated, wires = _SCALE.search(head), _WIRE.findall(head)
+    scale = _ACCEPTED.fullmatch(stated[1] if stated else "")
     if stated is None:
-        problems.add(1, 1, "$timescale", "no_rate", lacks="a $timescale")
-    elif scale is None:
+        problems.refuse(1, 1, "no_rate", lacks="a $timescale")
+    if scale is None:
         problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
-    return int(scale[1]) * _PS[scale[2]] if scale else 0
+    elif not wires:
+        problems.add(1, 1, "", "no_edges")
+    problems.raise_if_any()
+    power = _POWERS[scale[2]] - scale[1].count("0") if scale else 0
+    columns = [TimerColumn(n, mark, "level", gate=name) for n, (mark, name) in enumerate(wires, 1)]
+    return [TimerColumn(0, "time", "time", power), *columns]
+
+
+def vcd_rows(
+    lines: Iterator[tuple[int, str]], columns: list[TimerColumn], problems: ProblemList
+) -> Iterator[Row]:
+    """Yield a row of all levels for each time at which a level may change."""
+    places = {column.name: column.at for column in columns[1:]}
+    row, written = Row(0, ["0", *("x" for _ in places)]), set[int]()
+    for number, line in lines:
+        for word in line.split() if not line.startswith("$comment") else ():
+            at = places.get(word[1:], 0)
+            if word[0] == "#" and word[1:].isdecimal():
+                if row.line or written:
+                    yield row
+                row, written = Row(number, [word[1:], *row.texts[1:]], word), set[int]()
+            elif word[0] in "01xzXZ" and at:
+                if at in written and row.texts[at] != word[0]:
+                    accepted = "a change: this wire has another value at this time already"
+                    problems.reject(number, 1, columns[at].gate, word, accepted)
+                written.add(at)
+                row.texts[at] = word[0]
+    yield row

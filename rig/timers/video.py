@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 FEWEST = 6
 """Frames that tell an acceleration and how much they scatter."""
 _NAMES = {name: re.compile(rf"^{name}(?![A-Za-z])", re.IGNORECASE) for name in "txy"}
-_SCALES = {"s": 1.0, "ms": 1e-3, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_UNIT = re.compile(r"[(\[/_]\s*([^\W\d_]+)")
+_LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_SCALES = {"t": {"": 1.0, "s": 1.0, "ms": 1e-3}, "x": _LENGTHS, "y": _LENGTHS}
 _HINT = (
     "accepted is what Tracker copies or exports: columns t, x and y with a heading, in s and m "
     "where it says no unit"
@@ -51,11 +53,15 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
     problems = ProblemList(str(path), _HINT)
     block, rows = next(Table(read_lines(path)).blocks(), (RowBlock(), iter(())))
     first = next(rows, None)
-    heading = next(filter(_has_columns, reversed(block.headings)), None)
-    if first is None or heading is None:
+    columns = next(filter(None, map(_find_columns, reversed(block.headings))), {})
+    if first is None or not columns:
         problems.refuse(1, 1, "no_track")
-    at = {name: _column(heading, name) for name in _NAMES}
-    scales = {name: _scale(heading, n, problems) for name, n in at.items()}
+    at, scales = {name: n for name, (n, _, _) in columns.items()}, dict[str, float]()
+    for name, (n, heading, unit) in columns.items():
+        scales[name] = _SCALES[name].get(unit, 0.0)
+        if not scales[name]:
+            accepted, text = "a unit of this column: s, ms; m, cm, mm", heading.cell(n)
+            problems.reject(heading.line, heading.column(n), text, unit, accepted)
     frames: list[list[float]] = []
     for row in itertools.chain([first], rows):
         texts = {name: row.cell(n) for name, n in at.items()}
@@ -73,22 +79,12 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
     return track
 
 
-def _has_columns(row: Row) -> bool:
-    return all(any(pattern.search(text) for text in row.texts) for pattern in _NAMES.values())
-
-
-def _column(heading: Row, name: str) -> int:
-    return next(n for n, text in enumerate(heading.texts) if _NAMES[name].search(text))
-
-
-def _scale(heading: Row, at: int, problems: ProblemList) -> float:
-    text = heading.texts[at]
-    match = re.search(r"[(\[/_]\s*([^\W\d_]+)", text)
-    if match is None:
-        return 1.0
-    is_time = text[0].lower() == "t"
-    if match[1] not in _SCALES or (match[1] in {"s", "ms"}) is not is_time:
-        accepted = "a unit of this column: s, ms; m, cm, mm"
-        problems.reject(heading.line, heading.column(at), text, match[1], accepted)
-        return 1.0
-    return _SCALES[match[1]]
+def _find_columns(row: Row) -> dict[str, tuple[int, Row, str]]:
+    """Return where t, x and y stand in a heading, and their units; nothing if one of them lacks."""
+    columns = {}
+    for name, pattern in _NAMES.items():
+        for n, text in reversed(list(enumerate(row.texts))):
+            if pattern.search(text):
+                unit = _UNIT.search(text)
+                columns[name] = n, row, unit[1] if unit else ""
+    return columns if len(columns) == len(_NAMES) else {}

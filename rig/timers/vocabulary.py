@@ -21,6 +21,8 @@ CLOCK = re.compile(
     r"(?:([0-9]{1,2}):)?([0-9]{1,3}):([0-9]{1,2}(?:[.,][0-9]{1,15})?)(?:Z|[+-][0-9:]{4,6})?"
 )
 """A time of day, perhaps with its date."""
+TIMED = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s?(s|ms|us|µs|μs|ns)")
+"""A time with its unit."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,2})?")
 _NAME = re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}")
 _BRACKETED = re.compile(r"[\[({]\s*([^\W\d_]{1,20})\s*[\])}]")
@@ -118,6 +120,11 @@ def is_number(text: str) -> bool:
     return len(text) <= LONGEST and _NUMBER.fullmatch(text) is not None
 
 
+def is_clock(text: str) -> bool:
+    """Whether a text is a time of day, perhaps with its date."""
+    return ":" in text and len(text) <= LONGEST and CLOCK.fullmatch(text) is not None
+
+
 def is_value(text: str) -> bool:
     """Whether a word is a number, a date, a state or the name of an input."""
     if is_number(text.replace(",", ".", 1)) or state_of(text):
@@ -125,7 +132,7 @@ def is_value(text: str) -> bool:
     if len(text) > LONGEST or has_role(text, "start"):
         return False
     unknown = text.casefold() in {"x", "z", *words()["missing"]}
-    return unknown or bool(_NAME.fullmatch(text) or CLOCK.fullmatch(text))
+    return unknown or any(form.fullmatch(text) for form in (_NAME, CLOCK, TIMED))
 
 
 def number_of(label: str) -> int | None:

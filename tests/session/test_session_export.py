@@ -12,7 +12,7 @@ from rig.records import ClockSample, Drop, Edge
 from rig.session.export import csv_files, flatten
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.timers.edges_csv import read_edges
+from tests.timers.edges import read_edges
 
 ANALYSIS: dict[str, Any] = {
     "runs": [

@@ -287,17 +287,13 @@ def shapes() -> dict[str, Shape]:
     found["Gates below each other"] = text("".join(
         f"Gate {g}\nTime (s)\n" + "".join(f"{t:.6f}\n" for t, _, _ in edges)
         for g, edges in by_gate(RUNS[0]).items()))  # fmt: skip
-    tds = ["Record Length,4e+03,,", "Sample Interval,2e-04,,", "Trigger Point,0,,",
-           "Source,CH1,,",
-           "Vertical Units,V,,", "Horizontal Units,s,,"]  # fmt: skip
-    t16, v16 = volts(RUNS[0], [0])
-    found["Tektronix TDS"] = Shape(
-        "".join(
-            f"{tds[k] if k < len(tds) else ',,,'}{t:.7e},{v16[0, k]:.5f},\n"
-            for k, t in enumerate(t16)
-        ).encode(),
-        [[e for e in RUNS[0] if e[1] == 0]],
-        sampled=STEP,
-        options=("--channel", "0"),
-    )
+    tds = ["Record Length,4e+03,", "Sample Interval,2e-04,", "Trigger Point,0,", "Source,CH{},",
+           "Vertical Units,V,", "Horizontal Units,s,"]  # fmt: skip
+    for name, gates, options in (
+        ("Tektronix TDS", [0], ("--channel", "0")),
+        ("Tektronix TDS, two channels", [0, 1], ("--map", "CH1=0,CH2=1")),
+    ):
+        found[name] = scope("", lambda k, t, v: ",".join(
+            f"{tds[k].format(n) if k < len(tds) else ',,'}{t:.7e},{x:.5f}"
+            for n, x in enumerate(v, 1)) + ",\n", gates=gates, options=options)  # fmt: skip
     return found

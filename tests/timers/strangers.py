@@ -45,11 +45,19 @@ def strangers() -> dict[str, Shape]:
          + table([n, *(f"{t * 1e3:.3f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
         ("A column for each run", "Run 1,Run 2,Run 3\n"
          + table([f"{t:.6f}" for t, _, _ in three] for three in zip(*RUNS, strict=True))),
+        ("On and off of each gate", ",".join(
+            f"Gate {g} {w}" for g in HEIGHTS for w in ("on", "off")) + "\n"
+         + table([f"{t:.6f}" for t, _, _ in edges] for edges in RUNS)),
+        ("A list for each run", "[[" + "],\n [".join(
+            ", ".join(f"{t:.6f}" for t, _, _ in edges) for edges in RUNS) + "]]\n"),
     ):  # fmt: skip
         put(name, content, RUNS)
     for name, content in (
         ("Units that change", "gate,time,state\n" + write("{c},{ms} ms,{d}\n", runs=[one[:4]])
          + write("{c},{s} s,{d}\n", runs=[one[4:]])),
+        ("Tuples", "".join(f"({t:.6f}, {c}, {d})\n" for t, c, d in one)),
+        ("Dictionaries", "".join(
+            f"{{'gate': {c}, 't': {t:.6f}, 'blocked': {d}}}\n" for t, c, d in one)),
         ("Gates from 1", GTS + "".join(f"{c + 1},{t:.6f},{int(d)}\n" for t, c, d in one)),
         ("Gates by letters", GTS + "".join(f"{'ABCD'[c]},{t:.6f},{int(d)}\n" for t, c, d in one)),
         ("Gates by names", GTS + "".join(
@@ -111,12 +119,12 @@ def strangers() -> dict[str, Shape]:
 
 
 NOT_READ = {
-    "A unit in each cell", "Units that change", "Runs by a word alone", "Written by hand",
+    "Runs by a word alone", "Written by hand",
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
-    "Durations", "A summary below", "A row for each run", "A column for each run", "A word below",
+    "Durations", "A summary below", "A word below",
     "Rows out of order", "Newest first", "A clock that overflows", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart", "JSON in a line",
-    "Thousands by points", "Lists", "Microseconds as if they were seconds",
+    "Thousands by points", "Microseconds as if they were seconds",
     "The last row cut",
 }  # fmt: skip
 """Refused with what to do: the file leaves open, or contradicts, what is in it."""

@@ -11,8 +11,8 @@ from rig.errors import InputError, Problem
 from rig.records import Drop, Edge
 from rig.timers import lines
 from rig.timers.edge_rows import edges_text
-from rig.timers.edges_csv import read_edges
-from rig.timers.events import TICK_HZ
+from rig.timers.moments import TICK_HZ
+from tests.timers.edges import read_edges
 
 HEADER = "run,channel,time_s,state\n"
 
@@ -147,7 +147,6 @@ def test_many_faults_are_counted(tmp_path: Path) -> None:
         "# only a note\n",
         HEADER,
         "1,0,0.1,1\n",
-        "run;channel;time_s;state\n1;0;0;1\n",
         HEADER.encode("utf-16"),
         b"\xff\xfe\x00" * 100,
         "SQLite format 3\x00" + "\x00" * 100,

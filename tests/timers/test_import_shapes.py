@@ -9,7 +9,7 @@ import pytest
 from rig.commands.import_edges import import_with_protocol
 from rig.errors import InputError
 from rig.protocol import reader
-from rig.timers.events import TICK_HZ
+from rig.timers.moments import TICK_HZ
 from tests.timers.mutations import mutate
 from tests.timers.shapes import PROTOCOL, Shape, shapes
 from tests.timers.strangers import NOT_READ, REFUSED, strangers

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.records import Drop
-from rig.timers import events, vcd
-from rig.timers.events import TICK_HZ
+from rig.timers import events
 from rig.timers.layouts import find_layouts, read_drops
 from rig.timers.lines import read_lines
+from rig.timers.moments import TICK_HZ
 from rig.timers.table import Table
 from rig.timers.timer_file import read_timer_file
 from tests.examples import examples
@@ -22,10 +22,6 @@ from tests.examples import examples
 VERNIER = (
     "Vernier Format 2\nfence.cmbl\nRun 1\nTime\tGateState\tDistance\nT\tS\tD\ns\t\tm\n\n"
     "0.25\t1\t0\n0.26\t0\t\n0.275\t1\t0.05\n"
-)
-PASCO = (
-    '"Time (s) Run #1";"State Run #1";"Time (s) Run #2";"State Run #2"\n'
-    "0,25;1;1,5;1\n0,26;0;1,51;0\n0,275;1;;\n"
 )
 
 
@@ -46,19 +42,6 @@ def told(drop: Drop) -> list[tuple[float, bool]]:
     assert drop.tick_hz == TICK_HZ
     assert all(edge.channel == 3 for edge in drop.edges)
     return [(edge.tick / TICK_HZ, edge.blocked) for edge in drop.edges]
-
-
-def test_a_vernier_table(tmp_path):
-    (drop,) = read(tmp_path, VERNIER)
-    assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
-    assert (drop.run, drop.attempt, drop.certificate) == (1, 1, None)
-
-
-def test_a_pasco_table_with_decimal_commas_and_two_runs(tmp_path):
-    first, second = read(tmp_path, PASCO)
-    assert told(first) == [(0.25, True), (0.26, False), (0.275, True)]
-    assert told(second) == [(0.5, True), (0.51, False)]
-    assert (first.run, second.run) == (1, 2)
 
 
 @pytest.mark.parametrize(
@@ -321,7 +304,6 @@ def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, t
     "#0 0!\n#1 1!\n#2 0!\n#3 1!\n"])  # fmt: skip
 def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
     monkeypatch.setattr(events, "MAX_EVENTS", 2)
-    monkeypatch.setattr(vcd, "MAX_EVENTS", 2)
     assert faults(tmp_path, content)
 
 

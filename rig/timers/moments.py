@@ -1,0 +1,71 @@
+"""Times as files write them, in whole picoseconds: what a file says is what is analysed."""
+
+from __future__ import annotations
+
+import re
+from datetime import date
+from decimal import ROUND_HALF_EVEN, Context
+from typing import TYPE_CHECKING
+
+from rig.timers.vocabulary import CLOCK, POWERS, TIMED, unit_of
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+TICK_HZ = 10**12
+LONGEST_PS = 10**24
+_DECIMAL = re.compile(r"[+-]?(?=\.?[0-9])[0-9]{0,30}(?:\.[0-9]{0,60})?(?:[eE][+-]?[0-9]{1,2})?")
+_EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
+
+
+def moment(text: str, power: int = 0) -> int | None:
+    """Read a time as picoseconds: a number, perhaps with its unit, or a date with its time of day.
+
+    Parameters
+    ----------
+    power
+        Of ten, units in a second: 3 for milliseconds.
+
+    Returns
+    -------
+    int or None
+        `None` for what is no such time.
+    """
+    if text[-1:] == "s" and (timed := TIMED.fullmatch(text)):
+        text, power = timed[1].replace(",", "."), POWERS[unit_of(timed[2])]
+    match = CLOCK.fullmatch(text) if ":" in text else None
+    if match is None:
+        return picoseconds(text, -power)
+    first, mark, second, third, hours, minutes, rest = match.groups()
+    day, ticks = 0, picoseconds(rest.replace(",", ".")) or 0
+    if first:
+        # Only how many days lie between two times matters: which part is the year is enough.
+        parts = [int(first), int(second), int(third)]
+        year, month, of_month = parts if len(first) > 2 else parts[::-1]
+        if mark == "/" and parts[0] <= 12:
+            month, of_month = parts[0], parts[1]
+        try:
+            day = date(year, month, of_month).toordinal()
+        except ValueError:
+            return None
+    return ((day * 24 + int(hours or 0)) * 60 + int(minutes)) * 60 * TICK_HZ + ticks
+
+
+def picoseconds(text: str, power: int = 0) -> int | None:
+    """Read a decimal number of 10^power s as picoseconds, ties to even; `None` for another text.
+
+    No time that a drop can have is as long as 30,000 years.
+    """
+    if not _DECIMAL.fullmatch(text):
+        return None
+    number = _EXACT.scaleb(_EXACT.create_decimal(text), 12 + power)
+    return int(_EXACT.to_integral_value(number)) if abs(number) < LONGEST_PS else None
+
+
+def seconds(tick: int, rate: Fraction) -> str:
+    """Write a time as a plain decimal, exact to the picosecond."""
+    # In whole numbers: dividing Fractions costs ten times as much.
+    ticks, ratio = 2 * tick * TICK_HZ * rate.denominator, rate.numerator
+    rounded = (ticks + ratio) // (2 * ratio)
+    integer, part = divmod(abs(rounded), TICK_HZ)
+    return f"{'-' if rounded < 0 else ''}{integer}.{part:012d}".rstrip("0").rstrip(".")
