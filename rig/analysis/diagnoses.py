@@ -261,7 +261,7 @@ def low_gates_missing(protocol: Protocol, records: Sequence[ChainRecord], fit: F
     low = 0
     for _, due, unseen in sorted(struck)[:-1]:
         rods, hidden = rods - due, hidden - unseen
-        if unseen <= most_by_chance(due, max(MISSED, hidden / rods)):
+        if unseen <= most_by_chance(due, max(_PAIR * MISSED, hidden / rods)):
             break
         low += 1
     return low

@@ -237,19 +237,6 @@ class Linearization:
     loss: float
 
 
-def plain_equations(residuals: Array, slopes: Array) -> Linearization:
-    """Set up observations that are all good.
-
-    Parameters
-    ----------
-    residuals, slopes
-        In standard deviations of each, shapes ``(observations,)`` and ``(observations, unknowns)``.
-    """
-    chi2 = float(residuals @ residuals)
-    rows = EquationRows(slopes, residuals, np.arange(slopes.shape[1]))
-    return Linearization({"": rows}, chi2, residuals.size, chi2)
-
-
 def linearize(
     model: DropModel, matches: Matches, x: Array, inflation: float = 1.0, cut: float = math.inf
 ) -> Linearization:

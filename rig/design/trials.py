@@ -137,8 +137,7 @@ def _path(
     release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
     alphas = model_alphas(protocol, record, run)
     if alphas.size:
-        known, heavier = stated(protocol), above(record.chain.chain)
-        scatter = known.impulses(float(alphas.mean()), heavier)
+        scatter = stated(protocol).impulses(alphas.mean(), above(record.chain.chain))
         alphas += scatter * rng.standard_normal(alphas.size)
     return trajectory(protocol, record, release, start, alphas, rods)
 

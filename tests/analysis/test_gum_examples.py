@@ -9,8 +9,8 @@ import pytest
 
 from rig.analysis.adjust import least_squares
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.equations import plain_equations
 from rig.analysis.quantities import effective_degrees
+from tests.analysis.least_squares import plain_equations
 
 
 def test_end_gauge():

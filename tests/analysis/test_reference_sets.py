@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.adjust import least_squares
-from rig.analysis.equations import plain_equations
+from tests.analysis.least_squares import plain_equations
 
 DIGITS = 1e-4
 VAGUE = 1e10  # times a starting value: a prior that pulls by less than a digit
