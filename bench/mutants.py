@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from bench.process_fixture import FENCE
 from rig.errors import RigError
-from rig.protocol import reader
 from rig.recorder.controller import Controller
 from rig.session.store import Session
-from rig.timers.timer_file import read_timer_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -178,13 +176,10 @@ def altered_text(text: str, seed: int) -> str:
     return text
 
 
-def read_text_as(kind: str, text: str, path: Path) -> None:
-    """Write a text and read it as a protocol, as edges or as a timer's table."""
+def read_text_with(read: Callable[[Path], object], text: str, path: Path) -> None:
+    """Write a text and read it."""
     path.write_bytes(text.encode("utf-8", "surrogateescape" if "\ud800" not in text else "replace"))
-    if kind == "protocol":
-        reader.read(str(path))
-    else:
-        read_timer_file(path)
+    read(path)
 
 
 def failures(each: Callable[[int], object], seeds: range) -> list[str]:

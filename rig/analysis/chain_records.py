@@ -22,7 +22,7 @@ from rig.predictions import air_shares
 from rig.protocol.contact import higher_contacts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -257,14 +257,14 @@ def thinned(drop: Drop, hz: float) -> Drop:
 
 
 def chain_records(
-    protocol: Protocol, run: Run, drop: Drop, hz: float, aside: int = 0
+    protocol: Protocol, run: Run, drop: Drop, hz: float, aside: Collection[int] = ()
 ) -> list[ChainRecord]:
     """Collect each chain with the trains of its gates.
 
     Parameters
     ----------
     aside
-        How many of the gates beside the chain that strikes are left out, the lowest first.
+        Numbers of the gates that are left out, in the protocol's list.
     """
     records = []
     shares = air_shares(protocol)
@@ -279,11 +279,10 @@ def chain_records(
                 alpha = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
             except DomainError:
                 alpha = 0.0
-            low = _lowest(protocol, trains)[:aside]
             record = replace(
                 record,
-                trains=tuple(train for n, train in enumerate(trains) if n not in low),
-                aside=tuple(trains[n] for n in low),
+                trains=tuple(train for train in trains if train.gate not in aside),
+                aside=tuple(train for train in trains if train.gate in aside),
                 ratios=np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gammas)),
                 alpha=alpha,
                 # Behind the last leg nothing falls any more, but edges are asked for all the same.
@@ -293,13 +292,6 @@ def chain_records(
             )
         records.append(record)
     return records
-
-
-def _lowest(protocol: Protocol, trains: Sequence[EdgeTrain]) -> list[int]:
-    """Number trains from the lowest gate up."""
-    assert protocol.gates is not None
-    heights = [protocol.gates.gates[train.gate].height for train in trains]
-    return sorted(range(len(trains)), key=heights.__getitem__)
 
 
 def edge_trains(
@@ -316,7 +308,6 @@ def edge_trains(
         gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
         if name is not None and gates:
             chain = protocol.chains[name]
-            struck = role == "impact"
-            higher = higher_contacts(protocol, run.incline_deg, chain) if struck else None
+            higher = higher_contacts(protocol, run.incline_deg, chain) if role == "impact" else None
             trains = (edge_train(n, gate, chain, edges, start, higher) for n, gate in gates)
             yield role, chain, tuple(trains)

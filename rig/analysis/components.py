@@ -47,7 +47,7 @@ class Components:
         What strings that bounce add to the scatter of the last pull, relative to α. One rod alone
         goes with what its own string does; where M are left it counts by 1/M.
     landed
-        By how much the top rod strikes too early to be seen pass: relative to the protocol's own.
+        By how much rods strike too early to be seen pass: relative to what a drop has beforehand.
     stretch
         Of what strings do to a chain together: relative to the protocol's own.
     gates, rods

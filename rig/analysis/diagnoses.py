@@ -19,7 +19,7 @@ from rig.reasons import Reason, make_reason
 from rig.wordings import Severity
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -230,8 +230,10 @@ def _counts_crossed(one: _Seen, other: _Seen) -> bool:
     return bool(fewer.unseen & fewer.ends) and more.extra >= _PAIR
 
 
-def low_gates_missing(protocol: Protocol, records: Sequence[ChainRecord], fit: Fit | None) -> int:
-    """Count the lowest gates beside the chain that strikes that miss more rods than by chance.
+def gates_too_low(
+    protocol: Protocol, records: Iterable[ChainRecord], fit: Fit | None
+) -> tuple[int, ...]:
+    """Find the lowest gates beside the chain that strikes that miss more rods than by chance.
 
     Some strike before, or lie there. The highest gate is none of them, and chance is as large as
     all others miss.
@@ -242,9 +244,15 @@ def low_gates_missing(protocol: Protocol, records: Sequence[ChainRecord], fit: F
         The chains with their trains.
     fit
         `None` where it is not known which rods edges are: then their number tells.
+
+    Returns
+    -------
+    tuple of int
+        Their numbers in the protocol's list.
     """
     assert protocol.gates is not None
-    struck: list[tuple[float, int, int]] = []
+    heights = [gate.height for gate in protocol.gates.gates]
+    struck: list[tuple[EdgeTrain, int, int]] = []
     rods, hidden = 0, 0
     for record in records:
         for n, train in enumerate(record.trains):
@@ -252,19 +260,20 @@ def low_gates_missing(protocol: Protocol, records: Sequence[ChainRecord], fit: F
             if not due or not train.times.size:
                 continue
             if fit is None:
-                unseen = max(0, due - train.times.size // _PAIR)
+                unseen = max(0, due - train.times.size * due // train.rods.size)
             else:
                 unseen = np.unique(train.rods[fit.matches[record.role][n] < 0]).size
             rods, hidden = rods + due, hidden + unseen
             if record.role == "impact":
-                struck.append((protocol.gates.gates[train.gate].height, due, unseen))
-    low = 0
-    for _, due, unseen in sorted(struck)[:-1]:
+                struck.append((train, due, unseen))
+    low: list[int] = []
+    for train, due, unseen in sorted(struck, key=lambda row: heights[row[0].gate])[:-1]:
         rods, hidden = rods - due, hidden - unseen
-        if unseen <= most_by_chance(due, max(_PAIR * MISSED, hidden / rods)):
+        missed = MISSED * train.rods.size / due  # of a rod each edge may be
+        if unseen <= most_by_chance(due, max(missed, hidden / rods)):
             break
-        low += 1
-    return low
+        low.append(train.gate)
+    return tuple(low)
 
 
 def _other_ends(gates: list[_Seen]) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import chain_records, thinned
 from rig.analysis.components import stated
-from rig.analysis.diagnoses import FEW_GATES, low_gates_missing, silent
+from rig.analysis.diagnoses import FEW_GATES, gates_too_low, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
@@ -60,9 +60,9 @@ class DropSummary:
     explained
         Whether it was sought what else would explain it if it is void.
     identified
-        Which rods its edges are, by how many gates are left out; nothing of a damaged record.
+        Which rods its edges are, by the gates that are left out; nothing of a damaged record.
     aside
-        How many are; `None` where nothing was fitted.
+        Which are; `None` where nothing was fitted.
     x
         The unknowns, as they were adjusted; shape ``(unknowns,)``.
     deviations
@@ -72,8 +72,8 @@ class DropSummary:
     scale: TimeScale
     explained: bool
     result: DropResult
-    identified: Mapping[int, Identified]
-    aside: int | None
+    identified: Mapping[tuple[int, ...], Identified]
+    aside: tuple[int, ...] | None
     x: Array
     deviations: Mapping[str, Deviation | None]
 
@@ -105,7 +105,7 @@ class DropCase(NamedTuple):
     components
         How much everything scatters; as the protocol states it if not given.
     aside
-        How many of the lowest gates beside the chain that strikes are left out.
+        Numbers of the gates that are left out, see `rig.analysis.diagnoses.gates_too_low`.
     """
 
     protocol: Protocol
@@ -113,7 +113,7 @@ class DropCase(NamedTuple):
     drop: Drop
     scale: TimeScale
     components: Components | None = None
-    aside: int = 0
+    aside: tuple[int, ...] = ()
 
     @one_thread
     def summary(self, before: DropSummary | None = None, *, explain: bool = True) -> DropSummary:
@@ -133,7 +133,8 @@ class DropCase(NamedTuple):
             result = replace(result, gravity=gravity)
         aside, x = None, np.zeros(0)
         if fit is not None:
-            aside, x = sum(len(record.aside) for record in fit.model.records.values()), fit.x
+            records, x = fit.model.records.values(), fit.x
+            aside = tuple(train.gate for record in records for train in record.aside)
         deviations = {name: value.deviation for name, value in result.quantities.items()}
         return DropSummary(self.scale, explain, result, known, aside, x, deviations)
 
@@ -144,18 +145,18 @@ class DropCase(NamedTuple):
         if aside is None:
             return None
         case = self._at_contact()._replace(aside=aside)
-        return case._timed(summary.identified[aside], summary.x)
+        return case._timed(case._records(), summary.identified[aside], summary.x)
 
     @one_thread
     def read(
-        self, known: dict[int, Identified] | None = None, *, explain: bool = True
+        self, known: dict[tuple[int, ...], Identified] | None = None, *, explain: bool = True
     ) -> tuple[DropResult, Fit | None]:
         """Read the drop, without the low gates that not all rods pass.
 
         Parameters
         ----------
         known
-            What its edges are where so many gates are left out, as far as it is known, and will be.
+            What its edges are where some gates are left out, as far as it is known, and will be.
         explain
             As for `fit_drop`.
         """
@@ -167,8 +168,10 @@ class DropCase(NamedTuple):
         result, fit = stated._read(known, explain=False)
         wrong = _void_by(result) - _SKEW
         case, last = stated, fit
-        while low := low_gates_missing(self.protocol, case._records(), last):
-            case = case._replace(aside=case.aside + low)
+        while low := gates_too_low(
+            self.protocol, last.model.records.values() if last else case._records(), last
+        ):
+            case = case._replace(aside=(*case.aside, *low))
             without = other, last = case._read(known, explain=False)
             if not _void_by(other) - _SKEW:
                 return without
@@ -183,18 +186,19 @@ class DropCase(NamedTuple):
     def _records(self) -> list[ChainRecord]:
         return chain_records(self.protocol, self.run, self.drop, self.scale.hz, self.aside)
 
-    def _timed(self, identified: Identified, x: Array | None = None) -> Fit:
+    def _timed(
+        self, records: Sequence[ChainRecord], identified: Identified, x: Array | None = None
+    ) -> Fit:
         """Adjust at this time scale what was identified, or was adjusted before at this one."""
         begun = identified.begun
         assert begun is not None
-        records, clock_u = self._records(), self.scale.u
-        model = DropModel(self.protocol, records, begun.guesses, clock_u, self.components)
+        model = DropModel(self.protocol, records, begun.guesses, self.scale.u, self.components)
         if x is not None:
             return timed(model, begun._replace(x=x), 1.0)
         return timed(model, begun, self.scale.hz / identified.scale.hz)
 
     def _read(
-        self, every: dict[int, Identified], *, explain: bool
+        self, every: dict[tuple[int, ...], Identified], *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
         """Read a drop whose rods strike where the protocol, from the contact point, has them."""
         protocol, run, drop, scale, components, aside = self
@@ -216,7 +220,7 @@ class DropCase(NamedTuple):
                     every[aside] = known
                 reasons = (*reasons, *(known.explained or ()))
             return DropResult(run, drop.attempt, early.verdict, reasons, audit), None
-        fit = self._timed(known)
+        fit = self._timed(records, known)
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.matched, count_unexplained(unmatched))
         joint = by_itself(fit)
@@ -264,8 +268,7 @@ class DropCase(NamedTuple):
     def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
         assert self.components is not None
         premise = Premise(self.protocol, self.run, scale.hz, self.aside)
-        short = thinned(self.drop, scale.hz)
-        return Explainer(premise, short, scale.u, self.components, suspects)
+        return Explainer(premise, thinned(self.drop, scale.hz), scale.u, self.components, suspects)
 
 
 def fit_drop(

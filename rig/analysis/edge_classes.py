@@ -116,13 +116,13 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
                 back = later_passages(record, train, match, path, model.protocol.gravity.value)
                 unmatched += _surplus(gate.channel, train, match, hit, back)
         for train in record.aside:
-            every_edge = zip(
+            rows = zip(
                 train.times.tolist(), train.blocked.tolist(), train.edge.tolist(), strict=True
             )
             channel = gates[train.gate].channel
             unmatched += [
                 UnmatchedEdge("left out", channel, when, dark, None, edge, 0.0)
-                for when, dark, edge in every_edge
+                for when, dark, edge in rows
             ]
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 

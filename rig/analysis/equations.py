@@ -117,7 +117,7 @@ class Expected(NamedTuple):
     alone
         Whether all rods below have struck: only the top rod falls.
     landed
-        How much higher it may be there because it struck before, m; one standard deviation.
+        How much higher its rod may be there because it struck before, m; one standard deviation.
     begins, ends
         Number of observed edges before each gate, and of expected ones after each.
     """
@@ -152,10 +152,9 @@ class Expected(NamedTuple):
             # Others but the top rod may strike the one before, which may be thicker.
             before = np.append(0.0, record.chain.diameters[:-1])[rods]
             u = np.where(rods < strikes.size - 1, np.maximum(u, before), u)
-        left = np.full(rods.size, np.inf)  # of each rod's way
-        strike = np.full(rods.size, protocol.contact.strike.value)
+        left = np.full(rods.size, np.inf)  # of each rod's way until it strikes
         if record.ratios is not None:
-            left = levels + strikes[rods]
+            left = levels + strikes[rods] - protocol.contact.strike.value
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),
@@ -166,7 +165,7 @@ class Expected(NamedTuple):
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
-            _landed(strike, u, left),
+            _landed(u, left),
             np.cumsum(observed) - observed,
             np.cumsum(expected),
         )
@@ -188,11 +187,11 @@ class Expected(NamedTuple):
         return Seen(pick, self.times[edge], self.burst[edge], alone, landed, paired)
 
 
-def _landed(strike: Array, u: Array, left: Array) -> Array:
+def _landed(u: Array, left: Array) -> Array:
     """See `Expected.landed`: normally distributed strikes, from which on a rod is slower."""
     found = np.zeros_like(left)
     for place in np.flatnonzero(np.isfinite(left) & (u > 0.0)):
-        z = float(left[place] - strike[place]) / float(u[place])
+        z = float(left[place] / u[place])
         beyond = 0.5 * math.erfc(z / math.sqrt(2.0))
         square = (1.0 + z * z) * beyond - z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
         found[place] = SLOWED * u[place] * math.sqrt(max(square, 0.0))

@@ -36,7 +36,7 @@ class Premise(NamedTuple):
     protocol: Protocol
     run: Run
     hz: float
-    aside: int = 0
+    aside: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from rig.analysis.identify import identify
 from rig.analysis.verdict import SUPPORT, pattern_faults
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from rig.analysis.components import Components
     from rig.clock.calibration import TimeScale
@@ -56,7 +56,7 @@ def identified(
     drop: Drop,
     scale: TimeScale,
     components: Components,
-    aside: int = 0,
+    aside: Collection[int] = (),
 ) -> Identified:
     """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`."""
     window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)

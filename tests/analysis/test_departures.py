@@ -144,21 +144,21 @@ def test_gates_that_not_all_rods_pass_are_left_out(gates):
     """As if they were not there; each of their edges is named."""
     one = case(UNIFORM, MILD, incline=40.0)
     lost = {gate.channel: 8 + 6 * n for n, gate in enumerate(LOWEST[:gates])}
-    result = without(one, lost).analyze()
-    assert result.verdict == "marginal"
+    blind = without(one, lost)
+    result = blind.analyze()
     (reason,) = result.reasons
-    assert reason.code == "low_gates_miss_rods"
+    assert (result.verdict, reason.code) == ("marginal", "low_gates_miss_rods")
     assert {gate["channel"] for gate in reason.values["at"]} == set(lost)
-    left_out = [edge for edge in result.unmatched if edge.kind == "left out"]
-    assert {edge.channel for edge in left_out} == set(lost)
-    assert len(left_out) == sum(edge.channel in lost for edge in without(one, lost).drop.edges)
+    left_out = {edge.edge for edge in result.unmatched if edge.kind == "left out"}
+    assert left_out == {n for n, edge in enumerate(blind.drop.edges) if edge.channel in lost}
     placed = replace(UNIFORM.gates, gates=tuple(
         gate for gate in UNIFORM.gates.gates if gate.channel not in lost))  # fmt: skip
     without_gates = replace(one, protocol=replace(UNIFORM, gates=placed)).analyze()
     for name, measured in without_gates.quantities.items():
         if not name.endswith(("strike_m", "strike_m_s")):
-            assert result.quantities[name].value == pytest.approx(measured.value, rel=1e-6), name
-            assert result.quantities[name].u == pytest.approx(measured.u, rel=1e-4), name
+            found = result.quantities[name]
+            assert found.value == pytest.approx(measured.value, rel=1e-6), name
+            assert found.u == pytest.approx(measured.u, rel=1e-4), name
 
 
 def test_a_low_gate_whose_rods_come_late_is_left_out():
@@ -171,9 +171,8 @@ def test_a_low_gate_whose_rods_come_late_is_left_out():
                 edges[n] = edges[n]._replace(tick=edges[n].tick + round(1.5e-3 * HZ))
             seen.add(rod)
     result = one.with_edges(edges).analyze()
-    assert result.verdict == "marginal"
     (reason,) = result.reasons
-    assert reason.code == "low_gates_miss_rods"
+    assert (result.verdict, reason.code) == ("marginal", "low_gates_miss_rods")
     assert [gate["channel"] for gate in reason.values["at"]] == [LOWEST[0].channel]
 
 
@@ -185,10 +184,12 @@ def test_a_fault_is_named_beside_gates_that_are_left_out():
     assert "thickness" in codes(result)
 
 
-def test_a_gate_that_goes_blind_above_others_is_not_left_out():
+@pytest.mark.parametrize("lost", [{2: 8}, {0: -1, 1: 8}])
+def test_gates_above_others_are_not_left_out_nor_above_dead_ones(lost):
     one = case(UNIFORM, MILD, incline=40.0)
-    result = without(one, {LOWEST[2].channel: 8}).analyze()
+    result = without(one, {LOWEST[n].channel: rod for n, rod in lost.items()}).analyze()
     assert "low_gates_miss_rods" not in codes(result)
+    assert ("gate_silent" in codes(result)) == (-1 in lost.values())
 
 
 @pytest.mark.parametrize("above", [-0.01, 0.0, 0.015])
@@ -217,7 +218,7 @@ def test_a_rod_that_may_have_struck_is_seen_higher_by_half_of_what_it_had_to_go_
     """
     contact = Contact(strike=Quantity(above, 8e-3))
     expected = case(replace(UNIFORM, contact=contact), seed=3).model()[0].expected["impact"]
-    far = np.linspace(-9.0, 9.0, 2001)
+    far = np.linspace(-9.0, 9.0, 20001)
     assert expected.alone.sum() == 4
     heights = [gate.height for gate in UNIFORM.gates.gates]
     for n, rod in enumerate(expected.rods):
@@ -225,7 +226,7 @@ def test_a_rod_that_may_have_struck_is_seen_higher_by_half_of_what_it_had_to_go_
         off = expected.sign[n] * UNIFORM.chains["A"].widths[TOP]
         lost = 0.5 * np.maximum(above + sd * far - heights[expected.gate[n]] + off, 0.0)
         usual = math.sqrt(np.average(lost**2, weights=np.exp(-0.5 * far**2)))
-        assert expected.landed[n] == pytest.approx(usual, rel=2e-3, abs=1e-9)
+        assert expected.landed[n] == pytest.approx(usual, rel=1e-3, abs=1e-9)
 
 
 @pytest.mark.parametrize(

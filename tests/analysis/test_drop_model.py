@@ -206,8 +206,8 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
             off = np.where((times > hits[0]) & ~last, np.hypot(STATED.departure, further), 0.0)
             assert left[~last].min() == 2
             assert last.any()
-        edges = model.expected[role]
-        landed = np.where(edges.alone, 0.0, edges.landed)[np.concatenate(match) >= 0]
+        edges, seen = model.expected[role], np.concatenate(match) >= 0
+        landed = (edges.landed * ~edges.alone)[seen]
         expected = [
             math.sqrt(STATED.floor**2 + v**2 * (STATED.jitter**2 + b**2) + d**2 + early**2)
             for v, b, d, early in zip(speed, burst, off, landed, strict=True)
