@@ -128,11 +128,10 @@ class DropCase(NamedTuple):
         """
         known = {} if before is None else {**before.identified}
         result, fit = self.read(known, explain=explain)
-        if result.verdict in GOOD and self.protocol.track is None:  # friction is no clock's fault
-            gravity = free_gravity(self.protocol, result, self.drop, self.scale)
-            result = replace(result, gravity=gravity)
         aside, x = None, np.zeros(0)
         if fit is not None:
+            if result.verdict in GOOD:
+                result = replace(result, gravity=free_gravity(fit))
             records, x = fit.model.records.values(), fit.x
             aside = tuple(train.gate for record in records for train in record.aside)
         deviations = {name: value.deviation for name, value in result.quantities.items()}

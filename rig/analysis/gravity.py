@@ -2,47 +2,35 @@
 
 This is no result. In g = 2·length/time² an error of the time scale counts twice, so a g that is not
 the place's says that the clock, a beam's height or the protocol's gravity is not what it is said
-to be. It takes the adjustment's matches of edges to rods, and fits the free chain by itself, as
-the calibration drop that it is. What the air takes is fitted beside it: a light chain would read
-several per cent less.
+to be. The free chain's edges are asked alone, as those of the calibration drop that it is. What the
+air takes is unknown beside it: a light chain would read several per cent less.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.adjust import adjust
-from rig.analysis.annealing import Guess
 from rig.analysis.averages import average
-from rig.analysis.chain_records import chain_records
-from rig.analysis.drop_model import DropModel
-from rig.analysis.equations import Expected
+from rig.analysis.equations import scaled
 from rig.analysis.evidence import STATED_WEIGHT
-from rig.analysis.fit import CLOSE
+from rig.analysis.fit import count_matched
 from rig.analysis.plain_data import attributes
-from rig.analysis.quantities import Adjusted
 from rig.analysis.result import GOOD, Measured
-from rig.analysis.trajectory import free_trajectory
-from rig.threads import one_thread
+from rig.analysis.square_root import square_root
+from rig.analysis.unknowns import ANY_GRAVITY
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
-    from numpy.typing import NDArray
-
-    from rig.analysis.chain_records import EdgeTrain
+    from rig.analysis.fit import Fit
     from rig.analysis.result import DropResult
-    from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol
-    from rig.records import Drop
     from rig.units import Quantity
-
-    Index = NDArray[np.intp]
 
 _FEWEST = 8  # edges
 
@@ -112,46 +100,32 @@ def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityC
     return GravityCheck(mean, protocol.gravity, len(found))
 
 
-@one_thread
-def free_gravity(
-    protocol: Protocol, result: DropResult, drop: Drop, scale: TimeScale
-) -> Measured | None:
-    """Fit the free chain's fall to one drop's matched edges, as in a scene without a surface."""
-    if protocol.gates is None or result.run.free is None:
-        return None
-    if protocol.surface is None:  # then this is what is measured
-        return result.quantities.get("gravity_m_s2")
-    scene = replace(protocol, surface=None)
-    (record,) = chain_records(scene, replace(result.run, impact=None), drop, scale.hz) or (None,)
-    if record is None:
-        return None
-    matches = [_matched(train, result.matches) for train in record.trains]
-    expected = Expected.of(record, scene)
-    pick, edge = expected.chosen(matches)
-    if pick.size < _FEWEST:
-        return None
-    fall = free_trajectory(0.0, scene.drop.value, scene.gravity.value)
-    release = float(np.median(expected.times[edge] - fall.times(expected.levels[pick])))
-    guesses = {"free": Guess(release, scene.drop.value)}
-    model = DropModel(scene, [record], guesses, scale.u)
-    estimate = adjust(model, {"free": matches}, model.first(), done=CLOSE)
-    # How much edges scatter is seen where they are many; what is stated of it counts as one more.
-    if estimate.scatter == 1.0:
-        scatter = (STATED_WEIGHT + estimate.chi2) / (STATED_WEIGHT + estimate.degrees)
-        sizes, share = model.components, math.sqrt(scatter)
-        model.components = replace(sizes, floor=sizes.floor * share, jitter=sizes.jitter * share)
-        estimate = adjust(model, {"free": matches}, estimate.x, done=CLOSE)
-    gravity = Adjusted(model, estimate.x).gravity
-    return Measured(float(gravity.value), estimate.u(gravity.slopes))
+def free_gravity(fit: Fit) -> Measured | None:
+    """Let the free chain's edges alone say what gravity is, with all else as uncertain as it is.
 
+    About the fit of the whole drop one step leads there.
 
-def _matched(train: EdgeTrain, rods: Mapping[int, int]) -> Index:
-    """Return which edge of a train each expected one is, −1 for none; `rods` of a drop's edges."""
-    passages = zip(train.rods.tolist(), train.blocks.tolist(), strict=True)
-    seen = {
-        (rods.get(number), blocked): at
-        for at, (number, blocked) in enumerate(
-            zip(train.edge.tolist(), train.blocked.tolist(), strict=True)
-        )
-    }
-    return np.array([seen.get(passage, -1) for passage in passages], dtype=np.intp)
+    Returns
+    -------
+    Measured or None
+        m/s²; `None` where no free chain falls past beams, or gravity is what a scene measures.
+    """
+    estimate, model, rows = fit.estimate, fit.model, fit.estimate.rows.get("free")
+    if rows is None or model.protocol.surface is None:
+        return None
+    edges, at = count_matched(fit.matches["free"]), model.unknowns["gravity"].start
+    if edges < _FEWEST:
+        return None
+    sd = estimate.sd.copy()
+    sd[at] = ANY_GRAVITY
+    pull, share = scaled(estimate.x, sd), 1.0
+    for _ in range(2):
+        # How much edges scatter is seen where they are many; what is stated counts as one more.
+        rows = rows._replace(slopes=rows.slopes / share, left=rows.left / share)
+        root = square_root([rows], sd, pull)
+        step, inverse = root.step(), np.linalg.inv(root.matrix)
+        left = rows.after(step * sd).left
+        degrees = max(0.0, edges - sd.size + float(np.sum(inverse**2)))
+        share = math.sqrt((STATED_WEIGHT + float(left @ left)) / (STATED_WEIGHT + degrees))
+    value = model.protocol.gravity.value + float(estimate.x[at] + step[at] * sd[at])
+    return Measured(value, float(np.linalg.norm(inverse[at]) * sd[at]))
