@@ -115,7 +115,7 @@ def run_protocol(
     # The owner of the port has let go of the file: results are the runner's own business.
     with Session.open(session_path, readonly=True) as session:
         operator.say("analysing the session …")
-        return results(session, known=campaign.live.known)
+        return results(session, drops=campaign.live.known)
 
 
 class Campaign:

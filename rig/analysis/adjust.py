@@ -96,7 +96,7 @@ class Estimate:
 
     def kept(self) -> Estimate:
         """Return the same in little memory."""
-        rows = {role: one.triangle() for role, one in self.rows.items()}
+        rows = {role: block.triangle() for role, block in self.rows.items()}
         return replace(self, rows=rows)
 
 
@@ -165,41 +165,41 @@ def least_squares(
         Always of finite numbers; where no further step could be taken it is not settled.
     """
     search = _Search(linearize, sd, np.zeros_like(x) if centre is None else scaled(centre, sd))
-    here = search.look(scaled(x, sd))
-    if not math.isfinite(here.loss):
+    point = search.look(scaled(x, sd))
+    if not math.isfinite(point.loss):
         return Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
     damping, previous, step = 0.0, 0.0, np.zeros_like(x)
     settled, shorts = False, 0
     for _ in range(steps):
-        step = search.step(here, damping)
-        moved = length(step, here.root.matrix)
-        near = here.size < here.usual
+        step = search.step(point, damping)
+        moved = length(step, point.root.matrix)
+        near = point.size < point.usual
         # As long as steps get shorter alike, the next one is that of the last times their ratio.
         shorts = shorts + 1 if moved < done else 0
-        last = here.size < done or shorts > PATIENT
+        last = point.size < done or shorts > PATIENT
         short = near and (last or (not damping and moved**2 < done * previous))
         if short or (near and not rough):
-            factor = search.scatter(here)
+            factor = search.scatter(point)
             if short and (rough or factor == 1.0):
                 search.inflation, settled = search.inflation * factor, True
                 break
             if factor != 1.0:
-                here, previous = search.weigh(here, factor), 0.0
+                point, previous = search.weigh(point, factor), 0.0
                 continue
-        there = search.look(here.y + step)
-        if not there.loss <= here.loss - _GAIN * here.promised(step):
+        ahead = search.look(point.y + step)
+        if not ahead.loss <= point.loss - _GAIN * point.promised(step):
             damping = damping * _FASTER or _DAMPED
             continue
-        here, previous = there, moved
+        point, previous = ahead, moved
         damping = damping / _SLOWER if damping > _FAINT else 0.0
     step = step if settled else np.zeros_like(x)
-    rows = {role: rows.after(step * sd) for role, rows in here.seen.rows.items()}
+    rows = {role: rows.after(step * sd) for role, rows in point.seen.rows.items()}
     return Estimate(
-        (here.y + step) * sd,
+        (point.y + step) * sd,
         sd,
-        here.root.matrix,
-        here.seen.chi2,
-        here.seen.size,
+        point.root.matrix,
+        point.seen.chi2,
+        point.seen.size,
         search.inflation,
         settled,
         rows,
@@ -245,8 +245,8 @@ class _Point:
 
     def promised(self, step: Array) -> float:
         """By how much a step makes the loss less, if slopes were the same everywhere."""
-        left = self.root.left + self.root.matrix @ step
-        return float(self.root.left @ self.root.left - left @ left)
+        remainder = self.root.left + self.root.matrix @ step
+        return float(self.root.left @ self.root.left - remainder @ remainder)
 
 
 class _Search:
@@ -271,20 +271,20 @@ class _Search:
         """Look what observations say about a point."""
         return _Point(y, self._linearize(y * self._sd, self.inflation), self._sd, y - self._prior)
 
-    def step(self, here: _Point, damping: float) -> Array:
+    def step(self, point: _Point, damping: float) -> Array:
         """Step downhill; the more it is damped, the shorter (Marquardt 1963).
 
         By its second derivative along the way it follows a curve (Transtrum and Sethna 2012).
         """
-        lengths = np.linalg.norm(here.root.matrix, axis=0)
+        lengths = np.linalg.norm(point.root.matrix, axis=0)
         self._steepest = np.maximum(_FORGOTTEN * self._steepest, lengths)
         if not damping:
-            return here.root.step()
-        root = here.root.damped(damping, self._steepest)
+            return point.root.step()
+        root = point.root.damped(damping, self._steepest)
         straight = root.step()
-        there, gradient = self.look(here.y + _TRIED * straight).seen, np.zeros_like(here.y)
-        for role, rows in here.seen.rows.items():
-            turn = there.rows[role].slopes - rows.slopes
+        ahead, gradient = self.look(point.y + _TRIED * straight).seen, np.zeros_like(point.y)
+        for role, rows in point.seen.rows.items():
+            turn = ahead.rows[role].slopes - rows.slopes
             turned = turn @ (straight * self._sd)[rows.columns]
             gradient[rows.columns] += self._sd[rows.columns] * (turned @ rows.slopes)
         bend = root.pulled(0.5 / _TRIED * gradient)
@@ -292,21 +292,21 @@ class _Search:
         short = 2.0 * np.linalg.norm(self._steepest * bend) <= _BENT * long
         return straight + bend if short else straight * math.nan
 
-    def scatter(self, here: _Point) -> float:
+    def scatter(self, point: _Point) -> float:
         """How many times as much as thought observations scatter; 1 where that is near enough.
 
         They never scatter less than stated.
         """
-        seen, inverse = here.seen, np.linalg.inv(here.root.matrix)
+        seen, inverse = point.seen, np.linalg.inv(point.root.matrix)
         degrees = max(1.0, seen.size - len(inverse) + float(np.sum(inverse**2)))
         factor = max(math.sqrt(seen.chi2 / degrees), 1.0 / self.inflation)
         return 1.0 if 1.0 / _MORE < factor < _MORE else factor
 
-    def weigh(self, here: _Point, factor: float) -> _Point:
+    def weigh(self, point: _Point, factor: float) -> _Point:
         """Look at a point as if observations scattered so many times as before."""
         self.inflation *= factor
         self._steepest = self._steepest / factor
-        return self.look(here.y)
+        return self.look(point.y)
 
 
 def length(step: Array, root: Array) -> float:

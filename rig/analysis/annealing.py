@@ -183,17 +183,20 @@ class Pairing:
         blocked = np.concatenate([none, *(train.blocked for train in trains)])
         rods = np.concatenate([none, *(train.rods for train in trains)])
         kind, kinds = (
-            np.concatenate([none, *(2 * n + sides for n, sides in enumerate(every))])
-            for every in ([one.blocked for one in trains], [one.blocks for one in trains])
+            np.concatenate([none, *(2 * n + sides for n, sides in enumerate(states))])
+            for states in (
+                [gate_train.blocked for gate_train in trains],
+                [gate_train.blocks for gate_train in trains],
+            )
         )
-        other = np.full(blocked.size, -1)
+        partner = np.full(blocked.size, -1)
         begins = np.flatnonzero((kind[1:] == kind[:-1] - 1) & (blocked[:-1] > blocked[1:]))
-        other[begins], other[begins + 1] = begins + 1, begins
+        partner[begins], partner[begins + 1] = begins + 1, begins
         return cls(
             np.concatenate([np.zeros(0), *(train.times for train in trains)]),
             np.concatenate([none, *(np.arange(train.times.size) for train in trains)]),
             kind,
-            other,
+            partner,
             kinds,
             rods,
             np.array(widths)[rods] if widths else np.full(rods.size, np.inf),
@@ -252,11 +255,11 @@ class Pairing:
         # In units of σ: of several edges the nearest; written last, it stays.
         far = np.abs(weights.off[edges, which]) / weights.sigma[edges, which]
         order = np.argsort(-far, kind="stable")
-        found = np.full(self.kinds.size, -1)
-        found[weights.side[edges, which][order]] = edges[order]
-        return self._whole(found, speeds)
+        edge_of = np.full(self.kinds.size, -1)
+        edge_of[weights.side[edges, which][order]] = edges[order]
+        return self._whole(edge_of, speeds)
 
-    def _whole(self, found: Index, speeds: Array) -> Index:
+    def _whole(self, edge_of: Index, speeds: Array) -> Index:
         """Give back the top rod's ends of shadows longer than it that no rod below begins or ends.
 
         A rod that is thrown back and the top rod can make one shadow, and no rod that follows tells
@@ -264,15 +267,15 @@ class Pairing:
         """
         last = self.rods.max(initial=0)
         below = np.zeros(self.times.size + 1, dtype=np.bool_)
-        below[found[(found >= 0) & (self.rods < last)]] = True
-        sides = np.flatnonzero((found >= 0) & (self.rods == last))
-        sides = sides[self.other[found[sides]] >= 0]
-        edges = found[sides]
-        other = self.other[edges]
+        below[edge_of[(edge_of >= 0) & (self.rods < last)]] = True
+        sides = np.flatnonzero((edge_of >= 0) & (self.rods == last))
+        sides = sides[self.other[edge_of[sides]] >= 0]
+        edges = edge_of[sides]
+        partner = self.other[edges]
         # At uniform acceleration the mean of both speeds is that of the way between.
-        length = np.abs(self.times[edges] - self.times[other]) * (speeds[edges] + speeds[other])
-        found[sides[(0.5 * length > WIDER * self.widths[sides]) & ~below[other]]] = -1
-        return found
+        length = np.abs(self.times[edges] - self.times[partner]) * (speeds[edges] + speeds[partner])
+        edge_of[sides[(0.5 * length > WIDER * self.widths[sides]) & ~below[partner]]] = -1
+        return edge_of
 
     def matched(self, levels: Array, heights: Array, speeds: Array, scale: float) -> list[Index]:
         """Match the edges to rods.
@@ -298,9 +301,9 @@ class Pairing:
         weights = self.weights(levels, heights, speeds, scale)
         return self.numbered(self.chosen(weights, speeds))
 
-    def numbered(self, found: Index) -> list[Index]:
+    def numbered(self, edge_of: Index) -> list[Index]:
         """Number edges in their trains, train by train."""
-        return split(np.where(found >= 0, self.number[found], -1), self.ends)
+        return split(np.where(edge_of >= 0, self.number[edge_of], -1), self.ends)
 
 
 class Annealed(NamedTuple):
@@ -362,13 +365,13 @@ class SideFall:
     def of(cls, model: DropModel, role: str) -> SideFall:
         """Take a side of a drop that begins as stated."""
         protocol, components, record = model.protocol, model.components, model.records[role]
-        every, strings = model.unknowns.sd, protocol.priors.strings
+        prior_sd, strings = model.unknowns.sd, protocol.priors.strings
         sd = np.zeros(UNKNOWNS)
         sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, components.hang)
         sd[CLOCK], sd[DRAG] = model.clock_u, model.kappa_u
-        sd[PULL] = every[model.unknowns["gravity"]][0]
+        sd[PULL] = prior_sd[model.unknowns["gravity"]][0]
         # What else moves where an edge is expected is no unknown here, but scatters.
-        variance = components.floor**2 + (model.slopes[role].levels ** 2) @ every**2
+        variance = components.floor**2 + (model.slopes[role].levels ** 2) @ prior_sd**2
         if record.ratios is not None:
             variance += components.departure**2
             # All α are alike that energy allows.
@@ -399,9 +402,9 @@ class SideFall:
         low[PULL] = -0.9 * self.gravity
         low[DRAG] = FAINT - self.stated.kappa  # formulas for air and for none are not the same
         low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated.alpha, *ANY_ALPHA)
-        known = self.sd == 0.0
-        unit = np.where(known, 1.0, self.sd)
-        return np.where(known, -np.inf, low / unit), np.where(known, np.inf, high / unit)
+        exact = self.sd == 0.0
+        unit = np.where(exact, 1.0, self.sd)
+        return np.where(exact, -np.inf, low / unit), np.where(exact, np.inf, high / unit)
 
     @cached_property
     def _by(self) -> Array:
@@ -468,8 +471,8 @@ class SideFall:
             part, taken = weights.weight / weights.sigma**2, weights.weight.sum(axis=2)
             across = np.swapaxes(slopes, 1, 2)
             matrix = (across * part.sum(axis=2)[:, None, :]) @ slopes + prior
-            right = (across @ (part * weights.off).sum(axis=2)[..., None])[..., 0] + y @ prior
-            change = _bounded(matrix, right, y - high, y - low)
+            gradient = (across @ (part * weights.off).sum(axis=2)[..., None])[..., 0] + y @ prior
+            change = _bounded(matrix, gradient, y - high, y - low)
             lasting, done = np.ones(len(y), dtype=np.bool_), False
             if (width <= own).all():  # before that a fall may be on its way
                 likely = -np.log1p(-np.minimum(taken, 1.0 - 1e-12)).sum(axis=1)
@@ -480,8 +483,8 @@ class SideFall:
                 break
             # No chain moves on by more than its rods are sought within.
             moved = (slopes @ change[..., None])[..., 0] * (taken > 0.5)
-            most = np.abs(moved).max(axis=1, initial=1e-9)
-            change *= np.minimum(1.0, width.max() / most)[:, None]
+            longest = np.abs(moved).max(axis=1, initial=1e-9)
+            change *= np.minimum(1.0, width.max() / longest)[:, None]
             y = np.clip(y - change, low, high)[lasting]
         lost = 0.5 * ((y @ prior) * y).sum(axis=1) + 0.5 * np.linalg.slogdet(matrix)[1]
         return [
@@ -602,10 +605,10 @@ class SideFall:
         table = np.cumsum(votes.reshape(len(nodes), -1), axis=1)
         # A rod's distance at the fastest passage apart, no two are the same.
         row, near = np.arange(len(nodes)), np.arange(-int(PART / 2.0), int(PART / 2.0) + 1)
-        falls, most = np.repeat(nodes[None], PEAKS, axis=0), []
+        falls, counts = np.repeat(nodes[None], PEAKS, axis=0), []
         for peak in falls:
             at = table.argmax(axis=1)
-            most.append(table[row, at])
+            counts.append(table[row, at])
             # The middle of a plateau, not its beginning.
             ends = [
                 np.argmin(line[n:] == line[n]) for line, n in zip(table, at.tolist(), strict=True)
@@ -613,7 +616,7 @@ class SideFall:
             middle = at + np.maximum(np.array(ends) - 1, 0) // 2
             peak[:, RELEASE] = begin + step * (middle + 0.5)
             table[row[:, None], np.clip(middle[:, None] + near, 0, bins)] = 0
-        return falls.reshape(-1, UNKNOWNS), np.concatenate(most)
+        return falls.reshape(-1, UNKNOWNS), np.concatenate(counts)
 
     def _unlike(self, falls: Array) -> list[int]:
         """Return the first falls of which each gives other rods to the edges than all before."""
@@ -621,21 +624,21 @@ class SideFall:
         height, speed = self.path(falls).heights(self.since(falls, self.pairing.times))
         side, _, _, weight = self.pairing.weights(self.levels, height, speed, self.slack)
         rods = np.where(weight > 0.5, side, -1).max(axis=2)
-        for n, mine in enumerate(rods):
-            alike = ((rods[chosen] == mine) & (mine >= 0)).sum(axis=1)
-            if len(chosen) < PEAKS and (alike <= _ALIKE * (mine >= 0).sum()).all():
+        for n, sides in enumerate(rods):
+            alike = ((rods[chosen] == sides) & (sides >= 0)).sum(axis=1)
+            if len(chosen) < PEAKS and (alike <= _ALIKE * (sides >= 0).sum()).all():
                 chosen.append(n)
         return chosen
 
 
-def _bounded(matrix: Array, right: Array, least: Array, most: Array) -> Array:
+def _bounded(matrix: Array, gradient: Array, low: Array, high: Array) -> Array:
     """Solve for steps; what would leave its bounds goes there, and the others follow."""
-    change = np.linalg.solve(matrix, right[..., None])[..., 0]
-    held = (change < least) | (change > most)
+    change = np.linalg.solve(matrix, gradient[..., None])[..., 0]
+    held = (change < low) | (change > high)
     if held.any():
-        known = np.where(held, np.clip(change, least, most), 0.0)
-        right = np.where(held, known, right - (matrix @ known[..., None])[..., 0])
+        fixed = np.where(held, np.clip(change, low, high), 0.0)
+        gradient = np.where(held, fixed, gradient - (matrix @ fixed[..., None])[..., 0])
         free = ~held[:, :, None] & ~held[:, None, :]
         matrix = np.where(free, matrix, np.eye(UNKNOWNS))
-        change = np.linalg.solve(matrix, right[..., None])[..., 0]
+        change = np.linalg.solve(matrix, gradient[..., None])[..., 0]
     return np.asarray(change)

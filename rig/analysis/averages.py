@@ -50,9 +50,9 @@ def average(
     runs
         Of which the one that knows its own uncertainty least speaks for all.
     """
-    single, known = max(own, seen), min(max(1.0, run.degrees) for run in runs)
+    single, degrees_alone = max(own, seen), min(max(1.0, run.degrees) for run in runs)
     u = math.hypot(single, common)
-    share = single**4 / (freedom if seen > own else known) + common**4 / known
+    share = single**4 / (freedom if seen > own else degrees_alone) + common**4 / degrees_alone
     degrees = u**4 / share if share > 0.0 else math.inf
     return Measured(value, u, degrees, {"runs": single, "common": common})
 
@@ -98,25 +98,25 @@ def effect(blocks: Sequence[Sequence[Measured]], weights: Array) -> Measured:
 
     Its scatter is that between blocks and within them.
     """
-    every = [run for block in blocks for run in block]
+    runs = [run for block in blocks for run in block]
     values = np.array([[run.value for run in block] for block in blocks])
     sums = values @ weights
     n, size = len(blocks), float(weights @ weights)
     # Within a block one sum is left that knows of no mean, no chain and no linear drift.
-    known = np.stack([np.ones(len(ABBA)), np.arange(len(ABBA)), np.where(ABBA, 1.0, -1.0)])
-    rest = np.linalg.svd(known)[2][-1]
+    design = np.stack([np.ones(len(ABBA)), np.arange(len(ABBA)), np.where(ABBA, 1.0, -1.0)])
+    rest = np.linalg.svd(design)[2][-1]
     # Its square is of the runs' own scatter only: one more degree of freedom from each block.
     squares = float(np.sum((sums - sums.mean()) ** 2) + size * np.sum((values @ rest) ** 2))
     freedom = 2 * n - 1.0
-    vectors = _shared(every)
+    vectors = _shared(runs)
     if vectors is not None:
         common = float(np.linalg.norm(np.tile(weights, n) @ vectors / n))
     else:  # two chains share none of what is a chain's own, and all else cancels
         chains = math.hypot(weights[0] + weights[3], weights[1] + weights[2])
-        common = chains * math.sqrt(fmean(_parts(every, _CHAINS_OWN)))
-    own = _own_variance(every, _CHAINS_OWN) * size
+        common = chains * math.sqrt(fmean(_parts(runs, _CHAINS_OWN)))
+    own = _own_variance(runs, _CHAINS_OWN) * size
     seen = math.sqrt(squares / freedom / n)
-    return average(float(sums.mean()), math.sqrt(own / n), seen, freedom, common, every)
+    return average(float(sums.mean()), math.sqrt(own / n), seen, freedom, common, runs)
 
 
 def _shared(runs: Sequence[Measured]) -> Array | None:

@@ -66,19 +66,19 @@ class Budgets:
     def _gains(self) -> dict[int, Array]:
         """GᵀG of all drops' own unknowns, by the line of the budget that they belong to."""
         size = self._common.size
-        found: dict[int, Array] = {}
+        gains: dict[int, Array] = {}
         for drop in self.joint.drops if size else ():
             lines = _supposed(drop.model).line[drop.own]
             for line in set(lines.tolist()):
                 gain = drop.gain[lines == line]
-                total = found.setdefault(line, np.zeros((size, size)))
+                total = gains.setdefault(line, np.zeros((size, size)))
                 total[np.ix_(drop.here, drop.here)] += gain.T @ gain
-        return found
+        return gains
 
     def measured(self, drop: JointDrop) -> dict[str, Measured]:
         """Everything the scene lets one measure, by its JSON name."""
-        found = measurands(drop.model, drop.x)
-        return {name: self.measure(drop, value) for name, value in found.items()}
+        values = measurands(drop.model, drop.x)
+        return {name: self.measure(drop, value) for name, value in values.items()}
 
     def gates(self, drop: JointDrop) -> tuple[GatePassage, ...]:
         """How one object passed each gate."""
@@ -117,16 +117,20 @@ class Budgets:
         lines = np.bincount(place, own * own, size)
         lines += np.bincount(self._common, common * common, size)
         # The sum over all drops was made once; this drop's share is replaced by its own rows.
-        here = np.bincount(place, behind * behind, size)
+        behind_lines = np.bincount(place, behind * behind, size)
         for line, gains in self._gains.items():
-            lines[line] += max(0.0, float(common @ gains @ common) - float(here[line]))
+            lines[line] += max(0.0, float(common @ gains @ common) - float(behind_lines[line]))
         # What no prior explains comes from the edges; rounding may leave less than nothing.
         lines[_LINES["edges"]] += max(0.0, variance - float(lines.sum()))
         parts = zip(_LINES, np.sqrt(lines).tolist(), strict=True)
         budget = {name: line for name, line in parts if line > 0.0}
-        u, found = math.sqrt(variance), self.joint.degrees
-        known = {name: found[line.scale] for name, line in BUDGET.items() if line.scale in found}
-        degrees = effective_degrees(u, budget, known)
+        u, scale_degrees = math.sqrt(variance), self.joint.degrees
+        line_degrees = {
+            name: scale_degrees[line.scale]
+            for name, line in BUDGET.items()
+            if line.scale in scale_degrees
+        }
+        degrees = effective_degrees(u, budget, line_degrees)
         deviation = self._deviation(drop, gradient, degrees)
         return Measured(
             float(result.value), u, degrees, budget, shared if shared.size else None, deviation
@@ -134,31 +138,37 @@ class Budgets:
 
     def _deviation(self, drop: JointDrop, gradient: Array, degrees: float) -> Deviation:
         """Return how far a result may be from a prediction that holds."""
-        (place, known, absent), mine, here = _supposed(drop.model), drop.own, drop.here
+        (place, predicted, absent), own_places, places = _supposed(drop.model), drop.own, drop.here
         if self._common.size:  # what is guessed counts for as much as its expanded uncertainty says
             wider = (coverage_factor(GUESSED) / COVERAGE_95) ** 2
             absent = np.where(np.isin(place, _GUESSED), 1.0 - wider, absent)
-        true = np.where(known, 0.0, gradient)
-        told = gradient[mine] - true[mine]
-        moves, whole, without, lost = (np.zeros(self._common.size) for _ in range(4))
-        moves[here], lost[here] = true[drop.common], absent[drop.common]
-        whole[here] = gradient[drop.common] - drop.gain.T @ gradient[mine]
-        without[here] = drop.gain.T @ told
+        true = np.where(predicted, 0.0, gradient)
+        from_edges = gradient[own_places] - true[own_places]
+        moves, response, without, lost = (np.zeros(self._common.size) for _ in range(4))
+        moves[places], lost[places] = true[drop.common], absent[drop.common]
+        response[places] = gradient[drop.common] - drop.gain.T @ gradient[own_places]
+        without[places] = drop.gain.T @ from_edges
         root = self.joint.inverse  # whose product with its transpose is the common covariance
-        common = root @ (whole @ root)
-        alone = drop.inverse @ (gradient[mine] @ drop.inverse)
-        left = true[mine] - np.where(known[mine], 0.0, alone - drop.gain @ common[here])
-        own = true[mine] @ true[mine] - gradient[mine] @ alone + 2.0 * told @ alone
-        own -= absent[mine] @ left**2
-        less, more = (
+        common = root @ (response @ root)
+        solved = drop.inverse @ (gradient[own_places] @ drop.inverse)
+        error = true[own_places] - np.where(
+            predicted[own_places], 0.0, solved - drop.gain @ common[places]
+        )
+        own = (
+            true[own_places] @ true[own_places]
+            - gradient[own_places] @ solved
+            + 2.0 * from_edges @ solved
+        )
+        own -= absent[own_places] @ error**2
+        less, surplus = (
             np.sqrt(np.maximum(0.0, sign * lost)) * (moves - common) for sign in (1.0, -1.0)
         )
         # hCh + h(Ce) + (eC)h is what h + e make, less what e makes; e = −Gᵀ of what is known.
-        plus = np.concatenate([moves, without @ root, more])
-        minus = np.concatenate([(whole + without) @ root, less])
+        plus = np.concatenate([moves, without @ root, surplus])
+        minus = np.concatenate([(response + without) @ root, less])
         if not self._common.size:  # what drops have in common is known by its line alone
-            part = (1.0 - absent[mine]) * left**2
-            shared = float(part[np.isin(place[mine], _SHARED)].sum())
+            part = (1.0 - absent[own_places]) * error**2
+            shared = float(part[np.isin(place[own_places], _SHARED)].sum())
             own, plus, minus = own - shared, np.array([math.sqrt(shared)]), np.zeros(1)
         if "impact" in drop.model.records:
             degrees = self.joint.degrees.get("impulse", degrees)
@@ -187,11 +197,11 @@ class _Supposed(NamedTuple):
 @lru_cache(maxsize=1)  # all results of a drop ask for it
 def _supposed(model: DropModel) -> _Supposed:
     at = model.unknowns
-    line, known = np.zeros(len(at), dtype=np.intp), np.zeros(len(at), dtype=np.bool_)
+    line, predicted = np.zeros(len(at), dtype=np.intp), np.zeros(len(at), dtype=np.bool_)
     absent = np.zeros(len(at))
     measured = "alpha" if "impact" in model.records else "gravity"
     for name, row in at.rows.items():
-        line[at[name]], known[at[name]] = _LINES[row.line], row.name in {"release", measured}
+        line[at[name]], predicted[at[name]] = _LINES[row.line], row.name in {"release", measured}
         record = model.records["impact" if row.of == "impact" else next(iter(model.records))]
         absent[at[name]] = row.absent(Side(model, record))
-    return _Supposed(line, known, absent)
+    return _Supposed(line, predicted, absent)

@@ -119,13 +119,13 @@ class EdgeArrays:
         last = np.append(first[1:], times.size)[: first.size] - 1
         place = np.arange(times.size)
         from_end = np.minimum(place - first[flicker], last[flicker] - place)
-        left = np.flatnonzero(from_end < LONGEST // 2)
+        spared = np.flatnonzero(from_end < LONGEST // 2)
         return cls(
-            times[left],
-            channels[left],
-            edges[order[left], 2].astype(np.bool_),
-            (times[last] - times[first])[flicker[left]],
-            order[left],
+            times[spared],
+            channels[spared],
+            edges[order[spared], 2].astype(np.bool_),
+            (times[last] - times[first])[flicker[spared]],
+            order[spared],
             np.bincount(channels, minlength=1),
         )
 
@@ -212,15 +212,15 @@ def edge_train(
         How far above the contact point each rod ends, m: what passes below that is not expected;
         `None` where nothing is struck.
     """
-    mine = edges.of_channel(gate.channel)
+    at_gate = edges.of_channel(gate.channel)
     # Some timers tell nothing but that beams darken.
     darkening = bool(edges.blocked.size and edges.blocked.all())
     return EdgeTrain(
         number,
-        edges.times[mine],
-        edges.blocked[mine],
-        edges.burst[mine],
-        edges.numbers[mine],
+        edges.times[at_gate],
+        edges.blocked[at_gate],
+        edges.burst[at_gate],
+        edges.numbers[at_gate],
         *_passages(gate.height, chain, start, higher, darkening),
         edges.count_thinned(gate.channel),
     )

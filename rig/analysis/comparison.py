@@ -121,12 +121,12 @@ def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[
         lines = [
             _Line(
                 protocol.condition(runs[0].run),
-                [one.quantities[name] for one in runs],
+                [run.quantities[name] for run in runs],
                 model[name].value,
                 slope.get(name, {}),
             )
             for runs, model, slope in zip(cases, models, slopes, strict=True)
-            if name in model and all(name in one.quantities for one in runs)
+            if name in model and all(name in run.quantities for run in runs)
         ]
         comparison = _compare(name, lines) if lines else None
         if comparison is not None:
@@ -162,15 +162,15 @@ def _compare(name: str, lines: Sequence[_Line]) -> Comparison | None:
     own, common = _parts(lines)
     covariance = np.diag(own) + common + slopes @ slopes.T
     size = np.diag(slopes @ slopes.T) + [line.values[0].u ** 2 for line in lines]
-    kept = np.flatnonzero(np.diag(covariance) > _ROUNDING * size).tolist()
-    if not kept:
+    places = np.flatnonzero(np.diag(covariance) > _ROUNDING * size).tolist()
+    if not places:
         return None
-    covariance = covariance[np.ix_(kept, kept)]
+    covariance = covariance[np.ix_(places, places)]
     differences = tuple(
         Difference(line.difference, math.sqrt(u2), condition=line.condition, n=len(line.values))
-        for line, u2 in zip((lines[n] for n in kept), np.diag(covariance).tolist(), strict=True)
+        for line, u2 in zip((lines[n] for n in places), np.diag(covariance).tolist(), strict=True)
     )
-    off = np.array([each.value for each in differences])
+    off = np.array([difference.value for difference in differences])
     return Comparison(name, float(off @ np.linalg.solve(covariance, off)), differences)
 
 
@@ -181,7 +181,7 @@ def _parts(lines: Sequence[_Line]) -> tuple[Array, Array]:
     do is a second opinion, beside which the first one counts as a guessed scale does.
     """
     own, plus, minus = [], [], []
-    seen, more, degrees = 0.0, 0, math.inf
+    seen, seen_degrees, degrees = 0.0, 0, math.inf
     alike = len({len(drop.plus) for line in lines for drop in line.deviations}) == 1
     for line in lines:
         drops = line.deviations if alike else [_by_size(drop) for drop in line.deviations]
@@ -197,12 +197,12 @@ def _parts(lines: Sequence[_Line]) -> tuple[Array, Array]:
         if foretold > 0.0:
             values = np.array([drop.value for drop in line.values])
             seen += float(values.var()) * len(drops) * (len(drops) - 1) / foretold
-            more += len(drops) - 1
-    factor = (GUESSED + seen) / (GUESSED + more)
-    unsure = 1.0 / degrees + more / (GUESSED + more) ** 2
-    known = 1.0 / unsure if unsure else math.inf
+            seen_degrees += len(drops) - 1
+    factor = (GUESSED + seen) / (GUESSED + seen_degrees)
+    unsure = 1.0 / degrees + seen_degrees / (GUESSED + seen_degrees) ** 2
+    degrees_together = 1.0 / unsure if unsure else math.inf
     # A scale that is known from few counts for as much as its expanded uncertainty says.
-    factor *= (coverage_factor(max(1.0, known)) / coverage_factor(math.inf)) ** 2
+    factor *= (coverage_factor(max(1.0, degrees_together)) / coverage_factor(math.inf)) ** 2
     gains, losses = np.array(plus), np.array(minus)
     return factor * np.array(own), gains @ gains.T - losses @ losses.T
 

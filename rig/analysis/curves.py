@@ -36,23 +36,23 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
     if surface.pile is not None and low < surface.pile.below_deg <= high:
         edge = surface.pile.below_deg
         points |= {edge, float(np.nextafter(edge, 0.0))}
-    every = [
+    predictions = [
         (struck, predict_incline(protocol, incline, struck, beside(protocol, struck)))
         for struck in protocol.strikers
         for incline in sorted(points)
     ]
-    found = [each for each in every if each[1].separation is not None]
+    in_domain = [pair for pair in predictions if pair[1].separation is not None]
     curves: dict[str, Any] = {
-        "incline_deg": [each.incline_deg for _, each in found],
+        "incline_deg": [pair.incline_deg for _, pair in in_domain],
         "segments": [
-            ("pile" if "pile" in each.model else "surface")
+            ("pile" if "pile" in pair.model else "surface")
             + (f", chain {struck}" if protocol.unlike_chains else "")
-            for struck, each in found
+            for struck, pair in in_domain
         ],
-        "free_fall_speed_m_s": every[0][1].free_fall_speed,
+        "free_fall_speed_m_s": predictions[0][1].free_fall_speed,
     }
     for row in (SPEED, SEPARATION) if protocol.two_chains else (SPEED,):
-        sizes = [getattr(each, f"{row.stem}_u") or 0.0 for _, each in found]
-        curves[row.name] = [getattr(each, row.stem) for _, each in found]
+        sizes = [getattr(pair, f"{row.stem}_u") or 0.0 for _, pair in in_domain]
+        curves[row.name] = [getattr(pair, row.stem) for _, pair in in_domain]
         curves[row.key("U95")] = [coverage_factor(math.inf) * u for u in sizes]
     return curves

@@ -111,15 +111,15 @@ def _missing_rod(
     """Name the rod that no gate saw, while its neighbours passed, unless that may be chance."""
     rods = record.chain.chain.rods
     due, seen = np.zeros(rods), np.zeros(rods)
-    for one in gates:  # at each of which a rod that leaves no trace leaves none of either side
-        due[np.unique(one.train.rods)] += 1.0
-        seen[np.unique(one.train.rods[one.match >= 0])] += 1.0
+    for gate in gates:  # at each of which a rod that leaves no trace leaves none of either side
+        due[np.unique(gate.train.rods)] += 1.0
+        seen[np.unique(gate.train.rods[gate.match >= 0])] += 1.0
     absent = np.flatnonzero((due > 0.0) & (seen == 0.0))
     if absent.size != 1 or absent[0] in (0, rods - 1):
         return  # at an end the chain may have less of them, or hang elsewhere
     rod = int(absent[0])
-    others = due.sum() - due[rod]
-    missed = max(MISSED, (others - seen.sum()) / max(1.0, others))
+    due_others = due.sum() - due[rod]
+    missed = max(MISSED, (due_others - seen.sum()) / max(1.0, due_others))
     if rods * missed ** due[rod] <= _BY_CHANCE:
         yield make_reason(
             "rod_missing",
@@ -134,20 +134,26 @@ def _missing_rod(
 def silent(protocol: Protocol, records: Collection[ChainRecord]) -> list[Reason]:
     """Name the gates that gave no edges, while the others gave theirs."""
     gates = [train for record in records for train in record.trains if train.rods.size]
-    others = [train for train in gates if train.times.size]
-    if sum(one.times.size for one in others) <= STRANGE * sum(one.rods.size for one in others):
+    heard = [train for train in gates if train.times.size]
+    if sum(heard_train.times.size for heard_train in heard) <= STRANGE * sum(
+        heard_train.rods.size for heard_train in heard
+    ):
         return []
-    found = []
+    reasons = []
     for record in records:
-        dead = [one for one in record.trains if one.rods.size and not one.times.size]
+        dead = [
+            heard_train
+            for heard_train in record.trains
+            if heard_train.rods.size and not heard_train.times.size
+        ]
         if len(dead) == len(record.trains) > 1:
-            found.append(make_reason("side_silent", protocol.vocabulary, side=record.role))
+            reasons.append(make_reason("side_silent", protocol.vocabulary, side=record.role))
         else:
-            found += [
+            reasons += [
                 make_reason("gate_silent", protocol.vocabulary, **_values(protocol, train))
                 for train in dead
             ]
-    return found
+    return reasons
 
 
 class _Seen(NamedTuple):

@@ -84,9 +84,11 @@ class DropSummary:
 
     def whole(self) -> DropSummary:
         """Return what was kept with its deviations in their places."""
-        found = self.result.quantities.items()
-        whole = {name: replace(one, deviation=self.deviations[name]) for name, one in found}
-        return replace(self, result=replace(self.result, quantities=whole))
+        values = self.result.quantities.items()
+        quantities = {
+            name: replace(value, deviation=self.deviations[name]) for name, value in values
+        }
+        return replace(self, result=replace(self.result, quantities=quantities))
 
 
 class DropCase(NamedTuple):
@@ -126,8 +128,8 @@ class DropCase(NamedTuple):
         explain
             As for `fit_drop`.
         """
-        known = {} if before is None else {**before.identified}
-        result, fit = self.read(known, explain=explain)
+        readings = {} if before is None else {**before.identified}
+        result, fit = self.read(readings, explain=explain)
         aside, x = None, np.zeros(0)
         if fit is not None:
             if result.verdict in GOOD:
@@ -135,7 +137,7 @@ class DropCase(NamedTuple):
             records, x = fit.model.records.values(), fit.x
             aside = tuple(train.gate for record in records for train in record.aside)
         deviations = {name: value.deviation for name, value in result.quantities.items()}
-        return DropSummary(self.scale, explain, result, known, aside, x, deviations)
+        return DropSummary(self.scale, explain, result, readings, aside, x, deviations)
 
     @one_thread
     def fit(self, summary: DropSummary) -> Fit | None:
@@ -148,33 +150,33 @@ class DropCase(NamedTuple):
 
     @one_thread
     def read(
-        self, known: dict[tuple[int, ...], Identified] | None = None, *, explain: bool = True
+        self, readings: dict[tuple[int, ...], Identified] | None = None, *, explain: bool = True
     ) -> tuple[DropResult, Fit | None]:
         """Read the drop, without the low gates that not all rods pass.
 
         Parameters
         ----------
-        known
+        readings
             What its edges are where some gates are left out, as far as it is known, and will be.
         explain
             As for `fit_drop`.
         """
-        drop, known = self.drop, {} if known is None else known
+        drop, readings = self.drop, {} if readings is None else readings
         if drop.damage:  # the file's, and no finding about chains or gates
             reasons = (make_reason("record_damaged", text=drop.damage),)
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         stated = self._at_contact()
-        result, fit = stated._read(known, explain=False)
+        result, fit = stated._read(readings, explain=False)
         wrong = _void_by(result) - _SKEW
         case, last = stated, fit
         while low := gates_too_low(
             self.protocol, last.model.records.values() if last else case._records(), last
         ):
             case = case._replace(aside=(*case.aside, *low))
-            without = other, last = case._read(known, explain=False)
-            if not _void_by(other) - _SKEW:
+            without = reading, last = case._read(readings, explain=False)
+            if not _void_by(reading) - _SKEW:
                 return without
-        return stated._read(known, explain=True) if wrong and explain else (result, fit)
+        return stated._read(readings, explain=True) if wrong and explain else (result, fit)
 
     def _at_contact(self) -> DropCase:
         run, protocol = self.run, self.protocol
@@ -197,48 +199,50 @@ class DropCase(NamedTuple):
         return timed(model, begun, self.scale.hz / identified.scale.hz)
 
     def _read(
-        self, every: dict[tuple[int, ...], Identified], *, explain: bool
+        self, readings: dict[tuple[int, ...], Identified], *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
         """Read a drop whose rods strike where the protocol, from the contact point, has them."""
         protocol, run, drop, scale, components, aside = self
         assert components is not None
         records = self._records()
         audit = _blank_audit(drop, records)
-        rough, known = scale.rounded(), every.get(aside)
-        if known is None or known.scale != rough:
-            known = identified(protocol, run, drop, rough, components, aside)
-            every[aside] = known
-        unlike = {reason.text: reason for reason in known.unlike.values()}.values()
-        doubts = silent(protocol, records) if known.unlike else ()
+        rough, reading = scale.rounded(), readings.get(aside)
+        if reading is None or reading.scale != rough:
+            reading = identified(protocol, run, drop, rough, components, aside)
+            readings[aside] = reading
+        unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
+        doubts = silent(protocol, records) if reading.unlike else ()
         early = judge_record(drop, audit, [*unlike, *doubts])
-        if early.verdict == "void" or known.begun is None:
+        if early.verdict == "void" or reading.begun is None:
             reasons = early.reasons
-            if known.unlike and explain:
-                if known.explained is None:
-                    known = replace(known, explained=self._unlike_fall(known, rough))
-                    every[aside] = known
-                reasons = (*reasons, *(known.explained or ()))
+            if reading.unlike and explain:
+                if reading.explained is None:
+                    reading = replace(reading, explained=self._unlike_fall(reading, rough))
+                    readings[aside] = reading
+                reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, early.verdict, reasons, audit), None
-        fit = self._timed(records, known)
+        fit = self._timed(records, reading)
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.matched, count_unexplained(unmatched))
         joint = by_itself(fit)
         budgets = Budgets(joint)
         measured = budgets.measured(joint.drops[0])
         if not all(
-            math.isfinite(value) for each in measured.values() for value in (each.value, each.u)
+            math.isfinite(number)
+            for value in measured.values()
+            for number in (value.value, value.u)
         ):
             reasons = (make_reason("no_fall", protocol.vocabulary),)
             return DropResult(run, drop.attempt, "void", reasons, audit), None
-        alone = last_passages(fit)
-        end = judge(protocol, run, drop, audit, measured, fit, alone, unmatched)
+        by_passages = last_passages(fit)
+        end = judge(protocol, run, drop, audit, measured, fit, by_passages, unmatched)
         reasons = end.reasons
         if not end.known and (explain or end.verdict != "void"):
             explainer = self._explainer(scale, end.suspects)
             if end.odd or explainer.asked(fit):
                 causes = [cause for cause in explainer.explain(fit) if cause.whole]
                 if why := explained(causes, protocol.vocabulary, end.accused):
-                    reasons = (*(each for each in reasons if each not in end.accused), *why)
+                    reasons = (*(one for one in reasons if one not in end.accused), *why)
         result = DropResult(
             run,
             drop.attempt,
@@ -249,16 +253,16 @@ class DropCase(NamedTuple):
             fit.rods,
             fit.estimate.scatter,
             unmatched=unmatched,
-            last_passages=alone,
+            last_passages=by_passages,
             gates=budgets.gates(joint.drops[0]),
         )
         return result, fit
 
-    def _unlike_fall(self, known: Identified, scale: TimeScale) -> tuple[Reason, ...]:
+    def _unlike_fall(self, reading: Identified, scale: TimeScale) -> tuple[Reason, ...]:
         """Seek what else than the protocol would explain edges that are like no fall."""
         assert self.protocol.gates is not None
         gates = self.protocol.gates.gates
-        strange = [n for n, gate in enumerate(gates) if gate.side in known.poor]
+        strange = [n for n, gate in enumerate(gates) if gate.side in reading.poor]
         if not strange and len(gates) <= FEW_GATES:
             strange = [*range(len(gates))]  # each may see nearly what another should
         causes = self._explainer(scale, strange).explain(None)

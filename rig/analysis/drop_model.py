@@ -102,12 +102,12 @@ class DropModel:
 
     def changed(self, **attributes: Any) -> DropModel:
         """Return the same drop with something else about it, and priors that follow."""
-        other = copy(self)
-        vars(other).update(attributes, _held={})
-        other.unknowns = Unknowns(other)
+        model = copy(self)
+        vars(model).update(attributes, _held={})
+        model.unknowns = Unknowns(model)
         if "suspects" in attributes:
-            other.slopes = {role: side_slopes(other, role) for role in other.records}
-        return other
+            model.slopes = {role: side_slopes(model, role) for role in model.records}
+        return model
 
     def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
         """Return the same drop with other priors, that of impulses relative to the α found.
@@ -131,7 +131,7 @@ class DropModel:
     def under(self, protocol: Protocol) -> DropModel:
         """Return the same drop with the priors of another protocol, alike but for these."""
         # Its heights stay: they may be counted from a contact point that is this drop's own.
-        mine, gates, level = self.protocol, self.protocol.gates, protocol.contact.level
+        current, gates, level = self.protocol, self.protocol.gates, protocol.contact.level
         assert protocol.gates is not None
         assert gates is not None
         kappa, kappa_u = prior_air(protocol)
@@ -139,10 +139,10 @@ class DropModel:
             components=stated(protocol),
             protocol=replace(
                 protocol,
-                drop=Quantity(mine.drop.value, protocol.drop.u),
+                drop=Quantity(current.drop.value, protocol.drop.u),
                 gates=replace(protocol.gates, gates=gates.gates),
-                contact=replace(mine.contact, level=replace(mine.contact.level, u=level.u)),
-                stated=mine.stated,
+                contact=replace(current.contact, level=replace(current.contact.level, u=level.u)),
+                stated=current.stated,
             ),
             _kappa=kappa,
             kappa_u=kappa_u,
@@ -193,13 +193,13 @@ class DropModel:
         """κ of the first chain as a whole, 1/m."""
         return self._kappa + float(x[self.unknowns["drag"]][0])
 
-    def _last(self, what: str, role: str, key: object, make: Callable[[], T]) -> T:
+    def _last(self, kind: str, role: str, key: object, make: Callable[[], T]) -> T:
         """Return what was last made, where it is asked for again: matching and adjusting do so."""
-        held = self._held.get((what, role))
+        held = self._held.get((kind, role))
         if held is None or held[0] != key:
-            held = self._held[what, role] = key, make()
-        made: T = held[1]
-        return made
+            held = self._held[kind, role] = key, make()
+        value: T = held[1]
+        return value
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
         """Path of one side for given unknowns."""
@@ -273,11 +273,13 @@ class DropModel:
         """Return `residuals` with of each what the one before tells of it taken away."""
         return self.parted(role, self.residuals(role, x, matches), matches)
 
-    def parted(self, role: str, left: Residuals, matches: Sequence[Index]) -> Residuals:
+    def parted(self, role: str, residuals: Residuals, matches: Sequence[Index]) -> Residuals:
         """Make `independent` of some residuals."""
-        left = left._replace(values=left.values.copy(), sigma=left.sigma.copy())
-        self._part(self._matched(role, matches), left.loose > 0.0, left.values, left.sigma)
-        return left
+        residuals = residuals._replace(values=residuals.values.copy(), sigma=residuals.sigma.copy())
+        self._part(
+            self._matched(role, matches), residuals.loose > 0.0, residuals.values, residuals.sigma
+        )
+        return residuals
 
     def _part(self, seen: Seen, struck: Flags, values: Array, sigma: Array) -> Array:
         """Make both sides of a rod independent, in place; return `Equations.told`.
@@ -287,19 +289,19 @@ class DropModel:
         """
         together = seen.paired[:-1] & struck[:-1] & struck[1:]
         first, shared = np.flatnonzero(together), self.components.departure**2
-        told = np.zeros(values.size)
-        told[first + 1] = share = shared / sigma[first] ** 2
+        carried = np.zeros(values.size)
+        carried[first + 1] = share = shared / sigma[first] ** 2
         values[first + 1] -= share * values[first]
         sigma[first + 1] = np.sqrt(sigma[first + 1] ** 2 - share * shared)
-        return told
+        return carried
 
     def _sigma(self, seen: Seen, speed: Array, loose: Array) -> Array:
         """Standard deviation of where each edge was seen, m."""
-        known = self.components
-        variance = known.floor**2 + speed**2 * (known.jitter**2 + seen.burst**2)
-        variance += (known.landed * np.where(seen.alone, 0.0, seen.landed)) ** 2
-        found: Array = np.sqrt(variance + known.departures(loose))
-        return found
+        scales = self.components
+        variance = scales.floor**2 + speed**2 * (scales.jitter**2 + seen.burst**2)
+        variance += (scales.landed * np.where(seen.alone, 0.0, seen.landed)) ** 2
+        sigma: Array = np.sqrt(variance + scales.departures(loose))
+        return sigma
 
     def _stamps(self, role: str, x: Array, seen: Seen) -> tuple[Array, Array, Array, Array]:
         """When each edge should have been stamped, by how much later that is than it was, s.
@@ -334,11 +336,11 @@ class DropModel:
         # Of a slow clock the true time is later, and the chain lower by then.
         rates = self.unknowns.rate[acts.columns[acts.clocks]]
         slopes[:, acts.clocks] -= np.outer(speed * times / self.rate(x), rates)
-        told = self._part(seen, loose > 0.0, values, sigma)
-        second = np.flatnonzero(told)
-        slopes[second] -= told[second, None] * slopes[second - 1]
-        left = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
-        return Equations(left, told, slopes, acts.columns)
+        carried = self._part(seen, loose > 0.0, values, sigma)
+        second = np.flatnonzero(carried)
+        slopes[second] -= carried[second, None] * slopes[second - 1]
+        residuals = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
+        return Equations(residuals, carried, slopes, acts.columns)
 
 
 def _widths(record: ChainRecord) -> Sequence[float]:

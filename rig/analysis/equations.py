@@ -143,8 +143,8 @@ class Expected(NamedTuple):
         expected = [train.rods.size for train in trains]
         rods = np.concatenate([train.rods for train in trains])
         levels = np.concatenate([train.levels for train in trains])
-        alone = rods == strikes.size - 1
-        alone &= levels < (
+        last_falling = rods == strikes.size - 1
+        last_falling &= levels < (
             -strikes[-2] if record.ratios is not None and strikes.size > 1 else -np.inf
         )
         u = np.full(rods.size, protocol.contact.strike.u)
@@ -152,9 +152,9 @@ class Expected(NamedTuple):
             # Others but the top rod may strike the one before, which may be thicker.
             before = np.append(0.0, record.chain.diameters[:-1])[rods]
             u = np.where(rods < strikes.size - 1, np.maximum(u, before), u)
-        left = np.full(rods.size, np.inf)  # of each rod's way until it strikes
+        to_strike = np.full(rods.size, np.inf)  # of each rod's way until it strikes
         if record.ratios is not None:
-            left = levels + strikes[rods] - protocol.contact.strike.value
+            to_strike = levels + strikes[rods] - protocol.contact.strike.value
         return cls(
             np.concatenate([train.times for train in trains]),
             np.concatenate([train.burst for train in trains]),
@@ -164,8 +164,8 @@ class Expected(NamedTuple):
             np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
-            alone,
-            _landed(u, left),
+            last_falling,
+            _landed(u, to_strike),
             np.cumsum(observed) - observed,
             np.cumsum(expected),
         )
@@ -173,7 +173,7 @@ class Expected(NamedTuple):
     def chosen(self, matches: Sequence[Index]) -> tuple[Index, Index]:
         """Expected edges that are matched, and the observed edge of each."""
         match = np.concatenate(matches)
-        begins = np.repeat(self.begins, [one.size for one in matches])
+        begins = np.repeat(self.begins, [match_of.size for match_of in matches])
         pick = np.flatnonzero(match >= 0)
         return pick, (match + begins)[pick]
 
@@ -183,19 +183,19 @@ class Expected(NamedTuple):
         paired = np.zeros(pick.size, dtype=np.bool_)
         rods, gate = self.rods[pick], self.gate[pick]
         paired[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
-        alone, landed = self.alone[pick], self.landed[pick]
-        return Seen(pick, self.times[edge], self.burst[edge], alone, landed, paired)
+        last_falling, landed = self.alone[pick], self.landed[pick]
+        return Seen(pick, self.times[edge], self.burst[edge], last_falling, landed, paired)
 
 
-def _landed(u: Array, left: Array) -> Array:
+def _landed(u: Array, to_strike: Array) -> Array:
     """See `Expected.landed`: normally distributed strikes, from which on a rod is slower."""
-    found = np.zeros_like(left)
-    for place in np.flatnonzero(np.isfinite(left) & (u > 0.0)):
-        z = float(left[place] / u[place])
+    sd = np.zeros_like(to_strike)
+    for place in np.flatnonzero(np.isfinite(to_strike) & (u > 0.0)):
+        z = float(to_strike[place] / u[place])
         beyond = 0.5 * math.erfc(z / math.sqrt(2.0))
         square = (1.0 + z * z) * beyond - z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-        found[place] = SLOWED * u[place] * math.sqrt(max(square, 0.0))
-    return found
+        sd[place] = SLOWED * u[place] * math.sqrt(max(square, 0.0))
+    return sd
 
 
 def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
@@ -207,8 +207,8 @@ def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
         Standard deviations beyond which an edge does not count at all.
     """
     far = np.abs(residuals)
-    found: Array = np.where(far > cut, 0.0, HUBER / np.maximum(far, HUBER))
-    return found
+    weights: Array = np.where(far > cut, 0.0, HUBER / np.maximum(far, HUBER))
+    return weights
 
 
 def scaled(x: Array, sd: Array) -> Array:
@@ -253,9 +253,9 @@ def linearize(
     rows: dict[str, EquationRows] = {}
     chi2, loss, size = 0.0, 0.0, 0
     for role, match in matches.items():
-        left, _, slopes, columns = model.equations(role, x, match)
-        sigma = left.sigma * inflation
-        residuals = left.values / sigma
+        side, _, slopes, columns = model.equations(role, x, match)
+        sigma = side.sigma * inflation
+        residuals = side.values / sigma
         root = np.sqrt(robust_weights(residuals, cut))
         residuals *= root
         slopes *= (root / sigma)[:, None]  # in place: nobody else has them

@@ -99,17 +99,19 @@ class Evidence:
             # Back to α², for drops of different α have different units.
             squares = (y[block] * model.unknowns.sd[block]) ** 2
             size = np.full(squares.size, alpha**2)
-            alone = size / above(model.records["impact"].chain.chain) ** 2
-            self._impulses.append(np.stack([size, alone, squares, 1.0 - v[block]]))
+            single = size / above(model.records["impact"].chain.chain) ** 2
+            self._impulses.append(np.stack([size, single, squares, 1.0 - v[block]]))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:
         """Count what is left over of the edges that are no part of a flicker.
 
         Nor of rods that may have struck: most of what these are off is of another kind.
         """
-        known = self.components
+        scales = self.components
         for row in residuals:
-            usual = known.floor**2 + (row.speed * known.jitter) ** 2 + known.departures(row.loose)
+            usual = (
+                scales.floor**2 + (row.speed * scales.jitter) ** 2 + scales.departures(row.loose)
+            )
             good = row.clean & (np.abs(row.values) <= STRAY * row.sigma)
             good &= row.sigma**2 <= 2.0 * usual
             self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.loose[good]))
@@ -133,8 +135,8 @@ class Evidence:
         for kind in _MEMBERS:
             self._settle(kind, new)
         if self._impulses:
-            size, alone, squares, counts = np.concatenate(self._impulses, axis=1)
-            kinds = np.stack([size, np.ones_like(size), alone])
+            size, single, squares, counts = np.concatenate(self._impulses, axis=1)
+            kinds = np.stack([size, np.ones_like(size), single])
             self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new)
         # Where chains leave the equations, whatever else is found may be how they do that.
         parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
@@ -169,8 +171,8 @@ class Evidence:
         # Few bins do as well as all edges.
         edges = np.linspace(speeds.min(), speeds.max(), _BINS + 1)[1:-1]
         after = loose > 0.0
-        left = np.minimum(np.divide(1.0, loose, out=np.zeros_like(loose), where=after), _MANY)
-        place = np.digitize(speeds, edges) + _BINS * np.rint(left).astype(np.intp)
+        falling = np.minimum(np.divide(1.0, loose, out=np.zeros_like(loose), where=after), _MANY)
+        place = np.digitize(speeds, edges) + _BINS * np.rint(falling).astype(np.intp)
         bins = _BINS * (_MANY + 1)
         counts: Array = np.bincount(place, minlength=bins).astype(np.float64)
         sums: Array = np.bincount(place, squares, bins).astype(np.float64)
@@ -201,17 +203,17 @@ class Evidence:
         maximum of the χ² likelihood above the least a, by multiplicative steps.
         """
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
-        found = np.array([getattr(self.components, name) ** 2 for name in names])
+        variances = np.array([getattr(self.components, name) ** 2 for name in names])
         # The stated member is spread over all sizes, so that it pulls no component alone.
         share = STATED_WEIGHT / squares.size
-        squares, counts = squares + share * (_member(stated, found) @ kinds), counts + share
+        squares, counts = squares + share * (_member(stated, variances) @ kinds), counts + share
         least = LEAST_SHARE**2 * stated
         for _ in range(_INNER):
             for n, sizes in enumerate(kinds):
-                found[n] = max(
-                    found[n] * _explained(squares, counts, found @ kinds, sizes), least[n]
+                variances[n] = max(
+                    variances[n] * _explained(squares, counts, variances @ kinds, sizes), least[n]
                 )
-        for name, sizes, variance in zip(names, kinds, found.tolist(), strict=True):
+        for name, sizes, variance in zip(names, kinds, variances.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
 
@@ -221,9 +223,11 @@ def _doubted(parted: float) -> float:
     return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
 
 
-def _member(stated: Size, found: Size) -> Size:
+def _member(stated: Size, variance: Size) -> Size:
     """Square of the member that a stated variance counts for, where so large a one was found."""
-    return 2.0 * stated * found / (stated + found + np.finfo(float).tiny)  # 0 of what is exact
+    return (
+        2.0 * stated * variance / (stated + variance + np.finfo(float).tiny)
+    )  # 0 of what is exact
 
 
 def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:

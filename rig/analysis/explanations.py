@@ -113,9 +113,9 @@ class Explainer:
         self.drop = drop
         self.clock_u = clock_u
         self.components = components
-        every = faults(setting.protocol, setting.run, suspects)
-        self.discrete = [fault for fault in every if fault.shift is None]
-        self.sized = [fault for fault in every if fault.shift is not None]
+        candidates = faults(setting.protocol, setting.run, suspects)
+        self.discrete = [fault for fault in candidates if fault.shift is None]
+        self.sized = [fault for fault in candidates if fault.shift is not None]
         # A fault of one side leaves the other as it was.
         self._votes: dict[Hashable, int] = {}
 
@@ -123,9 +123,9 @@ class Explainer:
         """Whether an adjusted drop asks for some size of a fault."""
         return any(gain > RARE for gain in self._gains(self._scores(fit)))
 
-    def _gains(self, found: Sequence[Score]) -> list[float]:
+    def _gains(self, by_fault: Sequence[Score]) -> list[float]:
         """By how much each fault of some size would be likelier than none, if none were rare."""
-        pairs = zip(self.sized, found, strict=True)
+        pairs = zip(self.sized, by_fault, strict=True)
         return [score.gain - _occam(fault, score.u) for fault, score in pairs]
 
     def explain(self, fit: Fit | None) -> list[Explanation]:
@@ -174,27 +174,27 @@ class Explainer:
         Where one fault explains a drop, another one gains that share of it by which it does the
         same: those that may be as likely are weighed too, however many these are.
         """
-        found = self._scores(fit)
-        gains = np.array(self._gains(found))
+        by_fault = self._scores(fit)
+        gains = np.array(self._gains(by_fault))
         # Of a good reading the score tells beforehand which search would end in vain; air that
         # seems to push is what a fault may save besides.
         least = min(0.0, held_back(fit)) if well else -math.inf
         ranked = [int(n) for n in np.argsort(gains)[::-1] if gains[n] > least]
-        most, first = 0.0, max(gains.max(initial=0.0), 1.0)
+        likeliest, first = 0.0, max(gains.max(initial=0.0), 1.0)
         for rank, n in enumerate(ranked):
-            if rank >= _TRIED and most * (1.0 - gains[n] / first) > _APART:
+            if rank >= _TRIED and likeliest * (1.0 - gains[n] / first) > _APART:
                 return
-            one = self._open(self.sized[n], 0.0, fit.model, fit.x, stated, found[n])
-            if one is not None:
-                most = max(most, one.log_odds)
-                yield one
+            explanation = self._open(self.sized[n], 0.0, fit.model, fit.x, stated, by_fault[n])
+            if explanation is not None:
+                likeliest = max(likeliest, explanation.log_odds)
+                yield explanation
 
     def _beyond(self, fit: Fit, stated: float) -> Iterator[Explanation]:
         """Weigh that it is no fault, but that this fall is not the equations'."""
         if "stretch" not in fit.model.unknowns:
             return
-        known = self.components
-        wider = replace(known, stretch=_BEYOND * known.stretch, landed=_BEYOND * known.landed)
+        scales = self.components
+        wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
         x = fit.x.copy()
         model = fit.model.informed(wider, self.clock_u, x)
         reading = weighed(settle(model, match(model, x), x=x))
@@ -222,28 +222,28 @@ class Explainer:
     def _voted(self, faults: Sequence[Fault], stated: float) -> Iterator[Explanation]:
         """Weigh faults of the sizes for which most edges vote: enough, not fewer than for none."""
         least = self._net(self.setting)[1]
-        found = []
+        candidates = []
         for fault in faults:
             sized = [(*self._net(fault.premise(self.setting, size)), size) for size in fault.sizes]
             share, net, size = max(sized, key=lambda row: row[1])
             if share >= _VOTED and net >= least:
-                found.append((net, fault, size))
-        found.sort(key=lambda row: -row[0])
+                candidates.append((net, fault, size))
+        candidates.sort(key=lambda row: -row[0])
         enough = 0
-        for net, fault, size in found[:_TRIED]:
+        for net, fault, size in candidates[:_TRIED]:
             if net < enough:
                 return
-            one = self._afresh(fault, size, stated)
-            if one is not None:
-                if one.whole:
+            explanation = self._afresh(fault, size, stated)
+            if explanation is not None:
+                if explanation.whole:
                     enough = max(enough, net - 2 * _MARGIN)
-                yield one
+                yield explanation
 
     def _net(self, setting: Premise) -> tuple[float, int]:
         """Share of the expected edges that vote for one fall, and votes less edges without."""
         votes = 0
         records = self._records(setting)
-        expected = sum(one.expected for one in records)
+        expected = sum(side.expected for side in records)
         for record in records:
             key = expected, *_key(setting, record)
             if key not in self._votes:
@@ -299,41 +299,41 @@ class Explainer:
         """
         opened, x = model.suspecting(fault.suspect(model)), np.append(x, 0.0)
         if score is not None:
-            most = max(fault.sizes)
-            x += float(np.clip(score.size, -most, most)) * np.append(score.follow, 1.0)
+            largest = max(fault.sizes)
+            x += float(np.clip(score.size, -largest, largest)) * np.append(score.follow, 1.0)
         reading = weighed(settle(opened, match(opened, x), x=x))
         estimate = reading.fit.estimate
-        more, u = float(estimate.x[-1]), math.sqrt(estimate.covariance[-1, -1]) * estimate.sd[-1]
-        if not _TOLD * u < abs(size + more) <= max(fault.sizes):
+        further, u = float(estimate.x[-1]), math.sqrt(estimate.covariance[-1, -1]) * estimate.sd[-1]
+        if not _TOLD * u < abs(size + further) <= max(fault.sizes):
             return None  # it is better read for another reason than that
-        premise = fault.premise(self.setting, size + more)
+        premise = fault.premise(self.setting, size + further)
         if not last and self._expects_others(premise, model):
-            there = DropModel(
+            moved = DropModel(
                 premise.protocol,
                 self._records(premise),
                 model.guesses,
                 self.clock_u,
                 self.components,
             )
-            return self._open(fault, size + more, there, estimate.x[:-1], stated, last=True)
-        hz = fault.premise(self.setting, size).hz / (1.0 + opened.unknowns.rate[-1] * more)
-        return self._explanation(fault, size + more, u, reading, hz, stated)
+            return self._open(fault, size + further, moved, estimate.x[:-1], stated, last=True)
+        hz = fault.premise(self.setting, size).hz / (1.0 + opened.unknowns.rate[-1] * further)
+        return self._explanation(fault, size + further, u, reading, hz, stated)
 
     def _expects_others(self, premise: Premise, model: DropModel) -> bool:
         """Whether other rods pass other beams than those of a model."""
         return any(
-            not np.array_equal(train.rods, other.rods)
+            not np.array_equal(train.rods, stated.rods)
             for record in self._records(premise)
-            for train, other in zip(record.trains, model.records[record.role].trains, strict=True)
+            for train, stated in zip(record.trains, model.records[record.role].trains, strict=True)
         )
 
     def _explanation(
         self, fault: Fault, size: float, u: float, reading: Reading, hz: float, stated: float
     ) -> Explanation:
-        left = max((score.gain for score in self._scores(reading.fit)), default=0.0)
+        remaining = max((score.gain for score in self._scores(reading.fit)), default=0.0)
         log_odds = self._absolute(reading, hz) - RARE - stated
-        whole = well_read(reading) and left < _LEFT
-        return Explanation(fault, fault.values(size, u), log_odds, whole)
+        complete = well_read(reading) and remaining < _LEFT
+        return Explanation(fault, fault.values(size, u), log_odds, complete)
 
 
 def _freely(reading: Reading) -> float:
@@ -367,7 +367,7 @@ def _key(setting: Premise, record: ChainRecord) -> tuple[Hashable, ...]:
 
 
 def explained(
-    found: Sequence[Explanation], words: Vocabulary, accused: Sequence[Reason] = ()
+    explanations: Sequence[Explanation], words: Vocabulary, accused: Sequence[Reason] = ()
 ) -> list[Reason]:
     """Name the fault that explains a drop clearly, or the likeliest ones.
 
@@ -378,11 +378,18 @@ def explained(
     accused
         What is said where no fault is clear.
     """
-    if not found or found[0].log_odds < CLEAR or found[0].fault is NEITHER:
+    if not explanations or explanations[0].log_odds < CLEAR or explanations[0].fault is NEITHER:
         return [*accused]
-    best, lead = found[0], found[0].log_odds - max([0.0, *(one.log_odds for one in found[1:])])
+    best, lead = (
+        explanations[0],
+        explanations[0].log_odds
+        - max([0.0, *(explanation.log_odds for explanation in explanations[1:])]),
+    )
     if best.whole and lead > CLEAR:
         return [make_reason(best.fault.code, words, **best.values, log_odds=lead)]
-    named = [one for one in found if one.fault is not NEITHER]
-    candidates = [{"code": one.fault.code, "values": one.values} for one in named[:_NAMED]]
+    nameable = [explanation for explanation in explanations if explanation.fault is not NEITHER]
+    candidates = [
+        {"code": explanation.fault.code, "values": explanation.values}
+        for explanation in nameable[:_NAMED]
+    ]
     return [make_reason("unclear_fault", words, candidates=candidates)]

@@ -210,11 +210,11 @@ def _length(names: frozenset[str], name: str, top: float) -> Fault:
     return _sized("chain_length", values, 0.06, 0.015, Shift(chains=names, length=1.0))
 
 
-def _thickness(names: frozenset[str], name: str, most: float) -> Fault:
+def _thickness(names: frozenset[str], name: str, limit: float) -> Fault:
     def values(metres: float, u: float) -> dict[str, Any]:
         return {"name": name, **_size(metres, u)}
 
-    return _sized("thickness", values, most, most, Shift(chains=names, width=1.0))
+    return _sized("thickness", values, limit, limit, Shift(chains=names, width=1.0))
 
 
 def _rods(names: frozenset[str], name: str, rods: int) -> Fault:
@@ -300,11 +300,11 @@ def gate_values(gate: Gate) -> dict[str, Any]:
 
 
 def _with_chains(
-    names: Collection[str], other: Callable[[RodChain, float], RodChain]
+    names: Collection[str], replacement: Callable[[RodChain, float], RodChain]
 ) -> Callable[[Premise, float], Premise]:
     def change(setting: Premise, size: float) -> Premise:
         chains = {
-            name: other(chain, size) if name in names else chain
+            name: replacement(chain, size) if name in names else chain
             for name, chain in setting.protocol.chains.items()
         }
         return setting._replace(protocol=replace(setting.protocol, chains=chains))
@@ -325,9 +325,9 @@ def _with_rods(chain: RodChain, order: Sequence[int], heights: Sequence[float]) 
     return replace(chain, chain=hung, widths=widths, diameters=diameters)
 
 
-def _with_more(chain: RodChain, more: float) -> RodChain:
+def _with_more(chain: RodChain, count_more: float) -> RodChain:
     """Add rods like the top one at the top, or take some off."""
-    heights, count = chain.chain.heights, chain.chain.rods + round(more)
+    heights, count = chain.chain.heights, chain.chain.rods + round(count_more)
     top, pitch = len(heights) - 1, heights[-1] - heights[-2] if len(heights) > 1 else 0.0
     order = [min(n, top) for n in range(count)]
     return _with_rods(chain, order, [heights[k] + pitch * (n - k) for n, k in enumerate(order)])

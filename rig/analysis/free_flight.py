@@ -50,15 +50,15 @@ def fall_for(
     """
     rate = _rate(gravity, kappa)
     # An edge long after the fall overflows no sinh, and meets no second period of the sine.
-    sinus, most = (np.sinh, 300.0) if _is_positive(kappa) else (np.sin, 1.2)
-    half = sinus(np.minimum((0.5 * rate) * since, most)) / rate
+    sinus, largest = (np.sinh, 300.0) if _is_positive(kappa) else (np.sin, 1.2)
+    half = sinus(np.minimum((0.5 * rate) * since, largest)) / rate
     square = gravity * half * half
-    whole = 2.0 * half * np.sqrt(1.0 + kappa * square)
+    sine = 2.0 * half * np.sqrt(1.0 + kappa * square)
     # An adjustment may try what no air does: a chain that falls for ever.
-    grown = np.maximum(kappa * (2.0 * square + speed * whole), -0.9)
+    grown = np.maximum(kappa * (2.0 * square + speed * sine), -0.9)
     shrunk = 1.0 / (1.0 + grown)
-    end = (gravity * whole + speed * (1.0 + 2.0 * kappa * square)) * shrunk
-    return np.log1p(grown) / kappa, end, whole * shrunk
+    end = (gravity * sine + speed * (1.0 + 2.0 * kappa * square)) * shrunk
+    return np.log1p(grown) / kappa, end, sine * shrunk
 
 
 def fall_slopes(
@@ -73,13 +73,13 @@ def fall_slopes(
     As z(λt; v/λ, g/λ², κ) and z(t; λv, λg, κ/λ)/λ are z, they follow from the others:
     2g ∂z/∂g = t ∂z/∂t − v ∂z/∂v, and κ ∂z/∂κ = v ∂z/∂v + g ∂z/∂g − z.
     """
-    way, end, by_speed = fall
+    fallen, end, by_speed = fall
     slower = speed * by_speed
     by_gravity = (since * end - slower) / (2.0 * gravity)
     if _is_faint(kappa):  # −∫∫v² of a ballistic leg
         half = 0.5 * speed * speed + (speed * gravity / 3.0 + gravity**2 * since / 12.0) * since
         return by_gravity, -half * since * since
-    return by_gravity, (slower + gravity * by_gravity - way) / kappa
+    return by_gravity, (slower + gravity * by_gravity - fallen) / kappa
 
 
 def reach_of(distance: Array, kappa: float | Array) -> Array:

@@ -41,8 +41,8 @@ class GatePassage:
 
     def json(self) -> dict[str, Any]:
         """One member of ``gates`` of a run."""
-        found = attributes(self, "channel", "height_m") | {"speed_m_s": self.speed.json()}
-        return found if self.interval is None else found | {"interval_s": self.interval.json()}
+        fields = attributes(self, "channel", "height_m") | {"speed_m_s": self.speed.json()}
+        return fields if self.interval is None else fields | {"interval_s": self.interval.json()}
 
 
 def gate_passages(
@@ -78,13 +78,13 @@ def gate_passages(
     moments = [(gate, *moment(drop, gate)) if gate in seen else None for gate in ordered]
     return tuple(
         GatePassage(
-            now[0].channel,
-            now[0].height,
-            measured(now[2]),
-            measured(now[1] - last[1]) if last else None,
+            passage[0].channel,
+            passage[0].height,
+            measured(passage[2]),
+            measured(passage[1] - last[1]) if last else None,
         )
-        for last, now in pairwise([None, *moments])
-        if now is not None
+        for last, passage in pairwise([None, *moments])
+        if passage is not None
     )
 
 

@@ -66,8 +66,8 @@ class GravityCheck:
 
     def json(self) -> dict[str, Any]:
         """A member of ``calibration``."""
-        said = {"gravity_m_s2": self.measured.json(), "stated_m_s2": self.stated.value}
-        return said | attributes(self, "drops", "normalized_error", "agrees")
+        fields = {"gravity_m_s2": self.measured.json(), "stated_m_s2": self.stated.value}
+        return fields | attributes(self, "drops", "normalized_error", "agrees")
 
 
 def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityCheck | None:
@@ -84,20 +84,20 @@ def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityC
         `None` where no free chain passes gates.
     """
     # Without a surface it is what is measured, and a joint fit knows it better.
-    every = [
+    candidates = [
         result.quantities.get("gravity_m_s2", result.gravity)
         for result in results
         if result.verdict in GOOD
     ]
-    found = [gravity for gravity in every if gravity is not None]
-    if not found:
+    gravities = [gravity for gravity in candidates if gravity is not None]
+    if not gravities:
         return None
     # Beams, rods and clock are the same in every drop, so that no number of drops averages them.
-    common = math.sqrt(fmean(one.u**2 for one in found))
-    values, n = [one.value for one in found], len(found)
+    common = math.sqrt(fmean(measured.u**2 for measured in gravities))
+    values, n = [measured.value for measured in gravities], len(gravities)
     seen = stdev(values) / math.sqrt(n) if n > 1 else 0.0
-    mean = average(fmean(values), 0.0, seen, n - 1.0, common, found)
-    return GravityCheck(mean, protocol.gravity, len(found))
+    mean = average(fmean(values), 0.0, seen, n - 1.0, common, gravities)
+    return GravityCheck(mean, protocol.gravity, len(gravities))
 
 
 def free_gravity(fit: Fit) -> Measured | None:
@@ -124,8 +124,10 @@ def free_gravity(fit: Fit) -> Measured | None:
         rows = rows._replace(slopes=rows.slopes / share, left=rows.left / share)
         root = square_root([rows], sd, pull)
         step, inverse = root.step(), np.linalg.inv(root.matrix)
-        left = rows.after(step * sd).left
+        residuals = rows.after(step * sd).left
         degrees = max(0.0, edges - sd.size + float(np.sum(inverse**2)))
-        share = math.sqrt((STATED_WEIGHT + float(left @ left)) / (STATED_WEIGHT + degrees))
+        share = math.sqrt(
+            (STATED_WEIGHT + float(residuals @ residuals)) / (STATED_WEIGHT + degrees)
+        )
     value = model.protocol.gravity.value + float(estimate.x[at] + step[at] * sd[at])
     return Measured(value, float(np.linalg.norm(inverse[at]) * sd[at]))

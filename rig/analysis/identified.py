@@ -61,9 +61,9 @@ def identified(
     """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`."""
     window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
     records = chain_records(protocol, run, drop, scale.hz, aside)
-    found = identify(protocol, records, scale.u, components, window)
-    unlike, fit = pattern_faults(found, protocol.vocabulary), found.fit
+    identification = identify(protocol, records, scale.u, components, window)
+    unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
     if unlike or fit is None:
-        poor = tuple(role for role, share in found.shares.items() if share < SUPPORT)
+        poor = tuple(role for role, share in identification.shares.items() if share < SUPPORT)
         return Identified(scale, unlike, poor)
     return Identified(scale, unlike, begun=Begun(fit.model.guesses, fit.matches, fit.x))

@@ -127,7 +127,8 @@ def identify(
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
     matched = {
-        role: max((way.matched for way in side), default=0) for role, side in readings.items()
+        role: max((reading.matched for reading in side), default=0)
+        for role, side in readings.items()
     }
     return Identification(None, _shares(model, matched))
 
@@ -136,8 +137,8 @@ def read_quickly(
     protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
 ) -> Reading | None:
     """Read a drop like `identify`, but only near what is stated."""
-    found = identify(protocol, records, clock_u, components, batches=1)
-    return None if found.fit is None else weighed(found.fit)
+    identification = identify(protocol, records, clock_u, components, batches=1)
+    return None if identification.fit is None else weighed(identification.fit)
 
 
 def most_votes(
@@ -151,8 +152,8 @@ def most_votes(
 def well_read(reading: Reading) -> bool:
     """Whether nearly all that could be is matched, with no more scatter or strain than usual."""
     fit = reading.fit
-    most = sum(possible(record) for record in fit.model.records.values())
-    many = reading.share >= LEAST and fit.matched >= _FAIR * most
+    matchable = sum(possible(record) for record in fit.model.records.values())
+    many = reading.share >= LEAST and fit.matched >= _FAIR * matchable
     strain = float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
     return many and fit.estimate.scatter < _CALM and strain < STRAY
 
@@ -183,14 +184,14 @@ def stated_model(
 def _read(fall: SideFall, window: Span, batches: int | None) -> list[Annealed]:
     """Anneal from one batch of starts after another while none explains the edges."""
     readings: list[Annealed] = []
-    least, most = LEAST * fall.record.expected, possible(fall.record)
-    if not fall.pairing.times.size or most < least:
+    least, matchable = LEAST * fall.record.expected, possible(fall.record)
+    if not fall.pairing.times.size or matchable < least:
         return readings
     for starts, _ in itertools.islice(fall.starts(window, least), batches):
         if len(starts):
             readings = _ranked([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
-            if best.scatter < _CALM and best.matched >= max(least, _CLEAR * most):
+            if best.scatter < _CALM and best.matched >= max(least, _CLEAR * matchable):
                 break
     return readings
 
@@ -205,16 +206,16 @@ def _edges(reading: Annealed | Reading) -> list[Index]:
 def _ranked(readings: Iterable[Weighed]) -> list[Weighed]:
     """Order readings, the likeliest first, and leave out what is the same as a likelier one."""
     ranked: list[Weighed] = []
-    for reading in sorted(readings, key=lambda one: -one.evidence):
-        if all(any(map(_unlike, _edges(reading), _edges(other))) for other in ranked):
+    for reading in sorted(readings, key=lambda candidate: -candidate.evidence):
+        if all(any(map(_unlike, _edges(reading), _edges(likelier))) for likelier in ranked):
             ranked.append(reading)
     return ranked
 
 
-def _unlike(mine: Index, theirs: Index) -> bool:
+def _unlike(edges: Index, other_edges: Index) -> bool:
     """Whether two readings give really different rods to the same edges."""
-    matched = int(np.count_nonzero((mine >= 0) | (theirs >= 0)))
-    return bool(np.count_nonzero(mine != theirs) > max(_FEW, _OTHER * matched))
+    matched = int(np.count_nonzero((edges >= 0) | (other_edges >= 0)))
+    return bool(np.count_nonzero(edges != other_edges) > max(_FEW, _OTHER * matched))
 
 
 def log_evidence(fit: Fit) -> float:
@@ -269,8 +270,8 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
         together = _simultaneous(model.protocol, [side.guess.release for side in pair])
         pairs.append((sum(side.evidence for side in pair) + together, pair))
     pairs.sort(key=lambda row: -row[0])
-    most = pairs[0][0]
-    close = [pair for likely, pair in pairs if most - likely < _CLOSE][:PEAKS]
+    likeliest = pairs[0][0]
+    close = [pair for likely, pair in pairs if likeliest - likely < _CLOSE][:PEAKS]
     tried: list[Reading] = []
     for pair in close:
         sides = dict(zip(readings, pair, strict=True))
@@ -283,7 +284,7 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
         return Identification(None, shares)
     odds = best.evidence - rest[0].evidence if rest else math.inf
     if len(pairs) > len(close):
-        odds = min(odds, most - pairs[len(close)][0])
+        odds = min(odds, likeliest - pairs[len(close)][0])
     return Identification(best.fit, shares, odds, best.evidence, rest[0].fit if rest else None)
 
 
@@ -304,7 +305,7 @@ def _simultaneous(protocol: Protocol, releases: Sequence[float]) -> float:
     return -math.log1p(apart**2)
 
 
-def deciding_gate(one: Fit, other: Fit) -> tuple[str, float]:
+def deciding_gate(likelier: Fit, rival: Fit) -> tuple[str, float]:
     """Find the beam that would see two falls differ most.
 
     A beam tells no rod by itself: of each edge of one fall it is compared how far the chain is from
@@ -313,7 +314,7 @@ def deciding_gate(one: Fit, other: Fit) -> tuple[str, float]:
 
     Parameters
     ----------
-    one, other
+    likelier, rival
         Readings of the same drop.
 
     Returns
@@ -323,10 +324,10 @@ def deciding_gate(one: Fit, other: Fit) -> tuple[str, float]:
         blocks it.
     """
     best = ("", 0.0, -1.0)
-    protocol = one.model.protocol
+    protocol = likelier.model.protocol
     zero = 0.0 if protocol.stated is None else protocol.stated.drop.value - protocol.drop.value
-    for role, record in one.model.records.items():
-        paths = [fit.model.trajectory(role, fit.x) for fit in (one, other)]
+    for role, record in likelier.model.records.items():
+        paths = [fit.model.trajectory(role, fit.x) for fit in (likelier, rival)]
         places, drop = np.array(record.chain.chain.heights), protocol.drop
         start, blocked = drop.value, np.array(record.chain.widths) / 2.0 + max(CLEARANCE_M, drop.u)
         for height in np.arange(4e-3, start + float(places.max()), 4e-3).tolist():
@@ -338,9 +339,9 @@ def deciding_gate(one: Fit, other: Fit) -> tuple[str, float]:
                 levels = levels[levels > -places.max()]
             if levels.size == 0:
                 continue
-            mine, theirs = (path.times(levels) for path in paths)
-            apart = np.abs(mine[:, None] - theirs).min(axis=1)
-            mean = float(np.mean(apart * paths[0].heights(mine)[1]))
+            times, rival_times = (path.times(levels) for path in paths)
+            apart = np.abs(times[:, None] - rival_times).min(axis=1)
+            mean = float(np.mean(apart * paths[0].heights(times)[1]))
             if mean > best[2]:
                 best = role, height, mean
     return best[0], best[1] + zero

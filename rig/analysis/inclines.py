@@ -43,14 +43,14 @@ def other_incline(fit: Fit, run: Run) -> tuple[Reason, ...]:
         return far, -0.5 * far**2 - math.log(sd)
 
     likely: dict[float, tuple[float, float]] = {}
-    for one in dict.fromkeys((incline, *model.protocol.plan.inclines)):
+    for angle in dict.fromkeys((incline, *model.protocol.plan.inclines)):
         try:
-            likely[one] = off(one)
+            likely[angle] = off(angle)
         except DomainError:
             continue
     if incline not in likely or len(likely) < 2:
         return ()
-    best = max(likely, key=lambda one: likely[one][1])
+    best = max(likely, key=lambda angle: likely[angle][1])
     if likely[best][0] > _FITS or likely[best][1] - likely[incline][1] < CLEAR:
         return ()
     return (

@@ -139,8 +139,13 @@ class JointFit:
         return {
             "runs": len(self.drops),
             "scatter": [
-                {"name": name, "stated": known, "found": scatter[name], "degrees": degrees}
-                for (name, degrees), known in zip(
+                {
+                    "name": name,
+                    "stated": beforehand_value,
+                    "found": scatter[name],
+                    "degrees": degrees,
+                }
+                for (name, degrees), beforehand_value in zip(
                     self.degrees.items(), beforehand.values(), strict=True
                 )
             ],
@@ -195,7 +200,7 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
         moves = _move(drops, x, sd, step, damping) if np.isfinite(step).all() else None
         if moves is None:
             return JointFit(shared, x, sd, inverse, before, evidence.degrees, (), settled=False)
-        x, drops, left, damping = moves
+        x, drops, residuals, damping = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
         variance = np.sum(inverse**2, axis=1)
         ahead = step / np.sqrt(variance)
@@ -204,7 +209,7 @@ def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
             damping *= 0.5
         previous = ahead
         before = evidence.components
-        evidence = _weigh(evidence, shared, x, sd, inverse, drops, left)
+        evidence = _weigh(evidence, shared, x, sd, inverse, drops, residuals)
         # As long as steps get shorter alike, the next one is that of the last times their ratio.
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
@@ -236,23 +241,23 @@ def _move(
         was taken; nothing where no part of it will do.
     """
     while share > _SHORTEST:
-        there, moved = take(drops, x, sd, step, share)
-        left = [
+        common, moved = take(drops, x, sd, step, share)
+        remaining = [
             drop.model.residuals(role, drop.x, match)
             for drop in moved
             for role, match in drop.matches.items()
         ]
-        if all(np.isfinite(residuals.values).all() for residuals in left):
-            return there, moved, left, share
+        if all(np.isfinite(residuals.values).all() for residuals in remaining):
+            return common, moved, remaining, share
         share *= 0.5
     return None
 
 
 def _average(drops: Sequence[JointDrop], size: int) -> Array:
     """Begin at the mean of what the drops say by themselves."""
-    here = np.concatenate([drop.here for drop in drops])
-    total = np.bincount(here, np.concatenate([drop.x[drop.common] for drop in drops]), size)
-    return total / np.bincount(here, minlength=size)
+    places = np.concatenate([drop.here for drop in drops])
+    total = np.bincount(places, np.concatenate([drop.x[drop.common] for drop in drops]), size)
+    return total / np.bincount(places, minlength=size)
 
 
 def _weigh(
@@ -262,7 +267,7 @@ def _weigh(
     sd: Array,
     inverse: Array,
     drops: Sequence[JointDrop],
-    left: Sequence[Residuals],
+    residuals: Sequence[Residuals],
 ) -> Evidence:
     """Estimate the components anew from what is left over and what was found."""
     new = Evidence(evidence.components, evidence.stated)
@@ -284,18 +289,20 @@ def _weigh(
         if "impulses" in model.unknowns:
             struck += float(np.sum(1.0 - variance[model.unknowns["impulses"]]))
         new.drop(model, scaled(drop.x, model.unknowns.sd), variance)
-    new.edges(left)
+    new.edges(residuals)
     return new.settled(parameters, struck)
 
 
-def _steady(one: Components, other: Components, drops: Sequence[JointDrop]) -> bool:
+def _steady(before: Components, after: Components, drops: Sequence[JointDrop]) -> bool:
     """Whether no component changes much; a floor that is not there shrinks for ever.
 
     Of impulses it is their scatter in these drops that counts: where all have about the same α, it
     does not tell its two components apart, and nothing depends on them.
     """
-    names = [name for name in one.__slots__ if name not in ("impulse", "impulse_floor", "bounce")]
-    pairs = [(getattr(one, name), getattr(other, name), _LEAST.get(name, 0.0)) for name in names]
+    names = [
+        name for name in before.__slots__ if name not in ("impulse", "impulse_floor", "bounce")
+    ]
+    pairs = [(getattr(before, name), getattr(after, name), _LEAST.get(name, 0.0)) for name in names]
     alphas = {
         abs(drop.model.guesses["impact"].alpha) for drop in drops if "impact" in drop.model.guesses
     }
@@ -303,6 +310,6 @@ def _steady(one: Components, other: Components, drops: Sequence[JointDrop]) -> b
     pairs += [
         (a, b, 0.0)
         for alpha in alphas
-        for a, b in zip(one.impulses(alpha, ends), other.impulses(alpha, ends), strict=True)
+        for a, b in zip(before.impulses(alpha, ends), after.impulses(alpha, ends), strict=True)
     ]
     return all(abs(a - b) <= _STEADY * max(b, least) for a, b, least in pairs)

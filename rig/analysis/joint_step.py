@@ -54,11 +54,11 @@ class JointDrop(Matched):
     @classmethod
     def of(cls, fit: Fit | JointDrop, shared: SharedUnknowns) -> JointDrop:
         """Take a drop as it was adjusted by itself, or among others before."""
-        common, here = shared.places(fit.model)
+        common, places = shared.places(fit.model)
         own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
-        gain = np.zeros((own.size, here.size))
+        gain = np.zeros((own.size, places.size))
         nothing = np.zeros(own.size)
-        return cls(fit.model, fit.matches, fit.x, own, common, here, gain, gain, nothing)
+        return cls(fit.model, fit.matches, fit.x, own, common, places, gain, gain, nothing)
 
     def at(self, common: Array) -> JointDrop:
         """Return it with other values of the session's common unknowns."""
@@ -116,8 +116,8 @@ def take(
     x = x + share * step * sd
     moved = []
     for drop in drops:
-        there = drop.at(x)
+        state = drop.at(x)
         own = drop.target - drop.gain @ step[drop.here]
-        there.x[drop.own] += share * drop.model.unknowns.sd[drop.own] * own
-        moved.append(there)
+        state.x[drop.own] += share * drop.model.unknowns.sd[drop.own] * own
+        moved.append(state)
     return x, moved

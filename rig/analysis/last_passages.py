@@ -72,30 +72,32 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     for _ in range(3):  # Newton's steps to the moment at which it is at the contact level
         (height, speed), covariance = _fall(fit, "impact", last, when)
         when += height / speed
-    found = {"speed_m_s": Measured(speed, _u(covariance, 0.0, 1.0))}
+    values = {"speed_m_s": Measured(speed, _u(covariance, 0.0, 1.0))}
     moment_u = _u(covariance, 1.0, 0.0) / speed
     if "free" in model.records:
         near = _passages(fit, "free", when)
         if near.times.size >= 2 and np.ptp(near.times) > 0.0:
             (height, falling), covariance = _fall(fit, "free", near, when)
             u = math.hypot(_u(covariance, 1.0, 0.0), falling * moment_u)
-            found["separation_raw_m"] = Measured(height, u)
-    return found
+            values["separation_raw_m"] = Measured(height, u)
+    return values
 
 
-def disagreements(found: Mapping[str, Measured], alone: Mapping[str, Measured]) -> list[Reason]:
+def disagreements(
+    fitted: Mapping[str, Measured], by_passages: Mapping[str, Measured]
+) -> list[Reason]:
     """Say what the last passages alone have otherwise than the adjustment of the whole drop."""
     reasons = []
     codes = {"speed_m_s": "last_speed_differs", "separation_raw_m": "last_separation_differs"}
     for name, code in codes.items():
-        if name not in found or name not in alone:
+        if name not in fitted or name not in by_passages:
             continue
-        whole, last = found[name], alone[name]
+        adjusted, last = fitted[name], by_passages[name]
         # They share their last edges and so the errors of these: they are nearer than that.
-        if abs(whole.value - last.value) > _APART * math.hypot(whole.u, last.u):
+        if abs(adjusted.value - last.value) > _APART * math.hypot(adjusted.u, last.u):
             unit = name.removeprefix(MEASURANDS[name].stem)
-            values = {f"alone{unit}": last.value, f"whole{unit}": whole.value}
-            values |= {"alone_U95": last.expanded, "whole_U95": whole.expanded}
+            values = {f"alone{unit}": last.value, f"whole{unit}": adjusted.value}
+            values |= {"alone_U95": last.expanded, "whole_U95": adjusted.expanded}
             reasons.append(make_reason(code, **values))
     return reasons
 

@@ -55,8 +55,8 @@ class Likeness(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """``{"like_model", "departure_m", "impulses", "sentence"}``."""
-        said = {"like_model": self.like, "departure_m": self.departure}
-        return said | attributes(self, "impulses", "sentence")
+        fields = {"like_model": self.like, "departure_m": self.departure}
+        return fields | attributes(self, "impulses", "sentence")
 
 
 def likeness(joint: JointFit) -> Likeness | None:

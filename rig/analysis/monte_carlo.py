@@ -72,7 +72,7 @@ class Propagated:
         values: dict[str, list[float]] = {}
         for name, value in chain.from_iterable(trial.items() for trial in drawn):
             values.setdefault(name, []).append(value)
-        return {name: cls.of(np.array(each)) for name, each in values.items()}
+        return {name: cls.of(np.array(drawn_values)) for name, drawn_values in values.items()}
 
     def json(self) -> dict[str, float]:
         """``{"mean", "u", "low", "high"}``."""
@@ -100,7 +100,7 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, Propagated]:
 
 @one_thread
 def until_decided(
-    fit: Fit, measured: Mapping[str, Measured], seed: int, first: int = FIRST, most: int = MOST
+    fit: Fit, measured: Mapping[str, Measured], seed: int, first: int = FIRST, last: int = MOST
 ) -> tuple[dict[str, Propagated], int]:
     """Like `monte_carlo`, with twice as many trials until all results agree, or do not.
 
@@ -108,23 +108,23 @@ def until_decided(
     ----------
     measured
         What the drop says by itself, see `agreement`.
-    first, most
+    first, last
         With how many trials to begin and to end, whether they can tell then or not.
 
     Returns
     -------
-    found, trials
+    samples, trials
     """
 
-    def decided(found: Mapping[str, Propagated], _block: object, trials: int) -> bool:
+    def decided(samples: Mapping[str, Propagated], _block: object, trials: int) -> bool:
         return all(
             agreement(measured[name].value, measured[name].u, drawn, trials).decided
-            for name, drawn in found.items()
+            for name, drawn in samples.items()
         )
 
     sizes, done = [], 0
-    while done < most:
-        sizes.append(min(max(first, done), most - done))
+    while done < last:
+        sizes.append(min(max(first, done), last - done))
         done += sizes[-1]
     return _draw_until(decided, _drawn(fit, seed), sizes)
 
@@ -160,11 +160,13 @@ def until_stable(
     """
     blocks: list[Mapping[str, Propagated]] = []
 
-    def stable(found: Mapping[str, Propagated], block: Mapping[str, Propagated], _: int) -> bool:
+    def stable(samples: Mapping[str, Propagated], block: Mapping[str, Propagated], _: int) -> bool:
         blocks.append(block)
         return all(
-            _stable([each[name] for each in blocks if name in each], tolerance(whole.u, digits))
-            for name, whole in found.items()
+            _stable(
+                [sample[name] for sample in blocks if name in sample], tolerance(total.u, digits)
+            )
+            for name, total in samples.items()
         )
 
     return _draw_until(stable, drawn, repeat(block))
@@ -176,21 +178,21 @@ def _draw_until(
     sizes: Iterable[int],
 ) -> tuple[dict[str, Propagated], int]:
     """Draw blocks of trials until all of them, the last block and their number are enough."""
-    every: list[Mapping[str, float]] = []
-    found: dict[str, Propagated] = {}
+    trials: list[Mapping[str, float]] = []
+    samples: dict[str, Propagated] = {}
     for size in sizes:
         block = list(islice(drawn, size))
-        every += block
-        found = Propagated.all(every)
-        if enough(found, Propagated.all(block), len(every)):
+        trials += block
+        samples = Propagated.all(trials)
+        if enough(samples, Propagated.all(block), len(trials)):
             break
-    return found, len(every)
+    return samples, len(trials)
 
 
 def _stable(blocks: Sequence[Propagated], within: float) -> bool:
     if len(blocks) < 2:
         return False
-    ends = [list(one.json().values()) for one in blocks]
+    ends = [list(sample.json().values()) for sample in blocks]
     errors = np.std(ends, axis=0, ddof=1) / math.sqrt(len(blocks))
     return bool(2.0 * errors.max() <= within)
 
@@ -238,7 +240,7 @@ def session_monte_carlo(joint: JointFit, trials: int, seed: int) -> list[dict[st
 
 
 def _values(model: DropModel, x: Array) -> dict[str, float]:
-    return {name: one.value for name, one in measurands(model, x).items()}
+    return {name: value.value for name, value in measurands(model, x).items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,9 +308,9 @@ def _shaker(drop: Fit | JointDrop, scale: float = 1.0) -> Callable[[Generator], 
 
     def shake(rng: Generator) -> DropModel:
         times = {}
-        for role, size, edges, speed, sigma, told in sides:
+        for role, size, edges, speed, sigma, carried in sides:
             off = sigma * rng.normal(size=sigma.size)
-            off[1:] += told[1:] * off[:-1]  # the one before is first of its pair, or told is 0
+            off[1:] += carried[1:] * off[:-1]  # the one before is first of its pair, or that is 0
             times[role] = np.zeros(size)
             times[role][edges] = off / speed  # m at the beam are s in the stamp
         return drop.model.shaken(times)

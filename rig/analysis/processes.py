@@ -45,8 +45,8 @@ def do_in_order(
     processes
         That may be used, where it is worth it.
     """
-    left, began = iter(tasks), perf_counter()
-    for number, task in enumerate(left, 1):
+    remaining, began = iter(tasks), perf_counter()
+    for number, task in enumerate(remaining, 1):
         take(task, work(task))
         ahead_s = (perf_counter() - began) / number * (total - number)
         if processes > 1 and number >= _LOOK and ahead_s > _WORTH_S:
@@ -56,7 +56,7 @@ def do_in_order(
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(processes, context, _begin)
     try:
-        while batch := list(islice(left, _BATCH * processes)):
+        while batch := list(islice(remaining, _BATCH * processes)):
             with _ctrl_c_held():  # processes begin with the first tasks
                 results = executor.map(work, batch)
             for task, result in zip(batch, results, strict=True):

@@ -78,24 +78,24 @@ COMMON = frozenset(name for name, line in BUDGET.items() if line.common)
 def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
     """Return each measurand of the scene."""
     drop = Adjusted(model, x)
-    found = ((name, compute(drop)) for name, compute in COMPUTED.items())
-    return {name: value for name, value in found if value is not None}
+    values = ((name, compute(drop)) for name, compute in COMPUTED.items())
+    return {name: value for name, value in values if value is not None}
 
 
-def effective_degrees(u: float, budget: Mapping[str, float], known: Mapping[str, float]) -> float:
+def effective_degrees(u: float, budget: Mapping[str, float], degrees: Mapping[str, float]) -> float:
     """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4); at least 1.
 
     Parameters
     ----------
     budget
         Lines whose squares add up to that of `u`.
-    known
+    degrees
         Degrees of freedom of lines; those of guessed lines are `GUESSED`, others infinite.
     """
     share = sum(
-        (line / u) ** 4 / known.get(name, GUESSED)
+        (line / u) ** 4 / degrees.get(name, GUESSED)
         for name, line in budget.items()
-        if name in known or BUDGET[name].guessed
+        if name in degrees or BUDGET[name].guessed
     )
     return max(1.0, 1.0 / share) if share > 0.0 else math.inf
 
@@ -166,20 +166,20 @@ class Adjusted:
 
     def squares(self, role: str, levels: Dual) -> Dual:
         """Square of a chain's speed by the equations at some levels, shape ``(n,)``."""
-        found, slopes, steeper = self._path(role).squares(levels.value)
-        return self._by_path(role, found, slopes) - Dual(0.0 * found, levels.slopes) * steeper
+        squares, slopes, steeper = self._path(role).squares(levels.value)
+        return self._by_path(role, squares, slopes) - Dual(0.0 * squares, levels.slopes) * steeper
 
     def top(self, role: str, levels: Dual) -> Dual:
         """Where its top rod is, its reference point being at some levels, shape ``(n,)``."""
         chain, protocol = self.model.records[role].chain.chain, self.model.protocol
-        found = levels + chain.length + self.linear(f"{role} rods", np.eye(chain.rods)[-1])
+        level = levels + chain.length + self.linear(f"{role} rods", np.eye(chain.rods)[-1])
         # A chain that turned is lower at its top, the more the further it fell.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
-        found -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
+        level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
         if role == "free":
-            return found
+            return level
         last: Array = levels.value < self._path(role).height[chain.rods - 1]  # of all that fall
-        return found + self.linear("top") * last - self.stretched(levels.value)[0]
+        return level + self.linear("top") * last - self.stretched(levels.value)[0]
 
     def stretched(self, levels: Array) -> tuple[Dual, Dual]:
         """How far ahead strings have pulled the top rod, and how much faster it is for that."""

@@ -235,7 +235,9 @@ class DropResult:
         names = ("gates", "scatter", "last_passages", "alone")
         fields |= attributes(self, *(name for name in names if getattr(self, name)))
         fields |= attributes(self, "learned", "verdict") | reasons_json(self.reasons)
-        fields["degrees"] = plain({name: one.degrees for name, one in self.quantities.items()})
+        fields["degrees"] = plain(
+            {name: measured.degrees for name, measured in self.quantities.items()}
+        )
         fields["budget"] = [
             {"name": source, "quantity": name, "u": u}
             for name, value in self.quantities.items()

@@ -59,23 +59,23 @@ def scores(fit: Fit, directions: Sequence[Array]) -> list[Score]:
         return []
     estimate = fit.estimate
     along = np.stack(directions, axis=1)
-    slope, whole = np.zeros(along.shape[1]), np.zeros(along.shape[1])
+    slope, full = np.zeros(along.shape[1]), np.zeros(along.shape[1])
     shared = np.zeros(along.shape)
     seen = [(rows, rows.slopes @ along[rows.columns]) for rows in estimate.rows.values()]
     for rows, moved in seen:
         slope += rows.left @ moved
-        whole += np.sum(moved**2, axis=0)
+        full += np.sum(moved**2, axis=0)
         shared[rows.columns] += estimate.sd[rows.columns, None] * (rows.slopes.T @ moved)
     follow = estimate.inverse @ (estimate.inverse.T @ shared)
     # What other unknowns do not do as well, priors included: no difference of large numbers.
-    told = np.sum(follow**2, axis=0)
+    own = np.sum(follow**2, axis=0)
     for rows, moved in seen:
         rest = moved - rows.slopes @ (estimate.sd[:, None] * follow)[rows.columns]
-        told += np.sum(rest**2, axis=0)
-    sure = told > _UNTOLD * whole
-    h = np.where(sure, told, np.inf)
+        own += np.sum(rest**2, axis=0)
+    sure = own > _UNTOLD * full
+    h = np.where(sure, own, np.inf)
     u = np.where(sure, h**-0.5, np.inf)
     moves = -estimate.sd[:, None] * follow
     sizes, gains = -slope / h, 0.5 * slope**2 / h
-    found = zip(sizes.tolist(), u.tolist(), gains.tolist(), moves.T, strict=True)
-    return [Score(*one) for one in found]
+    table = zip(sizes.tolist(), u.tolist(), gains.tolist(), moves.T, strict=True)
+    return [Score(*one) for one in table]

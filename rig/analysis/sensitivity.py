@@ -40,18 +40,18 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
         return []
     protocol = next(iter(analysis.adjusted.values())).model.protocol
     protocol = protocol.stated or protocol
-    here = _again(protocol, analysis)
+    unchanged = _again(protocol, analysis)
     rows = []
     for name, place in _priors(protocol).items():
         changed = (_widened(protocol, place, by) for by in (FACTOR, 1.0 / FACTOR))
-        wider, narrower = (_again(other, analysis) for other in changed)
+        wider, narrower = (_again(changed_protocol, analysis) for changed_protocol in changed)
         # Without one of these a prior's line is left out: its joint fit did not converge.
-        for line, wide, narrow in zip(here or (), wider or (), narrower or (), strict=False):
+        for line, wide, narrow in zip(unchanged or (), wider or (), narrower or (), strict=False):
             for quantity, mean in line.means.items():
                 row: dict[str, Any] = {"prior": name, **line.condition.json(), "quantity": quantity}
-                for word, other in (("wider", wide.means), ("narrower", narrow.means)):
-                    row[word] = other[quantity].value - mean.value
-                    row[f"U95_ratio_{word}"] = other[quantity].expanded / mean.expanded
+                for word, changed_protocol in (("wider", wide.means), ("narrower", narrow.means)):
+                    row[word] = changed_protocol[quantity].value - mean.value
+                    row[f"U95_ratio_{word}"] = changed_protocol[quantity].expanded / mean.expanded
                 rows.append(row)
     return rows
 
@@ -65,20 +65,22 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
     if analysis.joint is None:
         joints = [
             by_itself(
-                Fit(each.model, each.matches, adjust(each.model, each.matches, each.x.copy()))
+                Fit(state.model, state.matches, adjust(state.model, state.matches, state.x.copy()))
             )
-            for each in drops.values()
+            for state in drops.values()
         ]
     else:
         joints = [joint_fit(list(drops.values()))]
         if not joints[0].settled:
             return None
-    results = (each.measured(drop) for each in map(Budgets, joints) for drop in each.joint.drops)
-    found = dict(zip(drops, results, strict=True))
+    results = (state.measured(drop) for state in map(Budgets, joints) for drop in state.joint.drops)
+    results_by_key = dict(zip(drops, results, strict=True))
     return summarize(
         protocol,
         (
-            replace(run, quantities=found.get((run.run.number, run.attempt), run.quantities))
+            replace(
+                run, quantities=results_by_key.get((run.run.number, run.attempt), run.quantities)
+            )
             for run in analysis.runs
         ),
     )

@@ -113,8 +113,10 @@ class Analysis:
             "learned": None if self.rig is None else self.rig.learned,
             "likeness": None if self.rig is None else self.rig.likeness,
         }
-        more = {name: plain(each) for name, each in where_there_are.items() if each is not None}
-        return attributes(self, "runs", "summary") | more
+        fields = {
+            name: plain(member) for name, member in where_there_are.items() if member is not None
+        }
+        return attributes(self, "runs", "summary") | fields
 
 
 @one_thread
@@ -124,7 +126,7 @@ def analyze(
     scale: Callable[[Drop], TimeScale],
     rejected: Mapping[tuple[int, int], Sequence[Reason]] | None = None,
     progress: Progress | None = None,
-    known: SummaryByDrop | None = None,
+    summaries: SummaryByDrop | None = None,
     total: int | None = None,
     processes: int = 1,
 ) -> Analysis:
@@ -142,7 +144,7 @@ def analyze(
         Causes by (run, attempt), for drops that the operator rejected.
     progress
         Called with the number of drops done and the number of all.
-    known
+    summaries
         What is known of drops by themselves, and will be. Results are the same without.
     total
         Number of drops, where they have no length.
@@ -157,7 +159,7 @@ def analyze(
     check_gates(protocol)
     check_measurable(protocol)
     planned = {run.number: run for run in planned_runs(protocol)}
-    known, rejected = {} if known is None else known, rejected or {}
+    summaries, rejected = {} if summaries is None else summaries, rejected or {}
     total = length_hint(drops) if total is None else total
     results: list[DropResult] = []
     fits: list[Fit | None] = []
@@ -172,7 +174,7 @@ def analyze(
             summary = case.summary(summary, explain=explain)
         unexplained += summary.unexplained
         if summary is not before:
-            known[case.drop] = summary
+            summaries[case.drop] = summary
         result = overruled(summary.result, rejected.get((case.run.number, case.drop.attempt)))
         results.append(result)
         fits.append(case.fit(summary) if joins(protocol, result) else None)
@@ -181,7 +183,7 @@ def analyze(
 
     cases = (DropCase(protocol, planned_run(planned, drop), drop, scale(drop)) for drop in drops)
     do_in_order(
-        _summarize, ((case, known.get(case.drop)) for case in cases), take, total, processes
+        _summarize, ((case, summaries.get(case.drop)) for case in cases), take, total, processes
     )
     return gather(protocol, results, fits)
 
@@ -271,10 +273,10 @@ def sum_up(
     earlier = tuple(result for result in ordered if last[result.run.number] is not result)
     summary = tuple(summarize(protocol, latest))
     spared = any(result.limits in GOOD for result in latest)
-    whole = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
+    with_rejected = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
     paired = effects(protocol, latest)
     rig = None if joint is None else joint.rig
-    return Analysis(latest, earlier, summary, rig, joint, adjusted or {}, paired, whole)
+    return Analysis(latest, earlier, summary, rig, joint, adjusted or {}, paired, with_rejected)
 
 
 class FittedTogether(NamedTuple, Generic[K]):
@@ -313,7 +315,7 @@ def fit_together(
     results, drops
         Of any drops, and of these the good ones with their unknowns.
     """
-    found, good = dict(results), dict(drops)
+    outcome, good = dict(results), dict(drops)
     while len(good) >= FEWEST:
         joint = joint_fit(list(good.values()))
         fewer = {
@@ -323,20 +325,20 @@ def fit_together(
         }
         # Where most are left out it is the adjustment that fails, and no drop is to blame for that.
         if not joint.settled or 2 * (len(drops) - len(good) + len(fewer)) > len(drops):
-            return FittedTogether(None, found, good, settled=False)
+            return FittedTogether(None, outcome, good, settled=False)
         if not fewer:
             adjusted, budgets = dict(zip(good, joint.drops, strict=True)), Budgets(joint)
             light = {
-                key: _joint_result(found[key], drop, budgets) for key, drop in adjusted.items()
+                key: _joint_result(outcome[key], drop, budgets) for key, drop in adjusted.items()
             }
-            return FittedTogether(joint, found | light, adjusted)
+            return FittedTogether(joint, outcome | light, adjusted)
         for key, matched in fewer.items():
-            result, fit = found[key], good.pop(key)
+            result, fit = outcome[key], good.pop(key)
             counts = {"matched": matched, "alone": fit.matched}
             why = make_reason("differs_from_session", fit.model.protocol.vocabulary, **counts)
             own = result.alone or result.quantities
-            found[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
-    return FittedTogether(None, found, good)
+            outcome[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
+    return FittedTogether(None, outcome, good)
 
 
 def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> DropResult:

@@ -157,8 +157,8 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
         drops,
     )
     if not together.settled:
-        every = ", ".join(part.name for part in parts)
-        raise make_error(InputError, "sessions_disagree", names=every)
+        names = ", ".join(part.name for part in parts)
+        raise make_error(InputError, "sessions_disagree", names=names)
     results: list[list[DropResult]] = [[] for _ in parts]
     for (place, _), result in together.results.items():
         results[place].append(result)

@@ -34,8 +34,8 @@ class EquationRows(NamedTuple):
 
     def triangle(self) -> EquationRows:
         """Return the same sum of squares of any step, in no more rows than columns and one."""
-        whole = triangle(np.column_stack([self.slopes, self.left]))
-        return self._replace(slopes=whole[:, :-1], left=whole[:, -1])
+        reduced = triangle(np.column_stack([self.slopes, self.left]))
+        return self._replace(slopes=reduced[:, :-1], left=reduced[:, -1])
 
     def after(self, step: Array) -> EquationRows:
         """Return the same about the point that a step leads to."""
@@ -62,17 +62,17 @@ class Root(NamedTuple):
 
     def pulled(self, gradient: Array) -> Array:
         """Return the step that balances a further gradient."""
-        found = np.linalg.solve(self.matrix, np.linalg.solve(self.matrix.T, -gradient))
-        return np.asarray(found, dtype=np.float64)
+        step = np.linalg.solve(self.matrix, np.linalg.solve(self.matrix.T, -gradient))
+        return np.asarray(step, dtype=np.float64)
 
     def damped(self, damping: float, lengths: Array) -> Root:
         """Return the root with λ times the squares of its columns' lengths (Marquardt 1963)."""
         size = self.left.size
-        whole = np.zeros((2 * size, size + 1))
-        whole[:size, :size], whole[:size, size] = self.matrix, self.left
-        whole[size + np.arange(size), np.arange(size)] = np.sqrt(damping) * lengths
-        whole = triangle(whole)
-        return Root(whole[:size, :size], whole[:size, size])
+        stack = np.zeros((2 * size, size + 1))
+        stack[:size, :size], stack[:size, size] = self.matrix, self.left
+        stack[size + np.arange(size), np.arange(size)] = np.sqrt(damping) * lengths
+        stack = triangle(stack)
+        return Root(stack[:size, :size], stack[:size, size])
 
 
 class Eliminated(NamedTuple):
@@ -106,15 +106,15 @@ def square_root(blocks: Sequence[EquationRows], sd: Array, pull: Array) -> Root:
     pull
         How far the unknowns are above their prior means, in these units.
     """
-    whole, top, rest = _eliminate_private(blocks, sd, pull, np.arange(sd.size))
+    matrix, top, rest = _eliminate_private(blocks, sd, pull, np.arange(sd.size))
     columns = np.setdiff1d(np.arange(sd.size), top, assume_unique=True)
     last = _stacked(rest, columns, pull[columns])
-    whole[top.size :, np.append(columns, sd.size)] = last[: columns.size]
-    return Root(whole[:, :-1], whole[:, -1])
+    matrix[top.size :, np.append(columns, sd.size)] = last[: columns.size]
+    return Root(matrix[:, :-1], matrix[:, -1])
 
 
 def eliminate(
-    blocks: Sequence[EquationRows], sd: Array, pull: Array, own: Index, others: Index
+    blocks: Sequence[EquationRows], sd: Array, pull: Array, own: Index, common: Index
 ) -> Eliminated:
     """Eliminate some unknowns, priors of these included.
 
@@ -122,19 +122,19 @@ def eliminate(
     ----------
     blocks, sd, pull
         As for `square_root`.
-    own, others
+    own, common
         Those that are eliminated, and all others.
     """
-    whole, top, rest = _eliminate_private(blocks, sd, pull, own)
-    more = np.setdiff1d(own, top, assume_unique=True)
-    columns = np.concatenate([more, others, [sd.size]])
-    last = _stacked(rest, columns[:-1], pull[more])
-    whole[top.size : own.size, columns] = last[: more.size]
-    inverse = np.linalg.inv(whole[: own.size, own]).astype(np.float64, copy=False)
-    right = inverse @ whole[: own.size, columns[more.size :]]
-    last = last[more.size :, more.size :]
+    matrix, top, rest = _eliminate_private(blocks, sd, pull, own)
+    rest_of_own = np.setdiff1d(own, top, assume_unique=True)
+    columns = np.concatenate([rest_of_own, common, [sd.size]])
+    last = _stacked(rest, columns[:-1], pull[rest_of_own])
+    matrix[top.size : own.size, columns] = last[: rest_of_own.size]
+    inverse = np.linalg.inv(matrix[: own.size, own]).astype(np.float64, copy=False)
+    beside = inverse @ matrix[: own.size, columns[rest_of_own.size :]]
+    last = last[rest_of_own.size :, rest_of_own.size :]
     return Eliminated(
-        inverse, right[:, :-1], -right[:, -1], EquationRows(last[:, :-1], last[:, -1], others)
+        inverse, beside[:, :-1], -beside[:, -1], EquationRows(last[:, :-1], last[:, -1], common)
     )
 
 
@@ -150,28 +150,28 @@ def _eliminate_private(
         unknowns + 1)``; their columns; and what each block says of other unknowns.
     """
     size = sd.size
-    known = np.zeros(size, dtype=np.intp)
+    block_count = np.zeros(size, dtype=np.intp)
     for block in blocks:
-        known[block.columns] += 1
+        block_count[block.columns] += 1
     private = np.zeros(size, dtype=np.bool_)
-    private[among] = known[among] == 1
-    whole, begin = np.zeros((size, size + 1)), 0
+    private[among] = block_count[among] == 1
+    matrix, begin = np.zeros((size, size + 1)), 0
     top, rest = [], []
     for block in blocks:
-        alone = private[block.columns]
-        order = np.concatenate([np.flatnonzero(alone), np.flatnonzero(~alone)])
-        columns, count, rows = block.columns[order], int(alone.sum()), block.left.size
+        is_private = private[block.columns]
+        order = np.concatenate([np.flatnonzero(is_private), np.flatnonzero(~is_private)])
+        columns, count, rows = block.columns[order], int(is_private.sum()), block.left.size
         stack = np.zeros((rows + count, order.size + 1))
         np.multiply(block.slopes[:, order], sd[columns], out=stack[:rows, :-1])
         stack[:rows, -1] = block.left
         stack[rows + np.arange(count), np.arange(count)] = 1.0
         stack[rows:, -1] = pull[columns[:count]]
         stack = triangle(stack)
-        whole[begin : begin + count, np.append(columns, size)] = stack[:count]
+        matrix[begin : begin + count, np.append(columns, size)] = stack[:count]
         begin += count
         top.append(columns[:count])
         rest.append(EquationRows(stack[count:, count:-1], stack[count:, -1], columns[count:]))
-    return whole, np.concatenate([np.zeros(0, dtype=np.intp), *top]), rest
+    return matrix, np.concatenate([np.zeros(0, dtype=np.intp), *top]), rest
 
 
 def _stacked(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Array:
@@ -191,5 +191,5 @@ def _stacked(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Arr
 
 def triangle(rows: Array) -> Array:
     """Return R of rows QR, with the same sum of squares of any step."""
-    found: Array = np.asarray(np.linalg.qr(rows, mode="r"))
-    return found
+    factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
+    return factor

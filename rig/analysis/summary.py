@@ -108,8 +108,8 @@ class Incline:
         fields |= attributes(self, "gates") if self.gates else {}
         fields["predicted"] = {name: model.value for name, model in self.predicted.items()}
         fields["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
-        main, *others = self.means
-        stems = {main: ""} | {name: f"_{MEASURANDS[name].stem}" for name in others}
+        main, *further = self.means
+        stems = {main: ""} | {name: f"_{MEASURANDS[name].stem}" for name in further}
         errors = {f"normalized_error{stem}": name for name, stem in stems.items()}
         return fields | {key: self.normalized_error(name) for key, name in errors.items()}
 
@@ -138,7 +138,7 @@ def good_cases(
         for result in results
         if result.verdict in GOOD or (rejected and result.limits in GOOD)
     ]
-    return by_case(protocol, good, lambda one: one.run)
+    return by_case(protocol, good, lambda member: member.run)
 
 
 def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]) -> list[list[T]]:
@@ -179,7 +179,7 @@ def _gate_means(results: Sequence[DropResult]) -> Iterator[GateMeans]:
     by_channel: dict[int, list[GatePassage]] = {}
     for passage in (gate for result in results for gate in result.gates):
         by_channel.setdefault(passage.channel, []).append(passage)
-    for runs in sorted(by_channel.values(), key=lambda each: -each[0].height_m):
+    for runs in sorted(by_channel.values(), key=lambda gate_runs: -gate_runs[0].height_m):
         speeds = [passage.speed for passage in runs]
         since = [passage.interval for passage in runs if passage.interval is not None]
         at = replace(runs[0], speed=mean(speeds), interval=mean(since) if since else None)
@@ -187,7 +187,7 @@ def _gate_means(results: Sequence[DropResult]) -> Iterator[GateMeans]:
 
 
 def _scatter(values: Sequence[Measured]) -> float | None:
-    return stdev(one.value for one in values) if len(values) > 1 else None
+    return stdev(value.value for value in values) if len(values) > 1 else None
 
 
 def _causes(runs: Sequence[Measured]) -> dict[str, float]:
@@ -195,4 +195,4 @@ def _causes(runs: Sequence[Measured]) -> dict[str, float]:
     parts = {
         name: math.sqrt(fmean(run.budget.get(name, 0.0) ** 2 for run in runs)) for name in COMMON
     }
-    return dict(sorted((each for each in parts.items() if each[1]), key=lambda each: -each[1]))
+    return dict(sorted((part for part in parts.items() if part[1]), key=lambda part: -part[1]))

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 def lever(chain: Chain) -> Array:
     """How far each rod is above the centre of mass, m; shape ``(rods,)``."""
     heights = np.array(chain.heights)
-    found: Array = heights - np.average(heights, weights=chain.masses)
-    found.flags.writeable = False
-    return found
+    levers: Array = heights - np.average(heights, weights=chain.masses)
+    levers.flags.writeable = False
+    return levers
 
 
 def drawn(lever: Array, protocol: Protocol, levels: Array) -> Array:

@@ -180,10 +180,10 @@ class Trajectory:
         leg = np.maximum(np.searchsorted(begins, -levels, side="left") - 1, 0)
         kappa, share, distance = self.kappas(leg), self.shares(leg), self.height[leg] - levels
         reach = reach_of(distance, kappa)
-        begin, left = self.speed[leg], 1.0 - kappa * reach
-        squares = np.maximum(left * begin**2 + self.gravity * reach, np.finfo(float).tiny)
+        begin, remaining = self.speed[leg], 1.0 - kappa * reach
+        squares = np.maximum(remaining * begin**2 + self.gravity * reach, np.finfo(float).tiny)
         steeper = 2.0 * (self.gravity - kappa * squares)
-        slopes = (2.0 * left * begin)[:, None] * self.slopes.speed[leg]
+        slopes = (2.0 * remaining * begin)[:, None] * self.slopes.speed[leg]
         slopes += steeper[:, None] * self.slopes.height[leg]
         slopes[:, GRAVITY] += reach
         slopes[:, DRAG] += share * _by_kappa(distance, reach, begin, self.gravity, kappa)
@@ -202,8 +202,8 @@ class Trajectory:
         if self.hits is None:
             return np.zeros(times.shape)
         struck = np.searchsorted(self.time[1:], times, side="left")
-        left: Array = np.maximum(self.time.size - 1 - struck, 1)
-        return np.where(struck > 0, 1.0 / left, 0.0)
+        falling: Array = np.maximum(self.time.size - 1 - struck, 1)
+        return np.where(struck > 0, 1.0 / falling, 0.0)
 
     def _legs(self, times: Array) -> tuple[Index, Array]:
         """On which leg each fall is at each time, in the line of all legs, and for how long."""
@@ -215,10 +215,10 @@ class Trajectory:
         if begins.ndim == 1:
             return np.maximum(np.searchsorted(begins, moments, side="right") - 1, 0)
         count, size = begins.shape
-        every = np.broadcast_to(moments, (count, moments.shape[-1]))
-        leg = [np.searchsorted(*row, side="right") for row in zip(begins, every, strict=True)]
-        found: Index = np.maximum(np.array(leg) - 1, 0) + size * np.arange(count)[:, None]
-        return found
+        moments_of = np.broadcast_to(moments, (count, moments.shape[-1]))
+        leg = [np.searchsorted(*row, side="right") for row in zip(begins, moments_of, strict=True)]
+        legs: Index = np.maximum(np.array(leg) - 1, 0) + size * np.arange(count)[:, None]
+        return legs
 
     @property
     def _every(self) -> Array:
@@ -249,15 +249,15 @@ class Trajectory:
         factor = _factors(gains)
         d_factor = ratio[:, None] * gain
         d_height = np.concatenate([common[[START]], -places])
-        way = d_height[:-1] - d_height[1:]
+        ways = d_height[:-1] - d_height[1:]
         reach = reach_of(distance, kappa)
-        left, begin = 1.0 - kappa * reach, self.speed[..., :-1]
+        remaining, begin = 1.0 - kappa * reach, self.speed[..., :-1]
         by_kappa = share * _by_kappa(distance, reach, begin, self.gravity, kappa)
-        alone = (2.0 * (self.gravity - kappa * arrival**2))[..., None] * way
-        alone += reach[..., None] * common[GRAVITY] + by_kappa[..., None] * common[DRAG]
-        kicked = 2.0 * left[..., 1:] * (factor * arrival**2)[..., :-1]
-        alone[..., 1:, :] += kicked[..., None] * d_factor[:-1]
-        d_arrival = _carried(left, factor, alone) / (2.0 * arrival)[..., None]
+        added = (2.0 * (self.gravity - kappa * arrival**2))[..., None] * ways
+        added += reach[..., None] * common[GRAVITY] + by_kappa[..., None] * common[DRAG]
+        kicked = 2.0 * remaining[..., 1:] * (factor * arrival**2)[..., :-1]
+        added[..., 1:, :] += kicked[..., None] * d_factor[:-1]
+        d_arrival = _carried(remaining, factor, added) / (2.0 * arrival)[..., None]
         d_speed = np.zeros((*self.time.shape, by.shape[1]))
         d_speed[..., 1:, :] = factor[..., None] * d_arrival + arrival[..., None] * d_factor
         # A leg lasts until its way is done.
@@ -265,7 +265,7 @@ class Trajectory:
         by_speed = speed_slope(lasted, distance, self.gravity, kappa)
         fall = distance, arrival, by_speed
         by_gravity, by_kappa = fall_slopes(lasted, begin, fall, self.gravity, kappa)
-        legs = way - by_speed[..., None] * d_speed[..., :-1, :]
+        legs = ways - by_speed[..., None] * d_speed[..., :-1, :]
         legs -= by_gravity[..., None] * common[GRAVITY]
         legs -= (share * by_kappa)[..., None] * common[DRAG]
         legs /= arrival[..., None]
@@ -281,8 +281,10 @@ def _by_kappa(
     distance: Array, reach: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> Array:
     """Derivative of the squared speed at the end of a leg by its κ."""
-    left = 1.0 - kappa * reach
-    slope: Array = gravity * reach_slopes(distance, reach, kappa) - 2.0 * distance * left * speed**2
+    remaining = 1.0 - kappa * reach
+    slope: Array = (
+        gravity * reach_slopes(distance, reach, kappa) - 2.0 * distance * remaining * speed**2
+    )
     return slope
 
 
@@ -291,23 +293,23 @@ def _factors(gains: Array) -> Array:
     return np.maximum(1.0 + gains, _NO_LESS)
 
 
-def _carried(left: Array, factor: Array, alone: Array) -> Array:
+def _carried(remaining: Array, factor: Array, added: Array) -> Array:
     """Sum up what each leg adds to a squared speed, and what is left of all legs before.
 
     Parameters
     ----------
-    left, factor
+    remaining, factor
         What is left of it at the end of a leg, and by what factor an impact makes a chain faster;
         shape ``(…, rods)``.
-    alone
+    added
         Shape ``(…, rods)`` or ``(…, rods, others)``.
     """
     product = np.ones_like(factor)
-    np.cumprod(left[..., 1:] * factor[..., :-1] ** 2, axis=-1, out=product[..., 1:])
+    np.cumprod(remaining[..., 1:] * factor[..., :-1] ** 2, axis=-1, out=product[..., 1:])
     product = np.maximum(product, np.finfo(float).tiny)
-    if alone.ndim > product.ndim:
-        return product[..., None] * np.cumsum(alone / product[..., None], axis=-2)
-    carried: Array = product * np.cumsum(alone / product, axis=-1)
+    if added.ndim > product.ndim:
+        return product[..., None] * np.cumsum(added / product[..., None], axis=-2)
+    carried: Array = product * np.cumsum(added / product, axis=-1)
     return carried
 
 

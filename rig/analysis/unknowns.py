@@ -433,9 +433,9 @@ def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
     sides = {role: Side(model, record) for role, record in model.records.items()}
     for own, rows in groupby((*TABLE, *model.suspects), lambda row: row.of == "each"):
         if own:
-            each = [*rows]
+            own_rows = [*rows]
             for role, side in sides.items():
-                yield from ((f"{role} {row.name}", row, side) for row in each)
+                yield from ((f"{role} {row.name}", row, side) for row in own_rows)
         else:
             first = next(iter(sides.values()))
             for row in rows:
@@ -446,9 +446,13 @@ def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
 def parameters(struck: int) -> dict[str, slice]:
     """Return which parameters of a trajectory are what, for so many rods that strike."""
     places = {"release": RELEASE, "start": START, "gravity": GRAVITY, "drag": DRAG}
-    found = {name: slice(place, place + 1) for name, place in places.items()}
+    slices = {name: slice(place, place + 1) for name, place in places.items()}
     ends = [COMMON, COMMON + struck, COMMON + 2 * struck]
-    return found | {"gains": slice(*ends[:2]), "places": slice(*ends[1:]), "all": slice(0, ends[2])}
+    return slices | {
+        "gains": slice(*ends[:2]),
+        "places": slice(*ends[1:]),
+        "all": slice(0, ends[2]),
+    }
 
 
 class SideSlopes(NamedTuple):
@@ -490,8 +494,8 @@ def side_slopes(model: DropModel, role: str) -> SideSlopes:
             if row.level is not None:
                 levels[:, at[name]] = row.level(side).reshape(levels[:, at[name]].shape)
     moving = np.flatnonzero(path.any(axis=0))
-    known = np.union1d(np.flatnonzero(levels.any(axis=0)), np.flatnonzero(at.rate))
-    columns = np.append(moving, np.setdiff1d(known, moving))
+    still = np.union1d(np.flatnonzero(levels.any(axis=0)), np.flatnonzero(at.rate))
+    columns = np.append(moving, np.setdiff1d(still, moving))
     return SideSlopes(path, levels, columns, moving.size, np.flatnonzero(at.rate[columns]))
 
 
@@ -531,10 +535,10 @@ class SharedUnknowns:
             for name, own in _common(model).items()
             if name in self.blocks
         ]
-        place, here = np.arange(len(model.unknowns)), np.arange(len(self))
+        place, common_place = np.arange(len(model.unknowns)), np.arange(len(self))
         return (
             np.concatenate([place[:0], *(place[own] for own, _ in both)]),
-            np.concatenate([here[:0], *(here[common] for _, common in both)]),
+            np.concatenate([common_place[:0], *(common_place[common] for _, common in both)]),
         )
 
 

@@ -104,16 +104,16 @@ def judge(
     run: Run,
     drop: Drop,
     audit: Audit,
-    found: Mapping[str, Measured],
+    values: Mapping[str, Measured],
     fit: Fit,
-    alone: Mapping[str, Measured],
+    by_passages: Mapping[str, Measured],
     unmatched: Collection[UnmatchedEdge],
 ) -> Judgement:
     """Judge a drop by what was fitted.
 
     Parameters
     ----------
-    alone
+    by_passages
         What its last passages say by themselves.
     unmatched
         Edges that are missing or belong to no rod.
@@ -125,7 +125,7 @@ def judge(
         return Judgement((*record, *void), known=True)
     # A motion in the wrong air tells nothing of the gates.
     accused = _other_air(fit) or tuple(void)
-    void = [*record, *_limits(protocol, audit, found), *accused, *_blown(fit)]
+    void = [*record, *_limits(protocol, audit, values), *accused, *_blown(fit)]
     doubts = [reason for reason in faults.reasons if reason.severity is not Severity.VOID]
     pushed = _pushed(fit)
     remarks = other_incline(fit, run)
@@ -136,8 +136,8 @@ def judge(
     accused += (*pushed, *remarks)
     if void:  # what is doubtful about gates may be why
         return Judgement((*void, *doubts), accused, odd, faults.suspects)
-    doubts += [*_doubts(protocol, drop, audit, found, estimate), *pushed]
-    doubts += disagreements(found, alone)
+    doubts += [*_doubts(protocol, drop, audit, values, estimate), *pushed]
+    doubts += disagreements(values, by_passages)
     # A drop is as good where the model's α is not its own: that is what is measured.
     remarks += _later_passages(protocol, unmatched)
     return Judgement((*doubts, *remarks), accused, odd, faults.suspects)
@@ -145,16 +145,16 @@ def judge(
 
 def pattern_faults(identified: Identification, words: Vocabulary = ANY_SCENE) -> dict[str, Reason]:
     """Say why the edges are not one fall of each chain, by role; nothing where they are."""
-    found = {
+    reasons = {
         role: make_reason("few_edges_fit", words, side=role, share=share)
         for role, share in identified.shares.items()
         if share < SUPPORT
     }
-    if not found and identified.fit is None:
+    if not reasons and identified.fit is None:
         return dict.fromkeys(identified.shares, make_reason("no_fall", words))
-    if not found and identified.log_odds < LEAD:
+    if not reasons and identified.log_odds < LEAD:
         return dict.fromkeys(identified.shares, _ambiguous(words, identified))
-    return found
+    return reasons
 
 
 def _ambiguous(words: Vocabulary, identified: Identification) -> Reason:
@@ -166,19 +166,21 @@ def _ambiguous(words: Vocabulary, identified: Identification) -> Reason:
     return make_reason("two_falls_gate", words, odds=odds, side=side, height_m=height)
 
 
-def _limits(protocol: Protocol, audit: Audit, found: Mapping[str, Measured]) -> Iterator[Reason]:
+def _limits(protocol: Protocol, audit: Audit, values: Mapping[str, Measured]) -> Iterator[Reason]:
     """Yield what is beyond the protocol's ``accept``."""
     accept, words = protocol.accept, protocol.vocabulary
     if audit.missed > _most_missed(audit.expected, accept.missed_edges):
         yield _many_missed("edges_missed", words, audit, accept.missed_edges)
     if audit.unexplained > _most_unexplained(audit.received, accept.unexplained_edges):
         yield _many_unexplained("edges_unexplained", words, audit, accept.unexplained_edges)
-    yield from (one for one in release_reasons(protocol, found) if one.severity is Severity.VOID)
+    yield from (
+        reason for reason in release_reasons(protocol, values) if reason.severity is Severity.VOID
+    )
 
 
-def release_reasons(protocol: Protocol, found: Mapping[str, Measured]) -> tuple[Reason, ...]:
+def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple[Reason, ...]:
     """Say that releases were too far apart, or that nobody can tell; nothing where all is well."""
-    skew, limit = found.get("release_skew_s"), protocol.accept.release_skew
+    skew, limit = values.get("release_skew_s"), protocol.accept.release_skew
     if skew is None:
         return ()
     near = abs(abs(skew.value) - limit) < skew.expanded
@@ -190,7 +192,9 @@ def nearly_in_time(result: DropResult, limit: float) -> bool:
     """Whether a drop is void for its release alone, and by no more than that is uncertain."""
     if result.verdict != "void":
         return False
-    if {one.code for one in result.reasons if one.severity is Severity.VOID} != {"release_skew"}:
+    if {reason.code for reason in result.reasons if reason.severity is Severity.VOID} != {
+        "release_skew"
+    }:
         return False
     skew = result.quantities["release_skew_s"]
     return abs(skew.value) - skew.expanded < limit
@@ -237,7 +241,7 @@ def _doubts(
     protocol: Protocol,
     drop: Drop,
     audit: Audit,
-    found: Mapping[str, Measured],
+    values: Mapping[str, Measured],
     estimate: Estimate,
 ) -> Iterator[Reason]:
     """Yield what makes a drop marginal."""
@@ -247,7 +251,9 @@ def _doubts(
         yield _many_missed("edges_missed_few", words, audit, missed)
     if unexplained * audit.received < audit.unexplained <= _PULSE:
         yield _many_unexplained("edges_unexplained_few", words, audit, unexplained)
-    yield from (one for one in release_reasons(protocol, found) if one.severity is Severity.DOUBT)
+    yield from (
+        reason for reason in release_reasons(protocol, values) if reason.severity is Severity.DOUBT
+    )
     if estimate.scatter > RESTLESS:
         yield make_reason("scatter", factor=estimate.scatter)
     if not estimate.settled:

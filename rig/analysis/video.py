@@ -43,9 +43,9 @@ class VideoFall:
 
     def json(self, gates: Measured | None) -> dict[str, Any]:
         """As ``video`` in the results."""
-        said: dict[str, Any] = {"acceleration_m_s2": self.acceleration.json()}
-        said |= {"frames": self.frames, "bent": self.bent}
-        return said if gates is None else said | {"normalized_error": self.beside(gates)}
+        fields: dict[str, Any] = {"acceleration_m_s2": self.acceleration.json()}
+        fields |= {"frames": self.frames, "bent": self.bent}
+        return fields if gates is None else fields | {"normalized_error": self.beside(gates)}
 
 
 def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
@@ -61,12 +61,12 @@ def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
     inverse = np.linalg.inv(triangle)
     places = np.column_stack([x, y])
     solved = inverse @ (basis.T @ places)
-    left = places - design @ solved
+    residuals = places - design @ solved
     rates = 2.0 * solved[0]
     size = float(np.hypot(*rates))
     along = rates / size if size else np.array([0.0, 1.0])
     degrees = times.size - 3
-    off = left @ along  # only what scatters the same way moves the size
+    off = residuals @ along  # only what scatters the same way moves the size
     u = 2.0 * float(np.sqrt(off @ off / degrees) * np.linalg.norm(inverse[0]))
     total = float(off @ off)
     neighbours = float(off[1:] @ off[:-1]) / total if total else 0.0

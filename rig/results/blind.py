@@ -40,10 +40,10 @@ def check_open(session: Reader, protocol: Protocol) -> None:
 
 def veiled_drop(result: DropResult) -> DropResult:
     """Leave out what a drop measured."""
-    told = {RELEASE_SKEW.name} & result.quantities.keys()
+    shown_names = {RELEASE_SKEW.name} & result.quantities.keys()
     return replace(
         result,
-        quantities={name: result.quantities[name] for name in told},
+        quantities={name: result.quantities[name] for name in shown_names},
         matches={},
         unmatched=(),
         last_passages={},

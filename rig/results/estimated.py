@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def session_estimate(
     session: Reader,
-    found: SessionResults,
+    results: SessionResults,
     progress: Progress | None = None,
     *,
     fresh: bool = False,
@@ -25,7 +25,7 @@ def session_estimate(
 
     Parameters
     ----------
-    found
+    results
         Of `results`, with its joint fit where that was made.
     progress, fresh
         As there.
@@ -35,11 +35,11 @@ def session_estimate(
     InputError, SessionError
         As `rig.estimate.session.estimate` raises it; the session is blind.
     """
-    kept = CacheEntry(SessionEstimate, found.digest, fresh=fresh)
-    estimated = kept.find()
+    entry = CacheEntry(SessionEstimate, results.digest, fresh=fresh)
+    estimated = entry.find()
     if estimated is None:
-        analysis = complete_analysis(session, found, progress)
+        analysis = complete_analysis(session, results, progress)
         estimated = estimate(protocol_of(session), analysis)
         if not estimated.failed:
-            estimated = kept.keep(estimated)
+            estimated = entry.keep(estimated)
     return estimated

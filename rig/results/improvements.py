@@ -50,11 +50,11 @@ class Improvement(NamedTuple):
     @property
     def sentence(self) -> str:
         """It in words."""
-        row, now = self.measurand, self.now * self.measurand.fine_scale
-        then, digits = self.then * row.fine_scale, max(0, 1 - math.floor(math.log10(now)))
+        row, present = self.measurand, self.now * self.measurand.fine_scale
+        then, digits = self.then * row.fine_scale, max(0, 1 - math.floor(math.log10(present)))
         return (
             f"If {BUDGET[self.line].known} were known {_BETTER:g} times better, U of {row.label} "
-            f"would be at most {then:.{digits}f} {row.fine} instead of {now:.{digits}f}."
+            f"would be at most {then:.{digits}f} {row.fine} instead of {present:.{digits}f}."
         )
 
 
@@ -69,22 +69,24 @@ def improvements(summary: Sequence[Incline]) -> Iterator[Improvement]:
         lines = [line for line in summary if line.causes.get(row.name)]
         if not lines:
             continue
-        now = _size(line.means[row.name].expanded for line in lines)
+        present = _size(line.means[row.name].expanded for line in lines)
         then = {
             name: _size(_without(line, row.name, name) for line in lines)
             for name in lines[0].causes[row.name]
             if BUDGET[name].known
         }
         for name in sorted(then, key=lambda name: then[name])[:_NAMED]:
-            if then[name] < _WORTH * now:
-                yield Improvement(row, name, now, then[name])
+            if then[name] < _WORTH * present:
+                yield Improvement(row, name, present, then[name])
 
 
 def _without(line: Incline, name: str, cause: str) -> float:
     """Return U95 of a mean with one cause so much smaller."""
     mean, part = line.means[name], line.causes[name].get(cause, 0.0)
-    left = mean.u**2 - (1.0 - _BETTER**-2) * min(part, mean.budget["common"]) ** 2
-    return replace(mean, u=math.sqrt(left), degrees=mean.degrees * (left / mean.u**2) ** 2).expanded
+    variance = mean.u**2 - (1.0 - _BETTER**-2) * min(part, mean.budget["common"]) ** 2
+    return replace(
+        mean, u=math.sqrt(variance), degrees=mean.degrees * (variance / mean.u**2) ** 2
+    ).expanded
 
 
 def _size(values: Iterable[float]) -> float:

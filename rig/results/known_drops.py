@@ -40,8 +40,8 @@ class KnownDrops:
         """Return what is known of a drop; `None` for nothing."""
         digest = digest_of(drop)
         summary = self._held.get(digest)
-        if summary is None and (kept := self._entry(digest).find()) is not None:
-            summary = kept.whole()
+        if summary is None and (stored := self._entry(digest).find()) is not None:
+            summary = stored.whole()
         return summary
 
     def __setitem__(self, drop: Drop, summary: DropSummary) -> None:

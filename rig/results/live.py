@@ -258,7 +258,9 @@ class LiveAnalysis:
             self._digest = digest
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
-        return {job: (one.verdict, self._summaries[job].scale.hz) for job, one in results.items()}
+        return {
+            job: (result.verdict, self._summaries[job].scale.hz) for job, result in results.items()
+        }
 
     def _planned(self, session: Reader) -> _Scene:
         scene = self._scene
@@ -266,8 +268,8 @@ class LiveAnalysis:
             protocol = protocol_of(session)
             if scene is None or scene.protocol != protocol:
                 plan = {run.number: run for run in planned_runs(protocol)}
-                kept = KnownDrops(protocol, blind=kept_back(session, protocol))
-                scene = _Scene(protocol, plan, kept, complete=False)
+                drops = KnownDrops(protocol, blind=kept_back(session, protocol))
+                scene = _Scene(protocol, plan, drops, complete=False)
             self._scene = scene = scene._replace(complete=bool(session.identities()))
         return scene
 
@@ -286,8 +288,8 @@ def _veiled_view(view: SessionView) -> SessionView:
     """Leave out what was measured, and the edges from which it could be drawn."""
     drops = {job: replace(drop, edges=()) for job, drop in view.drops.items()}
     results = {job: veiled_drop(result) for job, result in view.results.items()}
-    told = veiled(view.analysis)
-    return replace(view, drops=drops, results=results, analysis=told, fitted=0, lagging=False)
+    analysis = veiled(view.analysis)
+    return replace(view, drops=drops, results=results, analysis=analysis, fitted=0, lagging=False)
 
 
 def _pace(states: Sequence[StateEntry]) -> float | None:

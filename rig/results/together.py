@@ -82,7 +82,7 @@ class TogetherResults:
     @property
     def simulated(self) -> bool:
         """Whether any of the sessions is simulated."""
-        return any(one.simulated for one in self.sessions.values())
+        return any(session.simulated for session in self.sessions.values())
 
     @property
     def summary(self) -> tuple[Incline, ...]:
@@ -96,7 +96,9 @@ class TogetherResults:
     @property
     def void(self) -> bool:
         """Whether any run is void."""
-        return any(run.verdict == "void" for _, one in self.analyses() for run in one.runs)
+        return any(
+            run.verdict == "void" for _, analysis in self.analyses() for run in analysis.runs
+        )
 
     def json(self) -> dict[str, Any]:
         """As ``rig analyze A B --json`` prints it."""
@@ -104,8 +106,12 @@ class TogetherResults:
         return {
             "simulated": self.simulated,
             "sessions": [
-                {"session": name, "simulated": one.simulated, "calibration": one.calibration}
-                for name, one in self.sessions.items()
+                {
+                    "session": name,
+                    "simulated": session.simulated,
+                    "calibration": session.calibration,
+                }
+                for name, session in self.sessions.items()
             ],
             "shared": self._shared(),
             "runs": [
@@ -137,7 +143,7 @@ class TogetherResults:
                 for part in self.fit.parts
                 for line in part.analysis.summary
             ],
-            "differences": [one.json() for one in self.differences()],
+            "differences": [difference_row.json() for difference_row in self.differences()],
         }
 
     def differences(self) -> list[MeanDifference]:
@@ -151,10 +157,10 @@ class TogetherResults:
         InputError
             No session has runs like those of the first.
         """
-        first, *others = self.fit.parts
+        first, *rest = self.fit.parts
         differences = [
             MeanDifference(row.name, part.name, first.name, condition, difference(*values))
-            for part in others
+            for part in rest
             for condition, *sets in _pairs(part, first)
             for row in averaged()
             if (values := [_values(runs, row.name) for runs in sets]) and all(values)
@@ -171,8 +177,12 @@ def _pairs(part: SessionPart, first: SessionPart) -> Iterator[tuple[Condition, R
         for member in (part, first)
     )
     for condition, runs in cases.items():
-        like = [other for other in reference if other.incline_deg == condition.incline_deg]
-        same = [other for other in like if other.impact_chain == condition.impact_chain] or like
+        alike = [
+            candidate for candidate in reference if candidate.incline_deg == condition.incline_deg
+        ]
+        same = [
+            candidate for candidate in alike if candidate.impact_chain == condition.impact_chain
+        ] or alike
         if len(same) == 1:
             yield condition, runs, reference[same[0]]
 
@@ -217,10 +227,10 @@ def results_together(
     for name, session in zip(_names(files), files, strict=True):
         protocol = protocol_of(session)
         check_open(session, protocol)
-        found = results(session, progress, fresh=fresh, with_joint_fit=True)
-        own.append(found)
-        _check_whole(session, found, len(planned_runs(protocol)), unfinished=unfinished)
-        analysis = complete_analysis(session, found, progress)
+        session_results = results(session, progress, fresh=fresh, with_joint_fit=True)
+        own.append(session_results)
+        _check_whole(session, session_results, len(planned_runs(protocol)), unfinished=unfinished)
+        analysis = complete_analysis(session, session_results, progress)
         boards = [identity.get("unique_id", "") for _, identity in session.identities()]
         parts.append(SessionPart(name, protocol, analysis, str(boards[-1] if boards else "")))
     _check_repeats(files, own)
@@ -234,22 +244,27 @@ def _names(files: Sequence[Reader]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(session.path) for session in files]
 
 
-def _check_repeats(files: Sequence[Reader], found: Sequence[SessionResults]) -> None:
+def _check_repeats(files: Sequence[Reader], session_results: Sequence[SessionResults]) -> None:
     """Refuse to count drops more than once: a session named twice, its copy, or that continued."""
-    recorded = [(session.path, {*each.edges}) for session, each in zip(files, found, strict=True)]
-    for (path, edges), (other_path, other) in combinations(recorded, 2):
-        common = len(edges & other)
+    recorded = [
+        (session.path, {*result.edges})
+        for session, result in zip(files, session_results, strict=True)
+    ]
+    for (path, edges), (other_path, other_edges) in combinations(recorded, 2):
+        common = len(edges & other_edges)
         # Of few edges and a coarse timer single drops may happen to be alike.
-        if common and common == min(len(edges), len(other)):
+        if common and common == min(len(edges), len(other_edges)):
             paths = {"path": str(other_path), "other": str(path)}
             raise make_error(InputError, "session_repeated", **paths, drops=common)
 
 
-def _check_whole(session: Reader, found: SessionResults, planned: int, *, unfinished: bool) -> None:
+def _check_whole(
+    session: Reader, results: SessionResults, planned: int, *, unfinished: bool
+) -> None:
     """Refuse a session that is damaged, or lacks runs."""
-    path, runs = str(session.path), found.analysis.runs
-    if found.analysis.damaged:
-        records = "; ".join(found.analysis.damage)
+    path, runs = str(session.path), results.analysis.runs
+    if results.analysis.damaged:
+        records = "; ".join(results.analysis.damage)
         raise make_error(InputError, "records_damaged", path=path, records=records)
     missing = planned - len(runs)
     if missing and not unfinished:

@@ -90,11 +90,11 @@ class SessionResults:
     @property
     def calibration(self) -> dict[str, Any]:
         """``calibration`` of `json`: what is known of the clock, what free fall says included."""
-        said, check = self.clock.said, self.gravity
+        fields, check = self.clock.said, self.gravity
         if check is None:
-            return said
+            return fields
         doubts = [] if check.agrees else [_gravity_doubt(check)]
-        return said | {"gravity": check.json(), "notes": [*said["notes"], *doubts]}
+        return fields | {"gravity": check.json(), "notes": [*fields["notes"], *doubts]}
 
     @property
     def summary(self) -> tuple[Incline, ...]:
@@ -107,18 +107,18 @@ class SessionResults:
 
     def records(self) -> list[dict[str, Any]]:
         """Return each drop as JSON has it, those with a later attempt last."""
-        said = self.json()
-        return [*said["runs"], *said.get("superseded", [])]
+        fields = self.json()
+        return [*fields["runs"], *fields.get("superseded", [])]
 
     def json(self) -> dict[str, Any]:
         """As `rig analyze --json` prints it."""
-        said = self.analysis.json()
-        for run in (*said["runs"], *said.get("superseded", [])):
+        fields = self.analysis.json()
+        for run in (*fields["runs"], *fields.get("superseded", [])):
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
         head = {"simulated": self.simulated, "clock": self.clock.details}
         head |= {"blind": True} if self.blind else {}
-        better = [each.json() for each in improvements(self.analysis.summary)]
-        return head | {"calibration": self.calibration} | said | {"measure_next": better}
+        better = [improvement.json() for improvement in improvements(self.analysis.summary)]
+        return head | {"calibration": self.calibration} | fields | {"measure_next": better}
 
 
 def _gravity_doubt(check: GravityCheck) -> str:
@@ -135,7 +135,9 @@ def protocol_of(session: Reader) -> Protocol:
     Other timers may have had fewer than the protocol; a board's beams are those of the protocol.
     """
     protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
-    had = next((named["beams"] for _, named in session.identities() if "beams" in named), None)
+    had = next(
+        (identity["beams"] for _, identity in session.identities() if "beams" in identity), None
+    )
     return protocol if had is None else with_gates(protocol, had)
 
 
@@ -147,7 +149,7 @@ def calibration(session: Reader) -> Calibration:
 def results(
     session: Reader,
     progress: Progress | None = None,
-    known: KnownDrops | None = None,
+    drops: KnownDrops | None = None,
     *,
     fresh: bool = False,
     with_joint_fit: bool = False,
@@ -160,7 +162,7 @@ def results(
         Open, for reading at least.
     progress
         Called with the number of drops done and the number of all.
-    known
+    drops
         What its drops say by themselves, where a live analysis has found that out.
     fresh
         Whether to analyse it in any case.
@@ -171,14 +173,14 @@ def results(
     complete = None
     with session.snapshot():
         digest, blind = session.digest(), kept_back(session, protocol)
-        kept = CacheEntry(Finished, digest, fresh=fresh)
+        entry = CacheEntry(Finished, digest, fresh=fresh)
         clock = Calibrator().look(session, protocol.reference_u)
-        finished = kept.find()
+        finished = entry.find()
         if finished is None:
-            known = known or KnownDrops(protocol, blind=blind, fresh=fresh)
-            complete, scales, edges = _analyze(session, protocol, clock, known, progress)
-            shown = veiled(complete) if blind else replace(complete, joint=None, adjusted={})
-            finished = kept.keep(Finished(shown, scales, edges))
+            drops = drops or KnownDrops(protocol, blind=blind, fresh=fresh)
+            complete, scales, edges = _analyze(session, protocol, clock, drops, progress)
+            stored = veiled(complete) if blind else replace(complete, joint=None, adjusted={})
+            finished = entry.keep(Finished(stored, scales, edges))
     gravity = check_gravity(protocol, finished.analysis.runs)
     held = complete if with_joint_fit and not blind else None
     return SessionResults(*finished, gravity, session.simulated, clock, blind, digest, held)
@@ -188,7 +190,7 @@ def _analyze(
     session: Reader,
     protocol: Protocol,
     clock: Calibration,
-    known: KnownDrops,
+    known_drops: KnownDrops,
     progress: Progress | None,
 ) -> tuple[Analysis, dict[tuple[int, int], dict[str, Any]], tuple[str, ...]]:
     """Analyse all drops, read one by one, with their time scales and digests of their edges."""
@@ -202,8 +204,8 @@ def _analyze(
 
     total = sum(entry.state is RunState.RECORDED for entry in session.states())
     drops, causes = session.drops(), rejected(session)
-    found = analyze(protocol, drops, scale, causes, progress, known, total, _processors())
-    return found, scales, tuple(edges)
+    analysis = analyze(protocol, drops, scale, causes, progress, known_drops, total, _processors())
+    return analysis, scales, tuple(edges)
 
 
 def _processors() -> int:
@@ -219,7 +221,7 @@ def _processors() -> int:
 
 
 def complete_analysis(
-    session: Reader, found: SessionResults, progress: Progress | None = None
+    session: Reader, results: SessionResults, progress: Progress | None = None
 ) -> Analysis:
     """Return the analysis with its joint fit; where only results were kept it is made again.
 
@@ -228,7 +230,7 @@ def complete_analysis(
     SessionError
         The session is blind.
     """
-    return found.complete or detailed(session, progress)[0]
+    return results.complete or detailed(session, progress)[0]
 
 
 def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:

@@ -113,5 +113,5 @@ def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monk
     scales = {id(drop): view.scales[job] for job, drop in view.drops.items()}
     for before in (known, KnownDrops(view.protocol)):
         drops = list(view.drops.values())
-        again = analyze(view.protocol, drops, lambda drop: scales[id(drop)], known=before)
+        again = analyze(view.protocol, drops, lambda drop: scales[id(drop)], summaries=before)
         assert again.json() == cold
