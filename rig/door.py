@@ -264,12 +264,12 @@ class _Quantities:
 
     def _written(self) -> str:
         rows = (MEASURANDS[name] for name in self.quantities)
-        said = (
+        values = (
             f"{row.symbol} {plus_minus(self.quantities[row.name], row.scale)} {row.unit}"
             for row in rows
             if row.told
         )
-        return ", ".join(said)
+        return ", ".join(values)
 
 
 class RunResult(_Quantities):
@@ -309,8 +309,8 @@ class RunResult(_Quantities):
 
     def __repr__(self) -> str:
         at = f" at {self.incline_deg:g}°, {self.impact_chain} strikes" if self.impact_chain else ""
-        said = f": {self._written()}" if self.quantities else ""
-        return f"<run {self.run}{at}, {self.verdict}{said}>"
+        values = f": {self._written()}" if self.quantities else ""
+        return f"<run {self.run}{at}, {self.verdict}{values}>"
 
 
 class MeanResult(_Quantities):

@@ -47,7 +47,7 @@ def require_file(path: str | os.PathLike[str], *, descriptors: bool = False) -> 
         raise OSError(errno.EINVAL, f"it is {kind}; name a file", os.fspath(path))
 
 
-def read_input(path: str | os.PathLike[str], most: int = -1) -> bytes:
+def read_input(path: str | os.PathLike[str], limit: int = -1) -> bytes:
     """Read a file, or a pipe as of ``<(...)``, that a user has named; at most so many bytes.
 
     Raises
@@ -57,7 +57,7 @@ def read_input(path: str | os.PathLike[str], most: int = -1) -> bytes:
     """
     require_file(path, descriptors=True)
     with Path(path).open("rb") as stream:
-        return stream.read(most)
+        return stream.read(limit)
 
 
 def write_atomic(path: str | os.PathLike[str], text: str) -> None:
@@ -110,11 +110,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     InputError
         As in `write_atomic`.
     """
-    given, target = Path(path), Path(os.path.realpath(path))  # a pipe has no real path
+    path_given, target = Path(path), Path(os.path.realpath(path))  # a pipe has no real path
     try:
         check_place(path)
-        through = given.exists() and not given.is_file()
-        with given.open("wb") if through else _replacing(target) as stream:
+        through = path_given.exists() and not path_given.is_file()
+        with path_given.open("wb") if through else _replacing(target) as stream:
             yield stream
     except OSError as error:
         raise InputError(

@@ -184,10 +184,7 @@ class Pairing:
         rods = np.concatenate([none, *(train.rods for train in trains)])
         kind, kinds = (
             np.concatenate([none, *(2 * n + sides for n, sides in enumerate(states))])
-            for states in (
-                [gate_train.blocked for gate_train in trains],
-                [gate_train.blocks for gate_train in trains],
-            )
+            for states in ([gate.blocked for gate in trains], [gate.blocks for gate in trains])
         )
         partner = np.full(blocked.size, -1)
         begins = np.flatnonzero((kind[1:] == kind[:-1] - 1) & (blocked[:-1] > blocked[1:]))

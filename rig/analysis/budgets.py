@@ -117,20 +117,16 @@ class Budgets:
         lines = np.bincount(place, own * own, size)
         lines += np.bincount(self._common, common * common, size)
         # The sum over all drops was made once; this drop's share is replaced by its own rows.
-        behind_lines = np.bincount(place, behind * behind, size)
+        shares = np.bincount(place, behind * behind, size)
         for line, gains in self._gains.items():
-            lines[line] += max(0.0, float(common @ gains @ common) - float(behind_lines[line]))
+            lines[line] += max(0.0, float(common @ gains @ common) - float(shares[line]))
         # What no prior explains comes from the edges; rounding may leave less than nothing.
         lines[_LINES["edges"]] += max(0.0, variance - float(lines.sum()))
         parts = zip(_LINES, np.sqrt(lines).tolist(), strict=True)
         budget = {name: line for name, line in parts if line > 0.0}
-        u, scale_degrees = math.sqrt(variance), self.joint.degrees
-        line_degrees = {
-            name: scale_degrees[line.scale]
-            for name, line in BUDGET.items()
-            if line.scale in scale_degrees
-        }
-        degrees = effective_degrees(u, budget, line_degrees)
+        u, nu = math.sqrt(variance), self.joint.degrees
+        line_nu = {name: nu[line.scale] for name, line in BUDGET.items() if line.scale in nu}
+        degrees = effective_degrees(u, budget, line_nu)
         deviation = self._deviation(drop, gradient, degrees)
         return Measured(
             float(result.value), u, degrees, budget, shared if shared.size else None, deviation
@@ -138,28 +134,22 @@ class Budgets:
 
     def _deviation(self, drop: JointDrop, gradient: Array, degrees: float) -> Deviation:
         """Return how far a result may be from a prediction that holds."""
-        (place, predicted, absent), own_places, places = _supposed(drop.model), drop.own, drop.here
+        (place, predicted, absent), inner, places = _supposed(drop.model), drop.own, drop.here
         if self._common.size:  # what is guessed counts for as much as its expanded uncertainty says
             wider = (coverage_factor(GUESSED) / COVERAGE_95) ** 2
             absent = np.where(np.isin(place, _GUESSED), 1.0 - wider, absent)
         true = np.where(predicted, 0.0, gradient)
-        from_edges = gradient[own_places] - true[own_places]
+        direct = gradient[inner] - true[inner]
         moves, response, without, lost = (np.zeros(self._common.size) for _ in range(4))
         moves[places], lost[places] = true[drop.common], absent[drop.common]
-        response[places] = gradient[drop.common] - drop.gain.T @ gradient[own_places]
-        without[places] = drop.gain.T @ from_edges
+        response[places] = gradient[drop.common] - drop.gain.T @ gradient[inner]
+        without[places] = drop.gain.T @ direct
         root = self.joint.inverse  # whose product with its transpose is the common covariance
         common = root @ (response @ root)
-        solved = drop.inverse @ (gradient[own_places] @ drop.inverse)
-        error = true[own_places] - np.where(
-            predicted[own_places], 0.0, solved - drop.gain @ common[places]
-        )
-        own = (
-            true[own_places] @ true[own_places]
-            - gradient[own_places] @ solved
-            + 2.0 * from_edges @ solved
-        )
-        own -= absent[own_places] @ error**2
+        solved = drop.inverse @ (gradient[inner] @ drop.inverse)
+        error = true[inner] - np.where(predicted[inner], 0.0, solved - drop.gain @ common[places])
+        own = true[inner] @ true[inner] - gradient[inner] @ solved + 2.0 * direct @ solved
+        own -= absent[inner] @ error**2
         less, surplus = (
             np.sqrt(np.maximum(0.0, sign * lost)) * (moves - common) for sign in (1.0, -1.0)
         )
@@ -167,8 +157,8 @@ class Budgets:
         plus = np.concatenate([moves, without @ root, surplus])
         minus = np.concatenate([(response + without) @ root, less])
         if not self._common.size:  # what drops have in common is known by its line alone
-            part = (1.0 - absent[own_places]) * error**2
-            shared = float(part[np.isin(place[own_places], _SHARED)].sum())
+            part = (1.0 - absent[inner]) * error**2
+            shared = float(part[np.isin(place[inner], _SHARED)].sum())
             own, plus, minus = own - shared, np.array([math.sqrt(shared)]), np.zeros(1)
         if "impact" in drop.model.records:
             degrees = self.joint.degrees.get("impulse", degrees)

@@ -73,7 +73,7 @@ def diagnose(fit: Fit) -> Diagnosis:
         at = [_values(model.protocol, train) for train in aside]
         doubts.append(make_reason("low_gates_miss_rods", words, at=at))
     reasons: list[Reason] = []
-    alive = [one for one in gates if one.train.times.size]
+    alive = [beam for beam in gates if beam.train.times.size]
     absent = [
         reason
         for role, record in model.records.items()
@@ -81,7 +81,7 @@ def diagnose(fit: Fit) -> Diagnosis:
             model.protocol, record, [gate for gate in alive if gate.role == role]
         )
     ]
-    if absent and not any(one.strange for one in alive):
+    if absent and not any(beam.strange for beam in alive):
         return Diagnosis((*absent, *doubts), known=True)
     for gate in alive:
         where = _values(model.protocol, gate.train)
@@ -92,16 +92,18 @@ def diagnose(fit: Fit) -> Diagnosis:
         elif gate.off > IMPLAUSIBLE:
             reasons.append(make_reason("gate_off", words, **where, deviations=gate.off))
     # An exchanged gate fits what it should not see rods away, or at another height.
-    displaced = [one for one in alive if one.extra >= _PAIR and one.unseen & one.ends]
-    displaced += [one for pair in combinations(alive, 2) if _counts_crossed(*pair) for one in pair]
-    off = [one for one in alive if one.off > IMPLAUSIBLE]
-    suspects = dict.fromkeys(one.train.gate for one in [*displaced, *off])
-    strange = [one.train.gate for one in alive if one.strange]
+    displaced = [beam for beam in alive if beam.extra >= _PAIR and beam.unseen & beam.ends]
+    displaced += [
+        beam for pair in combinations(alive, 2) if _counts_crossed(*pair) for beam in pair
+    ]
+    off = [beam for beam in alive if beam.off > IMPLAUSIBLE]
+    suspects = dict.fromkeys(beam.train.gate for beam in [*displaced, *off])
+    strange = [beam.train.gate for beam in alive if beam.strange]
     if strange and len(gates) <= FEW_GATES:
         # A side of few gates is read well as another fall where one of them is the other side's.
-        suspects = dict.fromkeys([*strange, *(one.train.gate for one in alive)])
+        suspects = dict.fromkeys([*strange, *(beam.train.gate for beam in alive)])
     odd = any(reason.severity is Severity.VOID for reason in reasons) or len(displaced) >= _PAIR
-    odd |= any(_other_ends([one for one in alive if one.role == role]) for role in model.records)
+    odd |= any(_other_ends([beam for beam in alive if beam.role == role]) for role in model.records)
     return Diagnosis((*reasons, *doubts), tuple(suspects), odd)
 
 
@@ -135,17 +137,11 @@ def silent(protocol: Protocol, records: Collection[ChainRecord]) -> list[Reason]
     """Name the gates that gave no edges, while the others gave theirs."""
     gates = [train for record in records for train in record.trains if train.rods.size]
     heard = [train for train in gates if train.times.size]
-    if sum(heard_train.times.size for heard_train in heard) <= STRANGE * sum(
-        heard_train.rods.size for heard_train in heard
-    ):
+    if sum(gate.times.size for gate in heard) <= STRANGE * sum(gate.rods.size for gate in heard):
         return []
     reasons = []
     for record in records:
-        dead = [
-            heard_train
-            for heard_train in record.trains
-            if heard_train.rods.size and not heard_train.times.size
-        ]
+        dead = [gate for gate in record.trains if gate.rods.size and not gate.times.size]
         if len(dead) == len(record.trains) > 1:
             reasons.append(make_reason("side_silent", protocol.vocabulary, side=record.role))
         else:

@@ -97,12 +97,9 @@ class Discrepancy:
             return cls(nominal, stretch, 0.0, 0.0)
         pull = abs(record.alpha) * float(nominal.hits.ratio[-2] * nominal.hits.arrival[-2])
         seeing = [train for train in record.trains if strikes.size - 1 in train.rods]
-        lowest = min(
-            (protocol.gates.gates[seeing_train.gate].height for seeing_train in seeing),
-            default=np.inf,
-        )
-        unseen = max(0.0, min(lowest, float(strikes[-1] - strikes[-2])))
-        return cls(nominal, stretch, pull, unseen)
+        lowest = min((protocol.gates.gates[beam.gate].height for beam in seeing), default=np.inf)
+        hidden = max(0.0, min(lowest, float(strikes[-1] - strikes[-2])))
+        return cls(nominal, stretch, pull, hidden)
 
     def top(self, levels: Array) -> StretchModes:
         """Return the modes at the top rod, the reference point being at some levels, m."""

@@ -85,9 +85,7 @@ class DropSummary:
     def whole(self) -> DropSummary:
         """Return what was kept with its deviations in their places."""
         values = self.result.quantities.items()
-        quantities = {
-            name: replace(value, deviation=self.deviations[name]) for name, value in values
-        }
+        quantities = {name: replace(m, deviation=self.deviations[name]) for name, m in values}
         return replace(self, result=replace(self.result, quantities=quantities))
 
 

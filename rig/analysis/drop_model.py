@@ -273,13 +273,11 @@ class DropModel:
         """Return `residuals` with of each what the one before tells of it taken away."""
         return self.parted(role, self.residuals(role, x, matches), matches)
 
-    def parted(self, role: str, residuals: Residuals, matches: Sequence[Index]) -> Residuals:
+    def parted(self, role: str, rows: Residuals, matches: Sequence[Index]) -> Residuals:
         """Make `independent` of some residuals."""
-        residuals = residuals._replace(values=residuals.values.copy(), sigma=residuals.sigma.copy())
-        self._part(
-            self._matched(role, matches), residuals.loose > 0.0, residuals.values, residuals.sigma
-        )
-        return residuals
+        rows = rows._replace(values=rows.values.copy(), sigma=rows.sigma.copy())
+        self._part(self._matched(role, matches), rows.loose > 0.0, rows.values, rows.sigma)
+        return rows
 
     def _part(self, seen: Seen, struck: Flags, values: Array, sigma: Array) -> Array:
         """Make both sides of a rod independent, in place; return `Equations.told`.

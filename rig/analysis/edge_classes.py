@@ -104,10 +104,8 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     for role, record in model.records.items():
         path = model.trajectory(role, x)
         lowest = min(gates[train.gate].height for train in record.trains)
-        levels_by_gate = split(model.all_levels(role, x), model.expected[role].ends)
-        for train, levels, match in zip(
-            record.trains, levels_by_gate, drop.matches[role], strict=True
-        ):
+        by_gate = split(model.all_levels(role, x), model.expected[role].ends)
+        for train, levels, match in zip(record.trains, by_gate, drop.matches[role], strict=True):
             gate = gates[train.gate]
             # Only the lowest beam is near enough to what bounces.
             near = gate.height == lowest and record.ratios is not None

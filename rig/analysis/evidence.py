@@ -107,11 +107,9 @@ class Evidence:
 
         Nor of rods that may have struck: most of what these are off is of another kind.
         """
-        scales = self.components
+        sizes = self.components
         for row in residuals:
-            usual = (
-                scales.floor**2 + (row.speed * scales.jitter) ** 2 + scales.departures(row.loose)
-            )
+            usual = sizes.floor**2 + (row.speed * sizes.jitter) ** 2 + sizes.departures(row.loose)
             good = row.clean & (np.abs(row.values) <= STRAY * row.sigma)
             good &= row.sigma**2 <= 2.0 * usual
             self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.loose[good]))
@@ -223,11 +221,9 @@ def _doubted(parted: float) -> float:
     return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
 
 
-def _member(stated: Size, variance: Size) -> Size:
+def _member(stated: Size, size: Size) -> Size:
     """Square of the member that a stated variance counts for, where so large a one was found."""
-    return (
-        2.0 * stated * variance / (stated + variance + np.finfo(float).tiny)
-    )  # 0 of what is exact
+    return 2.0 * stated * size / (stated + size + np.finfo(float).tiny)  # 0 of what is exact
 
 
 def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:

@@ -146,20 +146,23 @@ class Explainer:
             reading = weighed(fit)
             stated, well = self._absolute(reading, self.setting.hz), well_read(reading)
             explanations = [*self._along(fit, stated, well), *self._voted(self.discrete, stated)]
-            likelier = [one for one in explanations if one.log_odds > 0.0]
-            likeliest = max(likelier, key=lambda one: one.log_odds, default=None)
+            likelier = [cause for cause in explanations if cause.log_odds > 0.0]
+            likeliest = max(likelier, key=lambda cause: cause.log_odds, default=None)
             sized = likeliest is not None and likeliest.whole and likeliest.fault in self.sized
             if not sized and (likelier or not well):
                 # A rod at one end too many looks like a chain that hangs a rod's distance higher,
                 # which no score tells that begins a rod off.
                 explanations += self._voted(self.sized, stated)
-            if any(one.whole and one.log_odds > CLEAR for one in explanations):
+            if any(cause.whole and cause.log_odds > CLEAR for cause in explanations):
                 explanations += self._beyond(fit, stated)
         likelier = sorted(
-            (one for one in explanations if one.log_odds > 0.0), key=lambda one: one.log_odds
+            (cause for cause in explanations if cause.log_odds > 0.0),
+            key=lambda cause: cause.log_odds,
         )
-        best = {id(one.fault): one for one in likelier}  # what was found in both ways counts once
-        return sorted(best.values(), key=lambda one: -one.log_odds)
+        best = {
+            id(cause.fault): cause for cause in likelier
+        }  # what was found in both ways counts once
+        return sorted(best.values(), key=lambda cause: -cause.log_odds)
 
     def _read_alone(self, record: ChainRecord) -> float:
         """Evidence of a side by itself, where the whole drop cannot be read."""
@@ -367,7 +370,7 @@ def _key(setting: Premise, record: ChainRecord) -> tuple[Hashable, ...]:
 
 
 def explained(
-    explanations: Sequence[Explanation], words: Vocabulary, accused: Sequence[Reason] = ()
+    causes: Sequence[Explanation], words: Vocabulary, accused: Sequence[Reason] = ()
 ) -> list[Reason]:
     """Name the fault that explains a drop clearly, or the likeliest ones.
 
@@ -378,18 +381,14 @@ def explained(
     accused
         What is said where no fault is clear.
     """
-    if not explanations or explanations[0].log_odds < CLEAR or explanations[0].fault is NEITHER:
+    if not causes or causes[0].log_odds < CLEAR or causes[0].fault is NEITHER:
         return [*accused]
     best, lead = (
-        explanations[0],
-        explanations[0].log_odds
-        - max([0.0, *(explanation.log_odds for explanation in explanations[1:])]),
+        causes[0],
+        causes[0].log_odds - max([0.0, *(cause.log_odds for cause in causes[1:])]),
     )
     if best.whole and lead > CLEAR:
         return [make_reason(best.fault.code, words, **best.values, log_odds=lead)]
-    nameable = [explanation for explanation in explanations if explanation.fault is not NEITHER]
-    candidates = [
-        {"code": explanation.fault.code, "values": explanation.values}
-        for explanation in nameable[:_NAMED]
-    ]
+    nameable = [cause for cause in causes if cause.fault is not NEITHER]
+    candidates = [{"code": cause.fault.code, "values": cause.values} for cause in nameable[:_NAMED]]
     return [make_reason("unclear_fault", words, candidates=candidates)]

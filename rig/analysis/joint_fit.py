@@ -139,13 +139,8 @@ class JointFit:
         return {
             "runs": len(self.drops),
             "scatter": [
-                {
-                    "name": name,
-                    "stated": beforehand_value,
-                    "found": scatter[name],
-                    "degrees": degrees,
-                }
-                for (name, degrees), beforehand_value in zip(
+                {"name": name, "stated": prior, "found": scatter[name], "degrees": degrees}
+                for (name, degrees), prior in zip(
                     self.degrees.items(), beforehand.values(), strict=True
                 )
             ],
@@ -293,16 +288,14 @@ def _weigh(
     return new.settled(parameters, struck)
 
 
-def _steady(before: Components, after: Components, drops: Sequence[JointDrop]) -> bool:
+def _steady(old: Components, new: Components, drops: Sequence[JointDrop]) -> bool:
     """Whether no component changes much; a floor that is not there shrinks for ever.
 
     Of impulses it is their scatter in these drops that counts: where all have about the same α, it
     does not tell its two components apart, and nothing depends on them.
     """
-    names = [
-        name for name in before.__slots__ if name not in ("impulse", "impulse_floor", "bounce")
-    ]
-    pairs = [(getattr(before, name), getattr(after, name), _LEAST.get(name, 0.0)) for name in names]
+    names = [name for name in old.__slots__ if name not in ("impulse", "impulse_floor", "bounce")]
+    pairs = [(getattr(old, name), getattr(new, name), _LEAST.get(name, 0.0)) for name in names]
     alphas = {
         abs(drop.model.guesses["impact"].alpha) for drop in drops if "impact" in drop.model.guesses
     }
@@ -310,6 +303,6 @@ def _steady(before: Components, after: Components, drops: Sequence[JointDrop]) -
     pairs += [
         (a, b, 0.0)
         for alpha in alphas
-        for a, b in zip(before.impulses(alpha, ends), after.impulses(alpha, ends), strict=True)
+        for a, b in zip(old.impulses(alpha, ends), new.impulses(alpha, ends), strict=True)
     ]
     return all(abs(a - b) <= _STEADY * max(b, least) for a, b, least in pairs)

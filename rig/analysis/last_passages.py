@@ -83,16 +83,14 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     return values
 
 
-def disagreements(
-    fitted: Mapping[str, Measured], by_passages: Mapping[str, Measured]
-) -> list[Reason]:
+def disagreements(fitted: Mapping[str, Measured], direct: Mapping[str, Measured]) -> list[Reason]:
     """Say what the last passages alone have otherwise than the adjustment of the whole drop."""
     reasons = []
     codes = {"speed_m_s": "last_speed_differs", "separation_raw_m": "last_separation_differs"}
     for name, code in codes.items():
-        if name not in fitted or name not in by_passages:
+        if name not in fitted or name not in direct:
             continue
-        adjusted, last = fitted[name], by_passages[name]
+        adjusted, last = fitted[name], direct[name]
         # They share their last edges and so the errors of these: they are nearer than that.
         if abs(adjusted.value - last.value) > _APART * math.hypot(adjusted.u, last.u):
             unit = name.removeprefix(MEASURANDS[name].stem)

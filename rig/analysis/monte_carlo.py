@@ -160,13 +160,13 @@ def until_stable(
     """
     blocks: list[Mapping[str, Propagated]] = []
 
-    def stable(samples: Mapping[str, Propagated], block: Mapping[str, Propagated], _: int) -> bool:
+    def stable(results: Mapping[str, Propagated], block: Mapping[str, Propagated], _: int) -> bool:
         blocks.append(block)
         return all(
             _stable(
                 [sample[name] for sample in blocks if name in sample], tolerance(total.u, digits)
             )
-            for name, total in samples.items()
+            for name, total in results.items()
         )
 
     return _draw_until(stable, drawn, repeat(block))

@@ -97,8 +97,6 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
 def _blocks(runs: Sequence[DropResult | None], first: str) -> list[Block]:
     """Cut an incline's runs in fours, and keep those that are whole."""
     fours = (runs[end - len(ABBA) : end] for end in range(len(ABBA), len(runs) + 1, len(ABBA)))
-    complete = ([run for run in four if run is not None] for four in fours)
+    full = ([run for run in four if run is not None] for four in fours)
     # All runs shuffled leave no blocks.
-    return [
-        block for block in complete if tuple(member.run.impact == first for member in block) == ABBA
-    ]
+    return [block for block in full if tuple(r.run.impact == first for r in block) == ABBA]

@@ -235,9 +235,7 @@ class DropResult:
         names = ("gates", "scatter", "last_passages", "alone")
         fields |= attributes(self, *(name for name in names if getattr(self, name)))
         fields |= attributes(self, "learned", "verdict") | reasons_json(self.reasons)
-        fields["degrees"] = plain(
-            {name: measured.degrees for name, measured in self.quantities.items()}
-        )
+        fields["degrees"] = plain({name: m.degrees for name, m in self.quantities.items()})
         fields["budget"] = [
             {"name": source, "quantity": name, "u": u}
             for name, value in self.quantities.items()

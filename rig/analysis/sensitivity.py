@@ -64,16 +64,14 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
     }
     if analysis.joint is None:
         joints = [
-            by_itself(
-                Fit(state.model, state.matches, adjust(state.model, state.matches, state.x.copy()))
-            )
-            for state in drops.values()
+            by_itself(Fit(fit.model, fit.matches, adjust(fit.model, fit.matches, fit.x.copy())))
+            for fit in drops.values()
         ]
     else:
         joints = [joint_fit(list(drops.values()))]
         if not joints[0].settled:
             return None
-    results = (state.measured(drop) for state in map(Budgets, joints) for drop in state.joint.drops)
+    results = (fit.measured(drop) for fit in map(Budgets, joints) for drop in fit.joint.drops)
     results_by_key = dict(zip(drops, results, strict=True))
     return summarize(
         protocol,

@@ -113,9 +113,7 @@ class Analysis:
             "learned": None if self.rig is None else self.rig.learned,
             "likeness": None if self.rig is None else self.rig.likeness,
         }
-        fields = {
-            name: plain(member) for name, member in where_there_are.items() if member is not None
-        }
+        fields = {name: plain(part) for name, part in where_there_are.items() if part is not None}
         return attributes(self, "runs", "summary") | fields
 
 

@@ -281,10 +281,8 @@ def _by_kappa(
     distance: Array, reach: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> Array:
     """Derivative of the squared speed at the end of a leg by its κ."""
-    remaining = 1.0 - kappa * reach
-    slope: Array = (
-        gravity * reach_slopes(distance, reach, kappa) - 2.0 * distance * remaining * speed**2
-    )
+    rest = 1.0 - kappa * reach
+    slope: Array = gravity * reach_slopes(distance, reach, kappa) - 2.0 * distance * rest * speed**2
     return slope
 
 

@@ -446,13 +446,9 @@ def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
 def parameters(struck: int) -> dict[str, slice]:
     """Return which parameters of a trajectory are what, for so many rods that strike."""
     places = {"release": RELEASE, "start": START, "gravity": GRAVITY, "drag": DRAG}
-    slices = {name: slice(place, place + 1) for name, place in places.items()}
+    spans = {name: slice(place, place + 1) for name, place in places.items()}
     ends = [COMMON, COMMON + struck, COMMON + 2 * struck]
-    return slices | {
-        "gains": slice(*ends[:2]),
-        "places": slice(*ends[1:]),
-        "all": slice(0, ends[2]),
-    }
+    return spans | {"gains": slice(*ends[:2]), "places": slice(*ends[1:]), "all": slice(0, ends[2])}
 
 
 class SideSlopes(NamedTuple):

@@ -173,9 +173,7 @@ def _limits(protocol: Protocol, audit: Audit, values: Mapping[str, Measured]) ->
         yield _many_missed("edges_missed", words, audit, accept.missed_edges)
     if audit.unexplained > _most_unexplained(audit.received, accept.unexplained_edges):
         yield _many_unexplained("edges_unexplained", words, audit, accept.unexplained_edges)
-    yield from (
-        reason for reason in release_reasons(protocol, values) if reason.severity is Severity.VOID
-    )
+    yield from (why for why in release_reasons(protocol, values) if why.severity is Severity.VOID)
 
 
 def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple[Reason, ...]:
@@ -192,9 +190,7 @@ def nearly_in_time(result: DropResult, limit: float) -> bool:
     """Whether a drop is void for its release alone, and by no more than that is uncertain."""
     if result.verdict != "void":
         return False
-    if {reason.code for reason in result.reasons if reason.severity is Severity.VOID} != {
-        "release_skew"
-    }:
+    if {why.code for why in result.reasons if why.severity is Severity.VOID} != {"release_skew"}:
         return False
     skew = result.quantities["release_skew_s"]
     return abs(skew.value) - skew.expanded < limit
@@ -251,9 +247,7 @@ def _doubts(
         yield _many_missed("edges_missed_few", words, audit, missed)
     if unexplained * audit.received < audit.unexplained <= _PULSE:
         yield _many_unexplained("edges_unexplained_few", words, audit, unexplained)
-    yield from (
-        reason for reason in release_reasons(protocol, values) if reason.severity is Severity.DOUBT
-    )
+    yield from (why for why in release_reasons(protocol, values) if why.severity is Severity.DOUBT)
     if estimate.scatter > RESTLESS:
         yield make_reason("scatter", factor=estimate.scatter)
     if not estimate.settled:

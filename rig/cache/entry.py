@@ -47,8 +47,8 @@ class CacheEntry(Generic[Kept]):
         """Return a kept result; `None` where there is none."""
         text = self._file.get(self._key) if self._key and not self._fresh else None
         with suppress(ValueError):
-            found = None if text is None else from_text(text)
-            return found if isinstance(found, self._kind) else None
+            kept_value = None if text is None else from_text(text)
+            return kept_value if isinstance(kept_value, self._kind) else None
         return None
 
     def keep(self, result: Kept) -> Kept:
@@ -71,8 +71,8 @@ def recall(
 ) -> Kept:
     """Return a kept result, or else make it; arguments as for `CacheEntry`."""
     entry = CacheEntry(kind, *content, fresh=fresh)
-    found = entry.find()
-    return entry.keep(make()) if found is None else found
+    answer = entry.find()
+    return entry.keep(make()) if answer is None else answer
 
 
 @cache

@@ -58,9 +58,9 @@ def _plain(value: object) -> object:
         return [_MAPPING, [*map(_plain, value)], [*map(_plain, value.values())]]
     if type(value) is list or type(value) is tuple:
         return [_LIST if type(value) is list else _TUPLE, *map(_plain, value)]
-    made: type = type(value)
-    parts = (_plain(getattr(value, name)) for name in _fields(made))
-    return [f"{made.__module__}:{made.__qualname__}", *parts]
+    kind: type = type(value)
+    parts = (_plain(getattr(value, name)) for name in _fields(kind))
+    return [f"{kind.__module__}:{kind.__qualname__}", *parts]
 
 
 def _record(value: Any) -> Any:
@@ -76,8 +76,8 @@ def _record(value: Any) -> Any:
     records = [_record(part) if type(part) is list else part for part in parts]
     if kind in {_LIST, _TUPLE}:
         return records if kind == _LIST else tuple(records)
-    made = _class(kind)
-    return made(**dict(zip(_fields(made), records, strict=True)))
+    record_type = _class(kind)
+    return record_type(**dict(zip(_fields(record_type), records, strict=True)))
 
 
 @cache

@@ -160,10 +160,10 @@ def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
 
 def _stop(flow: Flow) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
-        said = "stopped: the release is off"
+        message = "stopped: the release is off"
         if flow.stage is not Stage.TESTING:
-            said = "stopped: nothing fell"
-        return flow.to(flow.home, said), (events.Stop(),)
+            message = "stopped: nothing fell"
+        return flow.to(flow.home, message), (events.Stop(),)
     return flow, (events.Stop(),)
 
 
@@ -234,9 +234,9 @@ def _not_fired(flow: Flow, event: events.EffectFailed) -> Outcome:
 def _tick(flow: Flow, seconds: float) -> Outcome:
     if flow.stage is not Stage.COUNTDOWN:
         return flow, ()
-    left = flow.left_s - seconds
-    if left > 0.0:
-        return replace(flow, left_s=left), ()
+    seconds_left = flow.left_s - seconds
+    if seconds_left > 0.0:
+        return replace(flow, left_s=seconds_left), ()
     return replace(flow.to(Stage.FIRING), left_s=0.0), (events.FireRelease(flow.token),)
 
 

@@ -49,8 +49,8 @@ def in_common(row: VoidRow) -> tuple[str, ...]:
     if len(row) < MANY:
         return ()
     kinds = [{reason.kind: reason for reason in void.reasons} for void in row]
-    shared = [kind for kind in kinds[-1] if all(kind in other for other in kinds)]
-    return tuple(summarize_reasons([each[kind] for each in kinds]) for kind in shared)
+    shared = [kind for kind in kinds[-1] if all(kind in drop for drop in kinds)]
+    return tuple(summarize_reasons([table[kind] for table in kinds]) for kind in shared)
 
 
 def why_halted(row: VoidRow) -> str:
@@ -102,6 +102,6 @@ def voids_of(entries: Iterable[StateEntry]) -> Voids:
         if entry.state == "void":
             held.add(job)
         if in_common(row):
-            forgiven.update(one.job for one in row)
+            forgiven.update(drop.job for drop in row)
             row = ()
     return Voids(row, frozenset(held - forgiven), frozenset(forgiven))

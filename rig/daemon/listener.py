@@ -102,9 +102,9 @@ def _answers_at_socket(path: Path) -> bool:
 def _answers_at_port(file: Path) -> bool:
     """Whether a daemon answers: any program may have the port of one that was killed."""
     try:
-        told = json.loads(file.read_text("ascii"))
-        hello = {"api": rpc.API, "client": "a daemon that starts", "token": told["token"]}
-        with socket.create_connection(("127.0.0.1", told["port"]), _PROBE_S) as probe:
+        address = json.loads(file.read_text("ascii"))
+        hello = {"api": rpc.API, "client": "a daemon that starts", "token": address["token"]}
+        with socket.create_connection(("127.0.0.1", address["port"]), _PROBE_S) as probe:
             probe.sendall(rpc.request("hello", hello, 1))
             return b'"jsonrpc"' in probe.recv(1 << 12)
     except (OSError, ValueError, KeyError, TypeError):

@@ -58,7 +58,7 @@ class Stopper:
         while self._asked.wait() and not self._ending:
             self._asked.clear()
             for _ in range(_TIMES):
-                left = self._send()
+                unsent = self._send()
                 self._left.set()
-                if not left or self._taken_over.wait(_AGAIN_S):
+                if not unsent or self._taken_over.wait(_AGAIN_S):
                     break

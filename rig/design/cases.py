@@ -263,14 +263,14 @@ def _case(
     number: Index,
 ) -> Case:
     at, sd = model.unknowns, model.unknowns.sd
-    common_places, here = shared.places(model)
+    common_places, shared_places = shared.places(model)
     beam = np.zeros(len(at), dtype=np.bool_)
     for name in _BEAMS:
         if name in at:
             beam[at[name]] = True
     alpha = np.arange(at["alpha"].start, at["alpha"].stop) if "alpha" in at else np.zeros(0, int)
     # Own first, then α, then common, as `Case` has them: eliminated from the front.
-    common = common_places[shared_kept[here]]
+    common = common_places[shared_kept[shared_places]]
     own = np.setdiff1d(np.flatnonzero(~beam), np.append(common, alpha))
     order = np.concatenate([own, alpha, common])
     place = np.full(len(at), -1)
@@ -284,7 +284,7 @@ def _case(
         count,
         own.size,
         alpha.size,
-        number[here[shared_kept[here]]],
+        number[shared_places[shared_kept[shared_places]]],
         np.concatenate(chance),
         {name: (measurand.slopes * sd)[order] for name, measurand in measurands(model, x).items()},
         tuple(blocks.get(n, _BLIND) for n in range(at[_BEAMS[0]].stop - at[_BEAMS[0]].start)),

@@ -83,10 +83,8 @@ def improvements(summary: Sequence[Incline]) -> Iterator[Improvement]:
 def _without(line: Incline, name: str, cause: str) -> float:
     """Return U95 of a mean with one cause so much smaller."""
     mean, part = line.means[name], line.causes[name].get(cause, 0.0)
-    variance = mean.u**2 - (1.0 - _BETTER**-2) * min(part, mean.budget["common"]) ** 2
-    return replace(
-        mean, u=math.sqrt(variance), degrees=mean.degrees * (variance / mean.u**2) ** 2
-    ).expanded
+    rest = mean.u**2 - (1.0 - _BETTER**-2) * min(part, mean.budget["common"]) ** 2
+    return replace(mean, u=math.sqrt(rest), degrees=mean.degrees * (rest / mean.u**2) ** 2).expanded
 
 
 def _size(values: Iterable[float]) -> float:

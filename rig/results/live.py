@@ -258,9 +258,7 @@ class LiveAnalysis:
             self._digest = digest
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
-        return {
-            job: (result.verdict, self._summaries[job].scale.hz) for job, result in results.items()
-        }
+        return {job: (drop.verdict, self._summaries[job].scale.hz) for job, drop in results.items()}
 
     def _planned(self, session: Reader) -> _Scene:
         scene = self._scene

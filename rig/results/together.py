@@ -96,9 +96,7 @@ class TogetherResults:
     @property
     def void(self) -> bool:
         """Whether any run is void."""
-        return any(
-            run.verdict == "void" for _, analysis in self.analyses() for run in analysis.runs
-        )
+        return any(run.verdict == "void" for _, item in self.analyses() for run in item.runs)
 
     def json(self) -> dict[str, Any]:
         """As ``rig analyze A B --json`` prints it."""
@@ -106,12 +104,8 @@ class TogetherResults:
         return {
             "simulated": self.simulated,
             "sessions": [
-                {
-                    "session": name,
-                    "simulated": session.simulated,
-                    "calibration": session.calibration,
-                }
-                for name, session in self.sessions.items()
+                {"session": name, "simulated": item.simulated, "calibration": item.calibration}
+                for name, item in self.sessions.items()
             ],
             "shared": self._shared(),
             "runs": [
@@ -177,12 +171,8 @@ def _pairs(part: SessionPart, first: SessionPart) -> Iterator[tuple[Condition, R
         for member in (part, first)
     )
     for condition, runs in cases.items():
-        alike = [
-            candidate for candidate in reference if candidate.incline_deg == condition.incline_deg
-        ]
-        same = [
-            candidate for candidate in alike if candidate.impact_chain == condition.impact_chain
-        ] or alike
+        alike = [key for key in reference if key.incline_deg == condition.incline_deg]
+        same = [key for key in alike if key.impact_chain == condition.impact_chain] or alike
         if len(same) == 1:
             yield condition, runs, reference[same[0]]
 
@@ -244,27 +234,24 @@ def _names(files: Sequence[Reader]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(session.path) for session in files]
 
 
-def _check_repeats(files: Sequence[Reader], session_results: Sequence[SessionResults]) -> None:
+def _check_repeats(files: Sequence[Reader], part: Sequence[SessionResults]) -> None:
     """Refuse to count drops more than once: a session named twice, its copy, or that continued."""
     recorded = [
-        (session.path, {*result.edges})
-        for session, result in zip(files, session_results, strict=True)
+        (session.path, {*result.edges}) for session, result in zip(files, part, strict=True)
     ]
-    for (path, edges), (other_path, other_edges) in combinations(recorded, 2):
-        common = len(edges & other_edges)
+    for (path, edges), (other_path, rest) in combinations(recorded, 2):
+        common = len(edges & rest)
         # Of few edges and a coarse timer single drops may happen to be alike.
-        if common and common == min(len(edges), len(other_edges)):
+        if common and common == min(len(edges), len(rest)):
             paths = {"path": str(other_path), "other": str(path)}
             raise make_error(InputError, "session_repeated", **paths, drops=common)
 
 
-def _check_whole(
-    session: Reader, results: SessionResults, planned: int, *, unfinished: bool
-) -> None:
+def _check_whole(session: Reader, item: SessionResults, planned: int, *, unfinished: bool) -> None:
     """Refuse a session that is damaged, or lacks runs."""
-    path, runs = str(session.path), results.analysis.runs
-    if results.analysis.damaged:
-        records = "; ".join(results.analysis.damage)
+    path, runs = str(session.path), item.analysis.runs
+    if item.analysis.damaged:
+        records = "; ".join(item.analysis.damage)
         raise make_error(InputError, "records_damaged", path=path, records=records)
     missing = planned - len(runs)
     if missing and not unfinished:

@@ -135,9 +135,7 @@ def protocol_of(session: Reader) -> Protocol:
     Other timers may have had fewer than the protocol; a board's beams are those of the protocol.
     """
     protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
-    had = next(
-        (identity["beams"] for _, identity in session.identities() if "beams" in identity), None
-    )
+    had = next((board["beams"] for _, board in session.identities() if "beams" in board), None)
     return protocol if had is None else with_gates(protocol, had)
 
 

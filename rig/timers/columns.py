@@ -125,15 +125,15 @@ def columns_of(
     cells = [[text for row in rows if (text := row.cell(n))] for n in range(width)]
     facts = {n: _facts_of_values(texts) for n, texts in enumerate(cells) if texts}
     heading = _find_heading(block, facts, width)
-    if all("levels" in each for each in facts.values()):
+    if all("levels" in fact for fact in facts.values()):
         heading = _name_levels(len(facts), block, table) or heading
     if heading is None and _is_each_row_rising(rows, width):
         heading = Row(0, [f"moment {n}" for n in range(1, width + 1)])
     bare = set() if heading else {"bare", *({"single"} if len(facts) == 1 else set())}
-    is_rising = [n for n, each in facts.items() if {"rises", "fractions"} <= each - {"levels"}]
-    for each in facts.values():
-        each.update(bare, {"rival"} if is_rising and "fractions" not in each else ())
-    columns = [_read_heading(block, heading or Row(0, []), n, each) for n, each in facts.items()]
+    is_rising = [n for n, fact in facts.items() if {"rises", "fractions"} <= fact - {"levels"}]
+    for fact in facts.values():
+        fact.update(bare, {"rival"} if is_rising and "fractions" not in fact else ())
+    columns = [_read_heading(block, heading or Row(0, []), n, fact) for n, fact in facts.items()]
     if heading is None:
         _check_bare(block, columns, rows[0], problems)
     for column in columns:
@@ -164,8 +164,8 @@ def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
 
 def _name_levels(width: int, block: RowBlock, table: Table) -> Row | None:
     """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
-    named = {text.casefold() for row in block.headings[-1:] for text in row.texts}
-    if named - {"logic", "analog"} or not find_time_base([*table.remarks, *block.headings]):
+    labels = {text.casefold() for row in block.headings[-1:] for text in row.texts}
+    if labels - {"logic", "analog"} or not find_time_base([*table.remarks, *block.headings]):
         return None
     lists = [row.raw.partition(":")[2].split(",") for row in table.remarks]
     names = next((n for n in lists if len(n) == width), [f"D{n}" for n in range(width)])
@@ -227,8 +227,8 @@ def _read_heading(block: RowBlock, heading: Row, n: int, facts: set[str]) -> Tim
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     column.gate = next(filter(None, map(_find_gate, [name, *beside])), "")
     facts = facts | {role for role in words() if has_role(name, role)}
-    named = dict.fromkeys(POWERS, "timed") | {"v": "volt", "": "unitless"}
-    facts |= {named.get(unit, ""), "labelled" * bool(column.gate), "numbered" * bool(column.run)}
+    kinds = dict.fromkeys(POWERS, "timed") | {"v": "volt", "": "unitless"}
+    facts |= {kinds.get(unit, ""), "labelled" * bool(column.gate), "numbered" * bool(column.run)}
     if unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]:
         facts |= {"time"}
     column.role = _find_role(facts)
@@ -286,7 +286,7 @@ def _plain_power(texts: Sequence[str]) -> int | None:
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
     states = [state_of(text) or text.casefold() in {"x", "z"} for text in texts]
     numbers = [float(text) for text in texts if is_number(text)]
-    whole = [text for text in texts if number_of(text) is not None and not set(text) & set(".,+-")]
+    ints = [text for text in texts if number_of(text) is not None and not set(text) & set(".,+-")]
     steps = {b - a for a, b in pairwise(numbers)}
     is_numeric = len(numbers) == len(texts)
     facts = {
@@ -294,9 +294,9 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "plain": not {"blocked", "clear"} & set(states),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and all(step >= 0 for step in steps),
-        "counts": is_numeric and len(whole) == len(texts) > 1 and numbers[0] in {0, 1}
+        "counts": is_numeric and len(ints) == len(texts) > 1 and numbers[0] in {0, 1}
         and steps == {1.0},
-        "few": len(whole) == len(texts) >= 2 * len(set(texts)),
+        "few": len(ints) == len(texts) >= 2 * len(set(texts)),
         "binary": set(texts) <= {"0", "1"},
         "words": not numbers,
         "short": len(texts) < 3,

@@ -184,9 +184,9 @@ def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str)
     """Refuse what no drop does: the same again, more edges than bars, two changes at once."""
     alike: dict[object, int] = {}
     for drop in reading.drops:
-        other = alike.setdefault(drop.edges, drop.run)
-        if other != drop.run:
-            raise refusal(place, "same_twice", run=drop.run, other=other)
+        earlier = alike.setdefault(drop.edges, drop.run)
+        if earlier != drop.run:
+            raise refusal(place, "same_twice", run=drop.run, other=earlier)
         for channel, count in Counter(edge.channel for edge in drop.edges).items():
             if count > _EXCESS * bars:
                 excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
@@ -229,8 +229,8 @@ def _assumptions(file: TimerFile, reading: FileReading, gates: Sequence[int]) ->
     if absent := [str(n) for n in gates if n not in channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))
     if layout.dark in {"high", "low"}:
-        other = {"high": "low", "low": "high"}[layout.dark]
-        yield make_reason("blocked_level", level=layout.dark, other=other)
+        opposite = {"high": "low", "low": "high"}[layout.dark]
+        yield make_reason("blocked_level", level=layout.dark, other=opposite)
     idle = [label for label in file.labels if label not in channels]
     if idle and layout.groups != "passing":
         yield make_reason("inputs_unused", inputs=", ".join(idle))
@@ -242,8 +242,8 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     if options.map_file is not None and Path(options.map_file).exists():
         with Path(options.map_file).open(encoding="utf-8", errors="replace") as saved:
             stated = _read_map(saved.read(LONGEST_MAP).strip(), options.map_file, file, gates, {})
-    given = {"unit": None if file.has_unit else options.unit, "dark": options.dark}
-    stated |= {name: value for name, value in given.items() if value is not None}
+    options_given = {"unit": None if file.has_unit else options.unit, "dark": options.dark}
+    stated |= {name: value for name, value in options_given.items() if value is not None}
     if options.map is not None:
         stated = _read_map(options.map, "--map", file, gates, stated)
     elif options.channel is not None and len(file.labels) < 2:

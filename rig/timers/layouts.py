@@ -219,8 +219,8 @@ def _darkness(file: TimerFile, bars: int) -> list[str]:
 def _is_part_a_gate(file: TimerFile) -> bool:
     """Whether each part of a file is of an input of its own."""
     labels = [{event.label for event in part.events} for part in file.parts]
-    alone = all(len(part) == 1 and "" not in part for part in labels)
-    return alone and len(set().union(*labels)) == len(labels)
+    single = all(len(part) == 1 and "" not in part for part in labels)
+    return single and len(set().union(*labels)) == len(labels)
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:

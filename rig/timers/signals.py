@@ -140,7 +140,7 @@ def _values_of(
     clock: TimerColumn, times: Sequence[TimerColumn], values: Sequence[TimerColumn]
 ) -> list[TimerColumn]:
     """Return the values whose times a column has: those of its gate, or the nearest ones."""
-    beside = [other for other in times if other.run == clock.run]
+    beside = [signal for signal in times if signal.run == clock.run]
     own = [value for value in values if not clock.run or value.run in {clock.run, ""}]
     if len(beside) == 1:
         return own
@@ -160,7 +160,7 @@ def _label_of(signal: Signal, signals: Sequence[Signal]) -> str:
         return clock.name if clock and gate and is_own else gate
     if signal.is_sampled:
         return value.name if value.gate in value.name or not value.gate else value.gate
-    if sum(other.clock is clock for other in signals) > 1:
+    if sum(item.clock is clock for item in signals) > 1:
         return value.gate or value.name
-    alone = all(other.clock is clock or other.run != signal.run for other in signals)
-    return (clock.gate if clock else "") or ("" if alone else value.gate)
+    is_only = all(item.clock is clock or item.run != signal.run for item in signals)
+    return (clock.gate if clock else "") or ("" if is_only else value.gate)

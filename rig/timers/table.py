@@ -180,8 +180,8 @@ class Table:
                 elif self._is_row(row, block):
                     if not block.width and not block.headings and remark is not None:
                         # A heading that is marked as a remark has a name for each cell.
-                        named = len(list(filter(None, remark.texts))) == len(row.texts)
-                        block.headings += [remark] * named
+                        name_count = len(list(filter(None, remark.texts))) == len(row.texts)
+                        block.headings += [remark] * name_count
                     block.width = block.width or len(row.texts)
                     yield block, row
                 elif not self._put_aside(row, block):
@@ -212,8 +212,8 @@ class Table:
             return _is_mark(row) and not self.is_own
         texts = [text.casefold() for text in row.texts]
         again = any(texts == [text.casefold() for text in above.texts] for above in block.headings)
-        known = count_known(row)
-        return again or _is_mark(row) or 0 < len(texts) <= 2 * known
+        words_known = count_known(row)
+        return again or _is_mark(row) or 0 < len(texts) <= 2 * words_known
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
         if self.is_own:
@@ -228,10 +228,10 @@ class Table:
         # One of data with a fault: some of it is a number, as in those above.
         if block.width:
             return len(texts) == block.width
-        like = [above for above in block.headings if len(above.texts) == len(texts)]
+        alike = [above for above in block.headings if len(above.texts) == len(texts)]
         return not count_known(row) and any(
             count_known(above) > 1 and any(has_role(text, "time") for text in above.texts)
-            for above in like
+            for above in alike
         )
 
     def _is_data(self, texts: Sequence[str]) -> bool:

@@ -92,13 +92,13 @@ def unit_of(heading: str) -> str:
         A key of `POWERS`, ``v`` for volts and light, or the word in brackets.
     """
     text = normal(heading)
-    named = _BRACKETED.findall(text)
+    units = _BRACKETED.findall(text)
     last = _LAST.search(text)
-    for word in (*named, *([last[1]] if last else ())):
+    for word in (*units, *([last[1]] if last else ())):
         for unit in (*POWERS, "v"):
             if word in words()[f"unit {unit}"]:
                 return unit
-    return named[-1] if named else ""
+    return units[-1] if units else ""
 
 
 @lru_cache(1000)

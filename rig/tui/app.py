@@ -125,7 +125,7 @@ class RigApp(App[None], inherit_bindings=False):
         super().__init__(driver_class=Terminal)
         self.options = options
         self.keys: Mapping[str, str] = keys
-        self.action_of = {key: name for name, given in keys.items() for key in given.split(",")}
+        self.action_of = {key: name for name, text in keys.items() for key in text.split(",")}
         self.page: str = ""
         self.client = client
         self._loaded = loaded
@@ -218,8 +218,8 @@ class RigApp(App[None], inherit_bindings=False):
             base.query_one("#alarm")
         except NoMatches:
             return  # on its way in, or out
-        told = self._told if model.now_s - self._told_s < _TOLD_S else ""
-        base.query_one(StatusBar).show(model, self.page, self.keys, size, told)
+        message = self._told if model.now_s - self._told_s < _TOLD_S else ""
+        base.query_one(StatusBar).show(model, self.page, self.keys, size, message)
         base.query_one(StopBar).show(model, self.page, self.keys, size.width)
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
@@ -296,10 +296,10 @@ class RigApp(App[None], inherit_bindings=False):
         if ends and self.options.bell:
             self.bell()
         self._rang_at = stage
-        wanted = "history" if self.options.offline else _PAGE_OF.get(stage, "run")
-        if wanted != self._followed and stage is not Stage.TESTING:
-            self._followed = wanted
-            self.turn(wanted)
+        page_wanted = "history" if self.options.offline else _PAGE_OF.get(stage, "run")
+        if page_wanted != self._followed and stage is not Stage.TESTING:
+            self._followed = page_wanted
+            self.turn(page_wanted)
 
     async def _load_pages(self) -> None:
         """Have ready what was not needed for the first paint."""

@@ -58,8 +58,8 @@ class Sheet:
             One, or one a line.
         """
         inks = np.broadcast_to(np.asarray(inks), len(ends))
-        whole = np.isfinite(ends).all(axis=(1, 2))
-        ends, inks = ends[whole], inks[whole]
+        finite = np.isfinite(ends).all(axis=(1, 2))
+        ends, inks = ends[finite], inks[finite]
         ways = ends[:, 1] - ends[:, 0]
         share = np.linspace(0.0, 1.0, 2 + math.ceil(np.abs(ways).max(initial=0.0)))
         dots = ends[:, None, 0] + share[:, None] * ways[:, None]
@@ -76,9 +76,9 @@ class Sheet:
             One, or one a dot.
         """
         inks = np.broadcast_to(np.asarray(inks), len(places))
-        there = np.rint(places)
-        inside = ((there >= 0) & (there < [self.width * COLUMNS, self.height * ROWS])).all(axis=1)
-        x, y = there[inside].astype(np.intp).T
+        spots = np.rint(places)
+        inside = ((spots >= 0) & (spots < [self.width * COLUMNS, self.height * ROWS])).all(axis=1)
+        x, y = spots[inside].astype(np.intp).T
         at = y // ROWS, x // COLUMNS
         np.bitwise_or.at(self._bits, at, _BITS[y % ROWS, x % COLUMNS])
         np.maximum.at(self._inks, at, inks[inside])

@@ -28,8 +28,8 @@ def chosen(view: SessionView, words: str) -> tuple[Job, ...]:
     words
         Of `labels`, separated by blanks; empty for every drop.
     """
-    wanted = {word.casefold().rstrip("°") for word in words.split()}
-    return tuple(job for job, drop_labels in labels(view).items() if wanted <= {*drop_labels})
+    words_wanted = {word.casefold().rstrip("°") for word in words.split()}
+    return tuple(job for job, drop_labels in labels(view).items() if words_wanted <= {*drop_labels})
 
 
 def labels(view: SessionView) -> dict[Job, tuple[str, ...]]:

@@ -190,13 +190,13 @@ def _repeat(app: RigApp) -> None:
     """Ask, then go back to a run for another attempt."""
     model = app.model
     job = model.flow.job or model.job
-    wanted = again(model.runs, job.run) if job else None
-    if wanted is not None:
-        title = f"Repeat run {wanted.run} (attempt {wanted.attempt})?"
+    next_run = again(model.runs, job.run) if job else None
+    if next_run is not None:
+        title = f"Repeat run {next_run.run} (attempt {next_run.attempt})?"
         question = "This only prepares the run; nothing is armed yet."
-        if any(line.run == wanted.run and line.state in GOOD for line in model.runs):
+        if any(line.run == next_run.run and line.state in GOOD for line in model.runs):
             question += " The run has a good drop; the new attempt will count instead."
-        _confirm(app, title, question, "prepare", lambda: app.driver.take(Again(wanted)))
+        _confirm(app, title, question, "prepare", lambda: app.driver.take(Again(next_run)))
 
 
 def _unblind(app: RigApp) -> None:

@@ -18,7 +18,7 @@ def ascii_only(environment: Mapping[str, str]) -> bool:
     if environment.get("TERM", "") in {"linux", "vt100", "vt220", "ansi", "dumb"}:
         return True
     names = ("LC_ALL", "LC_CTYPE", "LANG")
-    locale = next((found for name in names if (found := environment.get(name))), "UTF-8")
+    locale = next((value for name in names if (value := environment.get(name))), "UTF-8")
     return "utf8" not in locale.casefold().replace("-", "")
 
 

@@ -73,10 +73,10 @@ class Driver:
 
     def take(self, event: Event) -> None:
         """Take an event, and have its effects carried out."""
-        self.flow, wanted = step(self.flow, event)
+        self.flow, effects = step(self.flow, event)
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
             self._follower.judged.add(self.flow.job)
-        for effect in wanted:
+        for effect in effects:
             if isinstance(effect, Stop):
                 self.stop = StopAnswer(monotonic())
             self._begin(self._carry_out(effect, self.flow.ticket))

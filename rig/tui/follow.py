@@ -138,8 +138,8 @@ class Follower:
             self.indicators, self._counted = Indicators.of(self.view.channels), (None, 0)
         drop = state.section("drop")
         job = Job(drop["run"], drop["attempt"]) if drop else None
-        known, counted = self._counted
-        if job != known:
+        last, counted = self._counted
+        if job != last:
             counted = 0
         if len(state.edges) > counted and drop.get("state") == "fired":
             fresh = tuple(int(edge[1]) for edge in state.edges[counted:])
@@ -169,7 +169,7 @@ class Follower:
         RigError
             It cannot be read.
         """
-        path, wanted = self._path, self._wanted
+        path, request = self._path, self._wanted
         if path is None:
             raise RigError("no session is open")
         self._reading = True
@@ -179,7 +179,7 @@ class Follower:
             live = self._live
             view = await asyncio.to_thread(live.read)
         finally:
-            self._reading, self._read = False, wanted
+            self._reading, self._read = False, request
         if path == self._path:
             self._take(view)
         if view.lagging and not self._fitting:

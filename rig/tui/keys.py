@@ -53,7 +53,7 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{place}: {reason}", _HOW) from None
     try:
-        given = tomllib.loads(text)
+        table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         reason, _, at = str(error).partition(" (at ")
         line, column = re.findall(r"\d+", at) or (
@@ -62,11 +62,11 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
         )
         raise InputError(f"{place}:{line}:{column}: {reason}", _HOW) from None
     lines = {line.partition("=")[0].strip(): n for n, line in enumerate(text.splitlines(), start=1)}
-    return combined(given, str(place), lines)
+    return combined(table, str(place), lines)
 
 
 def combined(
-    given: Mapping[str, object], source: str, lines: Mapping[str, int] | None = None
+    table: Mapping[str, object], source: str, lines: Mapping[str, int] | None = None
 ) -> dict[str, str]:
     """Put given keys over the table's own.
 
@@ -74,7 +74,7 @@ def combined(
 
     Parameters
     ----------
-    given
+    table
         Keys by action.
     source
         For messages.
@@ -90,7 +90,7 @@ def combined(
     places = {name: f"{source}:{line}" for name, line in (lines or {}).items()}
     chosen: dict[str, list[str]] = {}
     owner = {key: name for name, key in ALWAYS.items()}
-    for name, value in given.items():
+    for name, value in table.items():
         at = places.get(name, source)
         if name not in BY_NAME:
             faults.append(f"{at}: unknown action {name}; accepted: {', '.join(BY_NAME)}")

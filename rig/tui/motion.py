@@ -207,9 +207,9 @@ def _nearest(parts: Sequence[EdgeTrain], model: Trajectory | None) -> list[tuple
     return pairs
 
 
-def _counted(part: EdgeTrain, most: int) -> tuple[Array, Array]:
+def _counted(part: EdgeTrain, limit: int) -> tuple[Array, Array]:
     """Take a gate's edges for its rods in order."""
-    count = min(part.times.size, part.levels.size, most)
+    count = min(part.times.size, part.levels.size, limit)
     return part.times[:count], part.levels[:count]
 
 

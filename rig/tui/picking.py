@@ -62,12 +62,14 @@ def _look(path: Path) -> SessionEntry:
 async def sessions(app: RigApp) -> None:
     """Let one session of the folder be chosen, and play it."""
     view = app.model.view
-    mine = view.path if view else app.options.session
-    folder = mine.parent if mine else Path()
+    own = view.path if view else app.options.session
+    folder = own.parent if own else Path()
     entries = await asyncio.to_thread(session_list, folder)
     app.turn("history")
-    now = app.history.view.path if app.history.view else mine
-    at = next((n for n, entry in enumerate(entries) if now and _same(entry.path, now)), 0)
+    shown_path = app.history.view.path if app.history.view else own
+    at = next(
+        (n for n, entry in enumerate(entries) if shown_path and _same(entry.path, shown_path)), 0
+    )
 
     title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
     question = Pick(title, [_line(entry) for entry in entries], at)
@@ -118,5 +120,5 @@ def _line(entry: SessionEntry) -> Content:
     )  # fmt: skip
 
 
-def _same(one: Path, other: Path) -> bool:
-    return one.resolve() == other.resolve()
+def _same(path: Path, second: Path) -> bool:
+    return path.resolve() == second.resolve()

@@ -104,7 +104,7 @@ def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | Non
 
     `None` where nothing of it was measured. Of very many drops some are left out.
     """
-    rest = [other for other in jobs[:: 1 + len(jobs) // _LAID] if other != job]
+    rest = [job_beside for job_beside in jobs[:: 1 + len(jobs) // _LAID] if job_beside != job]
     series: list[Series] = []
     for drop in (*rest, job):
         apart = None
@@ -132,9 +132,9 @@ def run_picture(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | N
         if row.name in view.results[drop].quantities
     }
     rest = [point for drop, point in points.items() if drop != job]
-    mine = [point for drop, point in points.items() if drop == job]
+    own_points = [point for drop, point in points.items() if drop == job]
     series = (_bars(rest, "secondary", "●", "others ± U"),
-              _bars(mine, "primary", "●", f"run {job.run} ± U"))  # fmt: skip
+              _bars(own_points, "primary", "●", f"run {job.run} ± U"))  # fmt: skip
     return _over_runs(f"{row.label} ({row.unit})", view, series)
 
 

@@ -135,14 +135,14 @@ def plotted(picture: Picture, width: int, height: int, cursor: float | None = No
     margin = 1 + max(len(_number(value)) for value in (*upright, *beside))
     columns = max(1, width - margin - 1)
     x = _Axis(lows, highs, 0.0, COLUMNS * columns - 1.0)
-    lines, named = _panel(picture.series, columns, rows, x, upper, cursor)
+    lines, labels = _panel(picture.series, columns, rows, x, upper, cursor)
     read = [] if cursor is None else [_readings(picture, cursor, width)]
-    out = [legend(picture, named, width), *read, *_framed(lines, upright, upper, margin)]
+    out = [legend(picture, labels, width), *read, *_framed(lines, upright, upper, margin)]
     if strip:
-        shown, _ = _panel(picture.residuals, columns, strip - 1, x, lower, cursor)
+        rows_of_strip, _ = _panel(picture.residuals, columns, strip - 1, x, lower, cursor)
         head = f" {picture.residual_label} "[:columns]
         out.append([Span(" " * margin + "├" + head + "╌" * (columns - len(head)))])
-        out += _framed(shown, beside, lower, margin)
+        out += _framed(rows_of_strip, beside, lower, margin)
     return Plot([*out, *_foot(picture, x, columns, margin)], margin + 1, columns)
 
 
@@ -155,32 +155,32 @@ def spread(picture: Picture) -> tuple[float, float]:
     return (low, high) if low < high else (low - 0.5, low + 0.5)
 
 
-def legend(picture: Picture, named: Collection[str], width: int) -> list[Span]:
+def legend(picture: Picture, labels: Collection[str], width: int) -> list[Span]:
     """Say what is drawn: the upright axis, then what each mark means.
 
     Parameters
     ----------
-    named
+    labels
         Labels that stand where they belong.
     """
     parts = [Span(picture.y_label, bold=True)]
-    for one in picture.series:
-        if one.label and len(one.x) and one.label not in named:
-            parts += [Span("  "), Span(_mark(one), one.color, bold=True), Span(f" {one.label}")]
+    for line in picture.series:
+        if line.label and len(line.x) and line.label not in labels:
+            parts += [Span("  "), Span(_mark(line), line.color, bold=True), Span(f" {line.label}")]
     return _cut(parts, width)
 
 
 def _readings(picture: Picture, cursor: float, width: int) -> list[Span]:
     """Say what each series is at the cursor, by name or, where there is no room, by mark."""
     low, high = spread(picture)
-    shown = [one for one in picture.series if one.label and len(one.x)]
-    values = [_read(one, cursor, _NEAR * (high - low)) for one in shown]
+    curves = [curve for curve in picture.series if curve.label and len(curve.x)]
+    values = [_read(curve, cursor, _NEAR * (high - low)) for curve in curves]
     parts = [Span(f"{picture.x_label} {_number(cursor)}")]
-    names = [one.label for one in shown]
+    names = [curve.label for curve in curves]
     if sum(map(len, (parts[0].text, *names, *values))) + 3 * len(names) > width:
-        names = [_mark(one) for one in shown]
-    for one, name, value in zip(shown, names, values, strict=True):
-        parts += [Span(f"  {name} ", one.color), Span(value, one.color, bold=True)]
+        names = [_mark(curve) for curve in curves]
+    for curve, name, value in zip(curves, names, values, strict=True):
+        parts += [Span(f"  {name} ", curve.color), Span(value, curve.color, bold=True)]
     return _cut(parts, width)
 
 
@@ -188,28 +188,28 @@ def _number(value: float) -> str:
     return f"{value:.4g}".replace("-", "−")
 
 
-def _mark(one: Series) -> str:
-    return "⠒⠒" if one.kind == "line" else one.marker
+def _mark(curve: Series) -> str:
+    return "⠒⠒" if curve.kind == "line" else curve.marker
 
 
-def ticks(low: float, high: float, most: int) -> list[float]:
+def ticks(low: float, high: float, limit: int) -> list[float]:
     """Choose round numbers between two, at least three and otherwise at most so many.
 
     Parameters
     ----------
     low, high
         Ends, low < high.
-    most
+    limit
         That fit; steps are 1, 2 or 5 times a power of ten.
     """
     power = 10.0 ** math.floor(math.log10(high - low))
     chosen: list[float] = []
     for step in (share * power for power in (power, power / 10.0) for share in (5, 2, 1)):
         first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-        found = [float(f"{number * step:.12g}") for number in range(first, last + 1)]
-        if len(chosen) >= _FEWEST and len(found) > most:
+        values = [float(f"{number * step:.12g}") for number in range(first, last + 1)]
+        if len(chosen) >= _FEWEST and len(values) > limit:
             break
-        chosen = found
+        chosen = values
     return chosen
 
 
@@ -228,42 +228,42 @@ def _panel(
         down = np.arange(0, ROWS * rows, 2.0)
         across = np.full(down.size, float(x.at([cursor])[0]))
         sheet.dots(np.column_stack([across, down]), 0)
-    for one in series:
-        if len(one.x):
-            _draw(sheet, one, x, y)
-    named = {one.label for one in series if _named(sheet, one, x, y)}
-    return sheet.rows(), named
+    for curve in series:
+        if len(curve.x):
+            _draw(sheet, curve, x, y)
+    labels = {curve.label for curve in series if _named(sheet, curve, x, y)}
+    return sheet.rows(), labels
 
 
-def _draw(sheet: Sheet, one: Series, x: _Axis, y: _Axis) -> None:
-    ink = _COLORS.index(one.color)
-    places = np.column_stack([x.at(one.x), y.at(one.y)])
-    if one.kind == "line":
+def _draw(sheet: Sheet, curve: Series, x: _Axis, y: _Axis) -> None:
+    ink = _COLORS.index(curve.color)
+    places = np.column_stack([x.at(curve.x), y.at(curve.y)])
+    if curve.kind == "line":
         sheet.strokes(np.stack([places[:-1], places[1:]], axis=1), ink)
         return
-    if one.kind == "bars":
-        off = np.asarray(one.errors, dtype=np.float64)
+    if curve.kind == "bars":
+        off = np.asarray(curve.errors, dtype=np.float64)
         for sign in (-1.0, 1.0):
-            tips = np.column_stack([places[:, 0], y.at(np.asarray(one.y) + sign * off)])
+            tips = np.column_stack([places[:, 0], y.at(np.asarray(curve.y) + sign * off)])
             sheet.strokes(np.stack([places, tips], axis=1), ink)
             sheet.strokes(tips[:, None] + _CAP, ink)
     places = np.rint(places[np.isfinite(places).all(axis=1)])
-    shape = np.array(_SHAPES[one.marker], dtype=np.float64)
+    shape = np.array(_SHAPES[curve.marker], dtype=np.float64)
     sheet.dots((places[:, None] + shape).reshape(-1, 2), ink)
 
 
-def _named(sheet: Sheet, one: Series, x: _Axis, y: _Axis) -> bool:
+def _named(sheet: Sheet, curve: Series, x: _Axis, y: _Axis) -> bool:
     """Write a line's name beside it, where nothing else is drawn; whether there was room."""
-    if one.kind != "line" or not one.label or not len(one.x):
+    if curve.kind != "line" or not curve.label or not len(curve.x):
         return False
-    across, up = x.at(one.x), y.at(one.y)
-    there = np.flatnonzero(np.isfinite(across) & np.isfinite(up))
-    length = len(one.label)
-    for point in there[:: -max(1, there.size // 16)]:
+    across, up = x.at(curve.x), y.at(curve.y)
+    finite = np.flatnonzero(np.isfinite(across) & np.isfinite(up))
+    length = len(curve.label)
+    for point in finite[:: -max(1, finite.size // 16)]:
         row, end = int(up[point]) // ROWS, int(across[point]) // COLUMNS
         for at, column in ((row - 1, end - length), (row + 1, end - length), (row - 1, end)):
             if sheet.free(at, column, length):
-                sheet.write(at, column, Span(one.label, one.color))
+                sheet.write(at, column, Span(curve.label, curve.color))
                 return True
     return False
 
@@ -302,31 +302,31 @@ def _foot(picture: Picture, x: _Axis, columns: int, margin: int) -> Iterator[lis
     yield [Span(written)]
 
 
-def _read(one: Series, at: float, near: float) -> str:
+def _read(curve: Series, at: float, near: float) -> str:
     """Say what a series is at the cursor."""
-    x, y = np.asarray(one.x, dtype=np.float64), np.asarray(one.y, dtype=np.float64)
-    if one.kind == "line":
+    x, y = np.asarray(curve.x, dtype=np.float64), np.asarray(curve.y, dtype=np.float64)
+    if curve.kind == "line":
         inside = x.size > 0 and x.min() <= at <= x.max()
         return _number(float(np.interp(at, x, y))) if inside else "–"
     point = int(np.argmin(np.abs(x - at)))
     if abs(x[point] - at) > near:
         return "–"
-    bar = f" ± {one.errors[point]:.2g}" if one.kind == "bars" else ""
+    bar = f" ± {curve.errors[point]:.2g}" if curve.kind == "bars" else ""
     return f"{_number(float(y[point]))}{bar}"
 
 
 def _strip(picture: Picture, height: int) -> int:
     """Lines for the residuals, with what names them."""
-    some = any(len(one.x) for one in picture.residuals)
-    return max(_STRIP_LEAST, height // _STRIP_OF) if some and height >= _STRIP_FROM else 0
+    has_points = any(len(curve.x) for curve in picture.residuals)
+    return max(_STRIP_LEAST, height // _STRIP_OF) if has_points and height >= _STRIP_FROM else 0
 
 
 def _roomy(series: Sequence[Series], level: float | None = None) -> tuple[float, float]:
     """Give the upright axis room, and a span where all values are alike."""
     ends = [np.empty(0) if level is None else np.array([level])]
-    for one in series:
-        values = np.asarray(one.y, dtype=np.float64)
-        off = np.asarray(one.errors, dtype=np.float64) if len(one.errors) else 0.0
+    for curve in series:
+        values = np.asarray(curve.y, dtype=np.float64)
+        off = np.asarray(curve.errors, dtype=np.float64) if len(curve.errors) else 0.0
         ends += [values - off, values + off]
     values = np.concatenate(ends)
     values = values[np.isfinite(values)]
@@ -339,8 +339,8 @@ def _roomy(series: Sequence[Series], level: float | None = None) -> tuple[float,
 
 def _cut(parts: Sequence[Span], width: int) -> list[Span]:
     """Take what fits one line."""
-    kept = []
+    spans = []
     for part in parts:
-        kept.append(part._replace(text=part.text[: max(0, width)]))
+        spans.append(part._replace(text=part.text[: max(0, width)]))
         width -= len(part.text)
-    return kept
+    return spans

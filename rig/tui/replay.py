@@ -65,8 +65,8 @@ class Player:
         time = self._within(seconds * self.speed * (-1.0 if self.back else 1.0), end_s)
         return replace(self, time_s=time, playing=time != (0.0 if self.back else end_s))
 
-    def _within(self, more: float, end_s: float) -> float:
-        return min(end_s, max(0.0, self.time_s + more))
+    def _within(self, seconds: float, end_s: float) -> float:
+        return min(end_s, max(0.0, self.time_s + seconds))
 
 
 def end_of(drop: Drop, hz: float) -> float:

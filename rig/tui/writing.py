@@ -23,11 +23,11 @@ async def write(app: RigApp, *command: str) -> None:
         stderr=asyncio.subprocess.STDOUT,
     )  # fmt: skip
     try:
-        said, _ = await process.communicate()
+        output, _ = await process.communicate()
     except asyncio.CancelledError:  # the screen is left
         process.kill()
         await process.wait()
         raise
-    lines = [line for line in said.decode("utf-8", "replace").splitlines() if line.strip()]
-    shown = lines[-1:] if process.returncode == 0 else lines[-2:]
-    app.tell("; ".join(shown) or f"rig {command[0]} ended with {process.returncode}")
+    lines = [line for line in output.decode("utf-8", "replace").splitlines() if line.strip()]
+    last_lines = lines[-1:] if process.returncode == 0 else lines[-2:]
+    app.tell("; ".join(last_lines) or f"rig {command[0]} ended with {process.returncode}")

@@ -117,8 +117,8 @@ class HistoryPage(Page):
 
     @property
     def _end_s(self) -> float:
-        found, job = self.view, self.job
-        return end_of(found.drops[job], found.scales[job].hz) if found and job else 0.0
+        view, job = self.view, self.job
+        return end_of(view.drops[job], view.scales[job].hz) if view and job else 0.0
 
     # ------------------------------------------------------------------ drawing
 
@@ -203,8 +203,8 @@ def _which(view: SessionView, job: Job, page: HistoryPage) -> Content:
     symbol, colour = LOOKS.get(result.verdict, ("?", "$foreground"))
     place = page.jobs.index(job) + 1
     only = f" ({plain(page.words, 40)})" if page.words else ""
-    said = (one.reasons for one in reversed(view.states) if (one.run, one.attempt) == job)
-    note = "".join(f"\nnote: {plain(text, 160)}" for text in notes_in(next(said, ())))
+    reasons = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
+    note = "".join(f"\nnote: {plain(text, 160)}" for text in notes_in(next(reasons, ())))
     arrow = "◀" if player.back else "▶"
     state = f"{arrow} playing" if player.playing else f"‖ paused {arrow}"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} ×"

@@ -83,10 +83,8 @@ class SessionPage(Page):
         speed = [] if low else means[1:2]  # no room for both; Δz says more
         charted = charts[:2] if wide else turned[:1]
         self.say("meaning", "\n".join(meaning(picture.y_label) for picture in charted))
-        for figure, shown in zip(
-            figures, (means[:1], speed, charted[:1], charted[1:]), strict=True
-        ):
-            figure.show(next(iter(shown), None), key)
+        for figure, data in zip(figures, (means[:1], speed, charted[:1], charted[1:]), strict=True):
+            figure.show(next(iter(data), None), key)
 
     def other_chart(self) -> None:
         """Show the other quantity in the control chart."""
@@ -108,13 +106,13 @@ def _progress(model: Model) -> Content:
     width = 24
     filled = round(width * over / len(runs))
     pace = model.view.pace_s if model.view else None
-    left = (
+    remaining = (
         f" · about {duration(pace * (len(runs) - over))} left" if pace and over < len(runs) else ""
     )
     session = plain(Path(str(model.state.section("session").get("path", ""))).name, 60)
     return Content.assemble(
         ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
-        (f"  {over} of {len(runs)} runs", "bold"), f"{left}  ", (session, "$foreground 70%"),
+        (f"  {over} of {len(runs)} runs", "bold"), f"{remaining}  ", (session, "$foreground 70%"),
         _fit_words(model),
     )  # fmt: skip
 
@@ -132,12 +130,12 @@ def _plan(model: Model) -> Content:
     ordered = sorted(model.state.runs, key=condition)
     groups = [list(group) for _, group in groupby(ordered, key=condition)]
     means = [_means(summary.get(condition(group[0]))) for group in groups]
-    most = max(map(len, groups), default=0)
+    longest = max(map(len, groups), default=0)
     widths = [max(map(len, column)) for column in zip_longest(*means, fillvalue="")]
     lines = []
     for group, parts in zip(groups, means, strict=True):
         padded = [part.ljust(width) for part, width in zip(parts, widths, strict=False)]
-        marks = [*_marks(group, model), (" " * (most - len(group) + 2), "")]
+        marks = [*_marks(group, model), (" " * (longest - len(group) + 2), "")]
         head = f"{group[0].incline_deg:5g}° " if group[0].impact is not None else "drops  "
         head += f"{plain(group[0].impact, 12)} " if unlike and group[0].impact else ""
         lines.append(Content.assemble((head, "bold"), *marks, "  ".join(padded).rstrip()))
@@ -149,19 +147,19 @@ def _fit_words(model: Model) -> tuple[str, str]:
     view = model.view
     if view is None or not view.analysis.summary:
         return "", ""
-    more = " · adding the newest …" if view.lagging else ""
+    suffix = " · adding the newest …" if view.lagging else ""
     if view.fitted:
-        return f"\njoint fit of {view.fitted} runs{more}", "$foreground 70%"
-    joint = f"; joint fit from {FEWEST} good drops on" if not more else ""
-    return f"\neach drop fitted alone{joint}{more}", "$foreground 70%"
+        return f"\njoint fit of {view.fitted} runs{suffix}", "$foreground 70%"
+    joint = f"; joint fit from {FEWEST} good drops on" if not suffix else ""
+    return f"\neach drop fitted alone{joint}{suffix}", "$foreground 70%"
 
 
 def _marks(runs: Sequence[RunLine], model: Model) -> Iterator[tuple[str, str]]:
     """A symbol a run; the one that is on turns its colours round."""
     for line in runs:
-        now = model.job is not None and line.run == model.job.run
+        is_now = model.job is not None and line.run == model.job.run
         symbol, colour = LOOKS.get(line.state, ("?", "$foreground"))
-        yield symbol, f"{colour} reverse" if now else colour
+        yield symbol, f"{colour} reverse" if is_now else colour
 
 
 def _means(line: Incline | None) -> list[str]:

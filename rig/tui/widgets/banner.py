@@ -55,5 +55,5 @@ def verdict_words(model: Model) -> Content:
     if model.blind:
         lines.append(Content("  BLIND: results are hidden until you unblind the session"))
     if verdict == "void":
-        lines += [Content(f"  → {what}") for what in remedies(reasons)[:_REMEDIES]]
+        lines += [Content(f"  → {remedy}") for remedy in remedies(reasons)[:_REMEDIES]]
     return Content("\n").join(lines)

@@ -33,8 +33,8 @@ class SpanView(Widget):
         if len(rows) != len(before):
             self._layout_updates += 1  # or a height is kept that was found since the last wish
             self.refresh(layout=bool(self.styles.is_auto_height))
-        elif other := [y for y, row in enumerate(rows) if row != before[y]]:
-            self.refresh(*(Region(0, y, self.size.width, 1) for y in other))
+        elif changed_rows := [y for y, row in enumerate(rows) if row != before[y]]:
+            self.refresh(*(Region(0, y, self.size.width, 1) for y in changed_rows))
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
         """As many lines as there are."""

@@ -41,17 +41,17 @@ class StatusBar(Vertical):
         yield Words(id="alarm")
 
     def show(
-        self, model: Model, page: str, keys: Mapping[str, str], size: Size, told: str = ""
+        self, model: Model, page: str, keys: Mapping[str, str], size: Size, message: str = ""
     ) -> None:
-        """Draw what holds now; what was `told` only while nothing is wrong."""
+        """Draw what holds now; what was `message` only while nothing is wrong."""
         self.query_one("#headline", Words).say(headline(model, page, size.width - 2))
         self.query_one("#tabs", Words).say(tabs(page, keys))
         wrong = alarm(model)
         box = self.query_one("#alarm", Words)
-        box.display = wrong is not None or bool(told)
+        box.display = wrong is not None or bool(message)
         box.set_class(wrong is None, "-told")
         if wrong is None:
-            box.say(plain(told, 240))
+            box.say(plain(message, 240))
         else:
             hint = f"\n  → {plain(wrong.hint, 240)}" if wrong.hint else ""
             box.say(("✗ ", "bold $error"), (plain(wrong.message, 160), "bold"), hint)
@@ -72,10 +72,10 @@ def headline(model: Model, page: str, width: int) -> Content:
     link = _LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
     if model.offline:
         link = "file only"
-    right = [f"{plain(model.port, 24)}  {link}" if model.port else link]
+    right_side = [f"{plain(model.port, 24)}  {link}" if model.port else link]
     stamp = " ▲ SIMULATED " if model.simulated else ""
     blind = " BLIND " if model.blind else ""
-    taken = len(right[0]) + len(stamp) + len(blind) + 4
+    taken = len(right_side[0]) + len(stamp) + len(blind) + 4
     name = page.upper()
     title = plain(model.state.section("session").get("title") or
                   (model.protocol.title if model.protocol else "chainrig"))  # fmt: skip
@@ -86,5 +86,5 @@ def headline(model: Model, page: str, width: int) -> Content:
     return Content.assemble(
         (name, "bold $primary"), "  ", title, gap,
         (stamp, "bold $background on $warning"), (blind, "bold $background on $accent"),
-        " ", right[0],
+        " ", right_side[0],
     )  # fmt: skip

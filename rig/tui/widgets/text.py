@@ -27,8 +27,8 @@ def plain(text: object, limit: int = LONGEST) -> str:
     raw = str(text)
     # Cut first: a megabyte of note costs no more than what is shown of it.
     cut = raw[: limit + 1]
-    shown = "".join(_shown(character) for character in cut)
-    return shown if len(raw) <= limit else shown[: limit - 1] + "…"
+    text_shown = "".join(_shown(character) for character in cut)
+    return text_shown if len(raw) <= limit else text_shown[: limit - 1] + "…"
 
 
 def _shown(character: str) -> str:
