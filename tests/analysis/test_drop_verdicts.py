@@ -1,7 +1,5 @@
 """Void, marginal, accepted: by limits that can be said in advance, and never a traceback."""
 
-from __future__ import annotations
-
 import json
 import random
 from dataclasses import replace
@@ -211,7 +209,7 @@ def test_hardly_any_edges_are_void(scene, count):
     printable(result)
 
 
-@pytest.mark.parametrize("channel", [gate.channel for gate in UNIFORM.gates.gates])
+@pytest.mark.parametrize("channel", [gate.channel for gate in UNIFORM.gates.gates[::3]])
 def test_a_dead_gate_is_said_and_harms_nothing_but_the_number_of_edges(channel):
     one = case(UNIFORM, MILD, incline=40.0)
     dead = one.with_edges([edge for edge in one.drop.edges if edge.channel != channel])
