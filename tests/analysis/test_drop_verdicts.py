@@ -11,7 +11,7 @@ import pytest
 from rig.analysis.drop import fit_drop
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
-from rig.analysis.verdict import _SURE, _pushed
+from rig.analysis.verdict import _SURE, _pushed, pattern_faults
 from rig.errors import InputError
 from rig.model.chain import Chain
 from rig.protocol.protocol import Accept
@@ -224,6 +224,12 @@ def test_a_dead_gate_is_said_and_harms_nothing_but_the_number_of_edges(channel):
     assert result.verdict == ("void" if missed > 0.05 else "marginal")
     assert f"channel {channel} " in result.reasons[-1].text
     assert result.audit == lenient.audit
+
+
+@pytest.mark.parametrize(("share", "code"), [(0.59, "few_edges_fit"), (0.61, "no_fall")])
+def test_six_in_ten_edges_must_fit_a_fall(share, code):
+    identified = SimpleNamespace(shares={"free": share}, fit=None)
+    assert pattern_faults(identified)["free"].code == code
 
 
 @pytest.mark.parametrize("role", ["impact", "free"])

@@ -212,7 +212,7 @@ def test_the_least_sure_calibration_counts_for_all():
             assert measured.u == pytest.approx(other.quantities[name].u, rel=0.02)
 
 
-@pytest.mark.parametrize("drag", [0.0, 0.03])
+@pytest.mark.parametrize("drag", [0.03, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_session_teaches_what_the_air_takes(drag):
     drops = cases(EIGHT, replace(MILD, drag=drag), 4)
     found = analysis(drops)
