@@ -1,16 +1,11 @@
 """What many tests work out again of the same file is worked out once, for who asks for that."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from rig.commands import design
 from rig.design.trials import trials
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 
 def once(work: Callable) -> Callable:

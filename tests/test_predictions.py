@@ -1,7 +1,5 @@
 """There is one predictor: tables, curves and the terminal say the same, with and without air."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """README's commands work in their order, those of all pages are understood, and links lead on."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """Every code that is raised stands in the one table, and every code of the table is raised."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sqlite3

@@ -1,7 +1,5 @@
 """Columns of a table in a terminal."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.text_table import text_table

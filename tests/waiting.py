@@ -1,13 +1,8 @@
 """Waiting for what must come: for the event itself, and never for a time that it should take."""
 
-from __future__ import annotations
-
 import os
 import time
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from collections.abc import Callable
 
 PATIENCE_S = 120.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 """Only what never comes takes longer: it grows with how many programs share each processor."""

@@ -1,7 +1,5 @@
 """Least squares of anything: observations that are no edges."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rig.analysis.equations import Linearization

@@ -1,7 +1,5 @@
 """Whole sessions straight from the simulated lab, and what they say together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import cache
 

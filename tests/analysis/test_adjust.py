@@ -1,7 +1,5 @@
 """Least squares with priors against the same written directly, and the budget that follows."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """The JSON that scripts rely on: names, types and units exactly as promised."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from typing import Any

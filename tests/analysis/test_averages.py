@@ -1,7 +1,5 @@
 """Differences of means beside Student's test, and beside the law of errors that cancel."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

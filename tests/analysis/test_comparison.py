@@ -1,23 +1,17 @@
 """What is measured less what is predicted: one difference, with one covariance."""
 
-from __future__ import annotations
-
 import math
-import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from scipy.stats import kstest
 
-from bench.agreement import SessionAgreement, compare_sessions
 from rig.analysis.comparison import compare
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import Deviation, Measured
 from rig.analysis.summary import good_cases
 from rig.protocol.plan import runs
 from rig.units import Quantity
-from tests.analysis.drops import FENCE, PROTOCOLS, UNIFORM
+from tests.analysis.drops import FENCE, UNIFORM
 from tests.analysis.test_summary import results
 from tests.estimate.sessions import analysis
 
@@ -30,36 +24,6 @@ EXACT = replace(
         friction=Quantity(UNIFORM.surface.friction.value),
     ),
 )
-
-
-@pytest.fixture(scope="module")
-def single_drops(tmp_path_factory) -> dict[str, list[SessionAgreement]]:
-    """Two dozen rigs that are off by as much as their protocol says, a drop at four inclines."""
-    text = (PROTOCOLS / "inclined-uniform.yaml").read_text("utf-8")
-    protocol = tmp_path_factory.mktemp("inclines") / "four.yaml"
-    text, changed = re.subn(r"(?<=incline: )\[.*\]", "[10 deg, 30 deg, 50 deg, 70 deg]", text)
-    assert changed == 1
-    protocol.write_text(text, "utf-8")
-    sessions: dict[str, list[SessionAgreement]] = {}
-    for session in compare_sessions(protocol, 1, range(1, 25)):
-        sessions.setdefault(session.quantity, []).append(session)
-    return sessions
-
-
-def test_p_of_single_drops_is_uniform(single_drops):
-    """With one drop an incline the falls' own scatter is most of what differs."""
-    assert set(single_drops) == {"separation_m", "speed_m_s"}
-    for sessions in single_drops.values():
-        assert len(sessions) == 24
-        assert kstest([session.p for session in sessions], "uniform").pvalue > 0.01
-
-
-def test_single_drops_disagree_with_a_true_model_as_rarely_as_is_said(single_drops):
-    """Inclines of one rig share its errors: what chance allows is seen from rig to rig."""
-    for sessions in single_drops.values():
-        beyond = [np.mean(np.abs(session.normalized_errors) > 1.0) for session in sessions]
-        chance = max(np.std(beyond), math.sqrt(0.05 * 0.95)) / math.sqrt(len(beyond))
-        assert 0.0 < np.mean(beyond) < 0.05 + 3.0 * chance
 
 
 def differing(scatter: float, values: list[float]) -> list[Measured]:

@@ -1,7 +1,5 @@
 """Heights measured from the board: where rods touch follows from what they are like."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What the equations do not know: rods off their chain, piles, strikes above the level."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from dataclasses import replace
@@ -13,9 +11,7 @@ from rig.analysis.last_passages import disagreements
 from rig.analysis.likeness import Likeness, likeness
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.session import Analysis
-from rig.errors import InputError
 from rig.protocol.protocol import Contact
-from rig.protocol.reader import parse
 from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import HZ, STATED, UNIFORM, Case, case, codes
@@ -227,18 +223,6 @@ def test_a_rod_that_may_have_struck_is_seen_higher_by_half_of_what_it_had_to_go_
         lost = 0.5 * np.maximum(above + sd * far - heights[expected.gate[n]] + off, 0.0)
         usual = math.sqrt(np.average(lost**2, weights=np.exp(-0.5 * far**2)))
         assert expected.landed[n] == pytest.approx(usual, rel=1e-3, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [("{levle: 1 mm}", "did you mean level?"), ("{level: 1 s}", "a length"), ("3", "a mapping")],
-)
-def test_what_is_no_contact_is_refused_at_its_place(text, said):
-    with pytest.raises(InputError) as caught:
-        parse(f"{UNIFORM.text}\ncontact: {text}\n", "f")
-    (problem,) = caught.value.problems
-    assert problem.line == len(UNIFORM.text.splitlines()) + 2
-    assert said in str(problem)
 
 
 def test_last_passages_are_a_second_opinion():

@@ -1,24 +1,17 @@
 """Faults of the rig that are found and said, one kind after another, and none where none is."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
 import pytest
 
 from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
-from rig.analysis import adjust
-from rig.analysis.chain_records import chain_records
-from rig.analysis.diagnoses import diagnose
 from rig.analysis.drop import fit_drop
-from rig.analysis.drop_model import DropModel
-from rig.analysis.explanations import NEITHER, Explainer, Explanation, explained
-from rig.analysis.faults import Fault, Premise, faults, upside_down
+from rig.analysis.explanations import NEITHER, Explanation, explained
+from rig.analysis.faults import Fault, faults, upside_down
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
 from rig.protocol.plan import runs
@@ -27,19 +20,18 @@ from rig.protocol.reader import parse
 from rig.reasons import make_reason, sentences
 from rig.units import Quantity
 from sim.dials import Dials, read_dials
-from tests.analysis.drops import GRADED, SCENES, STATED, UNIFORM, Case, case, codes, with_dials
+from tests.analysis.drops import GRADED, SCENES, UNIFORM, Case, case, codes, with_dials
 from tests.analysis.sessions import MILD
 
 HEIGHTS = {gate.channel: gate.height for gate in UNIFORM.gates.gates}
 CHANNELS = [*HEIGHTS]
 # (0, 2) and (4, 5) are one rod and three rods apart, within half a millimetre.
 ALIKE = [(0, 2), (4, 5), (10, 11)]
-# Of all 120, a few; of the others more in the soaks.
+# Of all 120, a few in the soaks.
 OTHERS = list(combinations(CHANNELS, 2))
 PAIRS = [
     *ALIKE,
-    *OTHERS[::60],
-    *(pytest.param(*pair, marks=pytest.mark.slow) for pair in OTHERS[30::60]),
+    *(pytest.param(*pair, marks=pytest.mark.slow) for pair in OTHERS[::30]),
 ]
 
 
@@ -110,7 +102,7 @@ def with_rods(protocol: Protocol, rods: int) -> Protocol:
     return replace(protocol, chains=chains)
 
 
-@pytest.mark.parametrize(("rods", "seed"), [(24, 1), (26, 2), (27, 1)])
+@pytest.mark.parametrize(("rods", "seed"), [(24, 1), (26, 2)])
 def test_another_number_of_rods_is_void_and_counted(rods, seed):
     one = case(with_rods(UNIFORM, rods), MILD, incline=40.0, seed=seed)
     result = replace(one, protocol=UNIFORM).analyze()
@@ -144,20 +136,6 @@ def test_a_good_rig_has_no_faults(scene):
     for seed in range(1, 6):
         result = case(SCENES[scene], MILD, seed=seed).analyze()
         assert (result.verdict, result.reasons) == ("accepted", ())
-
-
-def test_rods_missed_at_one_gate_and_a_flicker_at_another_make_no_exchange():
-    """Both gave as many edges as the other should have; but it is no rod at an end that lacks."""
-    one = case(UNIFORM, Dials.quiet(), incline=40.0)
-    low, high = ([edge for edge in one.drop.edges if edge.channel == channel] for channel in (3, 4))
-    flicker = [high[9]._replace(tick=high[9].tick + n, blocked=n % 200 != 0) for n in (100, 200)]
-    spoiled = {*one.drop.edges, *flicker} - {*low[20:22]}
-    assert not odd(one.with_edges(spoiled))
-    assert odd(one.with_edges({*one.drop.edges, *flicker} - {*low[:2]}))
-
-
-def odd(one: Case) -> bool:
-    return diagnose(one.identify().fit).odd
 
 
 FEW = under(KINDS[2], (0.2, 0.65), (0.18, 0.6))
@@ -300,53 +278,6 @@ def test_odds_are_numbers_up_to_what_nobody_reads_any_more():
         )
 
 
-def premises(protocol: Protocol) -> list[tuple[Fault, Premise]]:
-    """Each fault that has a size, and the premise with a millimetre or a thousandth of it."""
-    stated = Premise(protocol, runs(protocol)[0], 16e6)
-    sized = [fault for fault in faults(protocol, stated.run, ()) if fault.shift is not None]
-    return [(fault, fault.premise(stated, 1e-3)) for fault in sized]
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_the_direction_of_a_fault_is_what_its_protocol_does(scene):
-    """Chains and gates that are described otherwise are met where the opened size has them."""
-    one = case(SCENES[scene], Dials.quiet(), run=runs(SCENES[scene])[0].number)
-    stated = one.model()[0]
-    codes_of_faults = set()
-    for fault, premise in premises(SCENES[scene]):
-        codes_of_faults.add(fault.code)
-        model = stated.suspecting(fault.suspect(stated))
-        x = np.append(np.zeros(len(stated.unknowns)), 1e-3)
-        other = DropModel(
-            premise.protocol,
-            chain_records(premise.protocol, one.run, one.drop, one.scale.hz),
-            stated.guesses,
-            one.scale.u,
-        )
-        nothing = np.zeros(len(other.unknowns))
-        assert model.rate(x) == pytest.approx(1.0 + 1e-3 * (fault.code == "clock"), rel=1e-12)
-        for role in stated.records:
-            path = model.trajectory(role, x)
-            times = np.linspace(path.time[0], path.time[-1] + 0.1, 50)
-            expected = other.trajectory(role, nothing).heights(times)[0]
-            np.testing.assert_allclose(path.heights(times)[0], expected, rtol=0, atol=1e-12)
-            # A rod that just hangs in a beam may be expected by one and not by the other.
-            seen, due = stated.expected[role], other.expected[role]
-            keys = [
-                {key: n for n, key in enumerate(zip(e.gate, e.rods, e.sign, strict=True))}
-                for e in (seen, due)
-            ]
-            both = [[key[name] for name in keys[0].keys() & keys[1].keys()] for key in keys]
-            assert len(both[0]) >= seen.rods.size - 2
-            np.testing.assert_allclose(
-                model.all_levels(role, x)[both[0]],
-                other.all_levels(role, nothing)[both[1]],
-                rtol=0,
-                atol=1e-12,
-            )
-    assert {"drop_height", "clock", "gate_height", "thickness"} <= codes_of_faults
-
-
 def test_a_fall_that_is_not_the_equations_accuses_nothing():
     """What explains a drop as well as that it is no such fall is not named."""
     length = Fault("chain_length", lambda s, u: {"name": "A", "size_m": s, "U95_m": u})
@@ -361,22 +292,3 @@ def test_a_fall_that_is_not_the_equations_accuses_nothing():
     for log_odds in (51.0, 500.0):
         first = replace(beyond, log_odds=log_odds)
         assert explained([first, named], words, accused) == [*accused]
-
-
-@pytest.mark.parametrize(("name", "size"), [("post's datum", 5.0), ("drop height", -15.0)])
-def test_a_fault_with_a_size_is_weighed_in_few_adjustments(name, size, monkeypatch):
-    """One direction each, from what was adjusted already; two that are alike are both tried."""
-    text = dict(next(rig for rig in WRONG_RIGS if rig.name == name).rigs(MORE.protocol()))[size]
-    stated = parse(MORE.protocol())
-    one = replace(case(parse(text), Dials.quiet(), run=9), protocol=stated)
-    fit = one.identify().fit
-    adjustments = []
-    whole = adjust.least_squares
-    monkeypatch.setattr(
-        adjust, "least_squares", lambda *a, **k: adjustments.append(1) or whole(*a, **k)
-    )
-    premise = Premise(stated, one.run, one.scale.hz)
-    (best, *_) = Explainer(premise, one.drop, one.scale.u, STATED, ()).explain(fit)
-    assert len(adjustments) <= 14
-    assert best.fault.code == name.replace("post's datum", "post").replace(" ", "_")
-    assert abs(best.values["size_m"] - size / 1e3) < best.values["U95_m"]

@@ -1,7 +1,5 @@
 """What must not matter: names, the origin and unit of time, the order of simultaneous edges."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -66,19 +64,6 @@ def test_the_order_of_simultaneous_edges():
     assert_same(expected, replace(found, matches=rods), 0.0)
 
 
-def test_the_number_of_a_channel():
-    one = case(UNIFORM, MILD, incline=40.0)
-    gates = one.protocol.gates
-    moved = tuple(replace(gate, channel=(gate.channel * 7 + 3) % 16) for gate in gates.gates)
-    other = replace(
-        one.with_edges(
-            [edge._replace(channel=(edge.channel * 7 + 3) % 16) for edge in one.drop.edges]
-        ),
-        protocol=replace(one.protocol, gates=replace(gates, gates=moved)),
-    )
-    assert_same(one.analyze(), other.analyze(), 0.0)
-
-
 def test_edges_of_gates_that_the_scene_does_not_have():
     one = case(SCENES["single"], MILD)
     unused = [
@@ -113,8 +98,3 @@ def test_the_name_of_a_chain():
             run=replace(one.run, impact=names[one.run.impact], free=names[one.run.free]),
         )
         assert_same(one.analyze(), other.analyze(), 0.0)
-
-
-def test_a_drop_analysed_again():
-    one = case(UNIFORM, MILD, incline=40.0)
-    assert one.analyze() == one.analyze()

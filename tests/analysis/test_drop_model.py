@@ -1,7 +1,5 @@
 """Observation equations and measurands: every derivative against finite differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -12,9 +10,6 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
 from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, STATED, UNIFORM, case, with_dials
 
-SEPARATIONS = "separation_m separation_raw_m separation_strike_m"
-SPEEDS = "speed_m_s speed_strike_m_s"
-TWO_CHAINS = {"uniform", "graded"}
 STEPS = {
     "alpha": 1e-5,
     "impulses": 1e-5,
@@ -148,21 +143,6 @@ def test_measurands_have_the_gradients_that_their_uncertainty_is_made_of(scene):
     assert not kinks.any()
     gradients = np.stack([one.slopes for one in measurands(model, x).values()])
     np.testing.assert_allclose(gradients, expected, rtol=1e-7, atol=2e-9)
-
-
-@pytest.mark.parametrize(
-    ("protocol", "names"),
-    [
-        (UNIFORM, f"{SEPARATIONS} release_skew_s {SPEEDS} fall_time_s"),
-        (GRADED, f"{SEPARATIONS} release_skew_s {SPEEDS} fall_time_s"),
-        (SINGLE, f"{SPEEDS} fall_time_s"),
-        (FENCE, "gravity_m_s2"),
-    ],
-)
-def test_a_scene_yields_what_it_has(protocol, names):
-    model, matches = case(protocol).model()
-    found = measurands(model, adjust(model, matches, model.first()).x)
-    assert sorted(found) == sorted(names.split())
 
 
 def test_what_a_scene_lacks_is_no_unknown():

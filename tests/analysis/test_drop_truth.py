@@ -1,7 +1,5 @@
 """Whole drops against the simulation's hidden truth."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -141,11 +139,6 @@ def fewest(n: int, p: float) -> int:
     raise AssertionError
 
 
-def test_fewest_is_the_binomial_bound():
-    assert fewest(1, 0.95) == 0  # 5 % of the time
-    assert fewest(4, 0.95) == 1  # none of four: 6e-6; one or none: 4.8e-4
-
-
 # Every dial at the size that the analysis takes for it, and nothing that it does not know of.
 AS_ASSUMED = with_dials(
     skew_sd=1e-3, hang_sd=0.3e-3, drop_error=1.0, rod_sd=0.3e-3, width_sd=0.1e-3, gate_sd=0.3e-3,
@@ -154,7 +147,10 @@ AS_ASSUMED = with_dials(
 CLOCK = 3e-4
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    "scene",
+    ["fence", *(pytest.param(one, marks=pytest.mark.slow) for one in SCENES if one != "fence")],
+)
 def test_stated_uncertainties_are_the_real_ones(scene):
     """Errors over standard uncertainties: mean square 1, where the rig is as bad as assumed."""
     # The simulation has no scatter of these kinds; allowed for, they make u larger than it is.
@@ -208,7 +204,7 @@ def test_a_clock_said_to_be_better_than_it_is_does_not_pass_unseen(error):
     assert f"% {'fast' if error > 0.0 else 'slow'}" in reason.text
 
 
-AIRS = (0.0, 0.004, 0.03, 0.08)
+AIRS = (0.004, 0.08)
 
 
 @pytest.mark.parametrize("drag", AIRS)
@@ -224,19 +220,6 @@ def test_what_the_air_takes_is_told_by_the_free_chain(drag):
             assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
             # What falls a tenth slower is told a tenth worse in time.
             assert measured.u == pytest.approx(still.quantities[name].u, rel=0.15), name
-
-
-@pytest.mark.parametrize("drag", [0.0, 0.03])
-@pytest.mark.parametrize("scene", ["graded", "single", "fence"])
-def test_where_nothing_or_little_tells_the_air_it_widens_the_intervals(scene, drag):
-    """A chain alone, and rods of which thin ones are held back more than thick ones."""
-    for seed in range(1, 5):
-        one = case(SCENES[scene], Dials(skew_sd=1e-3, drag=drag), seed=seed)
-        result = one.analyze()
-        assert result.verdict == "accepted", result.reasons
-        assert not wrong_rods(result, one.truth)
-        for name, measured in result.quantities.items():
-            assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
 
 
 @pytest.mark.parametrize("scene", ["graded", "single", "fence"])

@@ -1,7 +1,5 @@
 """Edges that are missing or belong to no rod, named against the simulation's hidden truth."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import replace

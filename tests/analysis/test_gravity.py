@@ -1,7 +1,5 @@
 """Gravity of the free chain: right where the rig is right, and a witness where it is not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

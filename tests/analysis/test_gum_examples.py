@@ -1,7 +1,5 @@
 """Examples of the GUM (JCGM 100, annex H) by the code that works out results."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

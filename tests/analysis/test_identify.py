@@ -1,7 +1,5 @@
 """The chosen reading against all readings there are, and against the truth on any layout."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from functools import cache
@@ -10,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.special import log_ndtr
 
-from rig.analysis import identify
 from rig.analysis.annealing import MISSED, STRAYS
 from rig.analysis.identify import deciding_gate
 from rig.analysis.verdict import LEAD, pattern_faults
@@ -19,7 +16,7 @@ from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.records import Edge
 from sim.dials import Dials
-from tests.analysis.drops import CLOCK_U, STATED, UNIFORM, Case, case, wrong_rods
+from tests.analysis.drops import CLOCK_U, STATED, Case, case, wrong_rods
 
 FENCE = """
 protocol: 1
@@ -318,9 +315,3 @@ def test_any_layout_is_read(written, dials):
         assert wrong_rods(result, one.truth) == []
         if dials.missed == 0.0:
             assert result.verdict != "void", (protocol.title, result.reasons)
-
-
-def test_releases_are_as_likely_apart_as_a_cauchy_of_the_accepted_skew_says():
-    skew = UNIFORM.accept.release_skew
-    apart = [identify._simultaneous(UNIFORM, [0.1, 0.1 + times * skew]) for times in (0, 1, 3)]
-    assert apart == pytest.approx([0.0, -math.log(2.0), -math.log(10.0)])

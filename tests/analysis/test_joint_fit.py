@@ -1,7 +1,5 @@
 """All drops fitted together: against all equations solved at once, and against the hidden truth."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, replace
 
@@ -145,6 +143,7 @@ def test_the_rod_maps_and_the_beams_are_the_rig_s():
     assert abs(joint.x[block][0] - width) < 4.0 * u[block][0]
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_and_are_not_too_wide():
     """Sessions on ten rigs: shares by the binomial, mean squares of error over u by χ²."""
     ratios: dict[str, list[list[float]]] = {}
@@ -213,7 +212,7 @@ def test_the_least_sure_calibration_counts_for_all():
             assert measured.u == pytest.approx(other.quantities[name].u, rel=0.02)
 
 
-@pytest.mark.parametrize("drag", [0.0, 0.03])
+@pytest.mark.parametrize("drag", [0.03, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_session_teaches_what_the_air_takes(drag):
     drops = cases(EIGHT, replace(MILD, drag=drag), 4)
     found = analysis(drops)
@@ -227,6 +226,7 @@ def test_a_session_teaches_what_the_air_takes(drag):
             assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u
 
 
+@pytest.mark.slow
 def test_a_post_off_its_height_moves_a_mean_by_what_the_budget_allows_for():
     """Beams of one side share an error that no number of drops averages, or tells."""
     scenes = {u: replace(UNIFORM, gates=replace(UNIFORM.gates, datum_u=u)) for u in (0.0, 1e-3)}
@@ -295,7 +295,7 @@ def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
     assert len(rejected.joint.drops) == 7
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it(seed):
     drops = cases(FOUR, seed=seed)
     runs = analysis(drops).runs
@@ -310,26 +310,6 @@ def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it(seed):
     assert (among.runs[n].verdict in GOOD) is (sizes[1] < sizes[0])
     assert ((latest.run.number, 1) in among.adjusted) is (sizes[1] < sizes[0])
     assert among.runs[n].learned
-
-
-@pytest.mark.parametrize("scene", ["single", "fence"])
-def test_simpler_scenes_learn_too(scene):
-    dials = Dials() if scene == "single" else with_dials(
-        rod_sd=0.05e-3, gate_sd=0.1e-3, jitter_sd=2e-6, hang_sd=1e-3, delay_sd=1e-3
-    )  # fmt: skip
-    drops = cases(FOUR, dials, 5, scene)
-    found = analysis(drops)
-    assert found.joint is not None
-    for one, result in zip(drops, found.runs, strict=True):
-        assert result.learned
-        for name, measured in result.quantities.items():
-            assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u
-            assert measured.u < one.analyze().quantities[name].u
-
-
-def test_stated_components_are_what_a_drop_by_itself_takes():
-    one = cases(FOUR)[0]
-    assert one.analyze() == one.analyze(STATED)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

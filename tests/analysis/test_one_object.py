@@ -1,7 +1,5 @@
 """One object past several gates: acceleration, speed at each gate, time between them."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from itertools import pairwise

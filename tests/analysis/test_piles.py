@@ -1,7 +1,5 @@
 """Rods that lie where others strike: drops of the resolved world on flat boards."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

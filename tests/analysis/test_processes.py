@@ -1,7 +1,5 @@
 """Work on several processors: the same results in the same order, and an end that is one."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -3,8 +3,6 @@
 Data and certified values as published at https://www.itl.nist.gov/div898/strd (public domain).
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

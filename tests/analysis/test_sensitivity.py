@@ -1,7 +1,5 @@
 """How results move with priors: against analyses of protocols that state these priors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Means over runs, their degrees of freedom and their agreement with the model, by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A gate that chatters: the middles of long flickers are left out, and counted."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

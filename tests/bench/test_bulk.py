@@ -3,8 +3,6 @@
 How long anything takes is never tested.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys
@@ -15,7 +13,6 @@ import pytest
 
 from bench.__main__ import main
 from bench.studies import bulk as bench
-from rig.errors import RigError
 from rig.model.fall import fall
 
 COMPILER = bench.find_compiler()
@@ -46,46 +43,6 @@ def test_the_c_loop_falls_as_the_model_does(loop):
 def no_mpmath(monkeypatch):
     monkeypatch.delitem(sys.modules, "rig.bench.reference", raising=False)
     monkeypatch.setitem(sys.modules, "mpmath", None)
-
-
-@needs_compiler
-def test_everything_is_counted_once_a_round(monkeypatch):
-    no_mpmath(monkeypatch)
-    said = []
-    monkeypatch.setattr(bench, "say", said.append)
-    found = bench.bulk(40, 3)
-    assert (found["rods"], found["falls"], found["rounds"]) == (25, 40, 3)
-    assert "-O2" in found["compiler"]
-    ratios = "single_over_roots", "single_over_batch", "batch_over_c", "falls_per_s"
-    for name in ratios:
-        assert 0.0 < found[name]["least"] <= found[name]["median"] <= found[name]["most"]
-    assert said == ["no mpmath here: left out the solver"]
-    assert "solver_over_single" not in found
-
-
-def test_the_solver_is_compared_at_rounding(monkeypatch):
-    pytest.importorskip("mpmath")
-    monkeypatch.setenv("CC", "no-such-compiler")
-    monkeypatch.delenv("CI", raising=False)
-    found = bench.bulk(5, 1)
-    assert found["solver"]["error"] <= bench.AT_ROUNDING
-    assert found["solver"]["single_error"] <= bench.AT_ROUNDING
-    assert found["solver_over_single"]["median"] > 0.0
-
-
-def test_in_ci_a_missing_compiler_is_an_error(monkeypatch, capsys):
-    monkeypatch.setenv("CC", "no-such-compiler")
-    monkeypatch.setenv("CI", "true")
-    assert main(["bulk", "--falls", "5", "--rounds", "1"]) == 1
-    out, err = capsys.readouterr()
-    assert not out
-    assert "no C compiler" in err
-
-
-def test_a_compiler_that_fails_is_an_error(monkeypatch, tmp_path):
-    monkeypatch.setenv("CC", "false --quietly")
-    with pytest.raises(RigError, match=r"compiler failed: .*false --quietly -O2"):
-        bench.CLoop(bench.find_compiler(), tmp_path)
 
 
 def test_the_command_prints_json_or_a_table(monkeypatch, capsys):

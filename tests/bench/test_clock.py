@@ -1,7 +1,5 @@
 """``./run bench clock``, small: errors fall with time, and a reference beats them all."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from bench.clock import clock

@@ -1,19 +1,12 @@
 """Rigs that are wrong in one thing: that they are rigs, and how what is said of them is counted."""
 
-from __future__ import annotations
-
 import json
-from dataclasses import replace
-
-import pytest
 
 from bench.__main__ import main
-from bench.studies.diagnoses import LAYOUTS, NONE, OUTCOMES, judged
+from bench.studies.diagnoses import LAYOUTS, NONE, OUTCOMES
 from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.protocol.reader import parse
 from rig.reasons import make_reason
-from sim.dials import Dials
-from tests.analysis.drops import SINGLE, case
 
 
 def test_every_fault_is_of_some_layout_and_another_rig_than_the_stated_one():
@@ -26,30 +19,7 @@ def test_every_fault_is_of_some_layout_and_another_rig_than_the_stated_one():
             assert otherwise or json.loads(text) != json.loads(layout.protocol())
 
 
-MISSED = make_reason("edges_missed", missed=9, expected=30, limit=0.05)
 CLOCK, GRAVITY = (make_reason(code, share=0.01, U95=0.001) for code in ("clock", "gravity"))
-UNCLEAR = make_reason("unclear_fault", candidates=[GRAVITY.json(), CLOCK.json()])
-
-
-@pytest.mark.parametrize(
-    ("reasons", "outcome"),
-    [
-        ((), "unnoticed"),
-        ((CLOCK,), "right"),
-        ((MISSED, GRAVITY), "wrong"),
-        ((UNCLEAR,), "likely"),
-        ((MISSED,), "unnamed"),
-    ],
-)  # fmt: skip
-def test_what_is_said_of_a_slow_clock_is_counted(reasons, outcome):
-    result = replace(case(SINGLE, Dials.quiet()).analyze(), reasons=reasons)
-    assert judged("clock", result) == outcome
-
-
-def test_where_nothing_is_wrong_any_name_is_wrong():
-    result = case(SINGLE, Dials.quiet()).analyze()
-    assert judged(NONE, result) == "unnoticed"
-    assert judged(NONE, replace(result, reasons=(GRAVITY,))) == "wrong"
 
 
 def test_the_bench_keeps_table_and_page(tmp_path, capsys):

@@ -1,13 +1,9 @@
 """Commands on an unchanged session: the same bytes again, and nothing is computed for them."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shutil
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -20,7 +16,6 @@ from rig.cli import main
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS, short
-from tests.waiting import PATIENCE_S
 
 SCENES = {
     "fence": ("picket-fence.yaml", ""),
@@ -168,29 +163,6 @@ def test_what_is_kept_and_cannot_be_read_is_computed_again(fence, counted, monke
         with rig.open(fence) as session:
             session.analyze()
     assert len(counted) == 10
-
-
-def bare(*arguments, home):
-    """Call ``rig`` with nothing of this user's surroundings."""
-    surroundings = {"PATH": os.environ["PATH"], "HOME": str(home), "LANG": "C.UTF-8"}
-    surroundings["PYTHONPATH"] = str(Path(rig.__file__).parents[1])
-    return subprocess.run(
-        [sys.executable, "-m", "rig", *map(str, arguments)],
-        env=surroundings, capture_output=True, check=False, timeout=PATIENCE_S,
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("home", ["new", "missing", "a file", "closed"])
-def test_any_home_will_do(fence, tmp_path, home):
-    place = tmp_path / "home"
-    if home in {"new", "closed"}:
-        place.mkdir(mode=0o700 if home == "new" else 0o500)
-    elif home == "a file":
-        place.write_text("")
-    cold, again = (bare("analyze", fence, "--json", home=place) for _ in range(2))
-    assert (cold.returncode, cold.stderr) == (0, b"")
-    assert again.stdout == cold.stdout
-    assert (place / ".cache/chainrig/results.sqlite").is_file() == (home != "a file") or os.getuid()
 
 
 def test_doctor_tells_the_size_and_forgets(fence, capsys):

@@ -1,7 +1,5 @@
 """Plain records as text and back, to the last bit."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The cache: what was kept comes back, from a file that anything may happen to."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sqlite3

@@ -1,7 +1,5 @@
 """A plan on its way: whatever happens in whatever order, nothing falls that should not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Which attempt comes next."""
 
-from __future__ import annotations
-
 from rig.campaign.plan import (
     CLOCK_S,
     CLOCK_U,

@@ -1,7 +1,5 @@
 """Voids of a kind in a row: seen, said in words, and not held against their runs."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.campaign.plan import ATTEMPTS

@@ -1,22 +1,18 @@
 """A small finished session, and ``rig`` called inside this process."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
 
 from rig.cli import main
 from tests.cli.lab import PROTOCOLS, rig, short
 from tests.once import analysed_once  # noqa: F401 - a fixture
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 
 class Done(NamedTuple):

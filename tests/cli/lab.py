@@ -1,7 +1,5 @@
 """What the tests of the command line share: short protocols, and what a session must look like."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

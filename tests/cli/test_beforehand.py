@@ -1,7 +1,5 @@
 """What a protocol's drops need is known before the first: how long to record, and which board."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -66,24 +64,3 @@ def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
         assert f"note: board {word} is not suitable: {path}:" in said.out
     path.write_text(changed("", ""), "utf-8")
     assert call("run", path, "--port", "sim://", "--session", session, "--yes").code == 0
-
-
-def test_a_session_that_was_there_stays_whatever_is_refused(call, tmp_path):
-    path, session = tmp_path / "p.yaml", tmp_path / "p.session"
-    path.write_text(changed("channel: 0, pulse", "channel: 2, pulse"), "utf-8")
-    assert call("run", path, "--port", "sim://", "--session", session, "--yes").code == 0
-    before = session.read_bytes()
-    done = call("run", path, "--port", "sim://?skew=1", "--session", session)
-    assert (done.code, session.read_bytes()) == (2, before)
-
-
-def test_a_fall_that_nothing_can_record_is_refused_before_a_session_is_made(call, tmp_path):
-    path, session = tmp_path / "p.yaml", tmp_path / "p.session"
-    text = changed("drop: 180 mm ± 2 mm", "drop: 100 m").replace("9.81 m/s^2", "0.01 m/s^2")
-    path.write_text(text, "utf-8")
-    done = call("run", path, "--port", "sim://", "--session", session)
-    assert done.code == 2
-    assert f"{path}:10:7: drop: from here a drop takes up to 142 s" in done.err
-    assert "boards record for at most 65.535 s" in done.err
-    assert not session.exists()
-    assert f"note: cannot be recorded: {path}:10:7: drop: from here" in call("check", path).out

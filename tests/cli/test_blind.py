@@ -1,7 +1,5 @@
 """A blind session keeps its numbers back from every command, until it is unblinded, once."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """``rig analyze --budget``."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Which clock a result stands on: said by every run, the same whenever it is computed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -11,7 +9,6 @@ from itertools import pairwise
 import pytest
 
 from rig.clock.calibration import Calibrator
-from rig.clock.host import HostClocks, HostWatch, SystemClock
 from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig.protocol import reader
@@ -161,72 +158,6 @@ def test_nothing_asks_for_the_time_from_arming_to_the_certificate(finished):
     assert during.count(FIRE) == 4
     assert set(during) <= {ARM, FIRE, STATUS}
     assert {PING, REFERENCE} <= set(idle)
-
-
-def test_a_waiting_recorder_keeps_the_device_armed_without_clock_samples(tmp_path, fence):
-    protocol = reader.read(fence)
-    with (
-        Session.create(
-            tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
-        ) as session,
-        Recorder(session, f"sim://?protocol={fence}") as recorder,
-    ):
-        recorder.wait(2.0)
-        token = recorder.arm(1, 1, protocol)
-        before = len(session.pings())
-        recorder.wait(3.0)
-        assert len(session.pings()) == before > 3
-        recorder.fire(token)
-        recorder.collect(1, 1)
-        recorder.wait(1.0)
-        assert len(session.pings()) > before
-
-
-class Sleepy(SystemClock):
-    """A host in virtual time that can sleep: its monotonic clock misses that."""
-
-    def __init__(self, port):
-        self.true, self.slept_ns = port.clock, 0
-
-    def now_ns(self):
-        return self.true.now_ns() - self.slept_ns
-
-    def sleep(self, seconds):
-        self.true.sleep(seconds)
-
-    def read(self):
-        true = self.true.now_ns()
-        return HostClocks(true - self.slept_ns, true, 10**18 + true)
-
-    def suspend(self, seconds):
-        self.true.sleep(seconds)
-        self.slept_ns += round(seconds * S)
-
-
-@pytest.mark.parametrize("seconds", [0.3, 5.0, 1000.0])
-def test_a_host_that_sleeps_between_samples_is_noticed(tmp_path, fence, monkeypatch, seconds):
-    protocol, hosts = reader.read(fence), []
-
-    def port_clock(port):
-        hosts.append(Sleepy(port))
-        return hosts[0]
-
-    monkeypatch.setattr("rig.recorder.recorder.port_clock", port_clock)
-    monkeypatch.setattr("rig.recorder.recorder.HostWatch", lambda: HostWatch(hosts[0].read))
-    with Session.create(
-        tmp_path / "s", protocol.text, "fence", simulated=True, origin="sim"
-    ) as session:
-        with Recorder(session, f"sim://?protocol={fence}") as recorder:
-            recorder.wait(60.0)
-            hosts[0].suspend(seconds)
-            recorder.wait(60.0)
-        (found,) = session.host_breaks()
-        assert (found.slept_ns, found.stepped_ns) == (round(seconds * S), 0)
-        clock = calibration(session)
-    assert clock.said["host_breaks"] == 1
-    assert clock.said["epochs"] == 2
-    assert abs(clock.said["rate_ppm"] + 1300.0) < 4.0 * clock.said["u_ppm"] < 8.0
-    assert any("the host slept" in note for note in clock.said["notes"])
 
 
 def test_a_real_host_is_believed_no_further_than_its_quartz(tmp_path, fence):

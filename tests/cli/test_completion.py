@@ -1,7 +1,5 @@
 """A shell completes what is typed."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

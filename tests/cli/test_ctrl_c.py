@@ -1,7 +1,5 @@
 """Ctrl-C while a command loads and as it ends: 130, and no traceback."""
 
-from __future__ import annotations
-
 import asyncio
 import io
 import os

@@ -1,7 +1,5 @@
 """Damage costs what is damaged: any value of any row altered, through every command that reads."""
 
-from __future__ import annotations
-
 import json
 import random
 import sqlite3
@@ -134,7 +132,7 @@ BY_BYTES_ALONE = 'UPDATE "drop" SET tick_hz = tick_hz / 2 WHERE id = 2'
 
 @pytest.mark.parametrize(
     ("sql", "bytes_too"),
-    [*((sql, lost) for sql in ALTERED for lost in (False, True)), (BY_BYTES_ALONE, False)],
+    [*((sql, False) for sql in ALTERED), (ALTERED[0], True), (BY_BYTES_ALONE, False)],
 )
 def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     sql, bytes_too, call, sound, without, tmp_path

@@ -1,7 +1,5 @@
 """The Python door: what its page and its notebook say, and that it says what the commands say."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,11 +1,8 @@
 """Bad arguments, bad files, closed pipes: one located line a problem, and never a traceback."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -124,31 +121,6 @@ def test_a_port_that_cannot_be_opened_is_device_trouble(
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [
-        (),
-        ("no-such-command",),
-        ("run",),
-        ("run", "p.yaml", "--port", "sim://"),
-        ("run", "p.yaml", "--port", "sim://", "--session", "s", "--seed", "many"),
-        ("analyze",),
-        ("analyze", "a", "b"),
-        ("report", "s"),
-        ("export", "s"),
-        ("import", "e.csv"),
-        ("replay", "s", "--json"),
-        ("bench",),
-        ("bench", "no-such-benchmark"),
-    ],
-)
-def test_bad_arguments_are_refused(call, arguments):
-    done = call(*arguments)
-    assert done.code == 2
-    assert done.out == ""
-    assert "Traceback" not in done.err
-
-
-@pytest.mark.parametrize(
     "words",
     [
         ("daemon",),
@@ -164,13 +136,6 @@ def test_an_empty_port_is_refused(call, words):
     done = call(*words, "--port", "")
     assert done.code == 2
     assert "no port is named" in done.err
-
-
-@pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("--version",)])
-def test_help_goes_to_stdout(call, arguments):
-    done = call(*arguments)
-    assert (done.code, done.err) == (0, "")
-    assert "rig" in done.out
 
 
 def test_every_problem_of_a_protocol_has_its_line_and_column(call, tmp_path):
@@ -269,26 +234,6 @@ def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port
 # ------------------------------------------------- where the output goes
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("predict", "PROTOCOL"),
-        ("predict", "PROTOCOL", "--json"),
-        ("--help",),
-    ],
-)
-def test_a_closed_pipe_is_no_error(arguments):
-    names = {"PROTOCOL": PROTOCOLS / "picket-fence.yaml"}
-    ours, theirs = os.pipe()
-    os.close(ours)  # as `head` does when it has seen enough, only sooner
-    try:
-        done = rig(*(names.get(word, word) for word in arguments), stdout=theirs)
-    finally:
-        os.close(theirs)
-    assert done.stderr == ""
-    assert done.returncode == 0
-
-
 def test_a_reader_that_leaves_in_the_middle_is_no_error(finished, tmp_path):
     """As in ``rig analyze --json | head -1``."""
     arguments = command("analyze", finished.copy(tmp_path), "--json")
@@ -365,26 +310,6 @@ def test_a_terminal_without_greek_letters_is_served(finished, tmp_path):
     done = rig("analyze", finished.copy(tmp_path), env=environment, encoding="latin-1")
     assert (done.returncode, done.stderr) == (0, "")
     assert "?z ± U (cm)" in done.stdout
-
-
-def test_an_interrupt_while_a_class_is_made_from_text_is_one_like_any_other(tmp_path):
-    """It may strike anywhere in an import, and there Python would end by the signal."""
-    (tmp_path / "struck.py").write_text(
-        "import sys, rig.cli, rig.commands.ports as ports\n"
-        "ports.main = lambda arguments: exec('raise KeyboardInterrupt')\n"
-        "sys.exit(rig.cli.main(['ports']))\n",
-        "utf-8",
-    )
-    places = f"{tmp_path}{os.pathsep}{ROOT}"
-    done = subprocess.run(
-        [sys.executable, "-m", "struck"],
-        env=os.environ | {"PYTHONPATH": places},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 130
-    assert done.stderr == "rig: interrupted\n"
 
 
 def test_what_only_the_system_refuses_is_said_without_numbers():

@@ -1,16 +1,12 @@
 """``rig estimate``, ``rig design`` and the import of data loggers' tables, as users meet them."""
 
-from __future__ import annotations
-
 import json
 import re
 
 import pytest
 
-from rig.link.messages import pack_label
 from rig.protocol import reader
 from sim.dials import Dials
-from sim.lab import ChainLab
 from tests.analysis.drops import SINGLE, case
 from tests.cli.lab import PROTOCOLS
 
@@ -125,91 +121,3 @@ def test_bad_limits_are_said(call, more, said):
     assert done.code == 2
     assert said in done.err
     assert "Traceback" not in done.err
-
-
-def test_an_estimate_of_a_fence_is_refused(call, tmp_path):
-    assert call("run", FENCE, "--port", "sim://", "--session", tmp_path / "s", "--yes").code == 0
-    done = call("estimate", tmp_path / "s")
-    assert done.code == 2
-    assert "no coefficients" in done.err
-
-
-@pytest.fixture
-def scene(tmp_path):
-    """The picket fence, of which it is known that the air takes next to nothing."""
-    path = tmp_path / "fence.yaml"
-    path.write_text(FENCE.read_text("utf-8") + "priors: {drag: 0.005}\n", "utf-8")
-    return path
-
-
-@pytest.fixture
-def table(tmp_path):
-    """Three falls through the upper gate of the picket fence, as a data logger's table."""
-    from rig.protocol import reader
-
-    protocol = reader.read(FENCE)
-    lab = ChainLab(protocol, Dials(rod_sd=1e-4, missed=0.0, chatter=0.0, string=0.0), 4)
-    falls = [
-        [(s, blocked) for s, channel, blocked in lab.drop(pack_label(n, 1)) if channel == 1]
-        for n in (1, 2, 3)
-    ]
-    heading = ";".join(f'"Time (s) Run #{n}";"State Run #{n}"' for n in (1, 2, 3))
-    rows = [
-        ";".join(f"{s:.6f};{blocked:d}" for s, blocked in row) for row in zip(*falls, strict=True)
-    ]
-    path = tmp_path / "fence.csv"
-    path.write_text("\n".join([heading, *rows]).replace(".", ","), "utf-8")
-    return path
-
-
-def test_a_logger_s_table_gives_gravity_with_its_uncertainty(call, table, scene, tmp_path):
-    session = tmp_path / "s"
-    given = ("import", table, "--protocol", scene, "--session", session, "--simulated")
-    done = call(*given, "--channel", "1", "--clock-uncertainty", "20 ppm")
-    assert (done.code, done.err.splitlines()[-1]) == (0, f"48 edges of 3 runs → {session}")
-    assert done.err.startswith("3 runs, 16 rows: 48 edges; 0 rows without a change\n")
-    found = json.loads(call("analyze", session, "--json").out)
-    assert [run["verdict"] for run in found["runs"]] == ["accepted"] * 3
-    (line,) = found["summary"]
-    gravity = line["gravity_m_s2"]
-    assert abs(gravity["value"] - 9.81) < gravity["U95"] < 0.1
-    assert call("report", session, "-o", tmp_path / "r.html").code == 0
-
-
-def test_a_column_of_times_of_darkening_is_enough(call, table, scene, tmp_path):
-    """Some timers tell only when a beam darkens: nothing else is then expected, or missed."""
-    rows = [line.split(";") for line in table.read_text("utf-8").splitlines()[1:]]
-    times = [time for time, state, *_ in rows if state == "1"]
-    column = tmp_path / "column.csv"
-    column.write_text("\n".join(["Time (s)", *times]), "utf-8")
-    session = tmp_path / "s"
-    given = ("import", column, "--protocol", scene, "--session", session, "--simulated")
-    done = call(*given, "--channel", "1", "--clock-uncertainty", "20 ppm")
-    assert (done.code, done.err.splitlines()[-1]) == (0, f"8 edges of 1 run → {session}")
-    assert "8 of 8 edges where a fall puts them" in done.err
-    found = json.loads(call("analyze", session, "--json").out)
-    (run,) = found["runs"]
-    assert run["edges"]["missed"] == 0
-    gravity = run["gravity_m_s2"]
-    assert abs(gravity["value"] - 9.81) < gravity["U95"] < 0.2
-
-
-def test_a_table_of_no_named_gate_is_of_that_which_fits_and_of_none_that_is_not_there(
-    call, table, tmp_path
-):
-    """Its times are those of the upper gate, as the protocol's fall tells."""
-    session = tmp_path / "s"
-    given = ("import", table, "--protocol", FENCE, "--session", session, "--simulated")
-    done = call(*given, "--channel", "9")
-    assert done.code == 2
-    assert not session.exists()
-    done = call(*given)
-    assert done.code == 0
-    assert "read as --map 'input=1': 3 runs: 48 of 48 edges where a fall puts them" in done.err
-
-
-def test_a_fault_of_a_table_has_its_place(call, table, tmp_path):
-    table.write_text(table.read_text("utf-8").replace("\n", "\n0,1;x;0,1;1;0,1;1\n", 1), "utf-8")
-    done = call("import", table, "--protocol", FENCE, "--session", tmp_path / "s", "--channel", "1")
-    assert done.code == 2
-    assert f"{table}:2:" in done.err

@@ -1,7 +1,5 @@
 """A command that needs a package which is no plain dependency names it, without a traceback."""
 
-from __future__ import annotations
-
 import sys
 
 from rig import cli

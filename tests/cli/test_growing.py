@@ -1,10 +1,7 @@
 """What a terminal is shown that a pipe is not: Fig. 3 as it grows, colours, broken sentences."""
 
-from __future__ import annotations
-
 import io
 import re
-from dataclasses import replace
 
 import pytest
 
@@ -83,15 +80,6 @@ def test_a_tall_terminal_shows_the_speed_too(size):
     terminal = Terminal()
     Growing(protocol, terminal).show_result(dropped(runs(protocol)[0]), 1)
     assert "V (m/s)" in terminal.getvalue()
-
-
-def test_words_stand_still_from_drop_to_drop():
-    from rig.runner import narration
-
-    run = runs(reader.parse(short("[40 deg]", 1)))[0]
-    one = dropped(run)
-    odd = replace(one, quantities={**one.quantities, "separation_m": Measured(-0.001, 0.0345)})
-    assert narration(one, 108).index("V ") == narration(odd, 108).index("V ")
 
 
 def test_colours_and_broken_sentences_are_for_terminals(size, monkeypatch):

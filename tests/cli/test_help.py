@@ -1,7 +1,5 @@
 """What the command line says of itself, and of what it does not accept."""
 
-from __future__ import annotations
-
 import re
 import shlex
 
@@ -88,15 +86,3 @@ def test_a_mistake_is_named(call, words, said):
     assert done.code in {2, 4}
     assert said in done.err
     assert "Traceback" not in done.err
-
-
-def test_what_no_board_has_is_refused(call, tmp_path):
-    done = call("run", PROTOCOLS / "single-chain.yaml", "--port", "sim://?restitution=7",
-                "--session", tmp_path / "s")  # fmt: skip
-    assert (done.code, "hint: -1 to 1" in done.err) == (2, True)
-
-
-def test_a_doctor_who_finds_nothing_says_so(call):
-    done = call("doctor")
-    if done.code == 0:  # a full disk is a finding
-        assert "nothing to do" in done.err

@@ -1,9 +1,6 @@
 """An import accounts for every row, asks what no fall decides, and saves how a file is read."""
 
-from __future__ import annotations
-
 import time
-import tracemalloc
 
 import pytest
 
@@ -94,28 +91,6 @@ def test_what_the_dry_run_prints_is_accepted(look, tmp_path, name):
         assert [line for line in again.out.splitlines() if line.startswith("run ")] == runs
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ("unit=parsec", "accepted: unit (s, ms, us, ns)"),
-        ("dark=grey", "accepted: unit (s, ms, us, ns)"),
-        ("pause_s=-1", "accepted: unit (s, ms, us, ns)"),
-        ("colour=1", "'colour' is not an input of the file: 0, 1, 2, 3"),
-        ("", "'' is not an input of the file"),
-        ("0=9", "'0=9' is not INPUT=CHANNEL with a gate's channel"),
-        ("[]", "'[]' is not an input of the file"),
-        ("\udcff{", "is not an input of the file"),
-    ],
-)
-def test_a_map_file_of_another_content_is_refused(look, tmp_path, content, said):
-    path = tmp_path / "map.txt"
-    path.write_bytes(content.encode("utf-8", "surrogateescape"))
-    done = look(HEAD + rows(RUNS[0]), "--map-file", path)
-    assert done.code == 2
-    assert done.err.startswith(f"{path}: ")
-    assert said in done.err
-
-
 def test_known_formats_are_listed(call):
     done = call("import", "--list-formats")
     assert done.code == 0
@@ -141,18 +116,3 @@ def test_a_hostile_file_is_read_or_refused_at_once(tmp_path, content):
     with pytest.raises(InputError):
         read_timer_file(path)
     assert time.process_time() - start < 1.0
-
-
-def test_samples_are_read_within_a_second_and_little_memory_for_each_megabyte(tmp_path):
-    path = tmp_path / "scope.csv"
-    path.write_bytes(shapes()["Digilent"].content[:600_000].rpartition(b"\n")[0])
-    megabytes = path.stat().st_size / 1e6
-    tracemalloc.start()
-    try:
-        read_timer_file(path)
-        assert tracemalloc.get_traced_memory()[1] < 20e6 * megabytes
-    finally:
-        tracemalloc.stop()
-    start = time.process_time()
-    read_timer_file(path)
-    assert time.process_time() - start < 1.0 * megabytes

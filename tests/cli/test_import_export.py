@@ -1,15 +1,10 @@
 """Edges go out as CSV and come in from any timer."""
 
-from __future__ import annotations
-
-import csv
 import json
-import re
 
 import pytest
 
-from rig.session.store import Session
-from tests.cli.lab import PROTOCOLS, drops_of, short
+from tests.cli.lab import drops_of, short
 
 QUANTITIES = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
 
@@ -24,11 +19,6 @@ def exported(finished, tmp_path_factory):
     return folder
 
 
-def table(path):
-    with path.open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
 @pytest.fixture
 def bring(call, finished, exported, tmp_path):
     """Import an edge file, the exported one by default."""
@@ -41,48 +31,6 @@ def bring(call, finished, exported, tmp_path):
         )
 
     return run
-
-
-def test_every_table_is_written(exported, analysis, finished):
-    names = {
-        "README.txt",
-        "budget.csv",
-        "edges.csv",
-        "pings.csv",
-        "runs.csv",
-        "states.csv",
-        "summary.csv",
-    }
-    assert {path.name for path in exported.iterdir()} == names
-    for row, run in zip(table(exported / "runs.csv"), analysis["runs"], strict=True):
-        assert int(row["run"]) == run["run"]
-        assert row["verdict"] == run["verdict"]
-        for name in QUANTITIES:
-            assert float(row[name]) == run[name]["value"]
-            assert float(row[f"{name}_U95"]) == run[name]["U95"]
-        assert int(row["edges_matched"]) == run["edges"]["matched"]
-    for row, line in zip(table(exported / "summary.csv"), analysis["summary"], strict=True):
-        assert float(row["separation_m"]) == line["separation_m"]["value"]
-        assert int(row["n"]) == line["n"]
-    with Session.open(finished.session, readonly=True) as session:
-        assert len(table(exported / "states.csv")) == len(session.states())
-        assert len(table(exported / "pings.csv")) == len(session.pings())
-        edges = sum(len(drop.edges) for drop in session.drops())
-    assert len(table(exported / "edges.csv")) == edges
-    (line, *_) = table(exported / "budget.csv")
-    assert {**line, "u": float(line["u"])} == {
-        "run": "1", "attempt": "1", "quantity": analysis["runs"][0]["budget"][0]["quantity"],
-        "source": analysis["runs"][0]["budget"][0]["name"],
-        "u": analysis["runs"][0]["budget"][0]["u"],
-    }  # fmt: skip
-    assert (exported / "README.txt").read_text("utf-8").startswith("SIMULATED DATA")
-
-
-def test_exporting_twice_gives_the_same_files(call, finished, exported, tmp_path):
-    done = call("export", finished.session, "--csv", tmp_path / "deep" / "er")
-    assert (done.code, done.out) == (0, "")
-    for path in exported.iterdir():
-        assert (tmp_path / "deep" / "er" / path.name).read_bytes() == path.read_bytes()
 
 
 def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_path):
@@ -185,24 +133,6 @@ def test_runs_beyond_the_plan_are_refused(bring, exported, tmp_path):
     assert hint.startswith("  hint: ")
 
 
-def test_every_fault_of_a_csv_file_is_located(bring, tmp_path):
-    events = tmp_path / "events.csv"
-    events.write_text(
-        "run,channel,time_s,state\n1,0,0.1,1\n1,0,0.05,0\nx,0,0.1,1\n1,99,0.1,1\n1,0,soon,1\n1,0,1\n",
-        "utf-8",
-    )
-    lines = refused(bring(events=events), tmp_path)
-    places = [re.match(rf"{re.escape(str(events))}:(\d+):(\d+): ", line) for line in lines]
-    assert all(places), lines
-    assert [(int(place[1]), int(place[2])) for place in places] == [
-        (3, 5),
-        (4, 1),
-        (5, 3),
-        (6, 5),
-        (7, 1),
-    ]
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -225,11 +155,6 @@ def test_what_is_missing_is_named(bring, tmp_path):
     assert line == f"{tmp_path / 'none.csv'}: cannot read this file: No such file or directory"
     (line, *_) = refused(bring(protocol=tmp_path / "none.yaml"), tmp_path)
     assert line == f"{tmp_path / 'none.yaml'}: there is no such file"
-
-
-def test_a_protocol_without_gates_has_no_edges(bring, tmp_path):
-    line, _ = refused(bring(protocol=PROTOCOLS / "bead-chain.yaml"), tmp_path)
-    assert line.endswith("bead-chain.yaml has no gates, so nothing can be measured")
 
 
 @pytest.mark.parametrize("u", ["nan", "-1 ppm", "50", "3 mm", ""])

@@ -1,7 +1,5 @@
 """``rig import --map`` takes what people type: blanks, commas, or both."""
 
-from __future__ import annotations
-
 import shlex
 
 import pytest

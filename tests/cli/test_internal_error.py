@@ -1,8 +1,5 @@
 """An exception that nobody foresaw: a short message, a log to report it with, and no traceback."""
 
-from __future__ import annotations
-
-import asyncio
 import os
 import re
 import subprocess
@@ -10,9 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from textual.app import App
-
-from rig.commands import tui
 
 BROKEN = """
 import sys, rig.cli, rig.__main__
@@ -71,16 +65,3 @@ def test_other_ends_are_no_internal_errors(ends, code, tmp_path):
     done = ended(BROKEN.format(ends, AT_WORK, ["check", "x"]), tmp_path)
     assert done.returncode == code
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_terminal_shows_no_traceback_either(capfd):
-    class Broken(App):
-        async def run_async(self):
-            return await super().run_async(headless=True)
-
-        def on_mount(self):
-            raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        asyncio.run(tui._show(Broken()))
-    assert "Traceback" not in "".join(capfd.readouterr())

@@ -1,7 +1,5 @@
 """One table of measurands: a row and a function are all that a new one takes."""
 
-from __future__ import annotations
-
 import csv
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """``rig new``: answers become a protocol that is read, drawn and tried."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

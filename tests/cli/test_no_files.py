@@ -1,7 +1,5 @@
 """What is no file is refused in words wherever a file is wanted: it might never end."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

@@ -1,7 +1,5 @@
 """Tables and numbers for notebooks, of one session and of several."""
 
-from __future__ import annotations
-
 import csv
 import sys
 

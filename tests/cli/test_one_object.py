@@ -1,7 +1,5 @@
 """One object past several gates, from the protocol to table, JSON and report."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,23 +1,18 @@
 """Predictions with an initial speed and in air, against the model and against many digits."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
 from mpmath import mp
 
 from rig.errors import InputError
-from rig.model.chain import Chain
-from rig.model.drag import drag_fall
-from rig.model.fall import fall, kicks
 from rig.predictions import predictions
 from rig.protocol.reader import parse, read
 from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.cli.lab import PROTOCOLS, short
 from tests.model.air_reference import reference_air_fall, reference_way
-from tests.model.reference import printed_alpha, reference_fall
+from tests.model.reference import printed_alpha
 
 TIGHT = 1e-13
 MASSES = (0.0241, 0.0203, 0.0162, 0.0131, 0.0108, 0.0089, 0.0072, 0.0060)
@@ -55,10 +50,6 @@ def close(line, wanted, relative=TIGHT):
     assert found == pytest.approx([float(x) for x in wanted], rel=relative, abs=0.0)
 
 
-def end_of(end):
-    return end.separation_m, end.speed_m_s, end.time_s
-
-
 def rod_drag(coefficient, density, diameter, length, tilt_deg):
     """½ ρ C d L v² of the speed across the rod, and of that force the upright part."""
     across = mp.cos(mp.radians(tilt_deg))
@@ -76,44 +67,6 @@ def test_the_ready_protocol_is_the_reference():
         close(line, wanted)
         assert line["model"] == "discrete, drag"
         assert line["separation_u_m"] > 0.0
-
-
-def test_initial_speed_is_used(predict):
-    line = predict(SCENE + "initial_speed: 2 m/s\n")
-    alpha = printed_alpha(0.5, 0.2, 50, mp.mpf(1) / 3)
-    close(line, reference_fall((1,) * 6, EVEN, alpha, mp.mpf(4) / 3, 0.15, 9.81, 2))
-    close(line, end_of(fall(Chain((1.0,) * 6, EVEN), line["alpha"], 4 / 3, 0.15, 9.81, 2.0)))
-    assert line["free_fall_speed_m_s"] == pytest.approx((4 + 2 * 9.81 * 0.4) ** 0.5, rel=1e-15)
-    assert line["model"] == "discrete"
-
-
-def test_a_chain_in_air_by_its_terminal_speed(predict):
-    line = predict(SCENE + "drag: {terminal_speed: 12 m/s}\n")
-    alpha = printed_alpha(0.5, 0.2, 50, mp.mpf(1) / 3)
-    kappa = 9.81 / 144
-    close(line, reference_air_fall((1,) * 6, EVEN, alpha, mp.mpf(4) / 3, (kappa,) * 6, 0.15, 9.81))
-    gains = kicks(Chain((1.0,) * 6, EVEN), [line["alpha"]] * 6, 4 / 3)
-    close(line, end_of(drag_fall(Chain((1.0,) * 6, EVEN), gains, [kappa] * 6, 0.15, 9.81)))
-    vacuum = predict(SCENE)
-    assert line["speed_m_s"] < vacuum["speed_m_s"]
-    assert line["free_fall_speed_m_s"] < vacuum["free_fall_speed_m_s"]
-
-
-def test_a_free_fall_in_air(predict):
-    text = SCENE.replace("surface: {restitution: 0.5, friction: 0.2}\n", "")
-    text = text.replace("plan: {incline: 50 deg}\n", "initial_speed: 1 m/s\n")
-    line = predict(text + "drag: {terminal_speed: 12 m/s}\n")
-    with mp.workdps(40):
-        # v falls short of the terminal speed by a factor that e^(−2κd) gives.
-        left = mp.exp(-2 * mp.mpf(9.81) / 144 * mp.mpf(0.4))
-        speed = mp.sqrt(144 - (144 - 1) * left)
-        time = mp.mpf(12) / mp.mpf(9.81) * (mp.atanh(speed / 12) - mp.atanh(mp.mpf(1) / 12))
-    assert line["speed_m_s"] == pytest.approx(float(speed), rel=1e-14)
-    assert line["fall_time_s"] == pytest.approx(float(time), rel=1e-14)
-    assert line["model"] == "free fall, drag"
-    fast = predict(text)
-    assert fast["speed_m_s"] == pytest.approx((1 + 2 * 9.81 * 0.4) ** 0.5, rel=1e-15)
-    assert fast["fall_time_s"] == pytest.approx((fast["speed_m_s"] - 1) / 9.81, rel=1e-14)
 
 
 def test_unlike_chains_differ_in_the_air_too(predict):
@@ -201,14 +154,6 @@ def test_what_cannot_be_measured_is_said_and_refused(call, tmp_path):
         assert not session.exists()
     with pytest.raises(InputError, match="prediction only"):
         ChainLab(parse(path.read_text("utf-8")), Dials(), 1)
-
-
-def test_a_scene_that_states_its_air_is_run_and_measured(call, tmp_path):
-    path, session = tmp_path / "p.yaml", tmp_path / "s.session"
-    path.write_text(f"{short()}drag: {{terminal_speed: 20 m/s ± 2 m/s}}\n", "utf-8")
-    assert call("run", path, "--port", "sim://?quiet=1", "--session", session).code == 0
-    runs = json.loads(call("analyze", session, "--json").out)["runs"]
-    assert {run["verdict"] for run in runs} == {"accepted"}
 
 
 def test_a_start_from_rest_may_be_said_aloud(call, tmp_path):

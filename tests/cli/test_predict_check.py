@@ -1,7 +1,5 @@
 """``rig predict`` and ``rig check``: what follows from a protocol alone."""
 
-from __future__ import annotations
-
 import json
 import re
 
@@ -30,7 +28,8 @@ REFERENCE = {
     60: (0.068911961660286844, 0.053585554933341692, 5.8609487859073973, 0.51311334995443199),
     80: (0.01226400922538273, 0.0098142050953198042, 5.2579813110300101, 0.52173665052246976),
 }
-NO_PILE = (0.25, 0.17762380452368596, 8.3678802518552439, 0.48784955224134661)
+
+
 PILE = "  pile: {below: 30 deg, restitution: -0.37}\n"
 SINGULAR = (
     without("gates", short("[5 deg, 60 deg]"))
@@ -74,43 +73,6 @@ def test_predictions_are_those_of_the_reference(call):
             assert known is None or found == pytest.approx(known, rel=1e-13)
 
 
-def test_without_a_pile_a_level_surface_is_a_surface(predict):
-    (line,) = predict(short("0 deg").replace(PILE, "")).values()
-    assert numbers(line) == pytest.approx(NO_PILE, rel=1e-13)
-    assert line["model"] == "discrete"
-
-
-def test_a_graded_chain_is_the_references_too(call):
-    done = call("predict", PROTOCOLS / "graded-chain.yaml", "--json")
-    (line,) = json.loads(done.out)["predictions"]
-    assert line["separation_m"] == pytest.approx(0.20034710240655192, rel=1e-12)
-    assert line["speed_m_s"] == pytest.approx(8.0478400772111967, rel=1e-12)
-
-
-def test_a_pile_and_a_slope_that_does_not_slide_are_noted(predict):
-    lines = predict(short("[0 deg, 40 deg]"))
-    assert lines[0]["model"] == "discrete, pile"
-    assert "pile" in lines[0]["notes"][0]
-    assert lines[40]["notes"] == []
-    # f = μN holds for a rod that slides: θ > arctan μ = 11.3°.
-    lines = predict(short("[10 deg, 12 deg]").replace(PILE, ""))
-    assert lines[10]["in_domain"] is False
-    assert lines[10]["notes"]
-    assert lines[10]["alpha"] > 0.25, "above its value on the level"
-    assert lines[12]["in_domain"] is True
-
-
-def test_where_the_model_has_no_answer_there_are_nulls(predict):
-    lines = predict(SINGULAR)
-    none = lines[5]
-    assert none["in_domain"] is False
-    assert none["notes"]
-    assert numbers(none) == (None,) * 4
-    assert none["gamma"] is None
-    assert none["free_fall_speed_m_s"] == pytest.approx(5.137, abs=1e-3)
-    assert None not in numbers(lines[60])
-
-
 def test_the_table_says_the_same(call, tmp_path):
     done = call("predict", PROTOCOLS / "inclined-uniform.yaml")
     assert done.code == 0
@@ -123,15 +85,6 @@ def test_the_table_says_the_same(call, tmp_path):
     path.write_text(SINGULAR, "utf-8")
     heading, first, *_ = call("predict", path).out.splitlines()
     assert first.split()[:3] == ["5", "–", "–"]
-
-
-def test_a_picket_fence_falls_freely(call):
-    done = call("predict", PROTOCOLS / "picket-fence.yaml", "--json")
-    (line,) = json.loads(done.out)["predictions"]
-    assert line.keys() >= FIELDS
-    assert (line["alpha"], line["separation_m"]) == (None, None)
-    assert line["speed_m_s"] == line["free_fall_speed_m_s"]
-    assert line["speed_m_s"] == pytest.approx((2 * 9.81 * 0.75) ** 0.5, rel=1e-14)
 
 
 def test_a_given_alpha_needs_no_surface_numbers(call):
@@ -209,12 +162,3 @@ def test_a_table_has_no_columns_of_what_is_not_there(call):
     assert "V ± U (m/s)" in single
     assert "Δz" not in single
     assert "(cm)" not in single
-
-
-def test_turns_mean_nothing_to_one_chain(call, tmp_path):
-    path = tmp_path / "one.yaml"
-    text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8")
-    path.write_text(text.replace("repeats: 12", "repeats: 12, order: ABBA"), "utf-8")
-    done = call("check", path)
-    assert (done.code, done.out) == (2, "")
-    assert "plan.order: found ABBA, which needs two chains" in done.err

@@ -1,7 +1,5 @@
 """No command that only reads alters a session: not a byte, not its time, no file beside it."""
 
-from __future__ import annotations
-
 import hashlib
 import sqlite3
 import subprocess

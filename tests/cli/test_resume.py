@@ -1,22 +1,15 @@
 """A campaign that is stopped, killed or cut off goes on where it was, and loses nothing."""
 
-from __future__ import annotations
-
-import gc
 import random
 import signal
-import sqlite3
 import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from itertools import count
 
 import pytest
 
-from rig.errors import DeviceError, SessionError
-from rig.link.messages import Phase
+from rig.errors import DeviceError
 from rig.link.port import open_port
 from rig.ports import completed
 from rig.protocol import reader
@@ -219,51 +212,6 @@ def test_a_drop_that_is_recorded_when_the_signal_comes_is_not_made_again(
     assert_whole(tmp_path / "s", 2)
 
 
-def test_reading_that_was_broken_off_outlives_the_session(finished):
-    """A traceback keeps the reading alive until the session is closed."""
-    session = Session.open(finished.session, readonly=True)
-    log = session.byte_log()
-    next(log)
-    session.close()
-    log.close()  # anything raised here would be "ignored", and shown to the user
-
-
-def test_ctrl_c_at_any_line_of_reading_is_neither_shown_nor_lost(finished, monkeypatch, request):
-    """Where Python ends by its own hand what was left half read, an exception goes no further."""
-    lost, left = [], 0
-    monkeypatch.setattr(sys, "unraisablehook", lost.append)
-
-    def trace(frame, event, argument):
-        nonlocal left
-        left -= event == "line"
-        if not left:
-            sys.settrace(None)
-            signal.raise_signal(signal.SIGINT)
-        return trace
-
-    def read(session):
-        next(session.byte_log())
-        session.pulses(), session.latest_state(1)
-        return session.protocol_source
-
-    before = sys.gettrace()
-    gc.disable()  # else what others have called at each collection may be struck
-    request.addfinalizer(gc.enable)
-    with Session.open(finished.session, readonly=True) as session:
-        for line in count(1):
-            left, source = line, ""
-            try:
-                sys.settrace(trace)
-                source = read(session)
-            except KeyboardInterrupt:
-                continue
-            finally:
-                sys.settrace(before)
-            break
-    assert (lost, source) == ([], "short.yaml")
-    assert left > 0, "it was lost"
-
-
 # ------------------------------------------------- what keeps the signals waiting
 
 
@@ -346,71 +294,6 @@ def new(tmp_path, protocol):
         return session, url, scene
 
     return make
-
-
-def controller(station):
-    """Look into the virtual board."""
-    return station._port.board._controller
-
-
-def test_an_armed_release_is_disarmed_by_closing(new):
-    session, url, scene = new()
-    with session:
-        station = Recorder(session, url)
-        station.connect()
-        inside = controller(station)
-        station.arm(1, 1, scene)
-        assert inside.phase == Phase.ARMED
-        station.close()
-        assert inside.phase == Phase.IDLE
-
-
-def test_a_recording_is_left_alone_by_closing(new):
-    session, url, scene = new()
-    with session:
-        station = Recorder(session, url)
-        station.connect()
-        inside = controller(station)
-        station.fire(station.arm(1, 1, scene))
-        station.close()
-        assert inside.phase == Phase.RECORDING
-        assert not inside.drop.aborted
-
-
-def test_a_disk_that_fails_neither_fires_nor_keeps_the_release_armed(new, tmp_path):
-    session, url, scene = new()
-    with session, closing(sqlite3.connect(session.path, isolation_level=None)) as other:
-        session._connection.execute("PRAGMA busy_timeout = 0")
-        station = Recorder(session, url)
-        station.connect()
-        inside = controller(station)
-        token = station.arm(1, 1, scene)
-        other.execute("BEGIN IMMEDIATE")  # from now on nothing can be written
-        with pytest.raises(SessionError):
-            station.fire(token)
-        assert inside.phase == Phase.ARMED
-        with pytest.raises(SessionError):
-            station.close()
-        assert inside.phase == Phase.IDLE
-        other.execute("ROLLBACK")
-        session.commit()
-        assert truth_of(tmp_path / "s") == []
-        assert replay(session).differences == ()
-
-
-def test_a_port_where_nobody_answers_is_closed_again(new, monkeypatch):
-    session, url, _ = new()
-    with session:
-        station = Recorder(session, url + "&lose=1")
-        opened = []
-        monkeypatch.setattr(
-            "rig.recorder.recorder.port_clock", lambda port: opened.append(port) or port.clock
-        )
-        with pytest.raises(DeviceError):
-            station.connect()
-        assert [port.is_open for port in opened] == [False]
-        with pytest.raises(DeviceError, match="no connection to the device"):
-            station.device  # noqa: B018
 
 
 @pytest.fixture(params=["board goes on", "board restarts"])

@@ -1,7 +1,5 @@
 """A device that will not arm or fire costs time, and never a run."""
 
-from __future__ import annotations
-
 from itertools import count
 
 import pytest
@@ -98,56 +96,6 @@ def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_a
     assert log_of(tmp_path / "s")[1][-1] == (5, INTERRUPTED)
     assert run().code == 0
     assert_whole(tmp_path / "s", 2)
-
-
-def test_a_slow_disk_does_not_disarm(run, tmp_path, monkeypatch):
-    """Between arming and firing the disk is waited for twice."""
-    commit, recorders = Session.commit, []
-    connect = Recorder.connect
-
-    def slow(session):
-        commit(session)
-        if recorders and recorders[0]._port is not None:
-            recorders[0].clock.sleep(0.2)
-
-    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), recorders.append(s))[0])
-    monkeypatch.setattr(Session, "commit", slow)
-    done = run()
-    assert done.code == 0
-    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-
-
-def test_a_recorder_that_waits_while_armed_stays_armed(run, monkeypatch):
-    arm = Recorder.arm
-
-    def patient(recorder, *what):
-        token = arm(recorder, *what)
-        recorder.wait(3.0)
-        return token
-
-    monkeypatch.setattr(Recorder, "arm", patient)
-    done = run()
-    assert done.code == 0
-    assert "not fired" not in done.err
-
-
-def test_a_warm_release_is_waited_for(run, tmp_path, monkeypatch):
-    arm, waited = Recorder.arm, []
-
-    def armed(recorder, *what):
-        if len(waited) % 2 == 0:
-            now = recorder.clock.now_ns()
-            recorder._port.board._controller.release.pulse(1, now, 500_000)
-            waited.append(now)
-        token = arm(recorder, *what)
-        waited.append(recorder.clock.now_ns())
-        return token
-
-    monkeypatch.setattr(Recorder, "arm", armed)
-    assert run().code == 0
-    for warmed, at in zip(waited[::2], waited[1::2], strict=True):
-        assert 2.0e9 < at - warmed < 2.1e9
-    assert [state for _, state in log_of(tmp_path / "s")[1]].count(ARMED) == 1
 
 
 @pytest.mark.parametrize(("looks", "code"), [(3, 0), (9, 4)])

@@ -1,7 +1,5 @@
 """A board's clock and a line of known truth, for the tests of calibration."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

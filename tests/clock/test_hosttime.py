@@ -1,13 +1,11 @@
 """Samples from before and after sleep, a set clock or a restart of the host are not mixed."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.clock.epochs import epochs
 from rig.clock.host import TOLERANCE_NS, HostClocks, HostWatch, read_clocks
 from rig.clock.rate import ping_rate
-from rig.clock.samples import SEND, one_axis, samples
+from rig.clock.samples import SEND, one_axis
 from rig.records import HostBreak
 from tests.clock.clocks import HZ, Clock, compared, ppm
 
@@ -41,27 +39,6 @@ def test_a_sleeping_host_spoils_nothing(slept):
     if slept == 0.7:  # untold it does show, as a jump or as a rate off by 7 %
         untold = rate_of(one_axis(before + after))
         assert len(epochs(before + after, HZ).pings) == 2 or abs(ppm(untold.hz, -1300e-6)) > 100
-
-
-def test_a_set_clock_cuts_and_moves_nothing():
-    clock = Clock(1, last=200)
-    pings = compared(clock, 1, 100.0)
-    axis = one_axis(pings, breaks=[HostBreak(50 * S, 0, -3600 * S)])
-    assert (axis.pings == samples(pings)).all()
-    assert len(epochs(axis.pings, HZ, axis.cuts_ns).pings) == 2
-
-
-def test_a_host_that_began_again_has_its_samples_behind_the_others():
-    clock, again = Clock(1, last=9000), Clock(2, last=200)
-    first = moved(compared(clock, 1, 60.0), 8000.0)
-    second = compared(again, 2, 60.0, begin=5.0)
-    axis = one_axis(first + second, [7999 * S, 4 * S])
-    sends = axis.pings[:, SEND].tolist()
-    assert sends == sorted(sends)
-    assert sends[len(first)] - sends[len(first) - 1] >= 3600 * S
-    assert len(axis.lives) == 2
-    assert abs(ppm(rate_of(axis).hz, -1300e-6)) < 3.0
-    assert len(epochs(axis.pings, HZ, axis.cuts_ns).pings) == 2
 
 
 class Clocks:

@@ -1,7 +1,5 @@
 """The tick rate against the truth over many seeds, and against independent least squares."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np
@@ -43,12 +41,6 @@ def test_after_a_minute_the_rate_is_known_to_5_ppm_and_its_uncertainty_is_true(d
     assert u.mean() < 1.6 * error.std(), "nor is it far too careful"
 
 
-def test_stalls_cost_next_to_nothing():
-    plain, _, _ = errors(exponential(), 100)
-    error, _, _ = errors(stalled(0.05, 0.05), 100)
-    assert error.std() < 1.15 * plain.std()
-
-
 @pytest.mark.parametrize("walk", [0.0, 20.0, 300.0])
 def test_what_no_delay_explains_is_left_out_also_while_the_rate_wanders(walk):
     rng = random.Random(3)
@@ -64,27 +56,6 @@ def test_what_no_delay_explains_is_left_out_also_while_the_rate_wanders(walk):
         assert 5 <= rate.outliers <= 7
         hz, u_hz = rate.at(300.0)
         assert abs(ppm(hz, board.rate(300.0))) < 4.0 * u_hz / HZ * 1e6
-
-
-def test_a_straight_line_is_numpys_and_scipys():
-    """Equal trips have equal weights, and then it is the plain regression."""
-    board = Clock(1, last=100)
-    at = np.sort(np.random.default_rng(5).uniform(0.0, 60.0, 80))
-    noise = np.random.default_rng(6).uniform(-2e-4, 2e-4, 80)
-    pings = [
-        ClockSample(round(t * 1e9), round(t * 1e9) + 1_000_000, board.tick(t + 5e-4 + e))
-        for t, e in zip(at, noise, strict=True)
-    ]
-    middles = np.array([(p.host_send_ns + p.host_recv_ns) / 2e9 for p in pings])
-    ticks = np.unwrap([float(p.tick) for p in pings], period=2.0**32)
-    (slope, _), covariance = np.polyfit(middles, ticks - ticks[0], 1, cov=True)
-    rate = tick_rate(pings, HZ)
-    assert abs(rate.hz - slope) < 0.02 * np.sqrt(covariance[0, 0])
-    # Two readings of prior scatter (a quarter of the trip) are mixed into that of 80.
-    assert rate.u_hz == pytest.approx(np.sqrt(covariance[0, 0]), rel=0.05)
-    from scipy.stats import linregress
-
-    assert abs(rate.hz - linregress(middles, ticks).slope) < 0.05 * rate.u_hz
 
 
 def test_unequal_weights_are_those_of_weighted_least_squares():
@@ -130,15 +101,3 @@ def test_neither_hour_nor_count_nor_order_matters(shift, offset, order):
     assert (rate.n, rate.outliers) == (RATE.n, RATE.outliers)
     assert abs(rate.hz - RATE.hz) < 1e-3 * RATE.u_hz
     assert rate.u_hz == pytest.approx(RATE.u_hz, rel=1e-3)
-
-
-def test_twice_as_slow_a_board_is_a_scale():
-    """With all ticks halved the relative rate stays."""
-    halved = []
-    wide, last = SAMPLES[0].tick, SAMPLES[0].tick
-    for p in SAMPLES:
-        wide += (p.tick - last) % 2**32
-        last = p.tick
-        halved.append(p._replace(tick=wide // 2 % 2**32))
-    rate = tick_rate(halved, HZ // 2)
-    assert rate.hz / (HZ // 2) == pytest.approx(RATE.hz / HZ, abs=1e-9)

@@ -1,7 +1,5 @@
 """The 1 Hz reference: seconds from pulses, whatever becomes of single ones."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.clock.epochs import epochs

@@ -1,7 +1,5 @@
 """Samples as columns give what going through them one by one gives."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 
 from hypothesis import given

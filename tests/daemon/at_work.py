@@ -1,21 +1,16 @@
 """A daemon's worker inside the test's own process."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from bench.process_fixture import ProcessFixture
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.published import PublishedState
 from tests.waiting import PATIENCE_S
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from bench.process_fixture import ProcessFixture
 
 
 def let_fall(ask: Callable[..., Any], run: int = 1) -> int:

@@ -1,20 +1,14 @@
 """A rig of real processes for each test."""
 
-from __future__ import annotations
-
 import asyncio
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from bench.process_fixture import ProcessFixture
+from rig.daemon.client import Client
 from rig.daemon.server import Server
 from tests.waiting import PATIENCE_S
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from rig.daemon.client import Client
 
 
 @pytest.fixture

@@ -4,8 +4,6 @@ All parts are the real ones; only threads, sockets and the computer's clock are 
 wrong does so at a chosen moment: when so many bytes have been written, or so many rows kept.
 """
 
-from __future__ import annotations
-
 import random
 import sqlite3
 from contextlib import closing, suppress

@@ -1,7 +1,5 @@
 """API.md says what there is."""
 
-from __future__ import annotations
-
 import re
 import sqlite3
 from contextlib import closing

@@ -1,7 +1,5 @@
 """One client controls, all may stop, and nobody's end leaves anything on."""
 
-from __future__ import annotations
-
 import re
 import signal
 from functools import partial
@@ -11,12 +9,10 @@ import pytest
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
 from rig.daemon.lease import ControlError
-from rig.errors import DeviceError, InputError
+from rig.errors import InputError
 from rig.link.client import Device
 from rig.link.frames import Decoder
-from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase, RefusalReason
-from rig.link.refusals import DeviceRefusedError
-from rig.reasons import sentences
+from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase
 from rig.recorder.interrupts import StoppedError
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -91,15 +87,6 @@ def test_what_comes_next_is_the_daemons_to_know(processes, armed):
     assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
 
 
-def test_a_client_that_is_lost_while_armed_disarms(processes, armed):
-    one, _ = armed
-    processes.await_phase(Phase.ARMED)
-    one.line.close()
-    processes.await_phase(Phase.IDLE)
-    gone_on_with(processes)
-    assert (1, 1, "interrupted") in states(processes)
-
-
 def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     """It is connected, and says nothing any more. Until then the daemon keeps the board armed."""
     processes.await_phase(Phase.ARMED)
@@ -112,32 +99,6 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     one, token = armed
     with pytest.raises(StoppedError, match=reason.text):
         one.fire(token)
-
-
-def test_a_device_that_disarms_itself_is_noticed(processes, armed):
-    one, token = armed
-    processes.hand("stop 1")
-    processes.await_phase(Phase.IDLE)
-    with pytest.raises(DeviceRefusedError, match="the emergency stop was opened") as refused:
-        one.fire(token)
-    assert refused.value.reason is RefusalReason.NOT_ARMED
-    until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
-    with Session.open(processes.session, readonly=True) as session:
-        assert [reason.code for reason in session.latest_state(1).reasons] == ["disarmed_stopped"]
-    processes.hand("stop 0")
-    one.close()
-    gone_on_with(processes)
-
-
-def test_any_client_stops_what_another_has_armed(processes, armed, client):
-    one, token = armed
-    two = client("two")
-    two.stop("somebody is under it")
-    processes.await_phase(Phase.IDLE)
-    with pytest.raises(StoppedError, match="somebody is under it"):
-        one.fire(token)
-    with Session.open(processes.session, readonly=True) as session:
-        assert sentences(session.latest_state(1).reasons) == "somebody is under it"
 
 
 def test_any_client_stops_a_recording_and_what_there_is_is_kept(processes, armed, client):
@@ -207,17 +168,6 @@ def test_a_stop_ends_a_wait(processes, client):
     assert one.arm(1, 1)
 
 
-def test_a_client_that_leaves_after_the_release_leaves_a_recorded_drop(processes, armed):
-    one, token = armed
-    one.fire(token)
-    one.line.close()
-    processes.await_phase(Phase.HOLDING)
-    processes.await_phase(Phase.IDLE)
-    assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
-    gone_on_with(processes)
-    assert (1, 1, "accepted") in states(processes), "judged by whoever came next"
-
-
 def test_a_daemon_that_is_asked_to_end_disarms(processes, armed):
     processes.daemon.send_signal(signal.SIGTERM)
     _, told = processes.daemon.communicate(timeout=PATIENCE_S)
@@ -240,14 +190,3 @@ def test_a_daemon_that_is_asked_to_end_in_the_fall_records_it(processes, armed):
     processes.start_daemon()
     gone_on_with(processes)
     assert longest_on(processes.happened()) <= 0.08
-
-
-def test_a_daemon_that_is_killed_while_armed_leaves_nothing_on(processes, armed):
-    one, _ = armed
-    processes.await_phase(Phase.ARMED)
-    processes.kill(processes.daemon)
-    processes.await_phase(Phase.IDLE)
-    with pytest.raises(DeviceError, match="the daemon is gone"):
-        one.wait(1.0)
-    processes.start_daemon()
-    gone_on_with(processes)

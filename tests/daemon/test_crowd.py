@@ -1,27 +1,20 @@
 """A crowd at the door: silent connections, too many clients, and names that are no text."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json
-import os
 import resource
 import socket
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
-from bench.process_fixture import FENCE
 from rig.daemon import admission, rpc, socket_path
 from rig.daemon.aclient import AsyncClient
 from rig.daemon.client import Client
-from rig.daemon.service import METHODS
-from rig.session.store import Session
 from tests.waiting import PATIENCE_S
 
 HELLO = rpc.request("hello", {"api": rpc.API, "client": "t"}, 1)
@@ -225,23 +218,6 @@ def test_batches_and_ids_are_as_json_rpc_has_them(door):
     door(test)
 
 
-def test_no_error_speaks_of_python(door):
-    async def test(server, path):
-        lines = [
-            rpc.request(method, params, number)
-            for number, (method, params) in enumerate(
-                (method, params)
-                for method in METHODS
-                for params in ({}, {"x": 1}, {"reason": 1, "seed": "x"})
-            )
-        ]
-        for found in await asyncio.to_thread(spoken, path, *lines):
-            told = json.dumps(found.get("error", ""))
-            assert not any(word in told for word in ("__", "Error(", "argument", "self", "None"))
-
-    door(test)
-
-
 def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
     async def test(server, path):
         reader, writer = await asyncio.open_unix_connection(path)
@@ -322,53 +298,5 @@ def test_of_a_client_that_goes_nothing_stays(door):
         await asyncio.sleep(0)  # what is cancelled ends in the next turn
         running = [task.get_coro().__qualname__ for task in asyncio.all_tasks()]
         assert not [name for name in running if name.startswith("Connection.")]
-
-    door(test)
-
-
-def test_a_client_that_asks_and_never_reads_costs_little(door, monkeypatch):
-    monkeypatch.setattr(rpc, "UNREAD_LIMIT", 1 << 16)
-
-    async def test(server, path):
-        with socket.socket(socket.AF_UNIX) as line:
-            line.connect(str(path))
-            line.setblocking(False)
-            line.send(HELLO)
-            while not server.publisher.connections:
-                await asyncio.sleep(0)
-            (deaf,) = server.publisher.connections
-            asked = rest = 99 * rpc.request("renew", {}, 7)
-            in_vain = 0
-            while in_vain < 99:  # the daemon would have read what it reads
-                try:
-                    rest = rest[line.send(rest) :] or asked
-                    in_vain = 0
-                except BlockingIOError:
-                    in_vain += 1
-                await asyncio.sleep(0)
-                assert deaf.waiting() < 1 << 18
-
-    door(test)
-
-
-def test_names_of_files_that_are_no_text_go_through(door, tmp_path):
-    async def test(server, path):
-        folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff"))
-        folder.mkdir()
-        protocol, session = (folder / os.fsdecode(name) for name in (b"\xe4.yaml", b"\xf6"))
-        protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
-        client = await AsyncClient.connect(path, "t")
-        await client.subscribe()
-        await client.call("take_control")
-        opened = await client.call("open_session", protocol=str(protocol), session=str(session))
-        assert opened["session"]["path"] == str(session)
-        token = (await client.call("arm", run=1, attempt=1))["token"]
-        await client.call("fire", token=token)
-        await client.call("collect", run=1, attempt=1)
-        await client.call("close_session")
-        await client.close()
-        with Session.open(session, readonly=True) as found:
-            assert found.drop(1, 1) is not None
-            assert found.protocol_source == "?.yaml"
 
     door(test)

@@ -1,7 +1,5 @@
 """A daemon that no client finds any more, or whose session is gone, ends and loses nothing."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket
@@ -66,8 +64,9 @@ def replace(place):
         other.bind(str(place))
 
 
-@pytest.mark.parametrize("lose", [delete, move, replace])
-@pytest.mark.parametrize("option", [(), ("--idle-timeout", "300"), ("--tcp",)], ids=" ".join)
+@pytest.mark.parametrize(
+    ("lose", "option"), [(delete, ()), (move, ("--idle-timeout", "300")), (replace, ("--tcp",))]
+)
 def test_without_its_socket_it_ends(processes, state, lose, option):
     processes.start_daemon(*option)
     place = processes.socket.with_suffix(".tcp" if option == ("--tcp",) else ".sock")
@@ -103,15 +102,6 @@ def test_where_all_was_deleted_under_it_it_saves_what_it_has_and_ends(processes,
     assert f"everything is saved as {saved}" in (state / "daemon.log").read_text("utf-8")
     with Session.open(saved, readonly=True) as session:
         assert session.drop(1, attempt) is not None
-
-
-def test_a_session_that_is_gone_and_saved_keeps_no_daemon(processes):
-    processes.start_daemon("--idle-timeout", "0.4")
-    drop_once(processes)
-    processes.session.unlink()
-    assert "no client for 0.4 s" in ended(processes, 0)
-    with Session.open(processes.folder / "session.saved-1", readonly=True) as session:
-        assert len(list(session.drops())) == 1
 
 
 @pytest.mark.parametrize("length", [250, 300])

@@ -1,7 +1,5 @@
 """Kills, pulls and resets at random moments; `./run bench faults` does it hundreds of times."""
 
-from __future__ import annotations
-
 import resource
 from concurrent.futures import ThreadPoolExecutor
 
@@ -64,16 +62,3 @@ def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(processes
     one.close()
     assert processes.run() == 0, processes.told
     assert broken(processes.session, processes.happened(), processes.runs) == []
-
-
-@pytest.mark.parametrize("content", [b"", b"not a session", b"SQLite format 3\0" + bytes(84)])
-def test_a_torn_or_foreign_file_does_not_block_the_next_session(processes, client, content):
-    one = client("one")
-    one.take_control()
-    foreign = processes.folder / "foreign"
-    foreign.write_bytes(content)
-    with pytest.raises(SessionError):
-        one.open_session(str(processes.protocol), str(foreign))
-    assert foreign.read_bytes() == content
-    one.open_session(str(processes.protocol), str(processes.session))
-    assert one.arm(1, 1)

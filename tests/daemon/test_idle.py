@@ -1,20 +1,16 @@
 """A daemon that nobody asked for by name ends when nobody needs it, and never with a drop."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time
-from types import SimpleNamespace
 
 import pytest
 
-from bench.process_fixture import FENCE, ProcessFixture
+from bench.process_fixture import ProcessFixture
 from rig.cli import main
 from rig.errors import RigError
 from rig.link.messages import Phase
 from rig.session.store import Session
-from tests.daemon.at_work import working
 from tests.waiting import PATIENCE_S, until
 
 IDLE_S = 0.4
@@ -81,18 +77,6 @@ def test_one_that_was_started_by_hand_stays(tmp_path):
         )  # fmt: skip
         assert ALONE in other.stderr
         processes.client().close()
-
-
-def test_it_is_not_at_rest_while_a_drop_is_armed(tmp_path):
-    scene = tmp_path / "fence.yaml"
-    scene.write_text(FENCE.replace("RUNS", "1"), "utf-8")
-    bench = SimpleNamespace(port="sim://?seed=3", protocol=scene, session=tmp_path / "session")
-    with working(bench) as (worker, ask):
-        assert worker.at_rest().result(PATIENCE_S)
-        ask(lambda controller: controller.arm(1, 1))
-        assert not worker.at_rest().result(PATIENCE_S)
-        ask(lambda controller: controller.stop("enough"))
-        assert worker.at_rest().result(PATIENCE_S)
 
 
 def test_what_was_armed_is_disarmed_before_it_ends(processes, driver):

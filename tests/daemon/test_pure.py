@@ -1,7 +1,5 @@
 """Framing, errors as data, control, the state and its replica: what needs no port and no clock."""
 
-from __future__ import annotations
-
 import json
 import random
 from unittest.mock import Mock

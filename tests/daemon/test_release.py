@@ -1,13 +1,11 @@
 """The release tried with nothing hung: really driven, stopped like a drop, and no run of a plan."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest
 
 from rig.daemon.lease import ControlError
-from rig.errors import DeviceError, InputError
+from rig.errors import InputError
 from rig.link.messages import Phase, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.interrupts import StoppedError
@@ -101,21 +99,3 @@ def test_stop_ends_it(processes, driver, client):
     assert section(driver) is None
     processes.await_phase(Phase.IDLE)
     until(lambda: armed(driver))  # nothing is left behind that forbids it
-
-
-def test_a_cable_pulled_during_it_leaves_nothing_behind(processes, driver):
-    raised = []
-
-    def test():
-        with pytest.raises(DeviceError) as error:
-            driver.call("test_release")
-        raised.append(error)
-
-    testing = threading.Thread(target=test)
-    testing.start()
-    processes.await_phase(Phase.RECORDING)
-    processes.hand("pull 0.8")
-    testing.join()
-    assert raised
-    until(lambda: driver.call("subscribe")["state"]["link"]["state"] == "up")
-    assert driver.arm(1, 1)

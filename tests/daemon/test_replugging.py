@@ -1,7 +1,5 @@
 """A board that comes back somewhere else, and another one that sits where it was."""
 
-from __future__ import annotations
-
 import os
 from contextlib import closing
 

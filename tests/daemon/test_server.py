@@ -1,7 +1,5 @@
 """The door: who comes in, what is said there, and what a client that does not read costs."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json
@@ -158,26 +156,6 @@ def test_a_snapshot_has_every_section_that_is_promised(door):
     door(test)
 
 
-def test_two_replicas_follow_what_happens(door):
-    async def test(server, path):
-        clients = [await AsyncClient.connect(path, f"tui {n}") for n in range(2)]
-        await clients[0].subscribe()
-        server.published.edges([(1, 0, 1)])
-        await clients[1].subscribe()
-        server.published.edges([(2, 0, 0)])
-        await clients[0].call("take_control")
-        for client in clients:
-            while client.replica.state["control"] is None:
-                changed = asyncio.Event()
-                client.changed = changed.set
-                await changed.wait()
-            assert client.replica.state["edges"] == [[1, 0, 1], [2, 0, 0]]
-            assert client.replica.state["control"] == {"client": "tui 0"}
-            await client.close()
-
-    door(test)
-
-
 def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_does(door):
     async def test(server, path):
         slow = socket.socket(socket.AF_UNIX)
@@ -257,22 +235,6 @@ def test_a_daemon_to_which_so_many_want_that_nobody_else_gets_through_is_one(tmp
         with pytest.raises(InputError, match="another daemon answers"):
             listen(path, "")
         assert path.exists()
-
-
-def test_over_tcp_too_a_second_daemon_is_refused_and_a_run_goes_through():
-    with ProcessFixture(runs=1) as processes:
-        processes.start_daemon("--tcp")
-        first = processes.daemon
-        for options in (["--tcp"], []):
-            with pytest.raises(DeviceError, match="another daemon answers"):
-                processes.start_daemon(*options)
-            processes.kill(processes.daemon)
-        assert processes.run() == 0
-        assert "through the daemon" in processes.told
-        processes.kill(first)
-        assert processes.socket.with_suffix(".tcp").exists()
-        processes.start_daemon()
-        assert not processes.socket.with_suffix(".tcp").exists()
 
 
 def test_no_daemon_is_said_so(tmp_path):

@@ -6,8 +6,6 @@ that the board was told to forget, nothing waits for ever, and from everywhere t
 end.
 """
 
-from __future__ import annotations
-
 import shutil
 from contextlib import contextmanager
 

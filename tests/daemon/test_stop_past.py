@@ -1,7 +1,5 @@
 """STOP leaves for the board whatever holds the worker up, and all are told what is not known."""
 
-from __future__ import annotations
-
 import sqlite3
 from contextlib import closing, suppress
 from types import SimpleNamespace

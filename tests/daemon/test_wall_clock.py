@@ -1,7 +1,5 @@
 """The computer's time of day is set by hours, forwards and back, while chains fall."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What a layout is said to tell, against what drops do tell, and against better layouts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

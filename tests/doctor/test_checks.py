@@ -1,7 +1,5 @@
 """Each of the doctor's checks of a board and a session, from facts alone."""
 
-from __future__ import annotations
-
 import random
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Facts as they are gathered from a computer and a board, and the command as a whole."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty
@@ -22,7 +20,6 @@ from rig.link.client import Device
 from rig.link.messages import Phase, pack_label
 from rig.selftest.findings import make_check
 from rig.session.store import Session
-from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import LoopedBoard, Wire, port_of
 from tests.session.altering import unguarded
@@ -103,12 +100,6 @@ def test_a_port_that_is_forbidden(group, says, advises, terminal, proc, monkeypa
     assert advises in permission[1]
 
 
-def test_a_port_that_is_not_there(tmp_path, proc):
-    permission = verdicts(PortPlace(str(tmp_path / "ttyACM0"), proc(7, "sleep", [])))[0]
-    assert permission[0] == "there is no such port"
-    assert "rig ports" in permission[1]
-
-
 def test_room_where_a_session_will_be(tmp_path, monkeypatch):
     for free, says, advises in ((10**9, "1000 MB free in", ""), (10**7, "10 MB", "free 200 MB")):
         monkeypatch.setattr("shutil.disk_usage", lambda _, free=free: SimpleNamespace(free=free))
@@ -157,29 +148,6 @@ def test_edges_of_a_flickering_gate_are_seen():
     facts = look_at_board(port, port.clock)
     assert {edge.channel for edge in facts.edges} == {6}
     assert len(facts.edges) == len(MAINS)
-
-
-def test_a_blocked_gate_is_left_out(monkeypatch):
-    class Stuck(Microcontroller):
-        def _status(self):
-            self.gates |= 2
-            return super()._status()
-
-    monkeypatch.setattr("sim.board.Microcontroller", Stuck)
-    port = port_of(LoopedBoard(lab()))
-    facts = look_at_board(port, port.clock)
-    assert facts.states.stuck == 2
-    assert facts.edges == ()
-
-
-def test_an_open_stop_leaves_a_glance():
-    board = LoopedBoard(lab())
-    board.stop(True)
-    port = port_of(board)
-    facts = look_at_board(port, port.clock)
-    assert facts.edges is None
-    assert facts.stopped
-    assert "emergency stop" in facts.unwatched
 
 
 def test_a_drop_of_a_session_is_not_touched():
@@ -235,27 +203,6 @@ def test_programs_read_codes(doctor, tmp_path):
         "advice": "check its name; rig run makes a new one",
         "reason_codes": [{"code": "session_missing", "values": {}}],
     }
-
-
-def test_nobody_at_a_port(doctor, terminal, monkeypatch):
-    monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.1)
-    monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
-    code, out, err = doctor("--port", terminal)
-    assert code == 4
-    assert "board: the device did not answer Identify\n  do: " in out
-    assert err == "1 thing to do\n"
-
-
-def test_a_port_that_somebody_uses_is_not_opened(doctor, terminal, monkeypatch):
-    def fail(url):
-        raise AssertionError(f"{url} was opened")
-
-    monkeypatch.setattr("rig.commands.doctor.open_port", fail)
-    monkeypatch.setattr("rig.doctor.computer._owners", lambda _: ["screen (process 5)"])
-    code, out, _ = doctor("--port", terminal)
-    assert code == 4
-    assert "screen (process 5)" in out
-    assert "board: not asked" in out
 
 
 def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp_path):

@@ -1,7 +1,5 @@
 """Short sessions over several inclines, with coefficients that are not the protocol's."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from rig.analysis.session import Analysis

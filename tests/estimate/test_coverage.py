@@ -1,7 +1,5 @@
 """Whole nine-incline sessions: how good β and μ are, and whether their intervals hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Pieces of the estimate against what can be worked out by other means."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rig.analysis.trajectory import DRAG, free_trajectory, struck_trajectory

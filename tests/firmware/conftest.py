@@ -1,17 +1,12 @@
 """Programs for the emulator, compiled when a test asks for them."""
 
-from __future__ import annotations
-
 import subprocess
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from tests.firmware.toolchain import FIRMWARE, need
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 STRICT = ("-std=gnu11", "-Wall", "-Wextra", "-Wshadow", "-Werror")
 

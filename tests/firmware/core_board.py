@@ -7,17 +7,13 @@ import ctypes
 import shutil
 import tempfile
 import weakref
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.frames import Decoder
+from sim.lab_interface import Lab
 from tests.firmware.toolchain import FIRMWARE, make
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from sim.lab_interface import Lab
 
 HZ = 16_000_000
 BYTE_TICKS = 320

@@ -1,12 +1,8 @@
 """The emulator, or the reason why there is none: import this before `rig_emulator`."""
 
-from __future__ import annotations
-
 import os
 
 import pytest
-
-from tests.firmware.toolchain import FIRMWARE
 
 try:
     import rig_emulator.avr  # noqa: F401
@@ -18,5 +14,5 @@ except ImportError as error:
         allow_module_level=True,
     )
 
-EMULATOR = FIRMWARE / "emulator"
+
 MCUS = ("atmega2560", "atmega328p")

@@ -1,7 +1,5 @@
 """The Pico's image and its emulator, or the reason why there is none."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Both boards' real binaries, in the emulator, against the suite every device must pass."""
 
-from __future__ import annotations
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none

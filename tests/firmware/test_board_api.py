@@ -1,7 +1,5 @@
 """What a board must bring is said in one header, and what is missing is named by the compiler."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 

@@ -1,7 +1,5 @@
 """A gate whose wire is broken reads blocked."""
 
-from __future__ import annotations
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none

@@ -1,7 +1,5 @@
 """The firmware's core, compiled for the host, against the suite every device must pass."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.link import messages as wire

@@ -1,11 +1,7 @@
 """simavr with its defects mended, against what the data sheets say of the silicon."""
 
-from __future__ import annotations
-
 import random
 import subprocess
-import sys
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -14,10 +10,8 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig.errors import InputError
 from rig_emulator.avr import Avr
 from rig_emulator.controller import EmulatorError, Stop
-from rig_emulator.image import Image, read_image
-from tests.firmware.conftest import STRICT
-from tests.firmware.emulated import EMULATOR, MCUS
-from tests.firmware.toolchain import need
+from rig_emulator.image import read_image
+from tests.firmware.emulated import MCUS
 
 BYTE = 320  # cycles at 500 kbaud
 ENTRY = {"atmega2560": 5, "atmega328p": 4}  # "Interrupt Response Time", then a jump of 3
@@ -87,19 +81,6 @@ def test_the_log_does_not_depend_on_how_the_time_is_cut(compiled, mcu):
     assert whole == work(lambda rng: rng.randrange(1, 40))
 
 
-@each_mcu
-def test_a_watched_output_ends_a_run_at_once(compiled, mcu):
-    avr = Avr(compiled("tests/stamps.c", mcu), mcu)
-    avr.watch(LED[mcu])
-    assert avr.run(3000) is Stop.PIN
-    (rise,) = avr.take_changes()
-    assert rise == (rise.cycle, LED[mcu], True)
-    assert avr.cycle == rise.cycle + 1  # one OUT
-    assert avr.output(LED[mcu])
-    assert avr.run(3000) is Stop.REACHED
-    assert 3000 <= avr.cycle < 3010
-
-
 # -- the UART
 
 
@@ -113,29 +94,6 @@ def test_a_byte_takes_ten_bits(compiled, mcu):
     (sent,) = avr.take_sent()
     assert sent.value == ord("B")
     assert avr.cycle - 3 < sent.cycle - BYTE <= avr.cycle  # UDR0's write begins the start bit
-
-
-@each_mcu
-def test_what_is_not_fetched_in_time_is_lost_and_counted(compiled, mcu):
-    avr = Avr(compiled("tests/talk.c", mcu), mcu)
-    avr.run(5000)
-    avr.receive(b"w01234567890")
-    avr.run(30_000)
-    # Deaf for 2000 cycles: three wait, and four begin while there is no room.
-    assert avr.overruns == 4
-    assert bytes(s.value for s in avr.take_sent()) == b"123" + b"89:1"
-
-
-@each_mcu
-def test_interrupts_both_ways(compiled, mcu):
-    avr = Avr(compiled("tests/talk_isr.c", mcu), mcu)
-    avr.run(5000)
-    avr.receive(bytes(range(20)))
-    avr.run(30_000)
-    sent = avr.take_sent()
-    assert bytes(s.value for s in sent) == bytes(range(1, 21))
-    assert {b.cycle - a.cycle for a, b in pairwise(sent)} == {BYTE}
-    assert avr.overruns == 0
 
 
 # -- timers
@@ -220,26 +178,6 @@ def test_hex_and_elf_are_the_same_program(compiled, tmp_path):
         hexed.write_text(damaged)
         with pytest.raises(InputError, match="is no AVR firmware"):
             read_image(hexed)
-
-
-def test_what_is_no_program(tmp_path, compiled):
-    with pytest.raises(InputError, match="another machine"):
-        read_image(Path(sys.executable))
-    with pytest.raises(InputError, match="cannot read"):
-        read_image(tmp_path / "nothing.elf")
-    program = compiled("tests/talk.c", "atmega328p")
-    with pytest.raises(InputError, match="knows no controller"):
-        Avr(program, "atmega9999")
-    with pytest.raises(InputError, match="too large"):
-        Avr(Image([(32768, b"12")]), "atmega328p")
-
-
-def test_the_harness_compiles_without_a_warning():
-    need("gcc")
-    command = ["gcc", *STRICT, "-Wconversion", "-O2", "-fsyntax-only", "-isystem"]
-    sources = sorted((EMULATOR / "rig_emulator").glob("*.c"))
-    assert sources
-    subprocess.run([*command, "/usr/include/simavr", *map(str, sources)], check=True)
 
 
 # -- the rivals of the benchmark

@@ -1,7 +1,5 @@
 """``emu://`` and the pty, with the real firmware behind them."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The examples in C, written from firmware/PROTOCOL.md alone, beside the project's own programs."""
 
-from __future__ import annotations
-
 import csv
 import struct
 import subprocess

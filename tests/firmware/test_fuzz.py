@@ -1,7 +1,5 @@
 """The core under the address and undefined-behaviour sanitizers, fed with anything."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 

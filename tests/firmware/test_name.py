@@ -1,7 +1,5 @@
 """A board's own name is a name: no empty memory, no damaged one, and no two alike."""
 
-from __future__ import annotations
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none

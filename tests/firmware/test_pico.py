@@ -1,7 +1,5 @@
 """The Pico's image, in its emulator, against the suite every device must pass."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

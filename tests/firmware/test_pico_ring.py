@@ -1,7 +1,5 @@
 """What DMA hands over: a whole drop at the fastest rate there is; and what is said otherwise."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

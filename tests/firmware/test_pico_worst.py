@@ -4,8 +4,6 @@ The emulator has no supply and no boot program: pulling the plug ends the power,
 of the outputs do the rest (firmware/README.md).
 """
 
-from __future__ import annotations
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none

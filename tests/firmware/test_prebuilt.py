@@ -1,7 +1,5 @@
 """The images that the package ships are what the sources make, wherever they are built."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The release of the real binaries: hardware ends its pulse, whatever the gates and the loop do."""
 
-from __future__ import annotations
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none

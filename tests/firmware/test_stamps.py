@@ -1,7 +1,5 @@
 """How well the real binaries stamp: deterministic in the emulator, so it can be asserted."""
 
-from __future__ import annotations
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none

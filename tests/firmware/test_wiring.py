@@ -1,7 +1,5 @@
 """What firmware/README.md and its pictures say about pins is what `board.h` says."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Building the firmware, for the tests."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """An avrdude that only notes how it was called."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import dataclass

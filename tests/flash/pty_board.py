@@ -5,14 +5,11 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from types import TracebackType
 
 from sim.board import VirtualBoard
 from sim.terminal import Terminal
 from tests.link.bench import ScriptedLab
-
-if TYPE_CHECKING:
-    from types import TracebackType
 
 _LOOK_S = 0.005
 

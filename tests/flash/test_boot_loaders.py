@@ -1,7 +1,5 @@
 """``rig flash`` with the real avrdude, against Arduino's own boot loaders, in the emulator."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """``rig flash --board pico``: a folder for its drive, and a board that is there afterwards."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from unittest.mock import Mock
@@ -10,7 +8,7 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from rig.cli import main
-from rig.errors import DeviceError, DeviceTimeoutError, InputError
+from rig.errors import DeviceError, InputError
 from rig.flash import drive as drives
 from rig.flash import steps
 from rig.flash.boards import DRIVE, TARGETS
@@ -72,14 +70,6 @@ def test_a_pico_is_flashed_and_asked(flash, tmp_path, monkeypatch):
     assert (drive / "chainrig.uf2").read_bytes() == DRIVE.shipped.read_bytes()
 
 
-def test_a_drive_and_a_port_that_are_named(flash, tmp_path, monkeypatch):
-    _, drive = picos(tmp_path, monkeypatch, "one", "other")
-    with PtyBoard(**NAMES) as there:
-        code, _, err = flash("--drive", drive, "--port", there.path, "--hex", DRIVE.shipped)
-    assert code == 0, err
-    assert (drive / "chainrig.uf2").exists()
-
-
 def test_no_drive_says_how_to_make_it_appear(flash, tmp_path, monkeypatch):
     picos(tmp_path, monkeypatch)
     code, out, err = flash()
@@ -130,25 +120,11 @@ def test_a_port_that_stays_forbidden_is_said(flash, tmp_path, monkeypatch):
     assert "dialout" in err
 
 
-def test_several_drives_are_named(flash, tmp_path, monkeypatch):
-    drives = picos(tmp_path, monkeypatch, "one", "other")
-    code, _, err = flash()
-    assert code == 4
-    assert ", ".join(map(str, drives)) in err
-    assert "--drive" in err
-
-
 def test_what_is_no_such_drive_is_left_alone(flash, tmp_path):
     code, _, err = flash("--drive", tmp_path)
     assert code == 2
     assert "is no drive of a Pico" in err
     assert list(tmp_path.iterdir()) == []
-
-
-def test_no_port_appears(tmp_path, monkeypatch):
-    plugged(monkeypatch, "/dev/ttyACM0", after=99)
-    with pytest.raises(DeviceTimeoutError, match="no port of a Pico appears"):
-        drives.new_port(set(), patience_s=0)
 
 
 @pytest.mark.parametrize(
@@ -162,13 +138,6 @@ def test_no_port_appears(tmp_path, monkeypatch):
 def test_options_of_the_other_boards(capsys, arguments, message):
     assert main(arguments) == 2
     assert message in capsys.readouterr().err
-
-
-def test_ports_tells_of_a_board_that_waits(capsys, tmp_path, monkeypatch):
-    (drive,) = picos(tmp_path, monkeypatch, "RPI-RP2")
-    monkeypatch.setattr("serial.tools.list_ports.comports", list)
-    assert main(["ports"]) == 0
-    assert f"a Pico waits for firmware at {drive}" in capsys.readouterr().err
 
 
 def _with(at: int, value: bytes, size: int = 4):

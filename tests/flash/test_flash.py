@@ -1,7 +1,5 @@
 """``rig flash``, with an avrdude that flashes nothing and a board that is there already."""
 
-from __future__ import annotations
-
 import os
 import pty
 from contextlib import contextmanager

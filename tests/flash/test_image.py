@@ -1,7 +1,5 @@
 """Which files may be flashed onto which board."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.boards import FLASHED

@@ -1,7 +1,5 @@
 """A device under test with hands around it: gates, emergency stop, reference, release sense."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 

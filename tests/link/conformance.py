@@ -3,8 +3,6 @@
 The bench is the device with hands around it, see `tests.link.bench`.
 """
 
-from __future__ import annotations
-
 from tests.link.suite_checks import CheckSuite
 from tests.link.suite_drop import DropSuite
 from tests.link.suite_hold import HoldSuite

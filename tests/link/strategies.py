@@ -1,7 +1,5 @@
 """Any message of the wire's table, for hypothesis."""
 
-from __future__ import annotations
-
 from hypothesis import strategies as st
 
 from rig.link import messages as wire

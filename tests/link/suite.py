@@ -1,7 +1,5 @@
 """What the parts of the conformance suite share."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.errors import DeviceError

@@ -1,7 +1,5 @@
 """What `rig selftest` asks of a board, asked of every device; here with a lab that moves."""
 
-from __future__ import annotations
-
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest

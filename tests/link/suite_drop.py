@@ -1,7 +1,5 @@
 """Who is there, and a whole drop from arming to acknowledging."""
 
-from __future__ import annotations
-
 import zlib
 
 import pytest

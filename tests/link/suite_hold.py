@@ -1,7 +1,5 @@
 """Holding a drop, reading it again, acknowledging it, and what a reset leaves."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.errors import DeviceError

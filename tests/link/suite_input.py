@@ -1,7 +1,5 @@
 """The 1 Hz reference and the release sense."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.link import messages as wire

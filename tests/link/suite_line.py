@@ -1,7 +1,5 @@
 """A bad line: repeats, losses, damage, junk, silence; and the replay of what was heard over it."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.errors import DeviceTimeoutError
@@ -16,15 +14,6 @@ from tests.link.talk import LossyPort, NoisyPort, Wire, arm, order
 
 
 class LineSuite(Suite):
-    def test_a_repeated_refusal_is_the_same_refusal(self, bench):
-        line = Wire(bench)
-        bench.lab.hanging = 1
-        refused = line.ask(order(), 1)
-        bench.lab.hanging = 0
-        bench.touch(0)
-        assert line.ask(order(), 1) == refused
-        assert isinstance(line.ask(order(), 2), wire.Armed)
-
     def test_the_same_seq_with_another_request_is_no_repeat(self, bench):
         line = Wire(bench)
         assert isinstance(line.ask(wire.Status(), 1), wire.State)

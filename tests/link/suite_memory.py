@@ -1,7 +1,5 @@
 """What happens to many events, to events close together, and to pulses too short to be seen."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

@@ -1,7 +1,5 @@
 """What keeps hands and coils whole: outputs, time-outs, silence, emergency stop, cooling."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.link import messages as wire

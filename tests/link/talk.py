@@ -1,7 +1,5 @@
 """Ways to speak to a device under test: good requests, single frames, bad lines."""
 
-from __future__ import annotations
-
 import random
 
 from rig.link import messages as wire

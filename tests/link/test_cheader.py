@@ -1,7 +1,5 @@
 """The firmware's header is not stale, and says where `pack` really puts things."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

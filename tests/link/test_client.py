@@ -1,7 +1,5 @@
 """What the client does when a device or a port misbehaves; the rest is in the conformance suite."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -174,12 +172,6 @@ def test_seq_wraps_around_zero(clock):
     assert seqs == [n % 254 + 1 for n in range(300)]
 
 
-def test_an_older_identity_is_refused(clock):
-    old = replace(IDENTITY, protocol_version=0)
-    with pytest.raises(DeviceError, match="protocol version 0, this program version 2"):
-        device(clock, {wire.Identify: [old]}).connect()
-
-
 def test_nonsense_is_said_to_be_nonsense(clock):
     with pytest.raises(DeviceError, match="answered Status with Pong"):
         device(clock, {wire.Status: [wire.Pong(1)]}).status()
@@ -196,10 +188,6 @@ def test_a_broken_cable_is_a_lost_connection(clock, monkeypatch, ask):
     with pytest.raises(DeviceError, match="connection lost") as caught:
         ask(Device(port, clock))
     assert not isinstance(caught.value, DeviceTimeoutError)
-
-
-def test_what_a_board_can_do_is_in_seconds():
-    assert IDENTITY.capabilities().longest_pulse == 0.5
 
 
 def test_the_tap_comes_before_everything(clock):
@@ -319,11 +307,6 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
     token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
     with pytest.raises(DeviceRefusedError, match="is not armed"):
         one.fire(token)
-
-
-def test_the_reference_is_told(clock):
-    pulse = wire.ReferencePulse(3, 70)
-    assert device(clock, {wire.Reference: [pulse]}).reference() == pulse
 
 
 def test_a_recording_without_end_is_a_time_out(clock):
@@ -467,13 +450,6 @@ def test_a_real_port_has_the_computer_s_clock():
     port.close()
     open_port("loop://").close()
     assert serial.protocol_handler_packages.count("sim") == 1
-
-
-@pytest.mark.parametrize("url", ["/dev/there-is-no-such-port", "nonsense://x"])
-def test_a_port_that_cannot_be_opened_has_a_hint(url):
-    with pytest.raises(DeviceError, match="cannot open") as caught:
-        open_port(url)
-    assert "rig ports" in caught.value.hint
 
 
 def test_a_port_belongs_to_one_program():

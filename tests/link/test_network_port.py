@@ -1,7 +1,5 @@
 """Ports at another computer, and pyserial's other URLs."""
 
-from __future__ import annotations
-
 import socket
 
 import pytest

@@ -1,7 +1,5 @@
 """What opening a port says when it cannot."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

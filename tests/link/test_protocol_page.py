@@ -1,10 +1,7 @@
 """firmware/PROTOCOL.md says what the code does: its tables, and its example to the last bit."""
 
-from __future__ import annotations
-
 import ast
 import re
-from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,9 +9,7 @@ from rig.link import frames
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import BAUDRATE
-from rig.link.transcript import Transcript
 from rig.link.wiretypes import Chars, Event, Raw, Tail, Unsigned
-from rig.records import Drop
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PAGE = (FIRMWARE / "PROTOCOL.md").read_text("utf-8")
@@ -176,34 +171,3 @@ def test_the_bytes_are_what_is_said_of_them():
 def test_what_is_said_gives_the_bytes():
     for said in TALK:
         assert encode(said.frame) == said.data
-
-
-def test_answers_belong_to_requests_and_numbers_count_up():
-    asked, seqs = 0, {"tx": 0, "rx": 0}
-    for said in TALK:
-        seqs[said.direction] += 1
-        assert said.frame.seq == seqs[said.direction]
-        if said.direction == "tx":
-            asked = said.frame.seq
-        elif said.frame.ack:
-            assert said.frame.ack == asked
-
-
-def test_the_example_is_a_sound_drop():
-    transcript = Transcript()
-    records = [r for n, s in enumerate(TALK) for r in transcript.feed(s.direction, n, s.data)]
-    (drop,) = [record for record in records if isinstance(record, Drop)]
-    assert (drop.run, drop.attempt) == (7, 1)
-    assert drop.faults == ()
-    assert drop.certificate.glitches == 1
-    assert [(edge.channel, edge.blocked) for edge in drop.edges] == [
-        (0, True),
-        (8, True),
-        (0, False),
-        (8, False),
-    ]
-    identity = transcript.identity
-    events = next(s.message.events for s in TALK if isinstance(s.message, wire.EventsFrame))
-    gaps = [b.tick - a.tick for a, b in pairwise(events)]
-    assert drop.certificate.late == sum(gap < identity.late_ticks for gap in gaps) == 1
-    assert drop.certificate.release_sense == 0.012 * identity.tick_hz

@@ -1,7 +1,5 @@
 """What is read many bytes at a time gives what reading them one by one gives."""
 
-from __future__ import annotations
-
 import zlib
 
 import pytest
@@ -10,76 +8,12 @@ from hypothesis import strategies as st
 
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
-from rig.link.frames import PAYLOAD_LIMIT, FrameError, cobs_decode
-from rig.link.wiretypes import EVENTS, Event, Events, read_field
+from rig.link.wiretypes import EVENTS, Event, Events
 from tests.examples import examples
-from tests.link.strategies import LONG, MESSAGES
+from tests.link.strategies import LONG
 
 STATES = st.integers(0, 2**16 - 1) | st.integers(0, 3)
 EVENT_LISTS = st.lists(st.builds(Event, LONG, STATES), max_size=12)
-
-
-def unstuffed(data: bytes) -> bytes | None:
-    """COBS as its authors tell it: a code says where the next zero was."""
-    if not data or 0 in data:
-        return None
-    out = bytearray()
-    at = 0
-    while at < len(data):
-        code = data[at]
-        if at + code > len(data):
-            return None
-        out += data[at + 1 : at + code]
-        at += code
-        if code != 0xFF and at < len(data):
-            out.append(0)
-    return bytes(out)
-
-
-@examples(300)
-@given(
-    st.binary(max_size=40)
-    | st.lists(st.integers(1, 5) | st.integers(250, 255), max_size=20).map(bytes)
-    | st.lists(st.sampled_from([b"\xff" + b"x" * 254, b"\x03ab", b"\1"]), max_size=6).map(b"".join)
-)
-def test_cobs_is_what_its_authors_tell(data):
-    plain = unstuffed(data)
-    if plain is None:
-        with pytest.raises(FrameError):
-            cobs_decode(data)
-    else:
-        assert cobs_decode(data) == plain
-
-
-def field_by_field(code: int, payload: bytes) -> list | None:
-    values, at = [], 0
-    try:
-        for field in wire.FIELDS[wire.TABLE[code]]:
-            value, at = read_field(field, payload, at)
-            values.append(value)
-    except (wire.MessageError, KeyError):
-        return None
-    return values if at == len(payload) else None
-
-
-@examples(300)
-@given(
-    MESSAGES.map(wire.pack)
-    | st.tuples(st.sampled_from(list(wire.TABLE)), st.binary(max_size=PAYLOAD_LIMIT))
-    | st.tuples(st.integers(0, 255), st.binary(max_size=8)),
-    st.integers(-3, 1),
-)
-def test_a_message_is_its_fields_one_by_one(packed, cut):
-    code, payload = packed
-    payload = payload[:cut] if cut < 0 else payload + bytes(cut)
-    values = field_by_field(code, payload)
-    if values is None:
-        with pytest.raises(wire.MessageError):
-            wire.unpack(code, payload)
-        return
-    message = wire.unpack(code, payload)
-    fields = wire.FIELDS[type(message)]
-    assert [getattr(message, field.name) for field in fields] == values
 
 
 @given(EVENT_LISTS, st.data())

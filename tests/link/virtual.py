@@ -1,7 +1,5 @@
 """The bench of a board in virtual time, behind a simulated port."""
 
-from __future__ import annotations
-
 from sim.serial_port import SimulatedSerial
 from tests.link.bench import Bench, ScriptedLab
 

@@ -4,8 +4,6 @@ Between impacts dv/dt = g − κv², so that v² and the way follow in closed fo
 all its way with the first κ. Nothing of `rig.model` is used.
 """
 
-from __future__ import annotations
-
 from mpmath import mp
 
 from tests.model.reference import End

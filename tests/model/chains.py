@@ -1,7 +1,5 @@
 """Chains for hypothesis, and how close two results must be."""
 
-from __future__ import annotations
-
 import math
 from itertools import accumulate
 

@@ -5,8 +5,6 @@ the integral S15 in closed form, a hypergeometric function, which is quick enoug
 Both take the separation as a difference of two heights, for which there are digits to spare.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mpmath
@@ -30,27 +28,6 @@ def printed_squared_speed(z, length, reach, alpha, drop, gravity, initial_speed)
     whole, part = length + reach, z + reach
     braces = h * whole**power + (whole ** (1 + power) - part ** (1 + power)) / (1 + power)
     return 2 * gravity / part**power * braces
-
-
-def printed_end(length, reach, alpha, drop, gravity, initial_speed=0) -> End:
-    """S15 by quadrature to 50 digits, in pieces that fit V's rise at the start and at the end."""
-    with mp.workdps(DIGITS):
-        given = [mp.mpf(v) for v in (length, reach, alpha, drop, gravity, initial_speed)]
-        z0, r, _, h, g, start = given
-
-        def slowness(fallen):  # of z₀ − z, lest its digits be lost where Eq. 14 starts from 0
-            with mp.workdps(DIGITS):
-                return 1 / mp.sqrt(printed_squared_speed(z0 - fallen, *given))
-
-        middle, early = z0 / 2, h + (start**2 / (2 * g) if g else z0)
-        cuts = {mp.mpf(0), middle, z0, *(f * early for f in (1, 100, 10**4, 10**6))}
-        cuts |= {z0 - f * r for f in (1, 100, 10**4)}
-        points = sorted(y for y in cuts if 0 <= y <= z0)
-        with mp.workdps(50):
-            time = mp.quad(slowness, points)
-        strike = mp.sqrt(printed_squared_speed(z0, *given))
-        separation = z0 - strike * time - g * time**2 / 2
-        return End(separation, mp.sqrt(printed_squared_speed(mp.mpf(0), *given)), time)
 
 
 def closed_end(length, reach, alpha, drop, gravity, initial_speed=0) -> End:

@@ -5,8 +5,6 @@ Nothing of `rig.model` is used. Arithmetic has so many digits that the forms whi
 taken as they stand.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import mpmath

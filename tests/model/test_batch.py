@@ -1,7 +1,5 @@
 """Many falls at once are the falls one at a time, to the last bit."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Limits of the continuum fall that have closed forms: Eqs. 15 and S17, no pull, no gravity."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -14,8 +12,8 @@ from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 
 LENGTHS = decades(-3, 3)
-LEADING_LIMIT = 2.0 * (2.0 * math.log(2.0) - 1.0)
-"""Δz/(α z₀) of Eq. 15 for γs/z₀ → 0."""
+
+
 RATIOS = decades(-15, 9)
 GRAVITIES = decades(-6, 3)
 
@@ -49,24 +47,6 @@ def test_equation_s17_keeps_its_digits(alpha, length, ratio):
     reach = ratio * length
     found = separation_fast(alpha, length, reach)
     assert close(found, printed_s17(alpha, length, reach), 1e-14)
-
-
-def test_limits_of_the_limits():
-    assert pytest.approx(0.7725887222397812, rel=1e-15) == LEADING_LIMIT
-    assert separation_leading_order(0.1, 2.0, 0.0) == pytest.approx(0.2 * LEADING_LIMIT, rel=1e-15)
-    assert separation_fast(0.25, 2.0, 0.0) == 0.4
-    # γs/z₀ → ∞: 2α z₀ (z₀/γs)/6 and α z₀ (z₀/γs)/2, both to 0 as the text says.
-    assert separation_leading_order(0.1, 1.0, 1e9) == pytest.approx(0.1 / 3e9, rel=1e-8)
-    assert separation_fast(0.1, 1.0, 1e9) == pytest.approx(0.1 / 2e9, rel=1e-8)
-
-
-@examples(60)
-@given(LENGTHS, st.one_of(st.just(0.0), RATIOS), GRAVITIES)
-def test_small_alpha_from_rest_is_equation_15(length, ratio, gravity):
-    reach = ratio * length
-    for alpha in (1e-300, 1e-25, 1e-18):
-        found = end(UniformChain(length, reach, alpha, 1.0, 0.0, gravity)).separation_m
-        assert close(found, separation_leading_order(alpha, length, reach), 1e-13)
 
 
 @examples(60)

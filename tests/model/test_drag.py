@@ -1,7 +1,5 @@
 """The fall in air against many digits, quadrature, a general solver and its own energy."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 
@@ -11,7 +9,6 @@ from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.errors import DomainError
-from rig.model.chain import Chain
 from rig.model.drag import (
     drag_fall,
     drag_hits,
@@ -166,36 +163,3 @@ def test_drag_of_a_leg_is_that_of_what_still_falls(chain, data):
     for k, kappa in enumerate(leg_drags(chain, drags)):
         wanted = sum(map(Fraction, drags[k:])) / sum(map(Fraction, chain.masses[k:]))
         assert kappa == float(wanted)
-
-
-def integrated(chain, gains, kappas, drop, gravity, speed):
-    """Both chains by a Taylor-series solver of v' = g − κv², stopped at each impact."""
-
-    def steps(kappa, start):
-        return mp.odefun(lambda _, y: [y[1], gravity - kappa * y[1] ** 2], 0, start, tol=1e-20)
-
-    now, time, before = mp.mpf(speed), mp.mpf(0), -mp.mpf(drop)
-    for height, gain, kappa in zip(chain.heights, gains, kappas, strict=True):
-        motion = steps(kappa, [mp.mpf(0), now])
-        way, t = height - before, (height - before) / (now + 1)
-        for _ in range(60):  # Newton's method
-            done, arrival = motion(t)
-            if abs(way - done) < 1e-18:
-                break
-            t += (way - done) / arrival
-        now, before, time = arrival * (1 + gain), height, time + t
-    free = steps(kappas[0], [mp.mpf(0), mp.mpf(speed)])(time)[0]
-    return drop + chain.length - free, arrival, time
-
-
-@pytest.mark.parametrize("drags", [(0.3, 0.3, 0.3), (0.01, 0.2, 0.9)])
-def test_a_whole_fall_against_a_general_solver(drags):
-    chain = Chain((1.0, 0.8, 0.5), (0.0, 0.4, 0.9))
-    gains = kicks(chain, [0.2] * 3, 4 / 3)
-    kappas = leg_drags(chain, drags)
-    end = drag_fall(chain, gains, kappas, 0.2, 9.81, 0.4)
-    with mp.workdps(25):
-        wanted = integrated(chain, gains, kappas, 0.2, 9.81, 0.4)
-    assert close(end.separation_m, wanted[0], TIGHT)
-    assert close(end.speed_m_s, wanted[1], TIGHT)
-    assert close(end.time_s, wanted[2], TIGHT)

@@ -1,7 +1,5 @@
 """The discrete fall against many-digit and exact rational arithmetic."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from itertools import pairwise
 

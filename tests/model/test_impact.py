@@ -1,7 +1,5 @@
 """The impact coefficients against direct solutions of the paper's equations of motion."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

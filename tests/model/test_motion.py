@@ -1,13 +1,9 @@
 """The whole motion: against the fall's end, many digits in between, and the ledger of energy."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
-from mpmath import mp
 
 from rig.model.fall import fall, hits, kicks
 from rig.model.impact import alpha_inclined, gamma_finite
@@ -27,28 +23,6 @@ def motion_of(chain, alpha, gamma, drop=DROP, gravity=GRAVITY, speed=0.0):
 PAPERS = motion_of(even_chain(25), alpha_inclined(0.5, 0.2, 40.0), gamma_finite(1 / 3))
 
 
-def legs_in_many_digits(chain, alpha, gamma, drop, gravity, speed):
-    """Of each leg: its beginning, the height, speed and Δz there, how long it takes; v before."""
-    g, height = mp.mpf(gravity), mp.mpf(drop)
-    time = separation = gained = mp.mpf(0)
-    v = mp.mpf(speed)
-    found = []
-    for k, rod in enumerate(chain.heights):
-        arrival = mp.sqrt(v**2 + 2 * g * (height + rod))
-        leg = (arrival - v) / g
-        found.append((time, height, v, separation, gained, leg))
-        time += leg
-        separation += gained * leg
-        height = -mp.mpf(rod)
-        rest = mp.fsum(chain.masses[k + 1 :])
-        step = mp.mpf(0)
-        if rest:
-            step = alpha * arrival * chain.masses[k] / rest / (1 + gamma * chain.masses[k] / rest)
-        gained += step
-        v = arrival + step
-    return found
-
-
 @examples(60)
 @given(chains(most=8), ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS)
 def test_ends_as_the_fall_does(chain, alpha, gamma, drop, gravity, speed):
@@ -63,34 +37,6 @@ def test_ends_as_the_fall_does(chain, alpha, gamma, drop, gravity, speed):
         assert close(end.separation_m, found, TIGHT)
     for found in (wanted.speed_m_s, exact.speed):
         assert close(end.speed_m_s, found, TIGHT)
-
-
-@examples(60)
-@given(
-    chains(most=6, mass_decades=1.0),
-    ALPHAS,
-    GAMMAS,
-    DROPS,
-    GRAVITIES,
-    SPEEDS,
-    st.floats(0.01, 0.99),
-)
-def test_between_impacts_it_is_the_reference(chain, alpha, gamma, drop, gravity, speed, share):
-    motion = motion_of(chain, alpha, gamma, drop, gravity, speed)
-    with mp.workdps(120):
-        for begin, height, v, separation, gained, leg in legs_in_many_digits(
-            chain, alpha, gamma, drop, gravity, speed
-        ):
-            time = float(begin + share * leg)
-            since = time - begin
-            if since <= 0 or since >= leg or leg < 1e-9 * begin:
-                continue  # the clock has too few digits to be within this leg
-            found = motion.at(time)
-            loose = TIGHT + 1e-15 * float(begin / since)  # as the clock rounds
-            assert close(found.speed_m_s, v + gravity * since, loose)
-            assert close(found.separation_m, separation + gained * since, loose)
-            fallen = drop - height + (v + gravity * since / 2) * since
-            assert close(drop - found.height_m, fallen, loose + TIGHT * float(drop / fallen))
 
 
 def test_release_and_impacts():

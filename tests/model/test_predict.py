@@ -1,7 +1,5 @@
 """Predictions: their uncertainties, their domain and what they leave empty."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The table of reference values in the project's physics notes, worked out with 60 digits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The equations are solved in kilograms, metres and newton seconds for one drawn r
 every impulse and every change of motion an unknown of its own.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Small protocols around single keys of the reference."""
 
-from __future__ import annotations
-
 import copy
 
 import yaml

@@ -1,7 +1,5 @@
 """Priors: keys of the protocol, listed by `rig check` and by their page, and used."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import pytest

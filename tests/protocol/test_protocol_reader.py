@@ -43,10 +43,6 @@ def test_ready_protocols_are_read_and_described(path):
     assert protocol.text == path.read_text("utf-8")
 
 
-def test_ready_protocols_are_there():
-    assert len(READY) >= 5
-
-
 def test_yaml_1_2_scalars():
     protocol = parse(GOOD)
     assert protocol.title == "on"

@@ -1,7 +1,5 @@
 """The reference of the protocol file against the reader: keys, examples, defaults, the schema."""
 
-from __future__ import annotations
-
 import copy
 import json
 from dataclasses import replace

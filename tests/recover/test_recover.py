@@ -1,7 +1,5 @@
 """What `rig recover` says of damaged sessions, and what it saves of them."""
 
-from __future__ import annotations
-
 import random
 import shutil
 import sqlite3
@@ -121,17 +119,6 @@ def test_a_torn_file_gives_what_is_before_the_tear(part, copy, truth, tmp_path):
     assert set(again["states"]) <= set(truth["states"]) or missing
 
 
-def test_the_further_the_tear_the_more_is_saved(copy, truth, tmp_path):
-    whole = copy.read_bytes()
-    counts = []
-    for pages in range(6, len(whole) // 4096 + 1, 5):
-        copy.write_bytes(whole[: pages * 4096])
-        fates = [one.fate for one in examine(copy).drops]
-        counts.append(sum(fate is not Fate.PARTIAL for fate in fates))
-    assert counts == sorted(counts)
-    assert 0 < counts[-2] <= counts[-1] == len(truth["drops"])
-
-
 def test_edges_that_are_lost_come_again_from_the_bytes(copy, truth, tmp_path):
     alter(
         copy,
@@ -169,13 +156,6 @@ def test_no_flipped_bit_changes_a_drop_unnoticed(seed, copy, truth, tmp_path):
             assert one.drop == known[one.drop.run, one.drop.attempt]
     again, _ = saved(copy, tmp_path, protocol=str(ROOT / "protocols/picket-fence.yaml"))
     assert len(again["drops"]) >= len(truth["drops"]) - 2
-
-
-def test_a_page_of_zeros(copy):
-    whole = copy.read_bytes()
-    for number in range(1, len(whole) // 4096, 7):
-        copy.write_bytes(whole[: number * 4096] + bytes(4096) + whole[(number + 1) * 4096 :])
-        assert len(describe(examine(copy))) > 5
 
 
 @pytest.mark.parametrize("size", [4096, 65536])

@@ -1,7 +1,5 @@
 """The live analysis says what the whole one does, drop by drop and all together."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest

@@ -1,7 +1,5 @@
 """Several sessions as one: what cancels, what is refused, and what each command says of them."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -17,8 +15,6 @@ from rig.session.store import Session
 from tests.cli.conftest import call  # noqa: F401 - a fixture
 from tests.cli.lab import PROTOCOLS
 from tests.session.altering import unguarded
-
-SCENES = ("falling-ball", "picket-fence", "glider", "single-chain", "graded-chain")
 
 
 def record(folder, name, scene="picket-fence", seed=1, series=0, change=("", "")):
@@ -100,25 +96,6 @@ def test_of_one_rig_only_what_is_stated_alike_is_shared():
     assert same_owners(parts, same_rig=True)["posts"] == [["a", "b"]]
     parts[1] = SessionPart("b", parts[0].protocol, None, board="another")
     assert same_owners(parts, same_rig=None)["posts"] == [["a"], ["b"]]
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_every_scene_is_compared(tmp_path, call, scene):  # noqa: F811
-    first, other = (record(tmp_path, f"s{n}", scene, series=n) for n in (1, 2))
-    said = json.loads(call("compare", first, other, "--json").out)
-    assert said["differences"]
-    for row in said["differences"]:
-        assert row["reference"] == "s1.session"
-        assert row["normalized_error"] == pytest.approx(row["value"] / row["U95"])
-        assert abs(row["normalized_error"]) < 1.6
-    page = tmp_path / "page.html"
-    done = call("compare", first, other, "-o", page)
-    assert done.code == 0, done.err
-    assert "SIMULATED DATA" in done.out
-    assert "Differences of" in page.read_text("utf-8")
-    assert "<svg" in page.read_text("utf-8")
-    assert call("compare", first, other, "-o", tmp_path / "c.png").code == 0
-    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
 
 
 def refused(code, kind, *paths, work=together):

@@ -1,17 +1,12 @@
 """Odd but valid scenes, each drawn from its seed: what people may well write into a protocol."""
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
+from rig.protocol.protocol import Protocol
 from rig.protocol.reader import parse
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol
 
 TITLES = (
     "",

@@ -1,18 +1,11 @@
 """Any scene, any command: it ends, says what is true, and leaves out what is not there."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
-from tests.scenes.draw import scene
+from tests.scenes.draw import Scene, scene
 from tests.scenes.through import faults
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.scenes.draw import Scene
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 SOME = (0, 1, 4, 6, 13, 14, 15, 20, 22, 25, 28, 29, 30, 31, 39, 42, 43, 44, 46, 48, 49, 50, 54, 59,

@@ -1,11 +1,9 @@
 """Every scene speaks its own words: in what commands print, on the page and on every screen."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 from html import unescape
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -22,9 +20,6 @@ from rig.tui.app import RigApp
 from rig.tui.context import Options
 from tests.tui.lab import KEYS
 from tests.tui.screen import text_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 _PAIR = r"\b(?:free|impact) side|\bfree chain|skew|separation|Δz|both chains"
@@ -102,47 +97,6 @@ def test_a_draft_and_its_drawings_speak_the_words_of_their_scene(
     texts = {"draft": file.read_text("utf-8"), "plan": out, "questions": err, **drawings}
     for where, text in texts.items():
         assert_own_words(SCENES[scene], where, re.sub(NAMES, "", text))
-
-
-def test_commands_and_page_speak_the_words_of_their_scene(recorded, tmp_path, capsys):
-    scene, _, sessions = recorded
-    for number, session in enumerate(sessions):
-        capsys.readouterr()
-        main(["analyze", str(session), "--scatter"])
-        # Whether trials agree is said in the same words of every scene: one makes enough of them.
-        trials = () if (scene, number) == ("picket-fence", 0) else ("--trials", "2")
-        main(["analyze", str(session), "--budget", "1", *trials])
-        main(["report", str(session), "-o", str(tmp_path / "page.html")])
-        assert_own_words(scene, "analyze", "".join(capsys.readouterr()))
-        html = (tmp_path / "page.html").read_text("utf-8")
-        html = re.sub(r"<!--(.*?)-->", r"\1\n", html, flags=re.DOTALL)  # the texts of figures
-        html = re.sub(r"<(style|pre|title|h1|dl|a)\b.*?</\1>", "", html, flags=re.DOTALL)
-        assert_own_words(scene, "page", unescape(re.sub(r"<[^>]+>", "\n", html)))
-
-
-def test_what_goes_before_and_after_an_analysis_speaks_the_words_of_its_scene(
-    recorded, tmp_path, capsys
-):
-    scene, protocol, sessions = recorded
-    session = str(next(iter(sessions)))
-    csv, again = tmp_path / "csv", str(tmp_path / "again.session")
-    commands = [
-        ["check", str(protocol)],
-        ["predict", str(protocol)],
-        ["design", str(protocol)],
-        ["run", str(protocol), "--port", "sim://?seed=2", "--session", again, "--yes"],
-        ["export", session, "--csv", str(csv)],
-        ["import", f"{csv}/edges.csv", "--protocol", str(protocol), "--session", f"{again}.csv"],
-        ["estimate", session],
-        ["replay", session],
-        ["recover", session],
-        ["doctor", "--session", session],
-    ]
-    for command in commands:
-        capsys.readouterr()
-        main(command)
-        text = re.sub(r"\nLeft out\n.*", "", "".join(capsys.readouterr()), flags=re.DOTALL)
-        assert_own_words(scene, command[0], re.sub(NAMES, "", text))
 
 
 def test_screens_speak_the_words_of_their_scene(recorded, monkeypatch):

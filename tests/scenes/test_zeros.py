@@ -1,7 +1,5 @@
 """Zero behind a ± and as a prior means exactly so, in every command; a sound drop stays sound."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,25 +1,20 @@
 """One scene sent through every command, and all that is wrong with what they say."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
 import re
 import signal
 import traceback
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cli import main
 from rig.report.method import SOFTWARE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
-    from tests.scenes.draw import Scene
+from tests.scenes.draw import Scene
 
 LONGEST_S = 60.0
 """Processor time of one command, far beyond what any of them needs."""

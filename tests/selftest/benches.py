@@ -1,7 +1,5 @@
 """Boards on a bench for ``rig selftest``, with a wire from the sync output to a gate."""
 
-from __future__ import annotations
-
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest

@@ -1,7 +1,5 @@
 """Every check can fail: for each there is a board that is broken in just that way."""
 
-from __future__ import annotations
-
 import pytest
 
 from rig.errors import DeviceError

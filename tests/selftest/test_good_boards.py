@@ -1,7 +1,5 @@
 """A board that is in order passes, and no release is driven unless that is allowed."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Altering a session behind its back, as somebody would who takes its guards away for a moment."""
 
-from __future__ import annotations
-
 import sqlite3
 from contextlib import closing, contextmanager
 

@@ -1,7 +1,5 @@
 """What no board that works would say is kept as it came, judged, and told of in plain words."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Files of before codes hold sentences: each is kept as it was said, and taken for no code."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

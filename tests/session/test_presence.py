@@ -1,7 +1,5 @@
 """A session that is moved, deleted, replaced or cut while it is in use costs nothing."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import fcntl

@@ -1,7 +1,5 @@
 """Many drops of the simulated lab, and what chance allows of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, replace
 

@@ -1,7 +1,5 @@
 """One beam: shadows merged, and what a real receiver makes of them."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections import Counter

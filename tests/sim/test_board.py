@@ -1,7 +1,5 @@
 """The virtual board against the suite every device must pass, and what is its own."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

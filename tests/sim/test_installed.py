@@ -1,7 +1,5 @@
 """The simulation as others install it: under a name of its own, found by its URL."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The simulated lab with nothing disturbed is the model, edge by edge; and it is reproducible."""
 
-from __future__ import annotations
-
 import math
 import random
 from itertools import pairwise

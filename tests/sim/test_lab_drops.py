@@ -1,19 +1,13 @@
 """Chance in single drops: release, impulses, and what the beams make of rods and string."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
 
-from rig.model.chain import Chain
-from rig.model.fall import fall
 from sim.beam import NOT_A_ROD
 from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.sim.chance import (
-    A_STRIKES,
-    B_STRIKES,
     FEW_GATES,
     FREE,
     assert_normal,
@@ -75,20 +69,6 @@ def test_one_side_hangs_lower_in_every_run():
     assert one.edges == other.edges
     moved = {c: t - before for (t, c, *_), (before, *_) in zip(one.edges, quiet.edges, strict=True)}
     assert {channel for channel, late in moved.items() if late} == FREE & moved.keys()
-
-
-def test_rods_touch_as_high_in_every_run_at_an_incline():
-    """The same as a chain whose top rod hangs so much higher, let go so much lower."""
-    lab = ChainLab(FEW_GATES, dials := with_dials(contact_sd=2e-3), 1)
-    above = lab._contact(lab.runs[A_STRIKES])
-    assert lab._contact(lab.runs[B_STRIKES]) == above != 0.0
-    draws = [ChainLab(FEW_GATES, dials, n)._contact(lab.runs[A_STRIKES]) for n in range(300)]
-    assert_normal(draws, 2e-3)
-    (truth,) = attempts(dials, 1, FEW_GATES)
-    places = tuple(1.165 * k / 24 + above * (k == 24) for k in range(25))
-    struck = fall(Chain((1.0,) * 25, places), alpha(40), 4 / 3, 0.18 - above, G)
-    assert truth.separation_m == pytest.approx(struck.separation_m, rel=1e-12)
-    assert truth.speed_m_s == pytest.approx(struck.speed_m_s, rel=1e-12)
 
 
 def test_the_top_rod_strikes_what_lies_there():

@@ -5,8 +5,6 @@ were perfect: drop + z_rod − g t²/2. What this lacks to the height at which t
 the edge's residual, and each fault writes its own pattern into the residuals.
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 

@@ -1,7 +1,5 @@
 """Bad lines."""
 
-from __future__ import annotations
-
 from sim.line import BadLine
 
 

@@ -1,14 +1,7 @@
 """Resolved falls by their own physics: nothing here comes from the model but what it predicts."""
 
-from __future__ import annotations
-
-import json
 import math
-import os
-import sys
 from dataclasses import replace
-from pathlib import Path
-from subprocess import PIPE, run
 
 import numpy as np
 import pytest
@@ -22,7 +15,6 @@ from sim.resolved.hanging import stable_step
 from sim.resolved.motion import push
 from sim.resolved.scene import Board, Bounce, Chain, Fall, Rods, Strings
 
-ROOT = Path(__file__).parents[2]
 GRAVITY, DROP = 9.81, 1.0
 MASS, LENGTH, DIAMETER = 5.8e-3, 0.102, 12.7e-3
 PITCH = 1.165 / 24
@@ -128,25 +120,6 @@ def test_momentum_is_what_gravity_and_board_give(falls):
         assert np.abs(found.momentum[:, 2] - fallen).max() < 1e-12
         assert np.abs(found.momentum[:, :2]).max() < 1e-12
         assert found.board_impulse[2] > 0.0
-
-
-def test_loops_that_are_not_compiled_give_the_same_bits():
-    """What numba makes of them is what they say."""
-    command = [sys.executable, "-c", _SHORT_FALL]
-    ways = [os.environ | {"NUMBA_DISABLE_JIT": no} for no in "01"]
-    told = [run(command, cwd=ROOT, env=way, stdout=PIPE, check=True).stdout for way in ways]
-    assert told[0] == told[1]
-    assert len(set(json.loads(told[0]))) == 3
-
-
-_SHORT_FALL = """
-import json
-from bench.studies import resolved_precision
-from sim.resolved.fall import fall
-found = fall(resolved_precision.chains()[0], until=0.2)
-assert found.touched_s[0] < 0.195
-print(json.dumps(found.heights[-1].tolist()))
-"""
 
 
 LIMIT = [

@@ -1,11 +1,7 @@
 """The resolved world as a lab: the same beams, edges and truth in front of it."""
 
-from __future__ import annotations
-
-import errno
 import json
 import math
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -139,25 +135,6 @@ def test_arming_a_drop_has_the_next_ones_made(dropped, monkeypatch, tmp_path):
     assert sorted(made) == labels
 
 
-def test_a_disk_that_takes_nothing_only_costs_time(monkeypatch, tmp_path):
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    fall_cache.save("x", {"a": 1})
-    assert fall_cache.load("x") is None
-
-
-def test_a_full_disk_leaves_no_scraps(monkeypatch, tmp_path):
-    def fill(self, text, encoding):
-        self.write_bytes(text.encode(encoding)[:3])
-        raise OSError(errno.ENOSPC, "no space left on device")
-
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with monkeypatch.context() as full:
-        full.setattr(Path, "write_text", fill)
-        fall_cache.save("x", {"a": 1})
-    assert not [*fall_cache.folder().iterdir()]
-
-
 @pytest.mark.parametrize("hurt", [lambda t: t[:-1], lambda t: t.replace("1", "2"), lambda _: "[]"])
 def test_a_fall_that_was_damaged_on_the_disk_is_made_anew(hurt, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -166,16 +143,6 @@ def test_a_fall_that_was_damaged_on_the_disk_is_made_anew(hurt, monkeypatch, tmp
     (path,) = fall_cache.folder().iterdir()
     path.write_text(hurt(path.read_text()))
     assert fall_cache.load("x") is None
-
-
-def test_only_so_many_falls_are_kept(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(fall_cache, "KEPT", 2)
-    for age, name in enumerate("abc"):
-        fall_cache.save(name, name)
-        os.utime(fall_cache.folder() / f"{name}.json", (age, age))
-    fall_cache.save("d", "d")
-    assert [fall_cache.load(name) for name in "abcd"] == [None, None, "c", "d"]
 
 
 def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):

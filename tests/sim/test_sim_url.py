@@ -1,25 +1,18 @@
 """``sim://`` as the rest of the program meets it: a port by URL, a device on it, drops."""
 
-from __future__ import annotations
-
 import json
-import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 from urllib.parse import quote
 
 import pytest
 
-from rig.clock.rate import tick_rate
 from rig.errors import InputError
 from rig.link.client import Device
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
 from rig.records import ClockSample, Drop
 from tests.sim.falls import PROTOCOLS
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 FENCE = PROTOCOLS / "picket-fence.yaml"
 HZ = 16_000_000
@@ -91,34 +84,6 @@ def test_the_truth_file_tells_what_is_on_the_wire(tmp_path):
         raised = 9.81 * (fall * skew - skew**2 / 2)  # a later free chain is higher at the hit
         assert skew != 0
         assert line["separation_raw_m"] == pytest.approx(line["separation_m"] + raised, abs=1e-12)
-
-
-def test_a_quiet_drop_on_the_wire_is_the_closed_form():
-    (drop,) = talk(url(quiet=1)).drops
-    expected = []
-    for channel, gate in ((0, 0.050), (1, 0.350)):
-        for bar in range(8):
-            above = 0.400 + 0.050 * bar - gate
-            if above > 0:
-                for edge, blocked in ((above - 0.0125, True), (above + 0.0125, False)):
-                    expected.append((0.02 + math.sqrt(2 * edge / 9.81), channel, blocked))
-    assert len(drop.edges) == len(expected) > 20
-    for edge, (seconds, channel, blocked) in zip(drop.edges, sorted(expected), strict=True):
-        assert (edge.channel, edge.blocked) == (channel, blocked)
-        assert abs(edge.tick - seconds * HZ) <= 0.5 + 1e-6
-
-
-@pytest.mark.parametrize("ppm", [-1300, 0, 872, -3283])
-def test_the_clock_dial_shows_in_the_pings(ppm):
-    pulls = []
-    for seed in range(8):
-        done = talk(url(seed=seed, clock=f"{ppm} ppm"), runs=(), pings=25)
-        rate = tick_rate(done.pings, HZ)
-        assert (rate.n > 15, rate.u_hz < HZ * 50e-6) == (True, True)
-        pulls.append((rate.hz / HZ - 1 - ppm * 1e-6) / (rate.u_hz / HZ))
-    assert max(map(abs, pulls)) < 4
-    # Were the uncertainty far too small or too large, the pulls would not be of order one.
-    assert 0.25 < math.sqrt(sum(pull**2 for pull in pulls) / len(pulls)) < 2
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

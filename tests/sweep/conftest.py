@@ -1,16 +1,12 @@
 """``rig sweep`` called inside this process, and a scene whose grid shows every kind of note."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from rig.cli import main
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 SCENE = """\
 protocol: 1

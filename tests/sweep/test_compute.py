@@ -1,7 +1,5 @@
 """Every point of a sweep is the single fall there."""
 
-from __future__ import annotations
-
 import itertools
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace

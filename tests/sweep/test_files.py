@@ -1,20 +1,16 @@
 """What stands in the files."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
 import json
 import re
-import sys
 
 import numpy as np
 import pytest
 
 from rig import __version__
 from tests.sweep.conftest import SCENE, VARY
-from tests.test_imports import packages_loaded_by
 
 ONE_INCLINE = "incline=40deg"
 
@@ -101,22 +97,6 @@ def test_an_interrupt_while_writing_leaves_the_old_file(sweep, tmp_path, monkeyp
     assert sweep("s.csv", "friction=0..1:3") == (130, "rig: interrupted; nothing was written\n")
     assert (tmp_path / "s.csv").read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_a_table_needs_neither_dask_nor_matplotlib(scene, tmp_path):
-    program = "import sys, rig.cli; assert rig.cli.main(sys.argv[1:]) == 0"
-    arguments = ("sweep", str(scene), "--vary", "friction=0..1:3", "-o")
-    loaded = packages_loaded_by(program, *arguments, str(tmp_path / "s.npz"))
-    assert "numpy" in loaded
-    assert loaded.isdisjoint({"dask", "distributed", "matplotlib"})
-
-
-def test_a_missing_dask_is_named(sweep, monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    done = sweep("s.csv", "friction=0..1:3", ONE_INCLINE, more=("--cluster", "127.0.0.1:1"))
-    assert done.code == 2
-    assert done.err.startswith("rig: this needs distributed: ")
-    assert done.err.endswith(" -m pip install distributed\n")
 
 
 class Terminal(io.StringIO):

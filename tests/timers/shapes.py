@@ -1,7 +1,5 @@
 """One known truth, written as the programs of many makers write it."""
 
-from __future__ import annotations
-
 import bisect
 import json
 from dataclasses import dataclass

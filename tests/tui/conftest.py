@@ -1,17 +1,12 @@
 """A bench for each test."""
 
-from __future__ import annotations
-
 import shutil
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pytest
 
 from bench.process_fixture import ProcessFixture
 from tests.tui.lab import Lab, short_folder
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _FENCE = """\
 protocol: 1

@@ -1,7 +1,5 @@
 """A daemon with a simulated rig, and an operator's hands on the screen."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import re
@@ -10,11 +8,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from inspect import isawaitable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from textual.pilot import Pilot
 
 from rig.campaign.machine import Stage
 from rig.tui.actions import ACTIONS
@@ -23,11 +24,6 @@ from rig.tui.context import Options
 from tests.cli.lab import ROOT
 from tests.tui.screen import text_of
 from tests.waiting import PATIENCE_S
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable
-
-    from textual.pilot import Pilot
 
 KEYS = {action.name: action.keys for action in ACTIONS}
 

@@ -1,16 +1,10 @@
 """The screen of an app under test as text."""
 
-from __future__ import annotations
-
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from rich.console import Console
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from textual.app import App
+from textual.app import App
 
 
 def text_of(app: App[object]) -> str:

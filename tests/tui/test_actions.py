@@ -1,7 +1,5 @@
 """The table of actions and the operator's own keys."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

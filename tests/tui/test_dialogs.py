@@ -1,7 +1,5 @@
 """STOP everywhere: in every dialog, while typing, and in every state that lasts."""
 
-from __future__ import annotations
-
 from contextlib import asynccontextmanager
 from dataclasses import replace
 

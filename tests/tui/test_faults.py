@@ -1,14 +1,10 @@
 """The daemon dies, texts are hostile, protocols are wrong: said at once, and recovered from."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import signal
 import sqlite3
 from contextlib import closing
-
-import pytest
 
 from rig.campaign.machine import Stage
 from rig.tui import app, client
@@ -54,40 +50,6 @@ def test_a_disk_that_takes_nothing_is_said(lab):
     run(work())
 
 
-def test_a_daemon_killed_while_armed_is_said(lab):
-    async def work():
-        async with lab.ready(countdown_s=600.0) as op:
-            await op.arms(Stage.COUNTDOWN)
-            attempt = op.app.flow.job.attempt
-            await asyncio.to_thread(lab.kill)
-            await op.at(Stage.PREPARE)
-            old = lab.daemons[0].pid
-            await op.until(lambda: op.app.follower.state.section("daemon").get("pid") != old)
-            await op.until(lambda: op.app.follower.state.section("session"))
-            await op.sees(f"RUN 1 of 3 · attempt {attempt + 1}")
-
-    run(work())
-
-
-@pytest.mark.parametrize(
-    "title",
-    ["'[red]x[/'", "'[/]'", "'" + "long " * 400 + "'", "'[@click=app.exit]a'"],
-)
-def test_hostile_titles_are_shown_as_they_are(lab, fence, title):
-    lab.protocol.write_text(fence.replace("TITLE", title), "utf-8")
-
-    async def work():
-        async with lab.ready() as op:
-            for page in "123456":
-                await op.press(page)
-                await op.until(lambda: op.app.page != "")
-                assert "\x1b" not in text_of(op.app)
-            if title.startswith("'[red"):
-                await op.sees("[red]x[/")
-
-    run(work())
-
-
 def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab, fence):
     good = fence.replace("TITLE", "mended")
     lab.protocol.write_text(good.replace("8, length", "many, length"), "utf-8")
@@ -110,16 +72,5 @@ def test_a_daemon_of_another_port_is_named(lab):
     async def work():
         async with lab.operator() as op:
             await op.sees("the daemon has sim://?seed=3, not sim://?seed=99", "--socket")
-
-    run(work())
-
-
-def test_a_terminal_smaller_than_those_of_the_goldens_can_be_used(lab):
-    async def work():
-        async with lab.operator((40, 12)) as op:
-            await op.until(lambda: op.app.client.up)
-            for page in "123456":
-                await op.press(page)
-                await op.sees("STOP")
 
     run(work())

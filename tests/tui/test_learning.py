@@ -1,11 +1,9 @@
 """The session page says what ``rig analyze`` says; and the list of sessions."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,9 +25,6 @@ from rig.tui.why import speed_picture, why_words
 from rig.wordings import NOTE
 from tests.cli.lab import rig, short
 from tests.tui.lab import KEYS, Operator, run
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.fixture(scope="module")

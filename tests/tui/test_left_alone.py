@@ -1,7 +1,5 @@
 """The daemon that a screen started outlives the screen, and not for ever."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 

@@ -1,7 +1,5 @@
 """Cable, board and daemon fail while each screen is open: said at once, mended by itself."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest
@@ -11,7 +9,6 @@ from rig.session.store import Session
 from tests.tui.lab import run
 
 PULLED = ("✗ the port is lost", "reconnecting")
-RESTARTED = ("✗ the port was lost and is back: the board restarted", "check its power supply")
 
 
 def pull(processes, lab):
@@ -20,10 +17,6 @@ def pull(processes, lab):
 
 def plug(processes):
     processes.hand("pull 0")  # and in again at once
-
-
-def reset(processes, lab):
-    processes.hand("reset")
 
 
 def kill(processes, lab):
@@ -91,41 +84,3 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
     job = run(work())
     with Session.open(lab.session, readonly=True) as session:
         assert [(drop.run, drop.attempt) for drop in session.drops()] == [job]
-
-
-def test_what_was_armed_is_not_when_the_line_breaks(cabled):
-    processes, lab = cabled
-
-    async def work():
-        async with lab.operator(countdown_s=600.0) as op:
-            await session_on(op)
-            await op.press("enter")
-            await op.arms(Stage.COUNTDOWN)
-            attempt = op.app.flow.job.attempt
-            reset(processes, lab)
-            await op.at(Stage.PREPARE)  # at once: long before the count is over
-            await mended(op)
-            await op.sees("nothing fell", f"RUN 1 of 2 · attempt {attempt + 1}")
-
-    run(work())
-
-
-def test_a_board_that_restarts_is_said_and_its_lost_drop_is_repeated(cabled):
-    processes, lab = cabled
-
-    async def work():
-        async with lab.operator(countdown_s=0.1) as op:
-            await session_on(op)
-            reset(processes, lab)
-            await op.sees(*RESTARTED)
-            await mended(op)
-            await op.press("enter")
-            await op.arms(Stage.LIVE)
-            attempt = op.app.flow.job.attempt
-            reset(processes, lab)
-            await op.sees("restarted")
-            await mended(op)
-            await op.at(Stage.PREPARE)
-            await op.sees(f"RUN 1 of 2 · attempt {attempt + 1}")
-
-    run(work())

@@ -3,8 +3,6 @@
 ``GOLDENS=write ./run test tests/tui/test_looks.py`` writes the files anew; look at the difference.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From edges to heights, live and matched; and the tape of the history page."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,12 +1,7 @@
 """Whatever looks as if it could be clicked can be."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
-from rig.campaign.events import Stage
-from rig.tui.actions import OFFLINE
-from rig.tui.screens.dialogs import Ask, Confirm, Pick
 from rig.tui.widgets.text import Words
 from tests.tui.lab import flat, run
 
@@ -43,43 +38,6 @@ async def click(op, action):
     await op.pilot.click(offset=(x, y))
 
 
-def test_pages_keys_and_dialogs_go_by_mouse_alone(lab):
-    async def work():
-        async with lab.operator((120, 36)) as op:
-            await op.until(lambda: op.app.client and op.app.client.driving)
-            await click(op, "app.do('go_on')")
-            await op.at(Stage.DEVICE)
-            await op.until(lambda: op.app.view and op.app.indicators.known)
-            for page in ("result", "session", "history", "protocol", "run", "device"):
-                await click(op, f"app.do('page_{page}')")
-                await op.until(lambda page=page: op.app.page == page)
-            await click(op, "app.do('release_test')")
-            await op.until(lambda: isinstance(op.app.screen, Confirm))
-            await click(op, "screen.leave")
-            await op.until(lambda: len(op.app.screen_stack) == 1)
-            await click(op, "app.do('go_on')")
-            await op.at(Stage.PREPARE)
-            await op.until(lambda: op.app.page == "run")
-            await click(op, "app.do('go_on')")
-            await op.sees("only the Enter key arms")
-            await op.arms(Stage.RESULT)
-            await op.until(lambda: op.app.flow.logged)
-            await click(op, "app.do('note')")
-            await op.until(lambda: isinstance(op.app.screen, Ask))
-            await op.press(*"warm")
-            await click(op, "screen.say")
-            await op.sees("note: warm")
-            await click(op, "app.do('page_history')")
-            await click(op, "app.do('drops')")
-            await op.until(lambda: isinstance(op.app.screen, Pick))
-            await click(op, "screen.take")
-            await op.until(lambda: len(op.app.screen_stack) == 1)
-            await click(op, "app.do('play')")
-            await op.until(lambda: op.app.history.player.time_s > 0)
-
-    run(work())
-
-
 def test_a_protocol_and_stop_are_clicked(lab, fence):
     other = lab.folder / "other.yaml"
     other.write_text(fence.replace("TITLE", "The other one"), "utf-8")
@@ -109,20 +67,5 @@ def test_a_protocol_and_stop_are_clicked(lab, fence):
             op.app.client.call = call
             await click(op, "app.do('stop')")
             await op.until(lambda: "stop" in stopped)
-
-    run(work())
-
-
-def test_every_key_that_is_shown_can_be_clicked(lab):
-    async def work():
-        async with lab.ready((200, 60)) as op:
-            await op.until(lambda: "app.do('go_on')" in spots(op.app))
-            shown = set(spots(op.app))
-            assert {f"app.do('{name}')" for name in OFFLINE if name.startswith("page_")} <= shown
-            x, y = spots(op.app)["app.do('help')"]
-            words, region = op.app.screen.get_widget_at(x, y)
-            assert (
-                words.visual.plain[x - region.x - 1] == "?"
-            )  # the key itself, not only what it does
 
     run(work())

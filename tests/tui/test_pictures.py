@@ -4,8 +4,6 @@
 ``GOLDENS=write ./run test tests/tui`` writes the files anew; look at the difference.
 """
 
-from __future__ import annotations
-
 import lzma
 import os
 import re

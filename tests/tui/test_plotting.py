@@ -1,7 +1,5 @@
 """Plots: curves, marks, bars and cursor on the same dots, and numbers at both axes."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

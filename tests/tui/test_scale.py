@@ -1,7 +1,5 @@
 """Both chains to scale: where rods, gates and Δz stand, and on which dots."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

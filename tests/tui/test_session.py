@@ -1,7 +1,5 @@
 """A session driven by keys, against the daemon with a simulated rig."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from rig.campaign.machine import Stage
@@ -176,49 +174,5 @@ def test_a_second_screen_watches_and_can_only_stop(lab):
             await other.until(lambda: other.app.follower.state.holder is None)
             await other.press("c")
             await other.until(lambda: other.app.client.driving)
-
-    run(work())
-
-
-def test_leaving_does_not_stop_what_falls(lab):
-    lab.stop()
-    lab.daemons.clear()
-    lab.url += "&pace=1"
-    lab.start()
-
-    async def work():
-        async with lab.ready() as op:
-            await op.arms(Stage.LIVE)
-            job = op.app.flow.job
-        async with lab.operator() as again:
-            await again.until(lambda: again.app.flow.job == job)
-            await again.at(Stage.RESULT)
-            await again.sees("ACCEPTED")
-            await again.until(lambda: again.app.follower.state.line(job.run).state == "accepted")
-
-    run(work())
-    assert log_of(lab.session)[1][-1][1] is RunState.ACCEPTED
-
-
-def test_after_three_voids_of_a_kind_it_says_so_and_waits(lab):
-    lab.stop()
-    lab.daemons.clear()
-    lab.protocol.write_text(short(), "utf-8")
-    lab.url += "&skew_sd=1s"
-    lab.start()
-
-    async def work():
-        async with lab.ready() as op:
-            for attempt in (1, 2, 3):
-                await op.arms(Stage.RESULT)
-                await op.sees(f"run 1, attempt {attempt}", "VOID")
-                await op.until(lambda: op.app.flow.logged)
-                await op.press("enter")
-            await op.at(Stage.HALTED)
-            await op.sees("the last 3 drops are void for the same reason", "try again", "VOID")
-            await op.press("enter")
-            await op.at(Stage.PREPARE)
-            await op.sees("RUN 1 of 4 · attempt 4")
-            assert "same reason" not in text_of(op.app)
 
     run(work())

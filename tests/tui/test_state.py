@@ -1,7 +1,5 @@
 """What the screens are told: typed, and not changed under them."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 

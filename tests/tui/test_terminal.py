@@ -1,35 +1,27 @@
 """A whole ABBA session by keys alone in a real terminal."""
 
-from __future__ import annotations
-
 import asyncio
 import os
-import random
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 from textual.drivers.linux_driver import LinuxDriver
 
 from rig.errors import RigError
-from rig.session.schema import RunState
-from rig.session.store import Session
 from rig.tui import terminal as keyboard
 from rig.tui.stillness import STILL_S
 from tests.cli.lab import ROOT, assert_whole, short
 from tests.tui.lab import run, short_folder
 from tests.waiting import PATIENCE_S, until
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 _NEEDS_TMUX = pytest.mark.skipif(
     shutil.which("tmux") is None and not os.environ.get("CI"), reason="tmux is not installed"
@@ -164,45 +156,6 @@ def test_keys_have_one_reader_after_the_program_was_stopped(monkeypatch):
         for number, handler in handlers.items():
             signal.signal(number, handler)
     assert done == [begins, ends, begins, ends, begins]
-
-
-_TYPED = ("Enter", "Space", "Escape", "Tab", "F9", "Up", "BTab", "C-p", *"acdefkmnqxy129.?")
-"""Keys that may come anywhere; letters that mean nothing stand before each."""
-
-
-@_NEEDS_TMUX
-def test_nothing_is_armed_by_hands_on_a_real_keyboard(terminal):
-    session = terminal.begins("sim://?seed=3")
-    terminal.sees("RUN 1 of 4", "✓ gates steady", "Enter arm")
-    # A key, and Enter right after it, in a program that is stopped and goes on between the two.
-    time.sleep(1.2 * STILL_S)
-    terminal.press("j")
-    pid = int(terminal.tmux("display-message", "-p", "#{pane_pid}"))
-    os.kill(pid, signal.SIGSTOP)
-    terminal.press("Enter")
-    os.kill(pid, signal.SIGCONT)
-    terminal.sees("RUN 1 of 4", "Enter arm")
-    hands = random.Random(20)
-    for _ in range(25):
-        word = [key for _ in range(hands.randrange(1, 9)) for key in (*"jj", hands.choice(_TYPED))]
-        terminal.press(*word, *"jj", *["Enter"] * hands.randrange(3))
-        place = f"0;{hands.randrange(1, 99)};{hands.randrange(1, 30)}"
-        terminal.press("-l", f"\x1b[<{place}M\x1b[<{place}m")  # a click
-
-    def prepared() -> bool:
-        terminal.press("Escape")  # of whatever is open
-        time.sleep(STILL_S)
-        terminal.press("3")
-        time.sleep(STILL_S)
-        screen = terminal.screen()
-        if "c take control" in screen and "┏" not in screen:  # a typed c gave it back
-            terminal.press("c")
-        return "Enter arm" in screen and "┏" not in screen
-
-    until(prepared, terminal.screen)
-    with Session.open(session, readonly=True) as found:
-        assert {entry.state for entry in found.states()} <= {RunState.PLANNED}
-    terminal.drops(1)  # and by the deliberate step it is
 
 
 def _daemon_of(folder: Path) -> int:

@@ -1,7 +1,5 @@
 """Whatever is typed, pasted, held down or clicked: nothing is armed but by the deliberate step."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from contextlib import asynccontextmanager
@@ -10,9 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from rich.style import Style
 from textual import events
-from textual.widgets import OptionList
 
 from bench.pictures import QUIET, FakeClient
 from rig.campaign.machine import Flow, Stage
@@ -21,7 +17,6 @@ from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.context import Options
-from rig.tui.screens.dialogs import Palette
 from rig.tui.state import state_of
 from tests.cli.lab import short
 from tests.examples import examples
@@ -189,76 +184,6 @@ async def _typed(session, lived):
                     break
                 await hands.do(kind, what)
         return app.client.told, hands.keys
-
-
-def test_what_is_typed_as_the_terminal_ends_is_nobody_s(session):
-    async def work():
-        async with _screen(session) as (app, _):
-            pass
-        known = len(app.client.told)
-        for event in (
-            *(events.Key(key, None) for key in ("enter", "q", "escape")),
-            events.Paste("laser"),
-            events.MouseDown(None, 9, 5, 0, 0, 1, False, False, False, 9, 5),
-        ):
-            await app.on_event(event)
-        assert len(app.client.told) == known
-
-    run(work())
-
-
-def test_a_click_on_a_line_that_is_gone_takes_nothing(session):
-    async def work():
-        async with _screen(session) as (app, pilot):
-            await pilot.press("ctrl+p")
-            while not isinstance(app.screen, Palette):
-                await pilot.pause(0.01)
-            options = app.screen.query_one(OptionList)
-            gone = Style(meta={"option": options.option_count})
-            options.post_message(
-                events.Click(options, 1, 1, 0, 0, 1, False, False, False, style=gone)
-            )
-            await pilot.pause()
-            assert isinstance(app.screen, Palette)
-
-    run(work())
-
-
-def test_escape_leaves_a_dialog_whose_field_a_click_has_left(session):
-    async def work():
-        async with _screen(session) as (app, pilot):
-            await pilot.press("ctrl+p")
-            while not isinstance(app.screen, Palette):
-                await pilot.pause(0.01)
-            app.screen.set_focus(None)
-            await pilot.press("escape")
-            assert len(app.screen_stack) == 1
-            assert [method for _, method in app.client.told] == ["stop"]
-
-    run(work())
-
-
-@pytest.mark.parametrize("key", ["down", "enter", "escape"])
-def test_a_dialog_bears_keys_that_come_before_it_is_there(session, key):
-    async def work():
-        async with _screen(session) as (app, pilot):
-            await _at(app, pilot, "result")
-            opened = set()
-            for dialog in filter(None, DIALOGS):
-                for turns in range(3):
-                    app._takes(dialog, time.monotonic())
-                    await asyncio.sleep(0)
-                    opened.add(type(app.screen).__name__)
-                    for _ in range(turns):
-                        await asyncio.sleep(0)
-                    app._takes(key, time.monotonic())
-                    await pilot.pause(0.01)
-                    while len(app.screen_stack) > 1:
-                        app.screen.dismiss(None)
-                        await pilot.pause(0.01)
-            assert {"Palette", "Help", "Ask"} <= opened
-
-    run(work())
 
 
 def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):

@@ -1,7 +1,5 @@
 """Text from outside on the screen: no markup, no control characters, no endless lines."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

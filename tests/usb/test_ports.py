@@ -1,7 +1,5 @@
 """Which ports are candidates, finding a board again, and that nothing is opened unasked."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

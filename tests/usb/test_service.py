@@ -1,7 +1,5 @@
 """The unit that is shipped for systemd."""
 
-from __future__ import annotations
-
 import configparser
 import re
 import shutil
