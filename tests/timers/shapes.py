@@ -1,5 +1,7 @@
 """One known truth, written as the programs of many makers write it."""
 
+from __future__ import annotations
+
 import bisect
 import json
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """The same truth as a stranger writes it down: nobody's format, and all that goes wrong by hand."""
 
+from __future__ import annotations
+
 from tests.timers.shapes import (
     HEIGHTS,
     RUNS,

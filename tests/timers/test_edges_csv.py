@@ -140,9 +140,31 @@ def test_many_faults_are_counted(tmp_path: Path) -> None:
     assert str(caught.value).startswith(f"{path}:2:5: time_s: ")
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "# only a note\n",
+        HEADER,
+        "1,0,0.1,1\n",
+        HEADER.encode("utf-16"),
+        b"\xff\xfe\x00" * 100,
+        "SQLite format 3\x00" + "\x00" * 100,
+    ],
+)
+def test_other_files(tmp_path: Path, content: str | bytes) -> None:
+    assert faults(tmp_path, content)
+
+
 def test_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lines, "MAX_BYTES", 10)
     assert faults(tmp_path, HEADER + "1,0,0,1\n") == [(1, 1, "")]
+
+
+@pytest.mark.parametrize("name", ["", "missing.csv"])
+def test_unreadable(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="cannot read"):
+        read_edges(tmp_path / name)
 
 
 def test_fire_stamped_drops_use_the_calibrated_rate(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Every shape of one truth is read as the truth, and no mutant of it as anything else."""
 
+from __future__ import annotations
+
 from argparse import Namespace
 
 import pytest
@@ -8,6 +10,7 @@ from rig.commands.import_edges import import_with_protocol
 from rig.errors import InputError
 from rig.protocol import reader
 from rig.timers.moments import TICK_HZ
+from tests.timers.mutations import mutate
 from tests.timers.shapes import PROTOCOL, Shape, shapes
 from tests.timers.strangers import NOT_READ, REFUSED, strangers
 
@@ -72,6 +75,31 @@ def try_reading(path, content: bytes, shape: Shape):
         return read(path, content, shape), ""
     except InputError as error:
         return None, error.hint
+
+
+def wrong_mutants(path, name: str, seeds) -> list[str]:
+    wrong = []
+    for seed in seeds:
+        shape, mutant = SHAPES[name], mutate(SHAPES[name].content, seed)
+        runs, advice = try_reading(path, mutant.content, shape)
+        if runs is None:
+            assert advice
+            continue
+        runs = [[(time / mutant.scale, *rest) for time, *rest in edges] for edges in runs]
+        if why := differs(runs, shape, mutant.deleted):
+            wrong.append(f"seed {seed}, {mutant.kind}: {why}")
+    return wrong
+
+
+@pytest.mark.parametrize("name", [name for name, shape in SHAPES.items() if not shape.sampled])
+def test_no_mutant_is_read_as_another_truth(tmp_path, name):
+    assert wrong_mutants(tmp_path / "file", name, range(4)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SHAPES)
+def test_none_of_many_mutants_is_read_as_another_truth(tmp_path, name):
+    assert wrong_mutants(tmp_path / "file", name, range(100)) == []
 
 
 @pytest.mark.parametrize("name", STRANGERS)

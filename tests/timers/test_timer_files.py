@@ -1,5 +1,7 @@
 """Exports of data loggers: what they look like, and every fault at its place."""
 
+from __future__ import annotations
+
 from itertools import pairwise
 from pathlib import Path
 
@@ -43,6 +45,25 @@ def told(drop: Drop) -> list[tuple[float, bool]]:
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "0.25,1\n0.26,0\n0.275,1\n",
+        "0.25\t1\n0.26\t0\n0.275\t1\n",
+        "0,25;1\n0,26;0\n0,275;1\n",
+        "Time (ms),Blocked?\n250,Blocked\n260,Unblocked\n275,Blocked\n",
+        "\ufeffLatest: Time (s),Latest: GateState\r\n0.25,1\r\n0.26,0\r\n0.275,1\r\n",
+        "State,Time (s)\n1,0.25\n0,0.26\n1,0.275\n",
+        '"Zeit t (s)";"Zustand"\n"0,25";"1"\n"0,26";"0"\n"0,275";"1"\n',
+        "Time\tState\ns\t\n0.25\t1.0\n0.26\t0.0\n0.275\t1.0\n",
+        "t (µs);state\n250000;1\n260000;0\n2,75e5;1\n",
+    ],
+)
+def test_what_programs_write(tmp_path, text):
+    (drop,) = read(tmp_path, text)
+    assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
+
+
+@pytest.mark.parametrize(
     "text", ["0.25\n0.26\n0.275\n", "0,25\n0,26\n0,275\n", "Time (s)\n0.25\n0.26\n0.275\n"]
 )
 def test_a_column_of_times_is_of_darkening_or_of_both(tmp_path, text):
@@ -82,6 +103,11 @@ def faults(tmp_path: Path, content: str) -> list[tuple[int, int, str]]:
 )
 def test_faults_are_located(tmp_path, text, place):
     assert place in faults(tmp_path, text)
+
+
+def test_a_missing_file_is_said(tmp_path):
+    with pytest.raises(InputError, match="cannot read"):
+        read_timer_file(tmp_path / "none")
 
 
 def is_own(path):
@@ -155,6 +181,14 @@ def test_stacked_runs_are_runs_of_their_own(tmp_path):
         assert [time for time, _ in told(two)] == [0.24, 0.26, 0.275]
 
 
+def test_a_column_a_gate(tmp_path):
+    path = tmp_path / "export"
+    path.write_text("Photogate 1 (ms)\tPhotogate 2 (ms)\n100\t101\n110\t112\n\t115\n")
+    (drop,) = drops_of(read_timer_file(path), {"Photogate 1 (ms)": 4, "Photogate 2 (ms)": 3}, 8)
+    seen = [(edge.tick // 10**9, edge.channel) for edge in drop.edges]
+    assert seen == [(100, 4), (101, 3), (110, 4), (112, 3), (115, 3)]
+
+
 @pytest.mark.parametrize(
     ("text", "code", "reason"),
     [
@@ -178,6 +212,35 @@ def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, code, re
     assert code in {problem.reason.code for problem in caught.value.problems}
     assert reason in str(caught.value)
     assert caught.value.hint
+
+
+@examples(60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.tuples(st.integers(1, 10**5), st.integers(0, 3)), min_size=2, max_size=25),
+    st.permutations(["time", "channel", "state"]),
+    st.sampled_from([("s", 6), ("ms", 3), ("us", 0)]),
+    st.sampled_from([",", ";", "\t"]),
+)
+def test_a_long_table_is_read_in_any_order_of_columns(tmp_path, steps, order, unit, separator):
+    name, decimals = unit
+    dark = dict.fromkeys(range(4), False)
+    time, rows, wanted = 0, [], []
+    for step, channel in steps:
+        time += step
+        dark[channel] = not dark[channel]
+        cells = {
+            "time": f"{time / 10 ** (decimals):.{decimals}f}",
+            "channel": str(channel),
+            "state": str(int(dark[channel])),
+        }
+        rows.append(separator.join(cells[key] for key in order))
+        wanted.append((time * 10**6, channel, dark[channel]))
+    titles = {"time": f"Time ({name})", "channel": "Pin", "state": "State"}
+    path = tmp_path / "export"
+    path.write_text("\n".join([separator.join(titles[key] for key in order), *rows]))
+    (drop,) = drops_of(read_timer_file(path), {str(n): n for n in range(4)}, 8)
+    start = drop.edges[0].tick - wanted[0][0]
+    assert [(e.tick - start, e.channel, e.blocked) for e in drop.edges] == wanted
 
 
 FALL = (0.24, 0.29, 0.41, 0.44)

@@ -1,5 +1,7 @@
 """A tracked video of the same fall, beside what the gates say."""
 
+from __future__ import annotations
+
 import json
 import math
 from pathlib import Path
