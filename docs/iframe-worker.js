@@ -11,12 +11,11 @@ if (location.protocol === "file:") {
       const inside = this.frame.contentWindow;
       inside.document.write("<!doctype html><title>search</title><body></body>");
       inside.document.close();
-      addEventListener("message", (event) => {
-        if (event.source !== inside) return;
-        this.dispatchEvent(new MessageEvent("message", { data: event.data }));
+      inside.postMessage = (data) => queueMicrotask(() => {
+        const event = new MessageEvent("message", { data });
+        this.dispatchEvent(event);
         this.onmessage?.(event);
       });
-      inside.postMessage = (data) => parent.postMessage(data, "*");
       inside.importScripts = (...urls) => urls.reduce((before, source) => before.then(() => {
         const script = inside.document.createElement("script");
         script.src = source;
