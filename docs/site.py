@@ -17,21 +17,37 @@ from typing import Any
 from mkdocs.commands.build import build
 from mkdocs.config import load_config
 
-ROOT = Path(__file__).resolve().parents[1]
+DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
 NAV: dict[str, tuple[str, ...]] = {
-    "Measure": ("docs/one-object.md", "docs/tutorial.md", "docs/timers.md", "docs/python.md"),
+    "Start": ("docs/build.md", "docs/one-object.md", "docs/tutorial.md"),
     "Set up": ("docs/boards.md", "firmware/README.md", "docs/daemon.md",
                "docs/troubleshooting.md"),
-    "Understand": ("docs/method.md", "docs/accuracy.md", "docs/glossary.md"),
+    "Use results": ("docs/python.md", "docs/timers.md"),
+    "Understand": ("docs/method.md", "docs/accuracy.md"),
 }  # fmt: skip
 """The menu: by heading, pages that each answer one question of a user."""
-REFERENCE = (
-    "docs/protocol.md", "docs/tui/README.md", "docs/notebook.ipynb", "docs/resolved-world.md",
-    "firmware/PROTOCOL.md", "rig/daemon/API.md", "docs/results/README.md",
-    "docs/results/[a-z]*.md", "docs/results/*/*.md", "docs/architecture.md",
-    "docs/decisions.md", "CONTRIBUTING.md",
-)  # fmt: skip
-"""Pages to look something up in: one group of the menu, folded until it is opened."""
+REFERENCE: dict[str, tuple[str, ...]] = {
+    "Files and interfaces": (
+        "docs/protocol.md", "docs/glossary.md", "docs/notebook.ipynb", "docs/tui/README.md",
+        "rig/daemon/API.md", "firmware/PROTOCOL.md",
+    ),
+    "Proofs": ("docs/results/README.md", "docs/resolved-world.md", "docs/results/[a-z]*.md",
+               "docs/results/*/*.md"),
+    "The project": ("docs/architecture.md", "docs/decisions.md", "CONTRIBUTING.md"),
+}  # fmt: skip
+"""Pages to look something up in, by group: all of them below one heading of the menu."""
+FILES = ("docs/site.css", "docs/site.js", "docs/iframe-worker.js", "docs/icon.svg")
+"""What all pages use."""
+LANDING = """---
+hide: [navigation, toc]
+---
+<div class="landing" markdown>
+
+{text}
+</div>
+"""
+_NESTED = re.compile(r"^  - ", re.MULTILINE)
 _LETTER = re.compile(r"[^\W\d_]")
 _NUMBER = re.compile(r"[-+−]?[\d.]+e[-+]?\d+")
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
@@ -41,7 +57,7 @@ def pages() -> dict[str, list[Path]]:
     """Return all pages by heading, as paths from the project's root."""
     return {
         heading: [path.relative_to(ROOT) for name in names for path in sorted(ROOT.glob(name))]
-        for heading, names in (NAV | {"Reference": REFERENCE}).items()
+        for heading, names in (NAV | REFERENCE).items()
     }
 
 
@@ -68,14 +84,19 @@ def stage(folder: Path) -> None:
         A link leads nowhere.
     """
     known = {Path("README.md"), *(page for found in pages().values() for page in found)}
+    for name in FILES:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(DOCS.parent / name, folder / name)
     for page in known:
         text = (ROOT / page).read_text("utf-8")
         there = folder / as_page(page)
         there.parent.mkdir(parents=True, exist_ok=True)
         if page.suffix == ".ipynb":
             text = told(text)
-        there.write_text(_LINK.sub(lambda link, at=page: _linked(link, at, known, folder), text),
-                         "utf-8")  # fmt: skip
+        text = _LINK.sub(lambda link, at=page: _linked(link, at, known, folder), text)
+        text = _NESTED.sub("    - ", text)  # Python's Markdown nests by four blanks
+        home = page == Path("README.md")
+        there.write_text(LANDING.format(text=text) if home else text, "utf-8")
 
 
 def as_page(path: Path) -> Path:
@@ -114,23 +135,55 @@ def _linked(link: re.Match[str], page: Path, known: set[Path], folder: Path) -> 
 
 def settings(source: Path, site: Path) -> dict[str, Any]:
     """Make MkDocs' settings, with every doubtful link a warning."""
+    entries = {
+        heading: [str(as_page(page)) for page in group] for heading, group in pages().items()
+    }
     nav: list[dict[str, Any]] = [{"chainrig": "README.md"}]
-    for heading, group in pages().items():
-        entries: list[Any] = [str(as_page(page)) for page in group]
-        # A section within a section is folded.
-        nav.append({heading: [{"All pages": entries}] if heading == "Reference" else entries})
+    nav += [{heading: entries[heading]} for heading in NAV]
+    nav.append({"Reference": [{group: entries[group]} for group in REFERENCE]})
     doubts = {"not_found": "warn", "anchors": "warn", "unrecognized_links": "warn"}
     return {
         "site_name": "chainrig",
+        "site_description": "Drop it. Time it. Believe the number.",
         "docs_dir": str(source),
         "site_dir": str(site),
-        # Without colours for code, which would be fetched from elsewhere.
-        "theme": {"name": "readthedocs", "highlightjs": False},
+        "theme": {
+            "name": "material",
+            "font": False,  # those of the reader's machine: nothing is fetched from elsewhere
+            "favicon": "docs/icon.svg",
+            "logo": "docs/icon.svg",
+            "palette": [_palette(*scheme) for scheme in SCHEMES],
+            "features": ["navigation.tabs", "navigation.top", "navigation.footer",
+                         "content.code.copy", "search.highlight", "toc.follow"],
+        },
+        "extra_css": ["docs/site.css"],
+        "extra_javascript": ["docs/site.js"],
+        "extra": {"generator": False, "polyfills": ["docs/iframe-worker.js"]},
+        "plugins": ["search", "offline"],
+        "markdown_extensions": [
+            "admonition", "attr_list", "md_in_html", "tables", {"toc": {"permalink": True}},
+            {"pymdownx.highlight": {"anchor_linenums": False}}, "pymdownx.superfences",
+        ],
         "nav": nav,
         "strict": True,
         "use_directory_urls": False,  # so that it can be read without a server
         "validation": {"nav": {"not_found": "warn"}, "links": doubts},
-    }
+    }  # fmt: skip
+
+
+SCHEMES = (
+    ("(prefers-color-scheme)", "default", "material/brightness-auto", "Use light colours"),
+    ("(prefers-color-scheme: light)", "default", "material/weather-sunny", "Use dark colours"),
+    ("(prefers-color-scheme: dark)", "slate", "material/weather-night", "Use the system's colours"),
+)
+"""When each colour scheme is used, its name, and the button that leads to the next."""
+
+
+def _palette(media: str, scheme: str, icon: str, button: str) -> dict[str, Any]:
+    return {
+        "media": media, "scheme": scheme, "primary": "custom", "accent": "custom",
+        "toggle": {"icon": icon, "name": button},
+    }  # fmt: skip
 
 
 def main(site: Path) -> None:

@@ -31,6 +31,9 @@ GIVEN = {
         "±30 ppm": "as sold", "±0.5 %": "as sold", "6 m/s": "a speed to compare at",
         "71 ns": "the table above it", "0.4 µm": "71 ns of it", "1 mm": "firmware/README.md",
     },
+    "docs/build.md": {
+        "20 mm": "a ball", "50 mm": "a hand",
+    },
     "docs/daemon.md": {"300 s": "rig/tui", "250 ms": "firmware/PROTOCOL.md"},
     "docs/decisions.md": {"250 ms": "firmware/PROTOCOL.md"},
     "docs/method.md": {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import tempfile
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS, GATES
@@ -27,13 +26,15 @@ from rig.streams import ask, say
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Mapping
+    from collections.abc import Sequence
 
     from rig.protocol.draft import Scene
 
 _COEFFICIENTS = "coefficients"
 _MANY_INCLINES = "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"
 """Where the coefficients are to be measured, if no inclines are given."""
+_CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
+"""What somebody has, the ready protocol for it, and the command; README begins with it too."""
 
 
 def main(arguments: Namespace) -> int:
@@ -66,6 +67,8 @@ def main(arguments: Namespace) -> int:
 
 def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     """Return the board and the draft; ask for what the command line leaves open."""
+    if arguments.scene is None and _can_ask(arguments):
+        say(f"What have you got?\n{_CHOICE.replace('`', '')}")
     word = _ask(arguments, "scene", "What do you drop?", "object", SCENES)
     scene: Scene = next(name for name in SCENES if name == word)
     answers = {"rods": "1", "length": "", "incline": ""}
@@ -77,7 +80,7 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
         many = option == "incline" and answers.get("aim") == _COEFFICIENTS
         default = _MANY_INCLINES if many else usual
         words = {"board": (*BOARDS, "other"), "aim": (usual, _COEFFICIENTS)}.get(option, ())
-        answers[option] = _ask(arguments, option, question, default, dict.fromkeys(words, ""))
+        answers[option] = _ask(arguments, option, question, default, words)
     most = {"gates": GATES, "rods": 1000, "repeats": 1000}
     counts = {option: _count(option, answers[option], limit) for option, limit in most.items()}
     return answers["board"], Draft(
@@ -93,27 +96,24 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     )
 
 
+def _can_ask(arguments: Namespace) -> bool:
+    return not arguments.yes and sys.stdin.isatty()
+
+
 def _ask(
-    arguments: Namespace,
-    option: str,
-    words: str,
-    usual: str,
-    accepted: Mapping[Scene, str] | Mapping[str, str] = MappingProxyType({}),
+    arguments: Namespace, option: str, words: str, usual: str, accepted: Sequence[str] = ()
 ) -> str:
     """Return the answer of the command line or of the user, or the default.
 
-    `accepted` is empty where any answer is; an answer with a meaning has a line of its own.
+    `accepted` is empty where any answer is.
     """
     value = getattr(arguments, option)
     if value is not None:
         return str(value)
-    if arguments.yes or not sys.stdin.isatty():
+    if not _can_ask(arguments):
         say(f"{words} {usual} (--{option})")
         return usual
-    meanings = [f"  {word:14} {meaning}" for word, meaning in accepted.items() if meaning]
-    for line in meanings:
-        say(line)
-    choice = f" ({', '.join(accepted)})" if accepted and not meanings else ""
+    choice = f" ({', '.join(accepted)})" if accepted else ""
     while True:
         answer = ask(f"{words}{choice} [{usual}] ") or usual
         if not accepted or answer in accepted:

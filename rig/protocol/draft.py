@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import count, pairwise
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from rig.errors import InputError
 from rig.protocol.keys import key_at
@@ -17,13 +17,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, Side
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
-SCENES: dict[Scene, str] = {
-    "two-chains": "two equal chains, one strikes a board: separation and end speed",
-    "one-chain": "one chain strikes a board: end speed",
-    "object": "one object falls freely: gravity",
-    "track": "one object slides or rolls down a track: acceleration",
-    "picket-fence": "bars fall freely: gravity",
-}
+SCENES: tuple[Scene, ...] = get_args(Scene)
 STRUCK: tuple[Scene, ...] = ("two-chains", "one-chain")
 
 # Lowest first in importance: of the end speed first, then where the chain is before anything

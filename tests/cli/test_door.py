@@ -1,4 +1,4 @@
-"""The Python door: what its page and its notebook say, and that it says what the commands say."""
+"""The Python door: what its notebook says, and that it says what the commands say."""
 
 import json
 import re
@@ -27,14 +27,6 @@ def here(finished, tmp_path, monkeypatch):
     (tmp_path / "my-chains.yaml").write_text(finished.protocol.read_text("utf-8"), "utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def test_the_page_can_be_typed_in(here, call):
-    other = "--session", here / "other.session"
-    assert call("run", here / "my-chains.yaml", "--port", "sim://?seed=2", *other).code == 0
-    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "python.md").read_text("utf-8"), re.DOTALL)
-    assert len(blocks) > 4
-    exec("".join(blocks), {})
 
 
 @pytest.mark.usefixtures("here")

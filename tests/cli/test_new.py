@@ -77,6 +77,7 @@ def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.stdin", Terminal("\n".join(answers) + "\n"))
     done = call("new", "f.yaml")
     assert done.code == 0, done.err
+    assert done.err.startswith("What have you got?\n- one object past gates\n  - ball, card")
     assert "accepted: two-chains" in done.err
     (draft,) = tried
     assert (draft.rods, draft.length, draft.diameter) == (6, "250 mm", "25 mm")

@@ -1,0 +1,95 @@
+"""The site in a real browser: axe finds nothing on any page, at three widths, in both schemes.
+
+Of `./run bench soaks`, for a browser is large; `test_site.py` holds what can be told without one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from html import unescape
+from pathlib import Path
+
+import pytest
+
+from tests.report.test_browser import BROWSER, browse
+from tests.test_site import load
+
+AXE = Path(__file__).parent / "axe/node_modules/axe-core/axe.min.js"
+AT_ONCE = 10  # pages a browser visits before it is started anew
+MISSING = (BROWSER is None or not AXE.is_file()) and not os.environ.get("CI")
+_HOST = """<title></title><body><script>
+const visit = (page) => new Promise((loaded) => {
+  const frame = document.createElement("iframe");
+  Object.assign(frame, { width: WIDTH, height: 900, src: page, onload: () => loaded(frame) });
+  document.body.append(frame);
+});
+const tell = (found) => { document.title = JSON.stringify(found); };
+(async () => { WORK })();
+</script></body>"""
+_AXE = """const findings = {};
+for (const page of PAGES) {
+  const frame = await visit(page), inside = frame.contentWindow, { body } = inside.document;
+  const script = inside.document.createElement("script");
+  script.src = "SOURCE";
+  await new Promise((loaded) => { script.onload = loaded; body.append(script); });
+  const { violations, passes } = await inside.axe.run(inside.document);
+  const places = violations.flatMap((rule) => rule.nodes.map((node) => [rule.id, node.target]));
+  const wide = inside.document.documentElement.scrollWidth > inside.innerWidth;
+  findings[page] = [places, wide, body.dataset.mdColorScheme, passes.length > 10];
+  frame.remove();
+}
+tell(findings);"""
+_SEARCH = """const inside = (await visit("docs/method.html")).contentWindow, page = inside.document;
+const field = page.querySelector("[data-md-component=search-query]");
+page.querySelector("#__search").click();
+field.focus();
+field.value = "photogate";
+field.dispatchEvent(new inside.Event("input", { bubbles: true }));
+const results = page.querySelector(".md-search-result__meta");
+new MutationObserver(() => tell(results.textContent)).observe(results, { childList: true });"""
+_LOOP = 'tell((await visit("docs/pictures/loop.svg")).contentDocument.getAnimations().length);'
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(MISSING, reason="chromium or axe is missing")]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    load("site").main(folder)
+    return folder
+
+
+def ask_browser(built, tmp_path, work, *flags, width=1400):
+    """What a script of ours says that visits pages of the site."""
+    host = _HOST.replace("WORK", work).replace("WIDTH", str(width))
+    (built / "host.htm").write_text(host, "utf-8")
+    written = browse(
+        tmp_path, "--window-size=1600,1000", "--virtual-time-budget=900000", *flags,
+        "--allow-file-access-from-files", "--dump-dom", (built / "host.htm").as_uri(),
+    )  # fmt: skip
+    return json.loads(unescape(re.search(r"<title>(.*?)</title>", written, re.DOTALL)[1]))
+
+
+@pytest.mark.parametrize(("scheme", "number"), [("slate", 0), ("default", 1)])
+@pytest.mark.parametrize("width", [390, 820, 1400])
+def test_axe_finds_nothing(built, tmp_path, width, scheme, number):
+    pages = sorted(page.relative_to(built).as_posix() for page in built.rglob("*.html"))
+    pages.remove("404.html")  # for servers: it looks for its style at their root
+    assert len(pages) > 30
+    flag = f"--blink-settings=preferredColorScheme={number}"
+    axe = _AXE.replace("SOURCE", AXE.as_uri())
+    findings = {}
+    for begin in range(0, len(pages), AT_ONCE):
+        work = axe.replace("PAGES", json.dumps(pages[begin : begin + AT_ONCE]))
+        findings |= ask_browser(built, tmp_path, work, flag, width=width)
+    assert findings == {page: [[], False, scheme, True] for page in pages}
+
+
+def test_search_works_in_pages_that_are_opened_as_files(built, tmp_path):
+    assert re.search(r"[1-9] matching documents", ask_browser(built, tmp_path, _SEARCH))
+
+
+def test_the_loop_rests_for_whoever_asks_for_less_motion(built, tmp_path):
+    assert ask_browser(built, tmp_path, _LOOP) > 20
+    assert ask_browser(built, tmp_path, _LOOP, "--force-prefers-reduced-motion") == 0
