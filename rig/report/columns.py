@@ -71,6 +71,15 @@ def summary_columns(row: Measurand) -> list[Column[Incline]]:
     ]
 
 
+def value_columns(rows: Sequence[Measurand]) -> list[Column[Incline]]:
+    """Columns of the means of several measurands, without the model."""
+    return [*mean_columns(lambda line: line), *map(_mean_column, rows)]
+
+
+def _mean_column(row: Measurand) -> Column[Incline]:
+    return Column(_heading(row), lambda line: _written(row, line.means))
+
+
 def mean_columns(of: Callable[[T], Incline]) -> tuple[Column[T], ...]:
     """Columns that say of which runs a mean is."""
     return (

@@ -1,0 +1,198 @@
+"""A page as plain data: its card, its sections as rows, and the one template that writes them."""
+
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import dataclass, field
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rig.report.columns import DISAGREES, filled
+from rig.report.layout import COLUMN_PT, WIDE_PT, lay_out
+from rig.report.svg import page_css, page_svg
+
+if TYPE_CHECKING:
+    from collections.abc import Container, Mapping, Sequence
+
+    from jinja2 import Environment
+
+    from rig.report.columns import Column
+    from rig.report.figure import Figure
+    from rig.report.finding import Number
+    from rig.report.parts import Part
+
+_CODE = re.compile("`([^`]*)`")
+_TEMPLATES = Path(__file__).parent / "templates"
+_MARKED = ("void", "rejected", "marginal", DISAGREES)
+"""Words that get a colour and a weight; they say the same without."""
+
+
+class Row(NamedTuple):
+    """Cells of a table's row, whether it is grey, and where its first cell leads on the page."""
+
+    cells: list[str]
+    off: bool = False
+    link: str = ""
+
+
+class Table(NamedTuple):
+    """A filled table: its name for who hears the page, headings, and rows."""
+
+    name: str
+    head: list[tuple[str, bool]]
+    rows: list[Row]
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One section: what it claims, then its figures, and what only a referee wants below.
+
+    Attributes
+    ----------
+    parts, referee
+        Tables and sentences, shown and folded.
+    drops, method
+        What `drops.html` and `method.html` ask for; empty leaves them out.
+    facts, protocol
+        Names with values, and a file with its text, folded too.
+    """
+
+    anchor: str
+    heading: str
+    claims: Sequence[str] = ()
+    figures: Sequence[Figure] = ()
+    parts: Sequence[Part] = ()
+    referee: Sequence[Part] = ()
+    drops: Mapping[str, Any] = field(default_factory=dict)
+    method: Mapping[str, Any] = field(default_factory=dict)
+    facts: Sequence[tuple[str, str]] = ()
+    protocol: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A whole page; what a scene does not have stays empty and is left out.
+
+    Attributes
+    ----------
+    first
+        The figure of the first screen.
+    numbers, verdict, doubt, counted, warnings, source
+        Of the card: numbers, a sentence and whether it is bad news, what was done, what the reader
+        must know, where it comes from.
+    """
+
+    title: str
+    sections: Sequence[Section]
+    simulated: bool = False
+    first: Figure | None = None
+    numbers: Sequence[Number] = ()
+    verdict: str = ""
+    doubt: bool = False
+    counted: str = ""
+    warnings: Sequence[str] = ()
+    source: str = ""
+
+    @property
+    def figures(self) -> list[Figure]:
+        """All figures, as they are numbered."""
+        first = [self.first] if self.first else []
+        return first + [figure for section in self.sections for figure in section.figures]
+
+
+def page_html(page: Page) -> str:
+    """Write a page; all text is escaped."""
+    numbered = enumerate((_Drawn(figure) for figure in page.figures), 1)
+    first = next(numbered)[1] if page.first else None
+    sections = [
+        {
+            **{name: getattr(section, name) for name in Section.__slots__},
+            "figures": [next(numbered) for _ in section.figures],
+            "parts": [*map(_filled_part, section.parts)],
+            "referee": [*map(_filled_part, section.referee)],
+        }
+        for section in page.sections
+    ]
+    script = _read("page.js")
+    return _environment().get_template("page.html").render(
+        page={**{name: getattr(page, name) for name in Page.__slots__}, "first": first,
+              "sections": sections},
+        css=_read("page.css") + page_css(),
+        script=script,
+        script_digest="sha256-" + base64.b64encode(sha256(script.encode()).digest()).decode(),
+        marked=_MARKED,
+    )  # fmt: skip
+
+
+def parts_html(parts: Sequence[Part]) -> str:
+    """Write parts alone, for a notebook."""
+    write: Any = _environment().get_template("parts.html").make_module({"marked": _MARKED})
+    return "".join(write.part(_filled_part(part)) for part in parts)
+
+
+def filled_table(
+    name: str,
+    columns: Sequence[Column[Any]],
+    records: Sequence[Any],
+    off: Container[int] = (),
+    links: Mapping[int, str] | None = None,
+) -> Table:
+    """Fill a table; `off` are numbers of grey rows, `links` places to which first cells lead."""
+    kept, rows = filled(columns, records)
+    return Table(
+        name,
+        [(column.heading, column.numeric) for column in kept],
+        [Row(cells, n in off, (links or {}).get(n, "")) for n, cells in enumerate(rows)],
+    )
+
+
+class _Drawn:
+    """A figure drawn for a telephone and for a page; whichever has room is shown."""
+
+    def __init__(self, figure: Figure) -> None:
+        self.caption = figure.caption
+        self.slim, self.wide = (
+            _markup(page_svg(lay_out(figure, width), figure.title, kind))
+            for width, kind in ((COLUMN_PT, "slim"), (WIDE_PT, "wide"))
+        )
+
+
+def _filled_part(part: Part) -> dict[str, Any]:
+    table = filled_table(part.heading or "table", part.columns, part.records)
+    return {
+        "heading": part.heading,
+        "sentences": part.sentences,
+        "bullets": part.bullets,
+        "table": table if part.records else None,
+    }
+
+
+def _markup(html: str) -> str:
+    from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
+
+    return Markup(html)  # noqa: S704 - of our own drawing, which escapes
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - pages only
+
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined
+    )
+    environment.filters["prose"] = _prose
+    return environment
+
+
+def _prose(sentence: str) -> str:
+    """Escape a sentence, and set its keys and commands in code type."""
+    from markupsafe import escape  # noqa: PLC0415 - comes with Jinja2
+
+    return _markup(_CODE.sub(r"<code>\1</code>", str(escape(sentence))))
+
+
+def _read(name: str) -> str:
+    return _markup((_TEMPLATES / name).read_text("utf-8"))

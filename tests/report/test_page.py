@@ -1,0 +1,136 @@
+"""The page: whole, self-contained, and no text of a file becomes part of it."""
+
+from __future__ import annotations
+
+import base64
+import re
+import subprocess
+import sys
+from dataclasses import fields, replace
+from hashlib import sha256
+from html.parser import HTMLParser
+from pathlib import Path
+
+import yaml
+
+from rig import __version__
+from rig.report.attachments import METHOD, Attachment, method_page
+from rig.report.columns import Column
+from rig.report.figure import Axis, Figure, Panel, Series
+from rig.report.finding import Number
+from rig.report.page import Page, Section, filled_table, page_html, parts_html
+from rig.report.parts import Part, means_parts
+from rig.report.session_page import PAPER, SOFTWARE
+from tests.report import fake_analysis
+
+ROOT = Path(__file__).parents[2]
+VOID_TAGS = {"meta", "br", "hr", "img", "link"}
+BAD = '<script>alert("x")</script>&\'</pre></style>'
+
+
+class Balance(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [values[key] for key in ("href", "src") if key in values]
+        if tag not in VOID_TAGS:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID_TAGS:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def parse(page: str) -> Balance:
+    parser = Balance()
+    parser.feed(page)
+    parser.close()
+    assert not parser.open
+    return parser
+
+
+def page_with(text: str) -> Page:
+    """Return a page that says one text wherever a page says anything."""
+    panel = Panel(Axis(text), Axis(text), [Series(text, [0.0, 1.0], [0.0, 1.0], "line")])
+    figure = Figure(text, text, [panel])
+    part = Part(text, [text], [Column(text, lambda _: text, numeric=False)], [0])
+    drop = {"anchor": "drop-1-1", "title": text, "svg": "", "words": text}
+    section = Section(
+        "result", text, [text], [figure], [part], [part],
+        {"table": filled_table(text, part.columns, [0], {0}, {0: "drop-1-1"}),
+         "timelines": [drop], "lanes": "", "note": text},
+        {"struck": True, "apart": True, "pull": text, "together": False, "again": [text],
+         "files": [Attachment(text, text, b"1", text)], "paper": text, "software": text},
+        [(text, text)], (text, text),
+    )  # fmt: skip
+    return Page(
+        text, [section], True, figure, [Number(text, text, text)], text, True, text, [text], text
+    )
+
+
+def test_the_page_is_whole_and_needs_nothing_else():
+    page = page_html(page_with("Text"))
+    parser = parse(page)
+    assert len(parser.ids) == len(set(parser.ids))
+    places = [link[1:] for link in parser.links if not link.startswith("data:")]
+    assert set(places) - {"lanes"} <= set(parser.ids)
+    assert "SIMULATED DATA" in page
+    assert page == page_html(page_with("Text"))
+    (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    digest = base64.b64encode(sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in page
+
+
+def test_text_is_escaped():
+    plain, bad = page_html(page_with("Text")), page_html(page_with(BAD))
+    parse(bad)
+    for tag in ("<script", "</style>", "</pre>"):
+        assert bad.count(tag) == plain.count(tag)
+    assert bad.count("&lt;script&gt;") >= plain.count("Text")
+
+
+def test_what_is_missing_is_left_out():
+    every = page_with("Text")
+    bare = replace(every, simulated=False, first=None, numbers=(), verdict="", warnings=())
+    section = replace(every.sections[0], figures=(), drops={}, method={}, facts=(), referee=())
+    page = page_html(replace(bare, sections=[section]))
+    parse(page)
+    for absent in ("SIMULATED", "<figure", "<details", 'sortable"', 'class="verdict', "<pre"):
+        assert absent not in page.partition("<body>")[2].partition("<script>")[0]
+    assert {field.name for field in fields(Section)} >= {"claims", "figures", "referee"}
+
+
+def test_a_notebook_has_the_same_tables():
+    html = parts_html(means_parts(fake_analysis.gravity().summary))
+    assert "9.8188 ± 0.0027" in html
+    parse(f"<main>{html}</main>")
+
+
+def test_page_and_citation_file_name_the_same():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert cited["version"] == __version__
+    assert __version__ in SOFTWARE
+    assert cited["title"].partition(":")[2].strip() in SOFTWARE
+    (paper,) = cited["references"]
+    assert paper["title"] in PAPER
+    assert paper["identifiers"][0]["value"] in PAPER
+    assert method_page() == (ROOT / "docs" / METHOD).read_text("utf-8")
+
+
+def test_importing_loads_neither_matplotlib_nor_jinja2():
+    code = (
+        "import sys, rig.report.page, rig.report.figures, rig.report.columns, rig.session.export,"
+        "rig.session.store\n"
+        "assert not {'matplotlib', 'numpy', 'jinja2'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": str(ROOT)})
