@@ -10,7 +10,7 @@ from rig.report.canvas import KINDS, Canvas, kind_of
 from rig.report.figure import Figure, csv_table
 from rig.report.layout import lay_out
 from rig.report.looks import COLORS, FONT, LOOKS, SIZE
-from rig.report.svg import file_svg
+from rig.report.svg import figure_svg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +40,7 @@ def figure_file(figure: Figure, kind: Kind) -> bytes:
     """Return a figure, one column of a journal wide, as a file of a kind."""
     drawing = lay_out(figure)
     if kind == "svg":
-        return file_svg(drawing, figure.title).encode()
+        return figure_svg(drawing, figure.title).encode()
     return _plotted(drawing, figure.title).file(kind)
 
 

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import base64
-import re
 from dataclasses import dataclass, field
-from functools import cache
 from hashlib import sha256
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rig.report import looks
 from rig.report.columns import DISAGREES, filled
 from rig.report.layout import COLUMN_PT, WIDE_PT, lay_out
-from rig.report.svg import page_css, page_svg
+from rig.report.svg import figure_svg
+from rig.report.templates import environment, render
 
 if TYPE_CHECKING:
     from collections.abc import Container, Mapping, Sequence
-
-    from jinja2 import Environment
 
     from rig.report.columns import Column
     from rig.report.figure import Figure
     from rig.report.finding import Number
     from rig.report.parts import Part
 
-_CODE = re.compile("`([^`]*)`")
-_TEMPLATES = Path(__file__).parent / "templates"
 _MARKED = ("void", "rejected", "marginal", DISAGREES)
 """Words that get a colour and a weight; they say the same without."""
 
@@ -105,7 +100,7 @@ class Page:
 
 def page_html(page: Page) -> str:
     """Write a page; all text is escaped."""
-    numbered = enumerate((_Drawn(figure) for figure in page.figures), 1)
+    numbered = enumerate(map(_drawn, page.figures), 1)
     first = next(numbered)[1] if page.first else None
     sections = [
         {
@@ -116,20 +111,23 @@ def page_html(page: Page) -> str:
         }
         for section in page.sections
     ]
-    script = _read("page.js")
-    return _environment().get_template("page.html").render(
-        page={**{name: getattr(page, name) for name in Page.__slots__}, "first": first,
-              "sections": sections},
-        css=_read("page.css") + page_css(),
+    script = render("page.js")
+    digest = base64.b64encode(sha256(script.encode()).digest()).decode()
+    shown = {name: getattr(page, name) for name in Page.__slots__}
+    html = render(
+        "page.html",
+        page={**shown, "first": first, "sections": sections},
+        css=render("page.css") + render("figure.css", looks=looks),
         script=script,
-        script_digest="sha256-" + base64.b64encode(sha256(script.encode()).digest()).decode(),
+        script_digest=f"sha256-{digest}",
         marked=_MARKED,
-    )  # fmt: skip
+    )
+    return str(html)
 
 
 def parts_html(parts: Sequence[Part]) -> str:
     """Write parts alone, for a notebook."""
-    write: Any = _environment().get_template("parts.html").make_module({"marked": _MARKED})
+    write: Any = environment().get_template("parts.html").make_module({"marked": _MARKED})
     return "".join(write.part(_filled_part(part)) for part in parts)
 
 
@@ -149,15 +147,11 @@ def filled_table(
     )
 
 
-class _Drawn:
-    """A figure drawn for a telephone and for a page; whichever has room is shown."""
-
-    def __init__(self, figure: Figure) -> None:
-        self.caption = figure.caption
-        self.slim, self.wide = (
-            _markup(page_svg(lay_out(figure, width), figure.title, kind))
-            for width, kind in ((COLUMN_PT, "slim"), (WIDE_PT, "wide"))
-        )
+def _drawn(figure: Figure) -> dict[str, str]:
+    """Draw a figure for a telephone and for a page; whichever has room is shown."""
+    slim = figure_svg(lay_out(figure, COLUMN_PT), figure.title, "slim")
+    wide = figure_svg(lay_out(figure, WIDE_PT), figure.title, "wide")
+    return {"caption": figure.caption, "slim": slim, "wide": wide}
 
 
 def _filled_part(part: Part) -> dict[str, Any]:
@@ -168,31 +162,3 @@ def _filled_part(part: Part) -> dict[str, Any]:
         "bullets": part.bullets,
         "table": table if part.records else None,
     }
-
-
-def _markup(html: str) -> str:
-    from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
-
-    return Markup(html)  # noqa: S704 - of our own drawing, which escapes
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - pages only
-
-    environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined
-    )
-    environment.filters["prose"] = _prose
-    return environment
-
-
-def _prose(sentence: str) -> str:
-    """Escape a sentence, and set its keys and commands in code type."""
-    from markupsafe import escape  # noqa: PLC0415 - comes with Jinja2
-
-    return _markup(_CODE.sub(r"<code>\1</code>", str(escape(sentence))))
-
-
-def _read(name: str) -> str:
-    return _markup((_TEMPLATES / name).read_text("utf-8"))

@@ -12,8 +12,6 @@ from datetime import datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from markupsafe import Markup
-
 from rig import __version__
 from rig.analysis.curves import model_curves
 from rig.analysis.result import GOOD
@@ -22,7 +20,7 @@ from rig.measurands import SEPARATION, SEPARATION_RAW, acceleration_in, averaged
 from rig.protocol.plan import runs as planned_runs
 from rig.reasons import remedies, sentences
 from rig.report.attachments import attachments
-from rig.report.columns import AUDIT, Column, run_columns, run_incline, value_columns
+from rig.report.columns import Column, run_columns, run_incline, value_columns
 from rig.report.deviations import deviations
 from rig.report.estimate import page_parts
 from rig.report.falls import fall_figures
@@ -62,8 +60,9 @@ SOFTWARE = (
 )
 _BLIND = "The results of this session are hidden until `rig unblind`."
 _NUMERICS = ("numpy", "scipy")
-_TIMELINES = 360_000
+_TIMELINES = 480_000
 """Characters of all timelines together, see `rig.report.attachments`."""
+_AROUND = 900  # characters of a timeline's frame and caption
 _VERDICTS: tuple[Column[DropResult], ...] = (
     Column("run", lambda drop: str(drop.run.number)),
     Column("attempt", lambda drop: str(drop.attempt)),
@@ -207,12 +206,15 @@ def _what_was_done(material: Material, protocol: Protocol) -> str:
 
 def _source(session: Reader) -> str:
     """Name the session, what recorded it and its protocol in one line."""
-    origin = session.meta["origin"].partition("?")[0]
-    digest = session.meta["protocol_sha256"][:8]
+    recorded, digest = (session.meta[name] for name in ("rig_version", "protocol_sha256"))
     return (
-        f"{session.path.name} · {origin} · recorded with rig {session.meta['rig_version']}, "
-        f"analysed with rig {__version__} · protocol {digest}"
+        f"{session.path.name} · {_origin(session)} · recorded with rig {recorded}, analysed with "
+        f"rig {__version__} · protocol {digest[:8]}"
     )
+
+
+def _origin(session: Reader) -> str:
+    return session.meta["origin"].partition("?")[0]
 
 
 def _falls(
@@ -302,50 +304,38 @@ def _drops(
     every = _every_drop(material)
     if not every:
         return {}
-    lines, left = {}, _TIMELINES
     scale = material.outcome.clock.scale
-    records = [drops[result.run.number, result.attempt] for result in every]
-    timed = [(record, scale(record).hz) for record in records]
+    timed = [
+        (record, scale(record).hz)
+        for result in every
+        for record in [drops[result.run.number, result.attempt]]
+    ]
     shared = lanes(protocol.gates.gates if protocol.gates else (), timed)
+    shown, left = {}, _TIMELINES
     # Those that do not count come first where not all have room.
     for number in sorted(range(len(every)), key=lambda n: (every[n].verdict == "accepted", n)):
-        svg = timeline(shared, *timed[number], every[number])
-        left -= len(svg)
-        if svg and left > 0:
-            lines[number] = _timeline_facts(every[number], svg)
-    note = f"Edges: {' / '.join(AUDIT)}."
-    if any(SEPARATION_RAW.name in drop.quantities for drop in every):
-        note += " Raw Δz is not corrected to simultaneous release."
-    if len(lines) < len(every):
-        note += f" {len(lines)} of {len(every)} drops are drawn; rig tui shows all."
+        result = every[number]
+        bars, odd = timeline(shared, *timed[number], result)
+        left -= len(bars) + len(odd) + _AROUND
+        if bars and left > 0:
+            values = "".join(
+                f", {row.symbol} {plus_minus(value, row.scale, row.decimals)} {row.unit}"
+                for row in averaged()
+                if (value := result.quantities.get(row.name)) is not None
+            )
+            anchor = f"drop-{result.run.number}-{result.attempt}"
+            shown[number] = {
+                "anchor": anchor, "result": result, "bars": bars, "odd": odd, "numbers": values
+            }  # fmt: skip
     off = {n for n, drop in enumerate(every) if drop.verdict not in GOOD}
-    links = {number: facts["anchor"] for number, facts in lines.items()}
+    links = {number: str(line["anchor"]) for number, line in shown.items()}
     return {
         "table": filled_table("Drops", run_columns(), every, off, links),
-        "timelines": [lines[number] for number in sorted(lines)],
-        "lanes": Markup(shared.svg),  # noqa: S704 - escaped where it is drawn
-        "note": note,
+        "timelines": [shown[number] for number in sorted(shown)],
+        "lanes": shared,
+        "raw": any(SEPARATION_RAW.name in drop.quantities for drop in every),
+        "hidden": len(every) - len(shown) if shown else 0,
     }
-
-
-def _timeline_facts(result: DropResult, svg: str) -> dict[str, str]:
-    run, audit = result.run, result.audit
-    tilt = run_incline(result)
-    head = " · ".join(filter(None, [
-        f"Run {run.number}, attempt {result.attempt}", f"{tilt}°" if tilt else "",
-        f"{run.impact} strikes" if run.impact else "", result.verdict,
-    ]))  # fmt: skip
-    values = "".join(
-        f", {row.symbol} {plus_minus(value, row.scale, row.decimals)} {row.unit}"
-        for row in averaged()
-        if (value := result.quantities.get(row.name)) is not None
-    )
-    counts = f"{audit.matched} edges matched, {audit.missed} missed, {audit.spurious} unexplained"
-    anchor = f"drop-{run.number}-{result.attempt}"
-    return {"anchor": anchor, "title": f"Gates of run {run.number}",
-            "svg": Markup(svg),  # noqa: S704 - escaped where it is drawn
-            "words": f"{head}: {counts}{values}. Bar: blocked beam. Orange mark: "
-            "unexplained edge."}  # fmt: skip
 
 
 def _method(material: Material) -> Section:
@@ -359,18 +349,16 @@ def _method(material: Material) -> Section:
         *clock_lines(outcome.calibration),
         *air_lines(None if rig is None else rig.drag),
     ]
-    facts = {
-        "session": name,
-        "created": session.meta["created"],
-        "origin": session.meta["origin"].partition("?")[0],
-        "recorded with": f"rig {session.meta['rig_version']}",
-        "analysed with": ", ".join(
-            [f"rig {__version__}", *(f"{package} {version(package)}" for package in _NUMERICS)]
-        ),
-        "protocol SHA-256": session.meta["protocol_sha256"],
-    }
-    rows = [*facts.items(), *(("device", identity) for _, identity in session.identities())]
-    rows += [(f"clock: {what}", value) for what, value in outcome.clock.details.items()]
+    meta = session.meta
+    packages = ", ".join(f"{name} {version(name)}" for name in _NUMERICS)
+    rows: list[tuple[str, object]] = [
+        ("session", name), ("created", meta["created"]), ("origin", _origin(session)),
+        ("recorded with", f"rig {meta['rig_version']}"),
+        ("analysed with", f"rig {__version__}, {packages}"),
+        ("protocol SHA-256", meta["protocol_sha256"]),
+        *(("device", identity) for _, identity in session.identities()),
+        *((f"clock: {what}", value) for what, value in outcome.clock.details.items()),
+    ]  # fmt: skip
     method = {
         "struck": struck,
         "apart": any(SEPARATION.name in drop.quantities for drop in analysis.runs),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,8 +13,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Gate
     from rig.records import Drop
 
-_LEFT, _WIDTH, _RIGHT = 112.0, 640.0, 24.0
-_LANE, _FOOT = 15.0, 34.0
+_LEFT, _WIDTH, _LANE = 112, 640, 15
 _STEPS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 _MOST_NUMBERS = 12
 _LONGEST = 2.0  # times as long as most: what falls later in a drop is not drawn
@@ -29,30 +27,21 @@ class Lanes(NamedTuple):
     span_ms: float
 
     @property
-    def height(self) -> float:
-        """Of a timeline."""
-        return _LANE * len(self.gates) + _FOOT
+    def foot(self) -> int:
+        """Where the axis of time is."""
+        return _LANE * len(self.gates)
 
     @property
-    def svg(self) -> str:
-        """A line with its name for each gate, and the axis of time."""
-        two_sides = len({gate.side for gate in self.gates}) > 1
-        parts = []
-        for place, gate in enumerate(self.gates):
-            y = _LANE * (place + 0.5)
-            words = f"{gate.side if two_sides else ''} {1e3 * gate.height:g} mm".strip()
-            parts += [
-                _text(_LEFT - 6, y + 3.5, words, "end"),
-                f'<path class="lane" d="M{_LEFT:g} {y:g}h{_WIDTH:g}"/>',
-            ]
-        foot, per_ms = _LANE * len(self.gates), _WIDTH / self.span_ms
+    def ticks(self) -> list[tuple[int, float]]:
+        """Milliseconds on that axis, and where they are."""
         step = next((ms for ms in _STEPS_MS if self.span_ms / ms <= _MOST_NUMBERS), 1000)
-        numbers = range(0, int(self.span_ms) + 1, step)
-        ticks = "".join(f"M{_LEFT + ms * per_ms:.1f} {foot:g}v4" for ms in numbers)
-        parts.append(f'<path class="lane-axis" d="M{_LEFT:g} {foot:g}h{_WIDTH:g}{ticks}"/>')
-        parts += [_text(_LEFT + ms * per_ms, foot + 15, str(ms), "middle") for ms in numbers]
-        words = "time since the release (ms)"
-        return "".join([*parts, _text(_LEFT + _WIDTH / 2, foot + 30, words, "middle")])
+        per_ms = _WIDTH / self.span_ms
+        return [(ms, _LEFT + ms * per_ms) for ms in range(0, int(self.span_ms) + 1, step)]
+
+    def name(self, gate: Gate) -> str:
+        """Name a gate by its height and, where there are two, by its side."""
+        two_sides = len({gate.side for gate in self.gates}) > 1
+        return f"{gate.side + ' ' if two_sides else ''}{1e3 * gate.height:g} mm"
 
 
 def lanes(gates: Sequence[Gate], drops: Sequence[tuple[Drop, float | Fraction]]) -> Lanes:
@@ -68,7 +57,7 @@ def lanes(gates: Sequence[Gate], drops: Sequence[tuple[Drop, float | Fraction]])
     return Lanes(tuple(ordered), max(1.0, min(max(spans), _LONGEST * median(spans))))
 
 
-def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult) -> str:
+def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult) -> tuple[str, str]:
     """Draw when each beam was blocked.
 
     Parameters
@@ -80,18 +69,15 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
     hz
         Calibrated ticks per second.
     result
-        Which of its edges were matched; the others are drawn as marks.
+        Which of its edges were matched.
 
     Returns
     -------
-    str
-        SVG for a page that has its colours and `Lanes.svg`; empty where there is no edge.
+    bars, marks
+        SVG path data of shadows, and of unexplained edges where anything was matched.
     """
-    if not drop.edges:
-        return ""
-    per_ms = _FINE * _WIDTH / lanes.span_ms
-    places = [round(ms * per_ms) for ms in _times_ms(drop, hz)]
-    bars = odd = ""
+    places = [round(ms * _FINE * _WIDTH / lanes.span_ms) for ms in _times_ms(drop, hz)]
+    bars = marks = ""
     for number, gate in enumerate(lanes.gates):
         y = f"{_LANE * (number + 0.5):g}"
         at = {
@@ -100,17 +86,14 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
             if edge.channel == gate.channel and place <= _FINE * _WIDTH
         }
         pen = 0
-        for begin, end in _spans(drop, at, blocked=bool(drop.initial_state >> gate.channel & 1)):
+        blocked = bool(drop.initial_state >> gate.channel & 1)
+        for begin, end in _spans(drop, at, blocked=blocked) if places else ():
             bars += f"m{begin - pen} 0h{end - begin}" if pen else f"M{begin} {y}h{end - begin}"
             pen = end
-        odd += "".join(f"M{place} {y}m0-5v10" for n, place in at.items() if n not in result.matches)
-    placed = f'transform="translate({_LEFT:g} 0)scale({1 / _FINE:g} 1)"'
-    marks = f'<path class="lane-odd" {placed} d="{odd}"/>' if odd and result.matches else ""
-    return (
-        f'<svg viewBox="0 0 {_LEFT + _WIDTH + _RIGHT:g} {lanes.height:g}" role="img" '
-        f'aria-label="{escape(_alt(result))}"><use href="#lanes"/>'
-        f'<path class="lane-bar" {placed} d="{bars}"/>{marks}</svg>'
-    )
+        if result.matches:
+            odd = [place for n, place in at.items() if n not in result.matches]
+            marks += "".join(f"M{place} {y}m0-5v10" for place in odd)
+    return bars, marks
 
 
 def _times_ms(drop: Drop, hz: float | Fraction) -> list[float]:
@@ -131,19 +114,4 @@ def _spans(drop: Drop, at: dict[int, int], *, blocked: bool) -> Iterator[tuple[i
             yield since, max(place, since + 1)
             since = None
     if since is not None:
-        yield since, max(round(_FINE * _WIDTH), since + 1)
-
-
-def _text(x: float, y: float, words: str, anchor: str) -> str:
-    return (
-        f'<text class="lane-name" x="{x:.5g}" y="{y:g}" text-anchor="{anchor}">'
-        f"{escape(words)}</text>"
-    )
-
-
-def _alt(result: DropResult) -> str:
-    audit = result.audit
-    return (
-        f"When the gates were blocked in run {result.run.number}, attempt {result.attempt}: "
-        f"{audit.matched} edges matched, {audit.missed} missed, {audit.spurious} unexplained"
-    )
+        yield since, max(_FINE * _WIDTH, since + 1)

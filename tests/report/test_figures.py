@@ -23,7 +23,7 @@ from rig.report.files import figure_file, write_figures
 from rig.report.film import film_figure
 from rig.report.layout import COLUMN_PT, WIDE_PT, lay_out
 from rig.report.looks import INK, MUTED, SECOND
-from rig.report.svg import page_svg
+from rig.report.svg import figure_svg
 from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains()
@@ -54,7 +54,7 @@ def figures() -> list[Figure]:
 @pytest.mark.parametrize("width", [COLUMN_PT, WIDE_PT])
 def test_a_figure_is_drawn_whole(figure, width):
     drawing = lay_out(figure, width)
-    ElementTree.fromstring(page_svg(drawing, figure.title, "wide"))
+    ElementTree.fromstring(figure_svg(drawing, figure.title, "wide"))
     assert drawing.texts[0].words == "SIMULATED DATA"
     for path in drawing.paths:
         points = np.array([point for line in path.lines for point in line]).reshape(-1, 2)

@@ -14,6 +14,8 @@ from pathlib import Path
 import yaml
 
 from rig import __version__
+from rig.analysis.result import Audit, DropResult
+from rig.protocol.protocol import Run
 from rig.report.attachments import METHOD, Attachment, method_page
 from rig.report.columns import Column
 from rig.report.figure import Axis, Figure, Panel, Series
@@ -21,6 +23,7 @@ from rig.report.finding import Number
 from rig.report.page import Page, Section, filled_table, page_html, parts_html
 from rig.report.parts import Part, means_parts
 from rig.report.session_page import PAPER, SOFTWARE
+from rig.report.timeline import Lanes
 from tests.report import fake_analysis
 
 ROOT = Path(__file__).parents[2]
@@ -64,11 +67,12 @@ def page_with(text: str) -> Page:
     panel = Panel(Axis(text), Axis(text), [Series(text, [0.0, 1.0], [0.0, 1.0], "line")])
     figure = Figure(text, text, [panel])
     part = Part(text, [text], [Column(text, lambda _: text, numeric=False)], [0])
-    drop = {"anchor": "drop-1-1", "title": text, "svg": "", "words": text}
+    result = DropResult(Run(1, 40.0, text, text), 1, text, (), Audit())
+    drop = {"anchor": "drop-1-1", "result": result, "numbers": text, "bars": "", "odd": "M0 0"}
     section = Section(
         "result", text, [text], [figure], [part], [part],
         {"table": filled_table(text, part.columns, [0], {0}, {0: "drop-1-1"}),
-         "timelines": [drop], "lanes": "", "note": text},
+         "timelines": [drop], "lanes": Lanes((), 1.0), "raw": True, "hidden": 1},
         {"struck": True, "apart": True, "pull": text, "together": False, "again": [text],
          "files": [Attachment(text, text, b"1", text)], "paper": text, "software": text},
         [(text, text)], (text, text),
@@ -83,7 +87,7 @@ def test_the_page_is_whole_and_needs_nothing_else():
     parser = parse(page)
     assert len(parser.ids) == len(set(parser.ids))
     places = [link[1:] for link in parser.links if not link.startswith("data:")]
-    assert set(places) - {"lanes"} <= set(parser.ids)
+    assert set(places) <= set(parser.ids)
     assert "SIMULATED DATA" in page
     assert page == page_html(page_with("Text"))
     (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
