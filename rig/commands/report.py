@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
 
     from rig.estimate.session import SessionEstimate
-    from rig.report.figure import Figure
+    from rig.report.figure import Chart
     from rig.results import SessionResults
 
 
@@ -29,7 +29,7 @@ class _Report(NamedTuple):
     """A report as it is kept: its HTML, its figures, and what failed."""
 
     html: str
-    figures: tuple[Figure, ...]
+    figures: tuple[Chart, ...]
     failed: tuple[str, ...]
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
 from rig.report.columns import Column, aligned, summary_table, verdict_on
-from rig.report.figure import Axis, Figure, Panel, Series
+from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.looks import MODEL, MUTED
 from rig.report.numbers import fixed, plus_minus
-from rig.report.page import Page, Section, page_html
+from rig.report.page import PageSection, ReportPage, page_html
 from rig.report.parts import Part
 
 if TYPE_CHECKING:
@@ -70,11 +70,11 @@ def comparison_page(results: TogetherResults) -> str:
     title = f"Comparison with {results.fit.parts[0].name}"
     claims = [_less(results), *shared_lines(results)]
     figures, tables = [draw_comparison(results)], [*_tables(results)]
-    section = Section("results", "Results", claims, figures, tables)
-    return page_html(Page(title, [section], results.simulated))
+    section = PageSection("results", "Results", claims, figures, tables)
+    return page_html(ReportPage(title, [section], results.simulated))
 
 
-def draw_comparison(results: TogetherResults) -> Figure:
+def draw_comparison(results: TogetherResults) -> Chart:
     """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
     differences = results.differences()
     panels = [
@@ -83,7 +83,7 @@ def draw_comparison(results: TogetherResults) -> Figure:
         if (members := [one for one in differences if one.quantity == row.name])
     ]
     caption = "Differences of means with U (95 %). Across zero, both sessions agree."
-    return Figure("Differences of means", caption, panels, results.simulated)
+    return Chart("Differences of means", caption, panels, results.simulated)
 
 
 def _difference_panel(row: Measurand, members: Sequence[MeanDifference]) -> Panel:
@@ -92,11 +92,11 @@ def _difference_panel(row: Measurand, members: Sequence[MeanDifference]) -> Pane
     limits = places[-1] - 0.6, 0.6
     values = [each.value.value * row.fine_scale for each in members]
     widths = [each.value.expanded * row.fine_scale for each in members]
-    zero = Series("", (0.0, 0.0), limits, "line", MUTED)
-    points = Series("", values, places, "mean", MODEL, widths, across=True)
+    zero = Trace("", (0.0, 0.0), limits, "line", MUTED)
+    points = Trace("", values, places, "mean", MODEL, widths, across=True)
     return Panel(
-        Axis(f"difference of {row.title} {row.symbol} ± U ({row.fine})"),
-        Axis("", dict(zip(places, names, strict=True)), limits),
+        PlotAxis(f"difference of {row.title} {row.symbol} ± U ({row.fine})"),
+        PlotAxis("", dict(zip(places, names, strict=True)), limits),
         [zero, points],
         16.0 * (len(members) + 0.5),
     )

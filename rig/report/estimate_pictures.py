@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from rig.measurands import SEPARATION
-from rig.report.figure import Axis, Figure, Panel, Series, residual_panel
+from rig.report.figure import Chart, Panel, PlotAxis, Trace, residual_panel
 from rig.report.looks import INK, MODEL, MUTED, SECOND
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _STYLES: tuple[tuple[Role, int], ...] = (("ring", MODEL), ("square", SECOND), ("
 
 def estimate_pictures(
     found: SessionEstimate, sections: Sections, *, simulated: bool
-) -> dict[str, Figure]:
+) -> dict[str, Chart]:
     """Draw everything there is, by file name without its ending.
 
     Parameters
@@ -45,7 +45,7 @@ def estimate_pictures(
     simulated
         Whether to stamp them so.
     """
-    wanted: dict[str, tuple[str, Callable[[], Figure | None]]] = {}
+    wanted: dict[str, tuple[str, Callable[[], Chart | None]]] = {}
     if found.alphas is not None:
         wanted["alpha"] = "The picture of α", partial(_alpha, found.alphas, simulated)
     if found.impulses:
@@ -67,40 +67,40 @@ def estimate_pictures(
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def _alpha(found: SingleAlphas, simulated: bool) -> Figure:
+def _alpha(found: SingleAlphas, simulated: bool) -> Chart:
     """α against incline, and below it every run's residual."""
-    axis = Axis("incline of the surface (°)")
+    axis = PlotAxis("incline of the surface (°)")
     fitted = [line for line in found.inclines if line.model is not None]
     left = [(run.run.incline_deg, run.residual) for run in found.runs if run.residual is not None]
     series = [
-        Series("single runs", [run.run.incline_deg for run in found.runs],
+        Trace("single runs", [run.run.incline_deg for run in found.runs],
                [run.alpha.value for run in found.runs], "points", MUTED),
-        Series("by fitted coefficients", [line.condition.incline_deg for line in fitted],
+        Trace("by fitted coefficients", [line.condition.incline_deg for line in fitted],
                [float(line.model or 0.0) for line in fitted], "dash", MODEL),
-        Series("incline ± U", [line.condition.incline_deg for line in found.inclines],
+        Trace("incline ± U", [line.condition.incline_deg for line in found.inclines],
                [line.alpha.value for line in found.inclines], "mean", INK,
                [line.alpha.expanded for line in found.inclines]),
     ]  # fmt: skip
-    panels = [Panel(axis, Axis("α"), series)]
+    panels = [Panel(axis, PlotAxis("α"), series)]
     if left:
         places, residuals = zip(*left, strict=True)
         panels.append(residual_panel(axis, places, [value / 2.0 for value in residuals]))
     words = (
         "The best single α of every incline and run. Below: each run less the fit, in units of U."
     )
-    return Figure("Impact coefficient against incline, with residuals", words, panels, simulated)
+    return Chart("Impact coefficient against incline, with residuals", words, panels, simulated)
 
 
-def _impulses(found: Sequence[Impulses], simulated: bool) -> Figure:
+def _impulses(found: Sequence[Impulses], simulated: bool) -> Chart:
     """ΔV of every rod beside Eq. 9, and the normalized errors of all inclines."""
-    axis = Axis("rod, counted from the bottom")
+    axis = PlotAxis("rod, counted from the bottom")
     series = []
     for line, (role, color) in zip(_spread(found), _STYLES, strict=False):
         rods = [1 + (gain.first + gain.last) / 2 for gain in line.gains]
         words = f"{line.condition.incline_deg:g}°"
         series += [
-            Series("", rods, [gain.eq9_m_s for gain in line.gains], "line", color),
-            Series(words, rods, [gain.measured.value for gain in line.gains], role, color,
+            Trace("", rods, [gain.eq9_m_s for gain in line.gains], "line", color),
+            Trace(words, rods, [gain.measured.value for gain in line.gains], role, color,
                    [gain.measured.expanded for gain in line.gains]),
         ]  # fmt: skip
     errors = [
@@ -109,16 +109,16 @@ def _impulses(found: Sequence[Impulses], simulated: bool) -> Figure:
         for gain in line.gains
         if gain.normalized_error is not None
     ]
-    panels = [Panel(axis, Axis("speed gained ΔV (m/s)"), series, 140.0)]
+    panels = [Panel(axis, PlotAxis("speed gained ΔV (m/s)"), series, 140.0)]
     panels += [residual_panel(axis, *zip(*errors, strict=True))] if errors else []
     words = (
         "Speed that the chain gains as each rod strikes: measured ± U, and by Eq. 9 with the best "
         "α of the incline (lines). Below: the normalized errors of all inclines."
     )
-    return Figure("Speed gained from each rod's impact", words, panels, simulated)
+    return Chart("Speed gained from each rod's impact", words, panels, simulated)
 
 
-def _curves(found: Sequence[DropCurves], simulated: bool) -> Figure:
+def _curves(found: Sequence[DropCurves], simulated: bool) -> Chart:
     """Δz(t) and V²(z) with bands (Fig. 4)."""
     shown = list(zip(_spread(found), (color for _, color in _STYLES), strict=False))
     free = all(drop.separation is not None for drop, _ in shown)
@@ -130,15 +130,17 @@ def _curves(found: Sequence[DropCurves], simulated: bool) -> Figure:
             if drop.separation is not None
             for one in _banded(drop, drop.time_s, drop.separation, SEPARATION.scale, color)
         ]
-        time, height = Axis("time since release (s)"), Axis("separation Δz (cm)")
+        time, height = PlotAxis("time since release (s)"), PlotAxis("separation Δz (cm)")
         panels.append(Panel(time, height, series, 140.0))
     series = [
         one
         for drop, color in shown
         for one in _banded(drop, drop.height_m, drop.squared_speed, 1.0, color)
     ]
-    panels.append(Panel(Axis("height of the top rod z (m)"), Axis("V² (m²/s²)"), series, 140.0))
-    return Figure(
+    panels.append(
+        Panel(PlotAxis("height of the top rod z (m)"), PlotAxis("V² (m²/s²)"), series, 140.0)
+    )
+    return Chart(
         "Separation against time and squared speed against height"
         if free
         else "Squared speed against height",
@@ -149,17 +151,15 @@ def _curves(found: Sequence[DropCurves], simulated: bool) -> Figure:
     )
 
 
-def _banded(
-    drop: DropCurves, at: Array, curve: Curve, scale: float, color: int
-) -> Iterator[Series]:
+def _banded(drop: DropCurves, at: Array, curve: Curve, scale: float, color: int) -> Iterator[Trace]:
     places, values = at.tolist(), (scale * curve.measured).tolist()
     words = f"{drop.run.incline_deg:g}°, run {drop.run.number}"
-    yield Series("", places, values, "band", color, (scale * curve.u95).tolist())
-    yield Series(words, places, values, "line", color)
-    yield Series("", places, (scale * curve.model).tolist(), "dash", color)
+    yield Trace("", places, values, "band", color, (scale * curve.u95).tolist())
+    yield Trace(words, places, values, "line", color)
+    yield Trace("", places, (scale * curve.model).tolist(), "dash", color)
 
 
-def _posterior(coefficients: Coefficients, simulated: bool) -> Figure | None:
+def _posterior(coefficients: Coefficients, simulated: bool) -> Chart | None:
     """Draw the regions of β and μ that hold 68.3 % and 95 %; `None` where they have no spread."""
     mixture = coefficients.posterior
     assert mixture is not None
@@ -195,14 +195,12 @@ def _posterior(coefficients: Coefficients, simulated: bool) -> Figure | None:
             return None  # narrower than the grid
         centres = [float(ends.mean()) for _, ends in rows]
         halves = [float(np.ptp(ends)) / 2 for _, ends in rows]
-        series.append(
-            Series(words, [float(mu_) for mu_, _ in rows], centres, "band", MODEL, halves)
-        )
+        series.append(Trace(words, [float(mu_) for mu_, _ in rows], centres, "band", MODEL, halves))
     best = {one.name: one.least_squares.value for one in coefficients.parameters}
-    series.append(Series("least squares", [best["friction"]], [best["restitution"]], "cross", INK))
+    series.append(Trace("least squares", [best["friction"]], [best["restitution"]], "cross", INK))
     words = "Posterior of β and μ: the smallest regions that contain 68.3 % and 95 %."
-    panel = Panel(Axis("friction μ"), Axis("restitution β"), series, 150.0)
-    return Figure("Posterior of restitution and friction", words, [panel], simulated)
+    panel = Panel(PlotAxis("friction μ"), PlotAxis("restitution β"), series, 150.0)
+    return Chart("Posterior of restitution and friction", words, [panel], simulated)
 
 
 def _spread(lines: Sequence[T]) -> list[T]:

@@ -16,7 +16,7 @@ from rig.model.fall import kicks
 from rig.model.motion import Motion
 from rig.model.rods import rod_impacts
 from rig.protocol.contact import as_struck, at_contact
-from rig.report.figure import Axis, Figure, Panel, residual_panel, series
+from rig.report.figure import Chart, Panel, PlotAxis, residual_panel, series
 from rig.report.looks import MODEL, MUTED
 from rig.report.numbers import plus_minus
 
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _MOMENTS = 200
-_TIME = Axis("time since release (s)")
-_FROM_FIRST = Axis("time since the first beam (s)")
-_TOP = Axis("height of the top rod z (m)")
+_TIME = PlotAxis("time since release (s)")
+_FROM_FIRST = PlotAxis("time since the first beam (s)")
+_TOP = PlotAxis("height of the top rod z (m)")
 _LEFT = "Lower panel: points less line, in units of U."
 
 
@@ -90,7 +90,7 @@ def passages(
 
 def fall_figures(
     protocol: Protocol, drop: Drop, hz: float | Fraction, result: DropResult, *, simulated: bool
-) -> Iterator[Figure]:
+) -> Iterator[Chart]:
     """Yield the pictures of one good drop: its fall first, then what shows the impacts."""
     if result.verdict not in GOOD or protocol.gates is None:
         return
@@ -100,7 +100,7 @@ def fall_figures(
         if free.time.size > 2:
             panels = _object_panels(protocol, free, result)
             words = f"{head}, beam by beam. Line: the motion with the fitted acceleration. {_LEFT}"
-            yield Figure("The fall", words, panels, simulated)
+            yield Chart("The fall", words, panels, simulated)
         return
     values = {name: value.value for name, value in result.quantities.items()}
     if struck.time.size < 3 or not {FALL_TIME.name, SPEED.name} <= values.keys():
@@ -120,7 +120,7 @@ def fall_figures(
         # The free chain's way, from all its passages, at the moments of the striking one's.
         ahead = np.mean(free.height + half * since**2) - half * struck.time**2 - struck.height
         u = np.hypot(u, struck.speed * result.quantities[RELEASE_SKEW.name].expanded)
-        axis = Axis("separation Δz (cm)")
+        axis = PlotAxis("separation Δz (cm)")
         curve = [
             series("model", at, model["ahead"], "line", MODEL, scale=100.0),
             series("rods in beams", struck.time, ahead, "points", scale=100.0),
@@ -139,7 +139,7 @@ def fall_figures(
         u = np.hypot(u, 2.0 * protocol.drop.u)
         title, words = "Height against time", "the top rod"
     panels = [Panel(_TIME, axis, curve, 100.0), residual_panel(_TIME, struck.time, left / u)]
-    yield Figure(title, f"{head}: {words}. {_LEFT}", panels, simulated)
+    yield Chart(title, f"{head}: {words}. {_LEFT}", panels, simulated)
     fallen = np.array([0.0, top])
     squares = [
         series("free fall", 2.0 * motion.gravity * fallen, top - fallen, "dash", MUTED),
@@ -148,8 +148,8 @@ def fall_figures(
         series("rods in beams", struck.speed**2, struck.height, "points"),
     ]
     words = "the top rod (the paper's Fig. 4). Steps are impacts of single rods."
-    panels = [Panel(Axis("squared speed V² (m²/s²)"), _TOP, squares, 150.0)]
-    yield Figure("Height against squared speed", f"{head}: {words}", panels, simulated)
+    panels = [Panel(PlotAxis("squared speed V² (m²/s²)"), _TOP, squares, 150.0)]
+    yield Chart("Height against squared speed", f"{head}: {words}", panels, simulated)
 
 
 def motion_by_model(protocol: Protocol, run: Run) -> Motion:
@@ -181,12 +181,12 @@ def _object_panels(protocol: Protocol, seen: Passages, result: DropResult) -> li
     u_speed = 2.0 * seen.speed * rods.width_u / rods.widths[0]
     where = "height z (m)" if protocol.track is None else "place on the track z (m)"
     return [
-        Panel(_FROM_FIRST, Axis(where), [
+        Panel(_FROM_FIRST, PlotAxis(where), [
             series("", at, line(at), "line", MODEL),
             series("beams", time, seen.height, "ring"),
         ], 100.0),
         residual_panel(_FROM_FIRST, time, (seen.height - line(time)) / u_height),
-        Panel(_FROM_FIRST, Axis("speed v (m/s)"), [
+        Panel(_FROM_FIRST, PlotAxis("speed v (m/s)"), [
             series(f"slope {row.symbol} = {value} {row.unit}", at, speed(at), "line", MODEL),
             series("width over shadow time", time, seen.speed, "ring"),
         ], 100.0),

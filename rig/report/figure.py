@@ -39,7 +39,7 @@ _COLUMNS = ("panel", "x_axis", "y_axis", "series", "x", "y", "U95", "begins")
 
 
 @dataclass(frozen=True, slots=True)
-class Series:
+class Trace:
     """What is drawn in one way.
 
     Attributes
@@ -69,7 +69,7 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class PlotAxis:
     """An axis: its label with the unit, names in place of numbers, limits, whole numbers only."""
 
     label: str
@@ -82,14 +82,14 @@ class Axis:
 class Panel:
     """Series on two axes, so many points high; neighbours with equal x axes share one."""
 
-    x: Axis
-    y: Axis
-    series: Sequence[Series]
+    x: PlotAxis
+    y: PlotAxis
+    series: Sequence[Trace]
     height: float = 120.0
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class Chart:
     """Panels above each other.
 
     Attributes
@@ -114,24 +114,24 @@ class Figure:
 def series(
     label: str, x: Values, y: Values, role: Role, color: int = INK, u: Values = (),
     scale: float = 1.0, **options: Any,
-) -> Series:  # fmt: skip
-    """Return a `Series` of any numbers, y and u times a factor."""
+) -> Trace:  # fmt: skip
+    """Return a `Trace` of any numbers, y and u times a factor."""
     x, y, u = [*map(float, x)], [scale * float(value) for value in y], [*map(float, u)]
-    return Series(label, x, y, role, color, [scale * value for value in u], **options)
+    return Trace(label, x, y, role, color, [scale * value for value in u], **options)
 
 
-def residual_panel(x: Axis, places: Values, ratios: Values) -> Panel:
+def residual_panel(x: PlotAxis, places: Values, ratios: Values) -> Panel:
     """Return the panel below a curve: what is left over in units of U, ±1 shaded."""
     most = 1.1 * max(2.0, *(abs(float(ratio)) for ratio in ratios))
     lines = [
-        Series("", (), (-1.0, 1.0), "shade", MODEL),
-        Series("", (), (0.0,), "level", MODEL),
+        Trace("", (), (-1.0, 1.0), "shade", MODEL),
+        Trace("", (), (0.0,), "level", MODEL),
         series("", places, ratios, "mean" if len(places) <= _FEW else "points"),
     ]
-    return Panel(x, Axis("residual\n/ U", limits=(-most, most)), lines, 42.0)
+    return Panel(x, PlotAxis("residual\n/ U", limits=(-most, most)), lines, 42.0)
 
 
-def csv_table(figure: Figure) -> str:
+def csv_table(figure: Chart) -> str:
     """Write all numbers of a figure as CSV, a row a point."""
     rows = [
         [number, panel.x.label, panel.y.label, series.label or series.role, *point]

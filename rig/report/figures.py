@@ -10,7 +10,7 @@ from rig.analysis.result import GOOD
 from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
 from rig.protocol.protocol import Condition
 from rig.report.bars import LABELS, bar
-from rig.report.figure import Axis, Figure, Panel, Series, residual_panel
+from rig.report.figure import Chart, Panel, PlotAxis, Trace, residual_panel
 from rig.report.looks import INK, MODEL, MUTED, PARTS, REST, RULE, SECOND
 from rig.report.numbers import fixed, plus_minus, value_of
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 FEWEST_INCLINES = 3
 """Below, a curve against incline says less than the runs themselves."""
 _GAP_DEG = 2.0  # the curve has a point each degree
-_INCLINE = Axis("incline of the surface (°)")
-_RUN = Axis("run", whole=True)
+_INCLINE = PlotAxis("incline of the surface (°)")
+_RUN = PlotAxis("run", whole=True)
 _SEGMENTS: dict[str, tuple[Any, str]] = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
 _SMALL = 0.04
 """Share of U² below which a source is among the others."""
@@ -41,7 +41,7 @@ def result_figures(
     simulated: bool,
     bars: Bars = "U95",
     site_m_s2: float | None = None,
-) -> Iterator[Figure]:
+) -> Iterator[Chart]:
     """Yield the figure of the session's result: against incline, or run by run where that is one.
 
     Parameters
@@ -63,7 +63,7 @@ def result_figures(
     if len(inclines) >= FEWEST_INCLINES and acceleration_in(measured) is None:
         panels = [panel for row in rows for panel in _incline_panels(analysis, curves, row, bars)]
         hidden = " Shaded inclines: the rods would not slide, the model has no answer."
-        yield Figure(
+        yield Chart(
             f"{' and '.join(_title(row) for row in rows)} against incline",
             f"Line: model with its U. Points: means ± {LABELS[bars]} over single runs (small). "
             "Lower panels: mean less model, in units of U."
@@ -72,7 +72,7 @@ def result_figures(
             simulated,
         )
     else:
-        yield Figure(
+        yield Chart(
             f"{' and '.join(_title(row) for row in rows)} of each run",
             "Each run ± U (95 %); the band is the mean ± U.",
             [_runs_panel(analysis, row, site_m_s2) for row in rows],
@@ -82,7 +82,7 @@ def result_figures(
 
 def runs_figure(
     analysis: Analysis, *, simulated: bool, skew_limit_s: float | None = None
-) -> Figure | None:
+) -> Chart | None:
     """Draw every run in order: Δz less its prediction (or mean), and the release skew below.
 
     Parameters
@@ -92,7 +92,7 @@ def runs_figure(
 
     Returns
     -------
-    Figure or None
+    Chart or None
         `None` where there are no two chains.
     """
     runs = sorted(analysis.runs, key=attrgetter("run.number"))
@@ -101,31 +101,31 @@ def runs_figure(
     if SEPARATION.name in names:
         references, words = _references(analysis.summary)
         label = f"Δz − {words}\n({SEPARATION.fine})"
-        zero = Series("", (), (0.0,), "level", MODEL)
+        zero = Trace("", (), (0.0,), "level", MODEL)
         scale = SEPARATION.fine_scale
         points = _run_series(runs, SEPARATION, scale, references)
-        panels.append(Panel(_RUN, Axis(label), [zero, *points], 90.0))
+        panels.append(Panel(_RUN, PlotAxis(label), [zero, *points], 90.0))
     if RELEASE_SKEW.name in names:
         row = RELEASE_SKEW
         limits = [limit * row.scale for limit in (skew_limit_s or 0.0, -(skew_limit_s or 0.0))]
-        edges = [Series("limit", (), limits, "limit", SECOND)] if skew_limit_s else []
+        edges = [Trace("limit", (), limits, "limit", SECOND)] if skew_limit_s else []
         points = _run_series(runs, row, row.scale)
-        panels.append(Panel(_RUN, Axis(f"{row.label}\n({row.unit})"), [*edges, *points], 70.0))
+        panels.append(Panel(_RUN, PlotAxis(f"{row.label}\n({row.unit})"), [*edges, *points], 70.0))
     if not panels:
         return None
     words = (
         "Runs in order ± U (95 %). If A and B differ above, the chains differ; a skew that stays "
     )
     words += "when they change places belongs to the sides."
-    return Figure("Runs in order", words, panels, simulated)
+    return Chart("Runs in order", words, panels, simulated)
 
 
-def budget_figure(summary: Sequence[Incline], *, simulated: bool) -> Figure | None:
+def budget_figure(summary: Sequence[Incline], *, simulated: bool) -> Chart | None:
     """Draw for each quantity which share of U² of its means each source makes.
 
     Returns
     -------
-    Figure or None
+    Chart or None
         `None` where no mean has a budget.
     """
     shares = {row: parts for row in averaged() if (parts := variance_shares(summary, row))}
@@ -143,18 +143,18 @@ def budget_figure(summary: Sequence[Incline], *, simulated: bool) -> Figure | No
         for source in named:
             if source in colors and parts.get(source, 0.0) > _SMALL:
                 end = begin + 100.0 * parts[source]
-                series.append(Series(f"{source} {fixed(end - begin, 0)} %", (end,), (0.0,), "bar",
+                series.append(Trace(f"{source} {fixed(end - begin, 0)} %", (end,), (0.0,), "bar",
                                      colors[source], base=(begin,)))  # fmt: skip
                 begin = end
         if begin < 99.5:
             words = f"others {fixed(100.0 - begin, 0)} %"
-            series.append(Series(words, (100.0,), (0.0,), "bar", REST, base=(begin,)))
+            series.append(Trace(words, (100.0,), (0.0,), "bar", REST, base=(begin,)))
         last = len(panels) == len(shares) - 1
-        axis = Axis("share of U² of the mean (%)" if last else "", limits=(0.0, 100.0))
-        names = Axis("", {0.0: row.symbol}, (-2.0, 0.6))
+        axis = PlotAxis("share of U² of the mean (%)" if last else "", limits=(0.0, 100.0))
+        names = PlotAxis("", {0.0: row.symbol}, (-2.0, 0.6))
         panels.append(Panel(axis, names, series, 64.0))
     words = "Averaged over all means. “Runs” falls with more runs; all other parts do not."
-    return Figure("What makes U", words, panels, simulated)
+    return Chart("What makes U", words, panels, simulated)
 
 
 def variance_shares(summary: Sequence[Incline], row: Measurand) -> dict[str, float]:
@@ -197,22 +197,22 @@ def _incline_panels(
     widths = [(bar(line, row.name, bars) or 0.0) * row.scale for line in lines]
     series = [
         *_model_series(curves, row),
-        Series("", [run.run.incline_deg for run in good], values, "points", MUTED),
-        Series("means", inclines, means, "mean", INK, widths),
+        Trace("", [run.run.incline_deg for run in good], values, "points", MUTED),
+        Trace("means", inclines, means, "mean", INK, widths),
     ]
-    yield Panel(_INCLINE, Axis(f"{row.title}\n{row.symbol} ({row.unit})"), series, 110.0)
+    yield Panel(_INCLINE, PlotAxis(f"{row.title}\n{row.symbol} ({row.unit})"), series, 110.0)
     errors = [(line.incline_deg, line.normalized_error(row.name)) for line in lines]
     known = [(incline, error) for incline, error in errors if error is not None]
     if known:
         yield residual_panel(_INCLINE, *map(list, zip(*known, strict=True)))
 
 
-def _model_series(curves: Mapping[str, Any], row: Measurand) -> Iterator[Series]:
+def _model_series(curves: Mapping[str, Any], row: Measurand) -> Iterator[Trace]:
     """Yield the model's curve part by part, with its bands and the inclines it cannot answer."""
     if row.name not in curves:
         return
     for gap in unanswered(curves):
-        yield Series("", gap, (), "gap", RULE)
+        yield Trace("", gap, (), "gap", RULE)
     inclines, first = curves["incline_deg"], None
     names = curves.get("segments") or ["surface"] * len(inclines)
     for name, part in groupby(range(len(names)), key=lambda index: names[index]):
@@ -224,11 +224,11 @@ def _model_series(curves: Mapping[str, Any], row: Measurand) -> Iterator[Series]
         at = [inclines[place] for place in places]
         values = [row.scale * curves[row.name][place] for place in places]
         widths = [row.scale * curves[row.key("U95")][place] for place in places]
-        yield Series("", at, values, "band", color, widths)
-        yield Series(f"{label}, {chain}" if chain else label, at, values, role, color)
+        yield Trace("", at, values, "band", color, widths)
+        yield Trace(f"{label}, {chain}" if chain else label, at, values, role, color)
     speed = value_of(curves.get("free_fall_speed_m_s"))
     if row == SPEED and speed is not None:
-        yield Series("free fall", (), (speed,), "limit", MUTED)
+        yield Trace("free fall", (), (speed,), "limit", MUTED)
 
 
 def _runs_panel(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> Panel:
@@ -240,15 +240,15 @@ def _runs_panel(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> 
         if row.name in line.means:
             mean = line.means[row.name]
             low, high = ((mean.value + way * mean.expanded) * row.scale for way in (-1, 1))
-            series.append(Series("", (), (low, high), "shade", MODEL))
+            series.append(Trace("", (), (low, high), "shade", MODEL))
             words = f"mean {plus_minus(mean, row.scale, row.decimals)} {row.unit}"
-            series.append(Series(words, (), (mean.value * row.scale,), "level", MODEL))
+            series.append(Trace(words, (), (mean.value * row.scale,), "level", MODEL))
             expected = expected or value_of(line.predicted.get(row.name))
     if expected is not None:
         words = f"expected {fixed(expected * row.scale, row.decimals)}"
-        series.append(Series(words, (), (expected * row.scale,), "limit", SECOND))
+        series.append(Trace(words, (), (expected * row.scale,), "limit", SECOND))
     series += _run_series(runs, row, row.scale)
-    return Panel(_RUN, Axis(f"{row.title}\n{row.symbol} ({row.unit})"), series, 110.0)
+    return Panel(_RUN, PlotAxis(f"{row.title}\n{row.symbol} ({row.unit})"), series, 110.0)
 
 
 def _run_series(
@@ -256,7 +256,7 @@ def _run_series(
     row: Measurand,
     scale: float,
     references: Mapping[Condition, float] | None = None,
-) -> Iterator[Series]:
+) -> Iterator[Trace]:
     """Yield a quantity of every run: a series for each chain that strikes, void runs as crosses."""
     chains = sorted({run.run.impact or "" for run in runs})
     groups: dict[str | None, list[tuple[float, float, float]]] = {}
@@ -274,7 +274,7 @@ def _run_series(
             role: Role = "ring" if second else "mean" if chain is not None else "cross"
             color = SECOND if second else INK if chain is not None else MUTED
             words = f"{chain} strikes" if chain else "" if chain is not None else "not counted"
-            yield Series(words, numbers, values, role, color, widths if chain is not None else ())
+            yield Trace(words, numbers, values, role, color, widths if chain is not None else ())
 
 
 def _reference(run: DropResult, references: Mapping[Condition, float]) -> float | None:

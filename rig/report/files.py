@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.ctrl_c import ctrl_c_waits
 from rig.files import make_folder, replacing
 from rig.report.canvas import KINDS, Canvas, kind_of
-from rig.report.figure import Figure, csv_table
+from rig.report.figure import Chart, csv_table
 from rig.report.layout import lay_out
 from rig.report.looks import COLORS, FONT, LOOKS, SIZE
 from rig.report.svg import figure_svg
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.report.canvas import Kind
-    from rig.report.layout import Drawing
+    from rig.report.layout import PlacedFigure
 
 _ANCHORS: dict[str, Any] = {"start": "left", "middle": "center", "end": "right"}
 
 
-def write_figure(path: Path, drawing: Canvas | Figure) -> None:
+def write_figure(path: Path, drawing: Canvas | Chart) -> None:
     """Write a figure as its file's ending says, whole or not at all.
 
     Raises
@@ -31,12 +31,12 @@ def write_figure(path: Path, drawing: Canvas | Figure) -> None:
         If it says nothing, or the file cannot be written.
     """
     kind = kind_of(path)
-    content = figure_file(drawing, kind) if isinstance(drawing, Figure) else drawing.file(kind)
+    content = figure_file(drawing, kind) if isinstance(drawing, Chart) else drawing.file(kind)
     with replacing(path) as stream:
         stream.write(content)
 
 
-def figure_file(figure: Figure, kind: Kind) -> bytes:
+def figure_file(figure: Chart, kind: Kind) -> bytes:
     """Return a figure, one column of a journal wide, as a file of a kind."""
     drawing = lay_out(figure)
     if kind == "svg":
@@ -44,7 +44,7 @@ def figure_file(figure: Figure, kind: Kind) -> bytes:
     return _plotted(drawing, figure.title).file(kind)
 
 
-def write_figures(folder: Path, figures: Sequence[Figure]) -> None:
+def write_figures(folder: Path, figures: Sequence[Chart]) -> None:
     """Write each figure as ``figure-1.svg``, ``.pdf``, ``.png`` and its numbers as ``.csv``."""
     make_folder(folder)
     for number, figure in enumerate(figures, 1):
@@ -55,14 +55,14 @@ def write_figures(folder: Path, figures: Sequence[Figure]) -> None:
             write_figure(path.with_suffix(f".{kind}"), figure)
 
 
-def _plotted(drawing: Drawing, title: str) -> Canvas:
+def _plotted(drawing: PlacedFigure, title: str) -> Canvas:
     """Let matplotlib draw what is laid out, for the kinds of file that it can write."""
-    from matplotlib.figure import Figure as Plot  # noqa: PLC0415 - half a second, only for files
+    from matplotlib.figure import Figure as MplFigure  # noqa: PLC0415 - half a second, only for files
     from matplotlib.patches import PathPatch  # noqa: PLC0415
     from matplotlib.path import Path as Outline  # noqa: PLC0415
 
     with ctrl_c_waits():
-        plot = Plot(figsize=(drawing.width / 72.0, drawing.height / 72.0))
+        plot = MplFigure(figsize=(drawing.width / 72.0, drawing.height / 72.0))
         axes = plot.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_axis_off()
         axes.set_xlim(0.0, drawing.width)

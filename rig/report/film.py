@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rig.report.figure import Axis, Figure, Panel, Series
+from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.looks import INK, MODEL, MUTED, SECOND
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ _APART_M = 0.26
 _LOW_M, _HIGH_M = -0.25, 0.55
 
 
-def film_figure(film: Film, pictures: int = PICTURES) -> Figure:
+def film_figure(film: Film, pictures: int = PICTURES) -> Chart:
     """Draw moments of a fall side by side, from the front and, below, along the rods.
 
     Parameters
@@ -37,8 +37,8 @@ def film_figure(film: Film, pictures: int = PICTURES) -> Figure:
         for place, moment in zip(places, moments, strict=True)
     }
     slope = math.tan(math.radians(film.incline_deg))
-    front: list[Series] = []
-    side: list[Series] = []
+    front: list[Trace] = []
+    side: list[Trace] = []
     for place, moment in zip(places, moments, strict=True):
         both = film.left[moment], film.right[moment]
         strings = [
@@ -56,23 +56,23 @@ def film_figure(film: Film, pictures: int = PICTURES) -> Figure:
         middles = film.middles(moment)
         board = [-0.08, 0.12]
         side += [
-            Series("", [place + y for y in board], [film.board_m - y * slope for y in board],
+            Trace("", [place + y for y in board], [film.board_m - y * slope for y in board],
                    "line", MODEL),
-            Series("", [place + y for _, y, _ in middles], [z for _, _, z in middles], "ring", INK),
+            Trace("", [place + y for _, y, _ in middles], [z for _, _, z in middles], "ring", INK),
         ]  # fmt: skip
-    across = Axis("time since release", names, (-0.1, places[-1] + 0.14))
+    across = PlotAxis("time since release", names, (-0.1, places[-1] + 0.14))
     words = "Slack strings are orange. Below: along the rods."
     title = f"A simulated fall at {film.incline_deg:g}°"
     panels = [
-        Panel(across, Axis(label, limits=(_LOW_M, _HIGH_M)), series, 170.0)
+        Panel(across, PlotAxis(label, limits=(_LOW_M, _HIGH_M)), series, 170.0)
         for label, series in (("height (m)", front), ("height (m), along the rods", side))
     ]
-    return Figure(title, f"{title}: the impact chain from the front. {words}", panels, True)
+    return Chart(title, f"{title}: the impact chain from the front. {words}", panels, True)
 
 
-def _lines(pairs: Iterable[tuple[Point, Point]], place: float, color: int) -> Series:
+def _lines(pairs: Iterable[tuple[Point, Point]], place: float, color: int) -> Trace:
     """Lines between points, with gaps between one line and the next."""
     pairs = list(pairs)
     xs = [x for low, high in pairs for x in (place + low[0], place + high[0], math.nan)]
     zs = [z for low, high in pairs for z in (low[2], high[2], math.nan)]
-    return Series("", xs, zs, "line", color)
+    return Trace("", xs, zs, "line", color)

@@ -31,7 +31,7 @@ class Number(NamedTuple):
     unit: str
 
 
-class Verdict(NamedTuple):
+class ModelCheck(NamedTuple):
     """Whether measurement and prediction agree, in one sentence."""
 
     sentence: str
@@ -91,11 +91,11 @@ def headline(summary: Sequence[Incline]) -> list[Number]:
     return numbers[:MOST_NUMBERS]
 
 
-def verdict(summary: Sequence[Incline]) -> Verdict:
+def verdict(summary: Sequence[Incline]) -> ModelCheck:
     """Say in one sentence whether means and predictions agree within U."""
     rows = [row for row in averaged() if any(row.name in line.differences for line in summary)]
     if not rows:
-        return Verdict("There is no prediction to compare with.", agrees=True)
+        return ModelCheck("There is no prediction to compare with.", agrees=True)
     off = [
         (abs(error), line, row)
         for row in rows
@@ -107,7 +107,9 @@ def verdict(summary: Sequence[Incline]) -> Verdict:
         number = {1: "", 2: " at both inclines"}
         where = number.get(len(summary), f" at all {len(summary)} inclines")
         verb = "agree" if len(rows) > 1 else "agrees"
-        return Verdict(f"{symbols} {verb} with {_expected(rows[0])}{where}, within U.", agrees=True)
+        return ModelCheck(
+            f"{symbols} {verb} with {_expected(rows[0])}{where}, within U.", agrees=True
+        )
     _, line, row = max(off, key=lambda each: each[0])
     difference = line.differences[row.name]
     places = {(each.incline_deg, each.impact_chain) for _, each, _ in off}
@@ -119,7 +121,7 @@ def verdict(summary: Sequence[Incline]) -> Verdict:
     where = f" at {_where(line)}" if len(summary) > 1 else ""
     names = " and ".join(dict.fromkeys(each.symbol for _, _, each in off))
     verb = "differ" if " and " in names else "differs"
-    return Verdict(
+    return ModelCheck(
         f"{names} {verb} from {_expected(row)}{often}: {row.symbol}{where} by {size} {row.fine}, "
         f"where ± {normal} {row.fine} would be normal.",
         agrees=False,

@@ -17,7 +17,7 @@ from rig.report.numbers import MINUS
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from rig.report.figure import Axis, Figure, Panel, Series
+    from rig.report.figure import Chart, Panel, PlotAxis, Trace
 
     Point = tuple[float, float]
 
@@ -46,7 +46,7 @@ class Path(NamedTuple):
     lines: list[list[Point]]
 
 
-class Text(NamedTuple):
+class PlacedText(NamedTuple):
     """Words at a point; `anchor` is start, middle or end."""
 
     x: float
@@ -58,20 +58,20 @@ class Text(NamedTuple):
 
 
 @dataclass(slots=True)
-class Drawing:
+class PlacedFigure:
     """A figure laid out, y downwards."""
 
     width: float
     height: float = 0.0
     paths: list[Path] = field(default_factory=list)
-    texts: list[Text] = field(default_factory=list)
+    texts: list[PlacedText] = field(default_factory=list)
 
 
-def lay_out(figure: Figure, width: float = COLUMN_PT) -> Drawing:
+def lay_out(figure: Chart, width: float = COLUMN_PT) -> PlacedFigure:
     """Lay a figure out in a width, points."""
-    drawing = Drawing(width)
+    drawing = PlacedFigure(width)
     if figure.simulated:
-        drawing.texts.append(Text(width - 2, SIZE, "SIMULATED DATA", "end", SECOND))
+        drawing.texts.append(PlacedText(width - 2, SIZE, "SIMULATED DATA", "end", SECOND))
         drawing.height = _LINE
     left = 1.6 * _LINE + max(_widest(panel) for panel in figure.panels)
     followers: list[Panel | None] = [*figure.panels[1:], None]
@@ -82,7 +82,7 @@ def lay_out(figure: Figure, width: float = COLUMN_PT) -> Drawing:
     for paragraph in figure.foot:
         for line in textwrap.wrap(paragraph, int(width / _LETTER), subsequent_indent="   "):
             drawing.height += _LINE
-            drawing.texts.append(Text(2.0, drawing.height, line))
+            drawing.texts.append(PlacedText(2.0, drawing.height, line))
     drawing.height += 4.0 if figure.foot else 0.0
     return drawing
 
@@ -90,7 +90,7 @@ def lay_out(figure: Figure, width: float = COLUMN_PT) -> Drawing:
 class _Frame:
     """One panel: its place, its scales, and what is drawn into it."""
 
-    def __init__(self, panel: Panel, drawing: Drawing, left: float, across: Point) -> None:
+    def __init__(self, panel: Panel, drawing: PlacedFigure, left: float, across: Point) -> None:
         self.panel, self.drawing = panel, drawing
         self.left, self.right = left, drawing.width - 9.0
         self.top = drawing.height + 5.0
@@ -128,18 +128,18 @@ class _Frame:
             Path("thin", RULE, grid),
             Path("axis", MUTED, [[(self.left, self.bottom), (self.right, self.bottom)]]),
         ]
-        texts += [Text(self.left - 4, y + 0.36 * SIZE, words, "end") for y, words in levels]
+        texts += [PlacedText(self.left - 4, y + 0.36 * SIZE, words, "end") for y, words in levels]
         middle = (self.top + self.bottom) / 2
         for number, line in enumerate(panel.y.label.split("\n")):
-            texts.append(Text(SIZE + number * _LINE, middle, line, "middle", turned=True))
+            texts.append(PlacedText(SIZE + number * _LINE, middle, line, "middle", turned=True))
         if numbered:
             names = panel.x.names.values()
             room = max([_TICK_PT, *(len(name) * _LETTER + 6 for name in names)])
             columns = _ticks(panel.x, self.x_range, (self.right - self.left) / room)
             for value, words in columns:
-                texts.append(Text(self.x(value), self.bottom + _LINE + 1, words, "middle"))
+                texts.append(PlacedText(self.x(value), self.bottom + _LINE + 1, words, "middle"))
             texts.append(
-                Text((self.left + self.right) / 2, self.bottom + 2.25 * _LINE, panel.x.label,
+                PlacedText((self.left + self.right) / 2, self.bottom + 2.25 * _LINE, panel.x.label,
                      "middle")
             )  # fmt: skip
             ticks = [[(self.x(v), self.bottom), (self.x(v), self.bottom + 3)] for v, _ in columns]
@@ -148,7 +148,7 @@ class _Frame:
     def _add(self, look: str, color: int, lines: Iterable[list[Point]]) -> None:
         self.drawing.paths.append(Path(look, color, [line for line in lines if line]))
 
-    def _series(self, series: Series) -> None:
+    def _series(self, series: Trace) -> None:
         places = list(zip(series.x, series.y, strict=False))
         if series.role in {"level", "limit"}:
             rows = [self.y(value) for value in series.y]
@@ -179,7 +179,7 @@ class _Frame:
         else:
             self._points(series, places)
 
-    def _points(self, series: Series, places: list[Point]) -> None:
+    def _points(self, series: Trace, places: list[Point]) -> None:
         inside = [
             (self.x(x), self.y(y)) for x, y in places if self.y_range[0] <= y <= self.y_range[1]
         ]
@@ -218,7 +218,7 @@ class _Frame:
             if math.isfinite(y)
         ]
 
-    def _label(self, series: Series) -> None:
+    def _label(self, series: Trace) -> None:
         """Write a series' name beside it, where it hides least."""
         wide, best = len(series.label) * _LETTER, None
         across = (-wide / 2, 5.0, -wide - 5.0)
@@ -241,10 +241,10 @@ class _Frame:
             left, top = best[1][:2]
             self.labels.append(best[1])
             self.drawing.texts.append(
-                Text(left, top + 0.8 * SIZE, series.label, color=series.color)
+                PlacedText(left, top + 0.8 * SIZE, series.label, color=series.color)
             )
 
-    def _label_bar(self, series: Series) -> None:
+    def _label_bar(self, series: Trace) -> None:
         """Write a bar's name below its middle, in the first line that has room for it."""
         half = len(series.label) * _LETTER / 2
         middle = self.x((series.base[0] + series.x[0]) / 2)
@@ -258,9 +258,9 @@ class _Frame:
                 break
         self.labels.append(box)
         self._add("axis", series.color, [[(middle, foot), (middle, base - 0.8 * SIZE)]])
-        self.drawing.texts.append(Text(place, base, series.label, "middle"))
+        self.drawing.texts.append(PlacedText(place, base, series.label, "middle"))
 
-    def _anchors(self, series: Series) -> list[Point]:
+    def _anchors(self, series: Trace) -> list[Point]:
         if series.role in {"level", "limit", "shade"}:
             rows = [self.y(max(series.y))]
             return [(x, y) for y in rows for x in _steps(self.left, self.right)]
@@ -293,7 +293,7 @@ def _widest(panel: Panel) -> float:
     return lines + max((len(words) for _, words in rows), default=0) * _LETTER
 
 
-def _range(axis: Axis, panels: Sequence[Panel], *, horizontal: bool) -> Point:
+def _range(axis: PlotAxis, panels: Sequence[Panel], *, horizontal: bool) -> Point:
     """Return the limits of an axis: those it has, or what holds all points and a margin."""
     if axis.limits is not None:
         return axis.limits
@@ -311,7 +311,7 @@ def _range(axis: Axis, panels: Sequence[Panel], *, horizontal: bool) -> Point:
     return low - margin, high + margin
 
 
-def _values(series: Series, *, horizontal: bool) -> Iterator[float]:
+def _values(series: Trace, *, horizontal: bool) -> Iterator[float]:
     """Yield what of a series an axis has to hold."""
     if series.role in _ALL:
         values = series.x if horizontal else series.y
@@ -324,7 +324,7 @@ def _values(series: Series, *, horizontal: bool) -> Iterator[float]:
         yield from series.y
 
 
-def _ticks(axis: Axis, limits: Point, most: float) -> list[tuple[float, str]]:
+def _ticks(axis: PlotAxis, limits: Point, most: float) -> list[tuple[float, str]]:
     """Return at most so many places with their names."""
     low, high = limits
     if axis.names:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Container, Mapping, Sequence
 
     from rig.report.columns import Column
-    from rig.report.figure import Figure
+    from rig.report.figure import Chart
     from rig.report.finding import Number
     from rig.report.parts import Part
 
@@ -25,7 +25,7 @@ _MARKED = ("void", "rejected", "marginal", DISAGREES)
 """Words that get a colour and a weight; they say the same without."""
 
 
-class Row(NamedTuple):
+class TableRow(NamedTuple):
     """Cells of a table's row, whether it is grey, and where its first cell leads on the page."""
 
     cells: list[str]
@@ -33,16 +33,16 @@ class Row(NamedTuple):
     link: str = ""
 
 
-class Table(NamedTuple):
+class FilledTable(NamedTuple):
     """A filled table: its name for who hears the page, headings, and rows."""
 
     name: str
     head: list[tuple[str, bool]]
-    rows: list[Row]
+    rows: list[TableRow]
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class PageSection:
     """One section: what it claims, then its figures, and what only a referee wants below.
 
     Attributes
@@ -58,7 +58,7 @@ class Section:
     anchor: str
     heading: str
     claims: Sequence[str] = ()
-    figures: Sequence[Figure] = ()
+    figures: Sequence[Chart] = ()
     parts: Sequence[Part] = ()
     referee: Sequence[Part] = ()
     drops: Mapping[str, Any] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
+class ReportPage:
     """A whole page; what a scene does not have stays empty and is left out.
 
     Attributes
@@ -81,9 +81,9 @@ class Page:
     """
 
     title: str
-    sections: Sequence[Section]
+    sections: Sequence[PageSection]
     simulated: bool = False
-    first: Figure | None = None
+    first: Chart | None = None
     numbers: Sequence[Number] = ()
     verdict: str = ""
     doubt: bool = False
@@ -92,19 +92,19 @@ class Page:
     source: str = ""
 
     @property
-    def figures(self) -> list[Figure]:
+    def figures(self) -> list[Chart]:
         """All figures, as they are numbered."""
         first = [self.first] if self.first else []
         return first + [figure for section in self.sections for figure in section.figures]
 
 
-def page_html(page: Page) -> str:
+def page_html(page: ReportPage) -> str:
     """Write a page; all text is escaped."""
     numbered = enumerate(map(_drawn, page.figures), 1)
     first = next(numbered)[1] if page.first else None
     sections = [
         {
-            **{name: getattr(section, name) for name in Section.__slots__},
+            **{name: getattr(section, name) for name in PageSection.__slots__},
             "figures": [next(numbered) for _ in section.figures],
             "parts": [*map(_filled_part, section.parts)],
             "referee": [*map(_filled_part, section.referee)],
@@ -113,7 +113,7 @@ def page_html(page: Page) -> str:
     ]
     script = render("page.js")
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
-    shown = {name: getattr(page, name) for name in Page.__slots__}
+    shown = {name: getattr(page, name) for name in ReportPage.__slots__}
     html = render(
         "page.html",
         page={**shown, "first": first, "sections": sections},
@@ -137,17 +137,17 @@ def filled_table(
     records: Sequence[Any],
     off: Container[int] = (),
     links: Mapping[int, str] | None = None,
-) -> Table:
+) -> FilledTable:
     """Fill a table; `off` are numbers of grey rows, `links` places to which first cells lead."""
     kept, rows = filled(columns, records)
-    return Table(
+    return FilledTable(
         name,
         [(column.heading, column.numeric) for column in kept],
-        [Row(cells, n in off, (links or {}).get(n, "")) for n, cells in enumerate(rows)],
+        [TableRow(cells, n in off, (links or {}).get(n, "")) for n, cells in enumerate(rows)],
     )
 
 
-def _drawn(figure: Figure) -> dict[str, str]:
+def _drawn(figure: Chart) -> dict[str, str]:
     """Draw a figure for a telephone and for a page; whichever has room is shown."""
     slim = figure_svg(lay_out(figure, COLUMN_PT), figure.title, "slim")
     wide = figure_svg(lay_out(figure, WIDE_PT), figure.title, "wide")

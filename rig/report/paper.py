@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
 from rig.model.fall import free_fall_speed
-from rig.report.figure import Axis, Figure, Panel, Series
+from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.looks import INK, MODEL, MUTED, SECOND
 
 if TYPE_CHECKING:
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     Columns = Mapping[str, list[float]]
     _Kind = tuple[Callable[[], dict[str, list[float]]], Callable[[Columns, Columns], list[Panel]]]
 
-_INCLINE = Axis("incline of the surface (°)")
+_INCLINE = PlotAxis("incline of the surface (°)")
 _NO_LINE = "No line from just above 0° to arctan μ = 11.3°: the rods would not slide there."
 
 
 def paper_figure(
     number: int, resolved: Columns | None = None
-) -> tuple[Figure, dict[str, list[float]]]:
+) -> tuple[Chart, dict[str, list[float]]]:
     """Draw one of the paper's figures.
 
     Parameters
@@ -49,15 +49,15 @@ def paper_figure(
         if claim.figure == number
     ]
     title = f"Figure {number} of the paper, from its equations"
-    return Figure(title, title, draw(columns, resolved or {}), foot=foot), columns
+    return Chart(title, title, draw(columns, resolved or {}), foot=foot), columns
 
 
 def _figure_3(columns: Columns, resolved: Columns) -> list[Panel]:
     """Δz above, V below; of resolved falls the means with their standard deviations."""
     return [
-        Panel(_INCLINE, Axis(row.axis), [
+        Panel(_INCLINE, PlotAxis(row.axis), [
             *_inclines(columns, row.name, row.scale),
-            *([Series(f"{resolved['falls'][0]:g} resolved falls ± SD", resolved["incline_deg"],
+            *([Trace(f"{resolved['falls'][0]:g} resolved falls ± SD", resolved["incline_deg"],
                       _scaled(resolved[row.name], row.scale), "square", INK,
                       _scaled(resolved[row.key("sd")], row.scale))] if resolved else []),
             *(_free_falls() if row == SPEED else ()),
@@ -66,7 +66,7 @@ def _figure_3(columns: Columns, resolved: Columns) -> list[Panel]:
     ]  # fmt: skip
 
 
-def _inclines(columns: Columns, name: str, scale: float) -> Iterator[Series]:
+def _inclines(columns: Columns, name: str, scale: float) -> Iterator[Trace]:
     for pile, words in ((0.0, "rods on the surface"), (1.0, "on a pile")):
         rows = [row for row, flag in enumerate(columns["pile"]) if flag == pile]
         inclines = [columns["incline_deg"][row] for row in rows]
@@ -74,15 +74,15 @@ def _inclines(columns: Columns, name: str, scale: float) -> Iterator[Series]:
         # The rods do not slide between level and arctan μ: no line across.
         start = 1 if not pile and inclines[0] == 0.0 else 0
         if start:
-            yield Series("", inclines[:1], values[:1], "mean", MODEL)
-        yield Series(words, inclines[start:], values[start:], "dash" if pile else "line", MODEL)
+            yield Trace("", inclines[:1], values[:1], "mean", MODEL)
+        yield Trace(words, inclines[start:], values[start:], "dash" if pile else "line", MODEL)
 
 
-def _free_falls() -> Iterator[Series]:
+def _free_falls() -> Iterator[Trace]:
     speed = free_fall_speed(paper.UNIFORM, paper.DROP, paper.GRAVITY)
     in_text = paper.TEXT_FREE_FALL_SPEED
-    yield Series(f"free fall in the text, {in_text:.2f} m/s", (), (in_text,), "limit", SECOND)
-    yield Series("free fall by the equations", (), (speed,), "limit", MUTED)
+    yield Trace(f"free fall in the text, {in_text:.2f} m/s", (), (in_text,), "limit", SECOND)
+    yield Trace("free fall by the equations", (), (speed,), "limit", MUTED)
 
 
 def _figure_4(columns: Columns, resolved: Columns) -> list[Panel]:
@@ -90,26 +90,26 @@ def _figure_4(columns: Columns, resolved: Columns) -> list[Panel]:
     end = columns["free_speed2"][-1]
     measured = 100.0 * paper.MEASURED_GRADED_SEPARATION
     series = [*_falls(columns, "strikes the surface at 40°", "falls freely", MODEL)]
-    series.append(Series("Δz = 17 cm measured", [end], [measured], "ring", SECOND))
+    series.append(Trace("Δz = 17 cm measured", [end], [measured], "ring", SECOND))
     series += _falls(resolved, "resolved rods, one fall", "", SECOND) if resolved else ()
-    return [Panel(Axis("V² (m²/s²)"), Axis("height of the top rod (cm)"), series, 170.0)]
+    return [Panel(PlotAxis("V² (m²/s²)"), PlotAxis("height of the top rod (cm)"), series, 170.0)]
 
 
-def _falls(columns: Columns, struck: str, free: str, color: int) -> Iterator[Series]:
+def _falls(columns: Columns, struck: str, free: str, color: int) -> Iterator[Trace]:
     heights = _scaled(columns["height_m"], 100.0)
-    yield Series(struck, columns["speed2"], heights, "line", color)
+    yield Trace(struck, columns["speed2"], heights, "line", color)
     heights = _scaled(columns["free_height_m"], 100.0)
-    yield Series(free, columns["free_speed2"], heights, "dash", INK if free else color)
+    yield Trace(free, columns["free_speed2"], heights, "dash", INK if free else color)
 
 
 def _figure_6(columns: Columns, _: Columns) -> list[Panel]:
     """Against ξ, with the closed forms beside the discrete model."""
-    axis = Axis("rotational inertia of the rods, ξ (uniform rods: 1/3)")
+    axis = PlotAxis("rotational inertia of the rods, ξ (uniform rods: 1/3)")
     return [
-        Panel(axis, Axis(row.axis), [
-            Series("discrete model", columns["inertia"], _scaled(columns[row.name], row.scale),
+        Panel(axis, PlotAxis(row.axis), [
+            Trace("discrete model", columns["inertia"], _scaled(columns[row.name], row.scale),
                    "line", MODEL),
-            Series(words, columns["inertia"], _scaled(columns[other], row.scale), "dash", INK),
+            Trace(words, columns["inertia"], _scaled(columns[other], row.scale), "dash", INK),
         ], 130.0)
         for row, other, words in (
             (SEPARATION, f"eq15_{SEPARATION.name}", "Eq. 15"),

@@ -28,7 +28,7 @@ from rig.report.figures import FEWEST_INCLINES, budget_figure, result_figures, r
 from rig.report.film import film_figure
 from rig.report.finding import count, headline, raised, verdict
 from rig.report.numbers import plus_minus, signed
-from rig.report.page import Page, Section, filled_table
+from rig.report.page import PageSection, ReportPage, filled_table
 from rig.report.parts import Part, budget_part, effects_parts, gate_parts, means_parts
 from rig.report.remarks import air_lines, alone_lines, clock_lines, common_lines
 from rig.report.timeline import lanes, timeline
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.report.bars import Bars
-    from rig.report.figure import Figure
+    from rig.report.figure import Chart
     from rig.results import SessionResults
     from rig.session.reading import Reader
 
@@ -100,7 +100,7 @@ class Material:
     sections: Sections = field(default_factory=Sections)
 
 
-def session_page(material: Material) -> Page:
+def session_page(material: Material) -> ReportPage:
     """Return the report of a session."""
     session, outcome, make = material.session, material.outcome, material.sections.make
     analysis, protocol = outcome.analysis, protocol_of(material.session)
@@ -121,7 +121,7 @@ def session_page(material: Material) -> Page:
     judged = verdict(analysis.summary)
     likeness = None if analysis.rig is None else analysis.rig.likeness
     sections = [
-        Section(
+        PageSection(
             "result",
             "Result",
             [*_claims(material)],
@@ -129,7 +129,7 @@ def session_page(material: Material) -> Page:
             make("The table of results", lambda: _result_parts(material)) or (),
             make("The paired differences", lambda: [*effects_parts(analysis.effects)]) or (),
         ),
-        Section(
+        PageSection(
             "model",
             "Does it fit the model?",
             [judged.sentence, *([likeness.sentence] if likeness else [])],
@@ -137,7 +137,7 @@ def session_page(material: Material) -> Page:
             (),
             make("The comparison with the model", lambda: _model_parts(material)) or (),
         ),
-        Section(
+        PageSection(
             "limits",
             "What limits it",
             [*common_lines(analysis.summary),
@@ -146,7 +146,7 @@ def session_page(material: Material) -> Page:
             (),
             make("The uncertainty budget", lambda: [*budget_part(analysis.summary)]) or (),
         ),
-        Section(
+        PageSection(
             "drops",
             "Every drop",
             deviations(protocol, analysis, session.states()),
@@ -158,7 +158,7 @@ def session_page(material: Material) -> Page:
         _method(material),
     ]  # fmt: skip
     blind = outcome.blind
-    return Page(
+    return ReportPage(
         protocol.title,
         [section for section in sections if _has_content(section, blind=blind)],
         simulated,
@@ -172,7 +172,7 @@ def session_page(material: Material) -> Page:
     )
 
 
-def _has_content(section: Section, *, blind: bool) -> bool:
+def _has_content(section: PageSection, *, blind: bool) -> bool:
     """Tell whether a section says anything: without means there is nothing to compare."""
     if section.anchor in {"model", "limits"}:
         return not blind and bool(section.figures or section.referee or section.parts)
@@ -219,7 +219,7 @@ def _origin(session: Reader) -> str:
 
 def _falls(
     material: Material, protocol: Protocol, drops: Mapping[tuple[int, int], Drop]
-) -> list[Figure]:
+) -> list[Chart]:
     """Draw the good drop that shows most: where the separation is largest, else the first."""
     good = [drop for drop in material.outcome.analysis.runs if drop.verdict in GOOD]
     if not good:
@@ -232,7 +232,7 @@ def _falls(
     return [*fall_figures(protocol, record, hz, shown, simulated=simulated)]
 
 
-def _films(material: Material) -> list[Figure]:
+def _films(material: Material) -> list[Chart]:
     """Draw how simulated chains fell: the first that counts, and the first that does not."""
     if not material.session.simulated:
         return []
@@ -338,7 +338,7 @@ def _drops(
     }
 
 
-def _method(material: Material) -> Section:
+def _method(material: Material) -> PageSection:
     session, outcome = material.session, material.outcome
     analysis, name = outcome.analysis, material.session.path.name
     measured = acceleration_in({name for drop in analysis.runs for name in drop.quantities})
@@ -373,7 +373,7 @@ def _method(material: Material) -> Section:
         "paper": PAPER,
         "software": SOFTWARE,
     }
-    return Section(
+    return PageSection(
         "method",
         "Method and files",
         method=method,

@@ -8,10 +8,10 @@ from rig.report import looks
 from rig.report.templates import render
 
 if TYPE_CHECKING:
-    from rig.report.layout import Drawing, Path, Point
+    from rig.report.layout import Path, PlacedFigure, Point
 
 
-def figure_svg(drawing: Drawing, title: str, kind: str = "") -> str:
+def figure_svg(drawing: PlacedFigure, title: str, kind: str = "") -> str:
     """Return SVG of a further class for a page, or without one for a file."""
     paths = [(path, _data(path)) for path in drawing.paths if path.lines]
     return render("figure.svg", drawing=drawing, title=title, kind=kind, paths=paths, looks=looks)

@@ -17,7 +17,7 @@ from rig.films import Film
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
 from rig.report.canvas import KINDS, canvas
-from rig.report.figure import Axis, Figure, Panel, Series, csv_table
+from rig.report.figure import Chart, Panel, PlotAxis, Trace, csv_table
 from rig.report.figures import budget_figure, result_figures, runs_figure, variance_shares
 from rig.report.files import figure_file, write_figures
 from rig.report.film import film_figure
@@ -35,7 +35,7 @@ FILM = Film(
 """Two rods that do not move; the right string is shorter than at rest."""
 
 
-def figures() -> list[Figure]:
+def figures() -> list[Chart]:
     """One of each kind, of made-up results."""
     budget = {"runs": 1e-3, "common": 2e-3}
     means = {"separation_m": Measured(0.1, 5**0.5 * 1e-3, budget=budget)}
@@ -156,9 +156,9 @@ def test_slack_strings_are_drawn_apart():
 
 
 def test_a_name_avoids_the_lines():
-    line = Series("flat", [0.0, 1.0], [0.0, 0.0], "line")
-    steep = Series("", [0.0, 0.5, 0.5, 1.0], [1.0, 1.0, -1.0, -1.0], "line", MUTED)
-    drawing = lay_out(Figure("t", "", [Panel(Axis("x"), Axis("y"), [line, steep])]))
+    line = Trace("flat", [0.0, 1.0], [0.0, 0.0], "line")
+    steep = Trace("", [0.0, 0.5, 0.5, 1.0], [1.0, 1.0, -1.0, -1.0], "line", MUTED)
+    drawing = lay_out(Chart("t", "", [Panel(PlotAxis("x"), PlotAxis("y"), [line, steep])]))
     (name,) = [text for text in drawing.texts if text.words == "flat"]
     (level,) = [path.lines[0] for path in drawing.paths if (path.look, path.color) == ("line", INK)]
     assert abs(name.y - level[0][1]) > 2.0

@@ -18,9 +18,9 @@ from rig.analysis.result import Audit, DropResult
 from rig.protocol.protocol import Run
 from rig.report.attachments import METHOD, Attachment, method_page
 from rig.report.columns import Column
-from rig.report.figure import Axis, Figure, Panel, Series
+from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.finding import Number
-from rig.report.page import Page, Section, filled_table, page_html, parts_html
+from rig.report.page import PageSection, ReportPage, filled_table, page_html, parts_html
 from rig.report.parts import Part, means_parts
 from rig.report.session_page import PAPER, SOFTWARE
 from rig.report.timeline import Lanes
@@ -62,14 +62,14 @@ def parse(page: str) -> Balance:
     return parser
 
 
-def page_with(text: str) -> Page:
+def page_with(text: str) -> ReportPage:
     """Return a page that says one text wherever a page says anything."""
-    panel = Panel(Axis(text), Axis(text), [Series(text, [0.0, 1.0], [0.0, 1.0], "line")])
-    figure = Figure(text, text, [panel])
+    panel = Panel(PlotAxis(text), PlotAxis(text), [Trace(text, [0.0, 1.0], [0.0, 1.0], "line")])
+    figure = Chart(text, text, [panel])
     part = Part(text, [text], [Column(text, lambda _: text, numeric=False)], [0])
     result = DropResult(Run(1, 40.0, text, text), 1, text, (), Audit())
     drop = {"anchor": "drop-1-1", "result": result, "numbers": text, "bars": "", "odd": "M0 0"}
-    section = Section(
+    section = PageSection(
         "result", text, [text], [figure], [part], [part],
         {"table": filled_table(text, part.columns, [0], {0}, {0: "drop-1-1"}),
          "timelines": [drop], "lanes": Lanes((), 1.0), "raw": True, "hidden": 1},
@@ -77,7 +77,7 @@ def page_with(text: str) -> Page:
          "files": [Attachment(text, text, b"1", text)], "paper": text, "software": text},
         [(text, text)], (text, text),
     )  # fmt: skip
-    return Page(
+    return ReportPage(
         text, [section], True, figure, [Number(text, text, text)], text, True, text, [text], text
     )
 
@@ -111,7 +111,7 @@ def test_what_is_missing_is_left_out():
     parse(page)
     for absent in ("SIMULATED", "<figure", "<details", 'sortable"', 'class="verdict', "<pre"):
         assert absent not in page.partition("<body>")[2].partition("<script>")[0]
-    assert {field.name for field in fields(Section)} >= {"claims", "figures", "referee"}
+    assert {field.name for field in fields(PageSection)} >= {"claims", "figures", "referee"}
 
 
 def test_a_notebook_has_the_same_tables():
