@@ -6,7 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from rig.report.figure import Chart, Panel, PlotAxis, Trace
+from rig.report.layout import lay_out
 from rig.report.looks import INK, MODEL, MUTED, SECOND
+from rig.report.svg import figure_svg
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -68,6 +70,12 @@ def film_figure(film: Film, pictures: int = PICTURES) -> Chart:
         for label, series in (("height (m)", front), ("height (m), along the rods", side))
     ]
     return Chart(title, f"{title}: the impact chain from the front. {words}", panels, True)
+
+
+def film_svg(film: Film) -> str:
+    """Draw a fall for a file."""
+    figure = film_figure(film)
+    return figure_svg(lay_out(figure), figure.title)
 
 
 def _lines(pairs: Iterable[tuple[Point, Point]], place: float, color: int) -> Trace:

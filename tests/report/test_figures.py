@@ -17,12 +17,12 @@ from rig.films import Film
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
 from rig.report.canvas import KINDS, canvas
-from rig.report.figure import Chart, Panel, PlotAxis, Trace, csv_table
+from rig.report.figure import Chart, csv_table
 from rig.report.figures import budget_figure, result_figures, runs_figure, variance_shares
 from rig.report.files import figure_file, write_figures
 from rig.report.film import film_figure
 from rig.report.layout import COLUMN_PT, WIDE_PT, lay_out
-from rig.report.looks import INK, MUTED, SECOND
+from rig.report.looks import SECOND
 from rig.report.svg import figure_svg
 from tests.report import fake_analysis
 
@@ -134,12 +134,6 @@ def test_a_void_run_does_not_set_the_scale():
     assert numbers(runs) == numbers(TWO.runs)
 
 
-def test_without_a_prediction_the_mean_takes_its_place():
-    bare = [replace(line, predicted={}) for line in TWO.summary]
-    figure = runs_figure(replace(TWO, summary=tuple(bare)), simulated=False)
-    assert figure.panels[0].y.label == "Δz − mean\n(mm)"
-
-
 def test_shares_of_a_variance_add_up_to_the_whole():
     (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
     mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
@@ -153,15 +147,6 @@ def test_slack_strings_are_drawn_apart():
         return sum(len(series.x) for series in lines)
 
     assert slack(FILM) > slack(replace(FILM, rest_m=[[0.05], [0.09]])) == 0
-
-
-def test_a_name_avoids_the_lines():
-    line = Trace("flat", [0.0, 1.0], [0.0, 0.0], "line")
-    steep = Trace("", [0.0, 0.5, 0.5, 1.0], [1.0, 1.0, -1.0, -1.0], "line", MUTED)
-    drawing = lay_out(Chart("t", "", [Panel(PlotAxis("x"), PlotAxis("y"), [line, steep])]))
-    (name,) = [text for text in drawing.texts if text.words == "flat"]
-    (level,) = [path.lines[0] for path in drawing.paths if (path.look, path.color) == ("line", INK)]
-    assert abs(name.y - level[0][1]) > 2.0
 
 
 @pytest.mark.parametrize("kind", ["svg", "png"])

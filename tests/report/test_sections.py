@@ -83,14 +83,6 @@ def test_a_part_that_fails_takes_no_other_along(found):
     )
 
 
-@pytest.mark.filterwarnings("error")
-def test_impulses_may_be_nothing(found):
-    still = changed(found, eq9_m_s=0.0, measured=Measured(-1e-4, 1e-6))
-    sections = Sections()
-    assert "impulses" in estimate_pictures(still, sections, simulated=True)
-    assert not sections.failed
-
-
 @pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
 def test_a_posterior_without_spread_has_no_picture(found, what):
     nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
