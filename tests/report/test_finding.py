@@ -116,7 +116,6 @@ def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
     shared = lanes(GATES, [(drop, 1000)])
     names = ["impact 60 mm", "impact 25 mm", "free 80 mm"]
     assert [shared.name(gate) for gate in shared.gates] == names
-    assert shared.ticks[-1] == (500, 752.0)
     # 1280 steps for 500 ms: from 100 to 200 and what is not over; blocked from the start.
     bars = "M256 7.5h256m768 0h1M0 22.5h640M1024 37.5h256"
     assert timeline(shared, drop, 1000, result) == (bars, "M1280 7.5m0-5v10")
