@@ -41,4 +41,4 @@ def _prose(sentence: str) -> str:
     """Escape a sentence, and set its keys and commands in code type."""
     from markupsafe import Markup, escape  # noqa: PLC0415 - comes with Jinja2
 
-    return Markup(_CODE.sub(r"<code>\1</code>", escape(sentence)))  # noqa: S704 - just escaped
+    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(sentence))))  # noqa: S704 - just escaped
