@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rig.ctrl_c import ctrl_c_waits
 from rig.errors import InputError
-from rig.files import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -25,8 +24,6 @@ MODEL = "#0072b2"
 MODEL_BAND = "#cce3f0"
 SECOND = "#d55e00"
 """Blue and vermilion of Okabe and Ito's palette; shapes and words say the same once more."""
-PARTS = (MODEL, "#e69f00", "#009e73", "#cc79a7", "#56b4e9", SECOND, "#f0e442", "#9aa3ad")
-"""Parts of a whole: the same palette, and grey for what is left."""
 
 Kind = Literal["svg", "png", "pdf"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -139,19 +136,6 @@ def kind_of(path: Path) -> Kind:
             f"for example {path.with_suffix('.svg')}",
         )
     return kind
-
-
-def write_figure(path: Path, drawing: Canvas) -> None:
-    """Write a figure as its file's ending says, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If it says nothing, or the file cannot be written.
-    """
-    content = drawing.file(kind_of(path))
-    with replacing(path) as stream:
-        stream.write(content)
 
 
 def annotate(

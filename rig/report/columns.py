@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
-from rig.analysis.result import COUNTS, Audit, Measured
+from rig.analysis.result import COUNTS, Measured
 from rig.measurands import acceleration_in, averaged, listed
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import text_table
@@ -21,9 +21,6 @@ T = TypeVar("T")
 
 AGREES, DISAGREES = "agrees", "disagrees"
 """What stands beside Eₙ."""
-
-AUDIT = tuple(field.name for field in fields(Audit))
-"""Counts of edges in the order in which the runs table gives them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +66,15 @@ def summary_columns(row: Measurand) -> list[Column[Incline]]:
         Column("Eₙ", lambda line: fixed(line.normalized_error(row.name), 2)),
         Column("model", lambda line: verdict_on(line.normalized_error(row.name)), numeric=False),
     ]
+
+
+def value_columns(rows: Sequence[Measurand]) -> list[Column[Incline]]:
+    """Columns of the means of several measurands, without the model."""
+    return [*mean_columns(lambda line: line), *map(_mean_column, rows)]
+
+
+def _mean_column(row: Measurand) -> Column[Incline]:
+    return Column(_heading(row), lambda line: _written(row, line.means))
 
 
 def mean_columns(of: Callable[[T], Incline]) -> tuple[Column[T], ...]:

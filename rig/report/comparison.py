@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
-from rig.report.canvas import MODEL, MUTED, canvas
-from rig.report.chapters import Chapter
 from rig.report.columns import Column, aligned, summary_table, verdict_on
-from rig.report.embed import PageFigure, embedded
-from rig.report.html import page_html
+from rig.report.figure import Chart, Panel, PlotAxis, Trace
+from rig.report.looks import MODEL, MUTED
 from rig.report.numbers import fixed, plus_minus
-from rig.report.tables import bullets, paragraphs, table
+from rig.report.page import PageSection, ReportPage, page_html
+from rig.report.parts import Part
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from rig.measurands import Measurand
-    from rig.report.canvas import Canvas
     from rig.results.together import MeanDifference, TogetherResults
 
 _LESS = (
@@ -62,48 +60,46 @@ def difference_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means of every session and their differences, as lines of text."""
     if results.simulated:
         yield "SIMULATED DATA"
-    for _, columns, records in _tables(results):
-        yield from ["", *aligned(columns, records)]
+    for part in _tables(results):
+        yield from ["", *aligned(part.columns, part.records)]
     yield from ["", _less(results), *shared_lines(results)]
 
 
 def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
     title = f"Comparison with {results.fit.parts[0].name}"
-    drawing = draw_comparison(results)
-    caption = "Differences of means with U (95 %). Across zero, both sessions agree."
-    figure = embedded(PageFigure(drawing.svg, "Differences of means", caption), 1)
-    lead = paragraphs([_less(results)], "lead") + bullets(shared_lines(results))
-    tables = "".join(table(*one) for one in _tables(results))
-    chapters = [Chapter("short", "Summary", lead), Chapter("results", "Results", figure + tables)]
-    return page_html(title, chapters, simulated=results.simulated)
+    claims = [_less(results), *shared_lines(results)]
+    figures, tables = [draw_comparison(results)], [*_tables(results)]
+    section = PageSection("results", "Results", claims, figures, tables)
+    return page_html(ReportPage(title, [section], results.simulated))
 
 
-def draw_comparison(results: TogetherResults) -> Canvas:
+def draw_comparison(results: TogetherResults) -> Chart:
     """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
     differences = results.differences()
     panels = [
-        (row, members)
+        _difference_panel(row, members)
         for row in averaged()
         if (members := [one for one in differences if one.quantity == row.name])
     ]
-    heights = tuple(0.7 + 0.25 * len(members) for _, members in panels)
-    with canvas(heights, simulated=results.simulated, sharex=False) as drawing:
-        for (row, members), axes in zip(panels, drawing.axes, strict=True):
-            axes.axvline(0.0, color=MUTED, linewidth=1.0)
-            axes.errorbar(
-                [one.value.value * row.fine_scale for one in members],
-                range(len(members)),
-                xerr=[one.value.expanded * row.fine_scale for one in members],
-                fmt="o",
-                color=MODEL,
-                markersize=4.2,
-            )
-            names = [", ".join(filter(None, [one.session, _runs(one)])) for one in members]
-            axes.set_yticks(range(len(members)), names)
-            axes.set_ylim(len(members) - 0.5, -0.5)
-            axes.set_xlabel(f"difference of {row.title} {row.symbol} ± U ({row.fine})")
-    return drawing
+    caption = "Differences of means with U (95 %). Across zero, both sessions agree."
+    return Chart("Differences of means", caption, panels, results.simulated)
+
+
+def _difference_panel(row: Measurand, members: Sequence[MeanDifference]) -> Panel:
+    places = [-float(number) for number in range(len(members))]
+    names = [", ".join(filter(None, [each.session, _runs(each)])) for each in members]
+    limits = places[-1] - 0.6, 0.6
+    values = [each.value.value * row.fine_scale for each in members]
+    widths = [each.value.expanded * row.fine_scale for each in members]
+    zero = Trace("", (0.0, 0.0), limits, "line", MUTED)
+    points = Trace("", values, places, "mean", MODEL, widths, across=True)
+    return Panel(
+        PlotAxis(f"difference of {row.title} {row.symbol} ± U ({row.fine})"),
+        PlotAxis("", dict(zip(places, names, strict=True)), limits),
+        [zero, points],
+        16.0 * (len(members) + 0.5),
+    )
 
 
 def _runs(mean: MeanDifference | Incline) -> str:
@@ -112,16 +108,14 @@ def _runs(mean: MeanDifference | Incline) -> str:
     return "" if acceleration_in(names) else str(mean.condition)
 
 
-def _tables(
-    results: TogetherResults,
-) -> Iterator[tuple[str, Sequence[Column[Any]], Sequence[Any]]]:
-    """Yield name, columns and records of the tables of each measurand."""
+def _tables(results: TogetherResults) -> Iterator[Part]:
+    """Yield the tables of each measurand."""
     differences = results.differences()
     for row in averaged():
         if means := _means(results, row):
-            yield f"Means of {row.symbol}", _mean_columns(row), means
+            yield Part(f"Means of {row.symbol}", (), _mean_columns(row), means)
         if members := [one for one in differences if one.quantity == row.name]:
-            yield f"Differences of {row.symbol}", _difference_columns(row), members
+            yield Part(f"Differences of {row.symbol}", (), _difference_columns(row), members)
 
 
 def _less(results: TogetherResults) -> str:

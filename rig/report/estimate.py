@@ -136,8 +136,7 @@ def _incline_by_incline(heading: str, found: SessionEstimate) -> Part | None:
 
 def _single_impulses(heading: str, found: SessionEstimate) -> Part | None:
     lines = [_Rods(one.condition, gain) for one in found.impulses or () for gain in one.gains]
-    folded = "Speed gained from each rod, from the bottom"
-    return Part(heading, (), _RODS, lines, folded) if lines else None
+    return Part(heading, (), _RODS, lines) if lines else None
 
 
 def _coefficient_words(told: Coefficients) -> Iterator[str]:

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from rig.measurands import SEPARATION
-from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, PAPER, SECOND, canvas
-from rig.report.embed import PageFigure
+from rig.report.figure import Chart, Panel, PlotAxis, Trace, residual_panel
+from rig.report.looks import INK, MODEL, MUTED, SECOND
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
-    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from rig.estimate.alphas import SingleAlphas
     from rig.estimate.curves import Curve, DropCurves
     from rig.estimate.rods import Impulses
     from rig.estimate.session import Coefficients, SessionEstimate
+    from rig.report.figure import Role
     from rig.sections import Sections
 
     Array = NDArray[np.float64]
@@ -29,12 +28,12 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _SHOWN = 3
-_STYLES = (("o", MODEL), ("s", SECOND), ("^", INK))
+_STYLES: tuple[tuple[Role, int], ...] = (("ring", MODEL), ("square", SECOND), ("mean", INK))
 
 
 def estimate_pictures(
     found: SessionEstimate, sections: Sections, *, simulated: bool
-) -> dict[str, PageFigure]:
+) -> dict[str, Chart]:
     """Draw everything there is, by file name without its ending.
 
     Parameters
@@ -46,7 +45,7 @@ def estimate_pictures(
     simulated
         Whether to stamp them so.
     """
-    wanted: dict[str, tuple[str, Callable[[], PageFigure | None]]] = {}
+    wanted: dict[str, tuple[str, Callable[[], Chart | None]]] = {}
     if found.alphas is not None:
         wanted["alpha"] = "The picture of α", partial(_alpha, found.alphas, simulated)
     if found.impulses:
@@ -57,134 +56,112 @@ def estimate_pictures(
     if found.curves:
         what = "The picture of Δz(t) and V²(z)" if found.free_chain else "The picture of V²(z)"
         wanted["curves"] = what, partial(_curves, found.curves, simulated)
-    told = found.coefficients
-    if told is not None and {"restitution", "friction"} <= {one.name for one in told.parameters}:
-        wanted["posterior"] = "The picture of the posterior", partial(_posterior, told, simulated)
+    coefficients = found.coefficients
+    names = {one.name for one in coefficients.parameters} if coefficients else set()
+    if coefficients is not None and {"restitution", "friction"} <= names:
+        wanted["posterior"] = (
+            "The picture of the posterior",
+            partial(_posterior, coefficients, simulated),
+        )
     drawn = {name: sections.make(what, draw) for name, (what, draw) in wanted.items()}
-    return {name: picture for name, picture in drawn.items() if picture is not None}
+    return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def _alpha(found: SingleAlphas, simulated: bool) -> PageFigure:
+def _alpha(found: SingleAlphas, simulated: bool) -> Chart:
     """α against incline, and below it every run's residual."""
+    axis = PlotAxis("incline of the surface (°)")
+    fitted = [line for line in found.inclines if line.model is not None]
     left = [(run.run.incline_deg, run.residual) for run in found.runs if run.residual is not None]
-    with canvas((2.6, 1.6) if left else (2.6,), simulated=simulated) as drawing:
-        top = drawing.axes[0]
-        top.plot(
-            [one.run.incline_deg for one in found.runs],
-            [one.alpha.value for one in found.runs],
-            "o", color=MUTED, markersize=3, alpha=0.5, markeredgewidth=0, label="single runs",
-        )  # fmt: skip
-        fitted = [one for one in found.inclines if one.model is not None]
-        top.plot(
-            [one.condition.incline_deg for one in fitted],
-            np.array([one.model for one in fitted], float),
-            "_", color=MODEL, markersize=16, label="fitted coefficients",
-        )  # fmt: skip
-        top.errorbar(
-            [one.condition.incline_deg for one in found.inclines],
-            [one.alpha.value for one in found.inclines],
-            yerr=[one.alpha.expanded for one in found.inclines],
-            fmt="o", color=INK, markersize=4, label="incline ± U (95 %)",
-        )  # fmt: skip
-        top.set_ylabel("α")
-        top.legend()
-        if left:
-            low = drawing.axes[1]
-            low.axhspan(-2, 2, color=MODEL_BAND, alpha=0.6, linewidth=0)
-            low.plot(*zip(*left, strict=True), "o", color=MODEL, markersize=3, markeredgewidth=0)
-            low.set_ylabel("residual / u")
-        drawing.axes[-1].set_xlabel("incline of the surface (°)")
-    return PageFigure(
-        drawing.svg,
-        "Impact coefficient against incline, with residuals",
-        "The best single α of every incline and run. Below: each run minus the fit, in standard "
-        "uncertainties (band: ±2).",
-        "impacts",
+    series = [
+        Trace("single runs", [run.run.incline_deg for run in found.runs],
+               [run.alpha.value for run in found.runs], "points", MUTED),
+        Trace("by fitted coefficients", [line.condition.incline_deg for line in fitted],
+               [float(line.model or 0.0) for line in fitted], "dash", MODEL),
+        Trace("incline ± U", [line.condition.incline_deg for line in found.inclines],
+               [line.alpha.value for line in found.inclines], "mean", INK,
+               [line.alpha.expanded for line in found.inclines]),
+    ]  # fmt: skip
+    panels = [Panel(axis, PlotAxis("α"), series)]
+    if left:
+        places, residuals = zip(*left, strict=True)
+        panels.append(residual_panel(axis, places, [value / 2.0 for value in residuals]))
+    words = (
+        "The best single α of every incline and run. Below: each run less the fit, in units of U."
     )
+    return Chart("Impact coefficient against incline, with residuals", words, panels, simulated)
 
 
-def _impulses(found: Sequence[Impulses], simulated: bool) -> PageFigure:
+def _impulses(found: Sequence[Impulses], simulated: bool) -> Chart:
     """ΔV of every rod beside Eq. 9, and the normalized errors of all inclines."""
-    shown = _spread(found)
-    with canvas((2.6, 1.6), simulated=simulated) as drawing:
-        top, low = drawing.axes
-        for one, (marker, color) in zip(shown, _STYLES, strict=False):
-            rods = [1 + (gain.first + gain.last) / 2 for gain in one.gains]
-            top.plot(rods, [gain.eq9_m_s for gain in one.gains], "-", color=color, linewidth=1)
-            top.errorbar(
-                rods,
-                [gain.measured.value for gain in one.gains],
-                yerr=[gain.measured.expanded for gain in one.gains],
-                fmt=marker, color=color, markerfacecolor=PAPER, markersize=4,
-                label=f"{one.condition.incline_deg:g}° ± U (95 %)",
-            )  # fmt: skip
-        gains = [
-            value
-            for one in shown
-            for gain in one.gains
-            for value in (gain.eq9_m_s, gain.measured.value)
-        ]
-        if max(gains, default=0.0) > 0.0:  # α may be nothing, and noise less
-            top.set_yscale("log")
-        top.set_ylabel("speed gained ΔV (m/s)")
-        top.legend(title="lines: Eq. 9")
-        low.axhspan(-1, 1, color=MODEL_BAND, alpha=0.6, linewidth=0)
-        for one in found:
-            low.plot(
-                [1 + (gain.first + gain.last) / 2 for gain in one.gains],
-                np.array([gain.normalized_error for gain in one.gains], float),
-                "o", color=MODEL, markersize=3, alpha=0.6, markeredgewidth=0,
-            )  # fmt: skip
-        low.set_ylabel("Eₙ, all inclines")
-        low.set_xlabel("rod, counted from the bottom")
-    return PageFigure(
-        drawing.svg,
-        "Speed gained from each rod's impact",
-        "Speed that the chain gains as each rod strikes: measured, and by Eq. 9 with the best α of "
-        "the incline. Below: the normalized errors.",
-        "impacts",
+    axis = PlotAxis("rod, counted from the bottom")
+    series = []
+    for line, (role, color) in zip(_spread(found), _STYLES, strict=False):
+        rods = [1 + (gain.first + gain.last) / 2 for gain in line.gains]
+        words = f"{line.condition.incline_deg:g}°"
+        series += [
+            Trace("", rods, [gain.eq9_m_s for gain in line.gains], "line", color),
+            Trace(words, rods, [gain.measured.value for gain in line.gains], role, color,
+                   [gain.measured.expanded for gain in line.gains]),
+        ]  # fmt: skip
+    errors = [
+        (1 + (gain.first + gain.last) / 2, float(gain.normalized_error))
+        for line in found
+        for gain in line.gains
+        if gain.normalized_error is not None
+    ]
+    panels = [Panel(axis, PlotAxis("speed gained ΔV (m/s)"), series, 140.0)]
+    panels += [residual_panel(axis, *zip(*errors, strict=True))] if errors else []
+    words = (
+        "Speed that the chain gains as each rod strikes: measured ± U, and by Eq. 9 with the best "
+        "α of the incline (lines). Below: the normalized errors of all inclines."
     )
+    return Chart("Speed gained from each rod's impact", words, panels, simulated)
 
 
-def _curves(found: Sequence[DropCurves], simulated: bool) -> PageFigure:
+def _curves(found: Sequence[DropCurves], simulated: bool) -> Chart:
     """Δz(t) and V²(z) with bands (Fig. 4)."""
-    shown = _spread(found)
-    row = SEPARATION
-    free = all(one.separation is not None for one in shown)
-    with canvas((2.6,), 7.0 if free else 4.5, simulated=simulated,
-                columns=2 if free else 1, sharex=False) as drawing:  # fmt: skip
-        for one, (_, color) in zip(shown, _STYLES, strict=False):
-            label = f"{one.run.incline_deg:g}°, run {one.run.number}"
-            if free and one.separation is not None:
-                _banded(drawing.axes[0], one.time_s, one.separation, row.scale, color, label)
-            _banded(drawing.axes[-1], one.height_m, one.squared_speed, 1.0, color, label)
-        if free:
-            drawing.axes[0].set_xlabel("time since release (s)")
-            drawing.axes[0].set_ylabel("separation Δz (cm)")
-        drawing.axes[-1].set_xlabel("height of the top rod z (m)")
-        drawing.axes[-1].set_ylabel("V² (m²/s²)")
-        drawing.axes[-1].invert_xaxis()
-        drawing.axes[0].legend(loc="upper left")
-    return PageFigure(
-        drawing.svg,
+    shown = list(zip(_spread(found), (color for _, color in _STYLES), strict=False))
+    free = all(drop.separation is not None for drop, _ in shown)
+    panels = []
+    if free:
+        series = [
+            one
+            for drop, color in shown
+            if drop.separation is not None
+            for one in _banded(drop, drop.time_s, drop.separation, SEPARATION.scale, color)
+        ]
+        time, height = PlotAxis("time since release (s)"), PlotAxis("separation Δz (cm)")
+        panels.append(Panel(time, height, series, 140.0))
+    series = [
+        one
+        for drop, color in shown
+        for one in _banded(drop, drop.height_m, drop.squared_speed, 1.0, color)
+    ]
+    panels.append(
+        Panel(PlotAxis("height of the top rod z (m)"), PlotAxis("V² (m²/s²)"), series, 140.0)
+    )
+    return Chart(
         "Separation against time and squared speed against height"
         if free
         else "Squared speed against height",
         f"Single drops: {'Δz(t) at simultaneous release and V²(z)' if free else 'V²(z)'}, with "
         "95 % bands. Dashed: the model with the protocol's coefficients.",
+        panels,
+        simulated,
     )
 
 
-def _banded(axes: Axes, at: Array, curve: Curve, scale: float, color: str, label: str) -> None:
-    values, band = scale * curve.measured, scale * curve.u95
-    axes.fill_between(at, values - band, values + band, color=color, alpha=0.3, linewidth=0)
-    axes.plot(at, values, color=color, linewidth=1.1, label=label)
-    axes.plot(at, scale * curve.model, "--", color=color, linewidth=0.8)
+def _banded(drop: DropCurves, at: Array, curve: Curve, scale: float, color: int) -> Iterator[Trace]:
+    places, values = at.tolist(), (scale * curve.measured).tolist()
+    words = f"{drop.run.incline_deg:g}°, run {drop.run.number}"
+    yield Trace("", places, values, "band", color, (scale * curve.u95).tolist())
+    yield Trace(words, places, values, "line", color)
+    yield Trace("", places, (scale * curve.model).tolist(), "dash", color)
 
 
-def _posterior(told: Coefficients, simulated: bool) -> PageFigure | None:
-    """Contours of β and μ; none where the posterior has no spread to draw."""
-    mixture = told.posterior
+def _posterior(coefficients: Coefficients, simulated: bool) -> Chart | None:
+    """Draw the regions of β and μ that hold 68.3 % and 95 %; `None` where they have no spread."""
+    mixture = coefficients.posterior
     assert mixture is not None
     beta, mu = (mixture.names.index(name) for name in ("restitution", "friction"))
     weights, means, sds = mixture.weights, mixture.means, mixture.sds
@@ -208,28 +185,22 @@ def _posterior(told: Coefficients, simulated: bool) -> PageFigure | None:
     # The least density inside the smallest regions that hold these shares.
     ordered = np.sort(density, axis=None)[::-1]
     held = np.cumsum(ordered) / ordered.sum()
-    levels = [float(ordered[np.searchsorted(held, share)]) for share in (0.95, 0.683)]
-    levels.append(float(density.max()) * 1.001)
-    if not all(low < high for low, high in pairwise(levels)):
-        return None  # narrower than the grid
-    with canvas((3.2,), 4.2, simulated=simulated) as drawing:
-        (axes,) = drawing.axes
-        axes.contourf(
-            grid, nodes, density.T, levels=levels,
-            colors=[MODEL_BAND, MODEL],
-        )  # fmt: skip
-        line = {one.name: one.least_squares.value for one in told.parameters}
-        axes.plot(line["restitution"], line["friction"], "+", color=INK, label="least squares")
-        axes.locator_params(axis="x", nbins=5)
-        axes.set_xlabel("restitution β")
-        axes.set_ylabel("friction μ")
-        axes.legend()
-    return PageFigure(
-        drawing.svg,
-        "Posterior of restitution and friction",
-        "Posterior of β and μ: the smallest regions that contain 68.3 % and 95 %.",
-        "impacts",
-    )
+    series = []
+    for share, words in ((0.95, "95 %"), (0.683, "68.3 %")):
+        level = ordered[np.searchsorted(held, share)]
+        # At each μ the densities of β have one summit: a region is a band.
+        inside = [np.flatnonzero(column >= level) for column in density.T]
+        rows = [(x, grid[at[[0, -1]]]) for x, at in zip(nodes, inside, strict=True) if at.size]
+        if len(rows) < 2:
+            return None  # narrower than the grid
+        centres = [float(ends.mean()) for _, ends in rows]
+        halves = [float(np.ptp(ends)) / 2 for _, ends in rows]
+        series.append(Trace(words, [float(mu_) for mu_, _ in rows], centres, "band", MODEL, halves))
+    best = {one.name: one.least_squares.value for one in coefficients.parameters}
+    series.append(Trace("least squares", [best["friction"]], [best["restitution"]], "cross", INK))
+    words = "Posterior of β and μ: the smallest regions that contain 68.3 % and 95 %."
+    panel = Panel(PlotAxis("friction μ"), PlotAxis("restitution β"), series, 150.0)
+    return Chart("Posterior of restitution and friction", words, [panel], simulated)
 
 
 def _spread(lines: Sequence[T]) -> list[T]:

@@ -1,4 +1,4 @@
-"""Figures of results as SVG text: pure functions of the analysis, byte for byte repeatable."""
+"""Figures of a session's results: pure functions of the result, as plain data."""
 
 from __future__ import annotations
 
@@ -7,291 +7,289 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
-from rig.measurands import GRAVITY, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
+from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
+from rig.protocol.protocol import Condition
 from rig.report.bars import LABELS, bar
-from rig.report.canvas import INK, MODEL, MODEL_BAND, MUTED, RULE, SECOND, annotate, canvas
-from rig.report.numbers import fixed, value_of
-from rig.report.panels import (
-    legend_above,
-    limit_lines,
-    mark_inclines,
-    run_axis,
-    run_points,
-)
+from rig.report.figure import Chart, Panel, PlotAxis, Trace, residual_panel
+from rig.report.looks import INK, MODEL, MUTED, PARTS, REST, RULE, SECOND
+from rig.report.numbers import fixed, plus_minus, value_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-
-    from matplotlib.axes import Axes
 
     from rig.analysis.result import DropResult
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
-    from rig.protocol.protocol import Condition
     from rig.report.bars import Bars
+    from rig.report.figure import Role
 
+FEWEST_INCLINES = 3
+"""Below, a curve against incline says less than the runs themselves."""
 _GAP_DEG = 2.0  # the curve has a point each degree
-_DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2, "markeredgewidth": 0}
-_MEAN: dict[str, Any] = {
-    "fmt": "o",
-    "color": INK,
-    "markersize": 3.6,
-    "elinewidth": 1.2,
-    "capsize": 3.5,
-    "zorder": 4,
-}
-_SEGMENTS: dict[str, tuple[Any, str]] = {
-    "surface": ("-", "model, rods on the surface"),
-    "pile": ((0, (5, 2.5)), "model, rods on a pile (level)"),
-}
+_INCLINE = PlotAxis("incline of the surface (°)")
+_RUN = PlotAxis("run", whole=True)
+_SEGMENTS: dict[str, tuple[Any, str]] = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
+_SMALL = 0.04
+"""Share of U² below which a source is among the others."""
 
 
-def incline_figure(
+def result_figures(
     analysis: Analysis,
-    curves: Mapping[str, Any] | None = None,
-    simulated: bool = False,
+    curves: Mapping[str, Any],
+    *,
+    simulated: bool,
     bars: Bars = "U95",
-) -> str:
-    """Separation and end speed against inclination (the paper's Fig. 3).
+    site_m_s2: float | None = None,
+) -> Iterator[Chart]:
+    """Yield the figure of the session's result: against incline, or run by run where that is one.
 
     Parameters
     ----------
     curves
-        The model, as `rig.analysis.curves.model_curves` gives it; without, there are no lines.
+        The model, as `rig.analysis.curves.model_curves` gives it; empty draws none.
     simulated
-        Whether to stamp the figure.
+        Whether to stamp figures.
     bars
         What the bars on means stand for.
-
-    Returns
-    -------
-    str
-        SVG.
+    site_m_s2
+        Expected gravity, for scenes without a surface.
     """
-    curves = curves or {}
-    measured = {name for one in analysis.runs for name in one.quantities}
-    rows = [row for row in averaged() if row.name in {*curves, *measured}] or [SEPARATION]
-    strips = {row for row in rows if _compared(analysis.summary, row)}
-    heights = [height for row in rows for height in ((2.5, 1.2) if row in strips else (3.1,))]
-    with canvas(tuple(heights), simulated=simulated) as drawing:
-        panels = iter(drawing.axes)
-        for row in rows:
-            axes = next(panels)
-            _incline_panel(axes, analysis, curves, row, bars)
-            axes.set_ylabel(row.axis)
-            if row == SEPARATION:
-                axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-            elif row == SPEED:
-                _free_fall_line(axes, value_of(curves.get("free_fall_speed_m_s")))
-            if row in strips:
-                _residual_strip(next(panels), analysis.summary, row)
-        legend_above(drawing.axes[0])
-        _incline_axis(drawing.axes[-1])
-    return drawing.svg
-
-
-def _compared(summary: Sequence[Incline], row: Measurand) -> list[Incline]:
-    return [line for line in summary if row.name in line.differences]
-
-
-def _residual_strip(axes: Axes, summary: Sequence[Incline], row: Measurand) -> None:
-    """Draw what is measured less what is predicted, with U of that difference."""
-    lines = _compared(summary, row)
-    differences = [line.differences[row.name] for line in lines]
-    left = [row.fine_scale * one.value for one in differences]
-    widths = [row.fine_scale * one.expanded for one in differences]
-    axes.axhline(0, color=MODEL, linewidth=0.9)
-    axes.errorbar([line.incline_deg for line in lines], left, widths, **_MEAN)
-    axes.set_ylabel(f"{row.symbol} − model\n({row.fine})")
+    measured = {name for run in analysis.runs for name in run.quantities}
+    rows = [row for row in averaged() if row.name in measured]
+    inclines = {run.run.incline_deg for run in analysis.runs}
+    if not rows:
+        return
+    if len(inclines) >= FEWEST_INCLINES and acceleration_in(measured) is None:
+        panels = [panel for row in rows for panel in _incline_panels(analysis, curves, row, bars)]
+        hidden = " Shaded inclines: the rods would not slide, the model has no answer."
+        yield Chart(
+            f"{' and '.join(_title(row) for row in rows)} against incline",
+            f"Line: model with its U. Points: means ± {LABELS[bars]} over single runs (small). "
+            "Lower panels: mean less model, in units of U."
+            + (hidden if unanswered(curves) else ""),
+            panels,
+            simulated,
+        )
+    else:
+        yield Chart(
+            f"{' and '.join(_title(row) for row in rows)} of each run",
+            "Each run ± U (95 %); the band is the mean ± U.",
+            [_runs_panel(analysis, row, site_m_s2) for row in rows],
+            simulated,
+        )
 
 
 def runs_figure(
-    analysis: Analysis, simulated: bool = False, skew_limit_s: float | None = None
-) -> str:
-    """Every run in order: separation less its prediction, and below it the release skew.
-
-    The lower panel is left out where no run has a skew. Where there is no prediction, the mean
-    of the run's inclination takes its place.
+    analysis: Analysis, *, simulated: bool, skew_limit_s: float | None = None
+) -> Chart | None:
+    """Draw every run in order: Δz less its prediction (or mean), and the release skew below.
 
     Parameters
     ----------
-    simulated
-        Whether to stamp the figure.
     skew_limit_s
         Beyond which a run is void, s; `None` draws no limits.
 
     Returns
     -------
-    str
-        SVG.
+    Chart or None
+        `None` where there are no two chains.
     """
     runs = sorted(analysis.runs, key=attrgetter("run.number"))
-    skewed = any(RELEASE_SKEW.name in one.quantities for one in runs)
-    with canvas((3.0, 2.2) if skewed else (3.0,), simulated=simulated) as drawing:
-        top, *rest = drawing.axes
+    names = {name for run in runs for name in run.quantities}
+    panels = []
+    if SEPARATION.name in names:
         references, words = _references(analysis.summary)
-        top.axhline(0, color=MUTED, linewidth=0.9)
-        run_points(top, runs, SEPARATION, references)
-        top.set_ylabel(f"{SEPARATION.symbol} − {words} ({SEPARATION.unit})")
-        for axes in rest:
-            axes.axhline(0, color=MUTED, linewidth=0.9)
-            run_points(axes, runs, RELEASE_SKEW)
-            axes.set_ylabel(f"{RELEASE_SKEW.label} ({RELEASE_SKEW.unit})")
-            if skew_limit_s:
-                limit_lines(axes, skew_limit_s * RELEASE_SKEW.scale)
-        legend_above(top)
-        run_axis(drawing.axes[-1])
-        mark_inclines(drawing.axes, runs)
-    return drawing.svg
+        label = f"Δz − {words}\n({SEPARATION.fine})"
+        zero = Trace("", (), (0.0,), "level", MODEL)
+        scale = SEPARATION.fine_scale
+        points = _run_series(runs, SEPARATION, scale, references)
+        panels.append(Panel(_RUN, PlotAxis(label), [zero, *points], 90.0))
+    if RELEASE_SKEW.name in names:
+        row = RELEASE_SKEW
+        limits = [limit * row.scale for limit in (skew_limit_s or 0.0, -(skew_limit_s or 0.0))]
+        edges = [Trace("limit", (), limits, "limit", SECOND)] if skew_limit_s else []
+        points = _run_series(runs, row, row.scale)
+        panels.append(Panel(_RUN, PlotAxis(f"{row.label}\n({row.unit})"), [*edges, *points], 70.0))
+    if not panels:
+        return None
+    words = (
+        "Runs in order ± U (95 %). If A and B differ above, the chains differ; a skew that stays "
+    )
+    words += "when they change places belongs to the sides."
+    return Chart("Runs in order", words, panels, simulated)
 
 
-def gravity_figure(
-    analysis: Analysis, simulated: bool = False, site_m_s2: float | None = None
-) -> str:
-    """Draw the acceleration of each run, their mean with its uncertainty and the site's value.
-
-    Parameters
-    ----------
-    analysis
-        Of a scene without a surface.
-    simulated
-        Whether to stamp the figure.
-    site_m_s2
-        Expected gravity; `None` for what the summary predicts.
+def budget_figure(summary: Sequence[Incline], *, simulated: bool) -> Chart | None:
+    """Draw for each quantity which share of U² of its means each source makes.
 
     Returns
     -------
-    str
-        SVG.
+    Chart or None
+        `None` where no mean has a budget.
     """
-    runs = sorted(analysis.runs, key=attrgetter("run.number"))
-    row = acceleration_in({name for one in runs for name in one.quantities}) or GRAVITY
-    mean = None
-    if analysis.summary:
-        mean = analysis.summary[0].means.get(row.name)
-        if site_m_s2 is None:
-            site_m_s2 = value_of(analysis.summary[0].predicted.get(row.name))
-    with canvas((3.2,), simulated=simulated) as drawing:
-        (axes,) = drawing.axes
-        if mean is not None:
-            axes.axhspan(
-                mean.value - mean.expanded,
-                mean.value + mean.expanded,
-                color=MODEL_BAND,
-                alpha=0.7,
-                linewidth=0,
-                label="mean ± U (95 %)",
-            )
-            axes.axhline(mean.value, color=MODEL, label="mean of runs")
-        if site_m_s2 is not None:
-            expected = "site" if row is GRAVITY else "without friction"
-            axes.axhline(
-                site_m_s2,
-                color=SECOND,
-                linestyle=(0, (5, 2.5)),
-                label=f"{expected}, {fixed(site_m_s2, row.decimals)} {row.unit}",
-            )
-        run_points(axes, runs, row)
-        axes.set_ylabel(row.axis)
-        axes.ticklabel_format(axis="y", useOffset=False)
-        legend_above(axes)
-        run_axis(axes)
-    return drawing.svg
+    shares = {row: parts for row in averaged() if (parts := variance_shares(summary, row))}
+    if not shares:
+        return None
+    most: dict[str, float] = {}
+    for parts in shares.values():
+        for source, share in parts.items():
+            most[source] = max(most.get(source, 0.0), share)
+    named = [name for name in sorted(most, key=lambda name: -most[name]) if most[name] > _SMALL]
+    colors = dict(zip(named, PARTS, strict=False))
+    panels: list[Panel] = []
+    for row, parts in shares.items():
+        begin, series = 0.0, []
+        for source in named:
+            if source in colors and parts.get(source, 0.0) > _SMALL:
+                end = begin + 100.0 * parts[source]
+                series.append(Trace(f"{source} {fixed(end - begin, 0)} %", (end,), (0.0,), "bar",
+                                     colors[source], base=(begin,)))  # fmt: skip
+                begin = end
+        if begin < 99.5:
+            words = f"others {fixed(100.0 - begin, 0)} %"
+            series.append(Trace(words, (100.0,), (0.0,), "bar", REST, base=(begin,)))
+        last = len(panels) == len(shares) - 1
+        axis = PlotAxis("share of U² of the mean (%)" if last else "", limits=(0.0, 100.0))
+        names = PlotAxis("", {0.0: row.symbol}, (-2.0, 0.6))
+        panels.append(Panel(axis, names, series, 64.0))
+    words = "Averaged over all means. “Runs” falls with more runs; all other parts do not."
+    return Chart("What makes U", words, panels, simulated)
 
 
-def _incline_panel(
-    axes: Axes,
-    analysis: Analysis,
-    curves: Mapping[str, Any],
-    row: Measurand,
-    bars: Bars,
-) -> None:
-    key, scale = row.name, row.scale
-    first = None
-    for name, part in _segments(curves) if key in curves else ():
-        where, _, chain = name.partition(", ")  # unlike chains have curves of their own
-        style, label = _SEGMENTS.get(where, (":", f"model, {where}"))
-        label = f"{label}, {chain}" if chain else label
-        first = chain if first is None else first
-        color = MODEL if chain == first else SECOND
-        inclines = [curves["incline_deg"][index] for index in part]
-        values = [_scaled(curves[key][index], scale) for index in part]
-        axes.plot(inclines, values, linestyle=style, color=color, label=label, zorder=3)
-        band = curves.get(row.key("U95"))
-        if band is not None:
-            widths = [_scaled(band[index], scale) for index in part]
-            low = [value - width for value, width in zip(values, widths, strict=True)]
-            high = [value + width for value, width in zip(values, widths, strict=True)]
-            axes.fill_between(inclines, low, high, color=MODEL_BAND, alpha=0.6, linewidth=0)
-    for number, gap in enumerate(unanswered(curves) if key in curves else ()):
-        axes.axvspan(*gap, facecolor="none", edgecolor=RULE, hatch="////", linewidth=0,
-                     label="model has no answer" if number == 0 else None, zorder=0)  # fmt: skip
-    dots = list(_single_runs(analysis.runs, key))
-    if dots:
-        xs, ys = zip(*dots, strict=True)
-        axes.plot(xs, [y * scale for y in ys], color=MUTED, alpha=0.45, label="single runs", **_DOT)
-    lines = [line for line in analysis.summary if key in line.means]
-    if lines:
-        axes.errorbar(
-            [line.incline_deg for line in lines],
-            [line.means[key].value * scale for line in lines],
-            yerr=[(bar(line, key, bars) or 0.0) * scale for line in lines],
-            label=f"mean of runs ± {LABELS[bars]}",
-            **_MEAN,
-        )
+def variance_shares(summary: Sequence[Incline], row: Measurand) -> dict[str, float]:
+    """Return which share of the variance of the means each source makes, the runs' scatter too."""
+    squares: dict[str, float] = {}
+    for line in summary:
+        mean = line.means.get(row.name)
+        if mean is None or not mean.u or "common" not in mean.budget:
+            continue
+        squares["runs"] = squares.get("runs", 0.0) + (mean.budget.get("runs", 0.0) / mean.u) ** 2
+        causes = line.causes.get(row.name, {})
+        whole = sum(u**2 for u in causes.values())
+        for cause, u in causes.items():
+            # What the runs have in common, parted as their own budgets part it.
+            part = (mean.budget["common"] / mean.u) ** 2 * u**2 / whole
+            squares[cause] = squares.get(cause, 0.0) + part
+    total = sum(squares.values())
+    return {name: square / total for name, square in squares.items()} if total else {}
 
 
 def unanswered(curves: Mapping[str, Any]) -> list[tuple[float, float]]:
     """Inclines between those of the model's curves for which it has no answer, degrees."""
-    found = sorted(set(curves.get("incline_deg", ())))
-    return [(low, high) for low, high in pairwise(found) if high - low > _GAP_DEG]
+    inclines = sorted(set(curves.get("incline_deg", ())))
+    return [(low, high) for low, high in pairwise(inclines) if high - low > _GAP_DEG]
 
 
-def _segments(curves: Mapping[str, Any]) -> Iterator[tuple[str, list[int]]]:
-    """Yield stretches of neighbouring points on the same part of the model."""
-    names = curves.get("segments") or ["surface"] * len(curves.get("incline_deg", ()))
-    for name, indices in groupby(range(len(names)), key=lambda index: names[index]):
-        yield str(name), list(indices)
+def _title(row: Measurand) -> str:
+    return f"{row.title} {row.symbol}"
 
 
-def _single_runs(runs: Sequence[DropResult], name: str) -> Iterator[tuple[float, float]]:
-    """Yield runs that count, spread a little sideways so that they do not hide each other."""
-    counted = [one for one in runs if one.verdict in GOOD and name in one.quantities]
-    counted.sort(key=attrgetter("run.incline_deg", "run.number"))
-    for incline, group in groupby(counted, key=attrgetter("run.incline_deg")):
-        members = list(group)
-        step = min(0.28, 2.2 / len(members))
-        for place, one in enumerate(members):
-            yield incline + step * (place - (len(members) - 1) / 2), one.quantities[name].value
+def _incline_panels(
+    analysis: Analysis, curves: Mapping[str, Any], row: Measurand, bars: Bars
+) -> Iterator[Panel]:
+    """Yield a measurand against incline, and below it what it is off by."""
+    good = [run for run in analysis.runs if run.verdict in GOOD and row.name in run.quantities]
+    values = [run.quantities[row.name].value * row.scale for run in good]
+    lines = [line for line in analysis.summary if row.name in line.means]
+    inclines = [line.incline_deg for line in lines]
+    means = [line.means[row.name].value * row.scale for line in lines]
+    widths = [(bar(line, row.name, bars) or 0.0) * row.scale for line in lines]
+    series = [
+        *_model_series(curves, row),
+        Trace("", [run.run.incline_deg for run in good], values, "points", MUTED),
+        Trace("means", inclines, means, "mean", INK, widths),
+    ]
+    yield Panel(_INCLINE, PlotAxis(f"{row.title}\n{row.symbol} ({row.unit})"), series, 110.0)
+    errors = [(line.incline_deg, line.normalized_error(row.name)) for line in lines]
+    known = [(incline, error) for incline, error in errors if error is not None]
+    if known:
+        yield residual_panel(_INCLINE, *map(list, zip(*known, strict=True)))
 
 
-def _incline_axis(axes: Axes) -> None:
-    axes.set_xlabel("incline of the surface (°)")
-    axes.margins(x=0.03)
-    low, high = axes.get_xlim()
-    if high - low < 10:  # one inclination alone must not fill the axis with thousandths
-        axes.set_xlim(low - 5, high + 5)
-
-
-def _free_fall_line(axes: Axes, speed: float | None) -> None:
-    if speed is None:
+def _model_series(curves: Mapping[str, Any], row: Measurand) -> Iterator[Trace]:
+    """Yield the model's curve part by part, with its bands and the inclines it cannot answer."""
+    if row.name not in curves:
         return
-    axes.axhline(speed, color=MUTED, linewidth=1.0, linestyle=(0, (1, 2)))
-    at, coords = (0.005, speed), ("axes fraction", "data")
-    annotate(axes, f"free fall, {fixed(speed, 2)} m/s", at, (0, 3), xycoords=coords, color=MUTED)
+    for gap in unanswered(curves):
+        yield Trace("", gap, (), "gap", RULE)
+    inclines, first = curves["incline_deg"], None
+    names = curves.get("segments") or ["surface"] * len(inclines)
+    for name, part in groupby(range(len(names)), key=lambda index: names[index]):
+        where, _, chain = name.partition(", ")  # unlike chains have curves of their own
+        first = chain if first is None else first
+        color = MODEL if chain == first else SECOND
+        role, label = _SEGMENTS[where]
+        places = list(part)
+        at = [inclines[place] for place in places]
+        values = [row.scale * curves[row.name][place] for place in places]
+        widths = [row.scale * curves[row.key("U95")][place] for place in places]
+        yield Trace("", at, values, "band", color, widths)
+        yield Trace(f"{label}, {chain}" if chain else label, at, values, role, color)
+    speed = value_of(curves.get("free_fall_speed_m_s"))
+    if row == SPEED and speed is not None:
+        yield Trace("free fall", (), (speed,), "limit", MUTED)
+
+
+def _runs_panel(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> Panel:
+    """Draw a measurand of each run, its mean with U as a band, and what is expected."""
+    runs = sorted(analysis.runs, key=attrgetter("run.number"))
+    series = []
+    expected = site_m_s2 if acceleration_in([row.name]) else None
+    for line in analysis.summary:
+        if row.name in line.means:
+            mean = line.means[row.name]
+            low, high = ((mean.value + way * mean.expanded) * row.scale for way in (-1, 1))
+            series.append(Trace("", (), (low, high), "shade", MODEL))
+            words = f"mean {plus_minus(mean, row.scale, row.decimals)} {row.unit}"
+            series.append(Trace(words, (), (mean.value * row.scale,), "level", MODEL))
+            expected = expected or value_of(line.predicted.get(row.name))
+    if expected is not None:
+        words = f"expected {fixed(expected * row.scale, row.decimals)}"
+        series.append(Trace(words, (), (expected * row.scale,), "limit", SECOND))
+    series += _run_series(runs, row, row.scale)
+    return Panel(_RUN, PlotAxis(f"{row.title}\n{row.symbol} ({row.unit})"), series, 110.0)
+
+
+def _run_series(
+    runs: Sequence[DropResult],
+    row: Measurand,
+    scale: float,
+    references: Mapping[Condition, float] | None = None,
+) -> Iterator[Trace]:
+    """Yield a quantity of every run: a series for each chain that strikes, void runs as crosses."""
+    chains = sorted({run.run.impact or "" for run in runs})
+    groups: dict[str | None, list[tuple[float, float, float]]] = {}
+    for run in runs:
+        measured = run.quantities.get(row.name)
+        reference = 0.0 if references is None else _reference(run, references)
+        if measured is not None and reference is not None:
+            group = (run.run.impact or "") if run.verdict in GOOD else None
+            point = run.run.number, (measured.value - reference) * scale, measured.expanded * scale
+            groups.setdefault(group, []).append(point)
+    for chain in [*chains, None]:
+        if chain in groups:
+            numbers, values, widths = map(list, zip(*groups[chain], strict=True))
+            second = chain is not None and chains.index(chain) % 2
+            role: Role = "ring" if second else "mean" if chain is not None else "cross"
+            color = SECOND if second else INK if chain is not None else MUTED
+            words = f"{chain} strikes" if chain else "" if chain is not None else "not counted"
+            yield Trace(words, numbers, values, role, color, widths if chain is not None else ())
+
+
+def _reference(run: DropResult, references: Mapping[Condition, float]) -> float | None:
+    like = Condition(run.run.incline_deg)  # where it makes no difference which one strikes
+    return references.get(like._replace(impact_chain=run.run.impact), references.get(like))
 
 
 def _references(summary: Sequence[Incline]) -> tuple[dict[Condition, float], str]:
     """Return what runs are compared with, by condition, and the words for it."""
-    model = {line.condition: line.predicted.get(SEPARATION.name) for line in summary}
-    found = {key: one.value for key, one in model.items() if one is not None}
-    if found:
-        return found, "model"
-    means = {line.condition: line.means.get(SEPARATION.name) for line in summary}
-    return {key: one.value for key, one in means.items() if one is not None}, "mean"
-
-
-def _scaled(quantity: object, scale: float) -> float:
-    value = value_of(quantity)
-    return float("nan") if value is None else value * scale
+    for words, attribute in (("model", "predicted"), ("mean", "means")):
+        values = {
+            line.condition: getattr(line, attribute)[SEPARATION.name].value
+            for line in summary
+            if SEPARATION.name in getattr(line, attribute)
+        }
+        if values:
+            return values, words
+    return {}, "mean"

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS, averaged, told
 from rig.report.bars import bar
-from rig.report.columns import Column, Mean, fine, mean_columns
+from rig.report.columns import Column, Mean, fine, mean_columns, summary_columns
+from rig.report.finding import raised
 from rig.report.numbers import degrees, fixed, plus_minus
 
 if TYPE_CHECKING:
@@ -23,19 +24,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A heading, sentences, and perhaps a table.
-
-    Attributes
-    ----------
-    folded
-        What a long table is called while it is folded away; empty shows it.
-    """
+    """A heading, sentences or bullets, and perhaps a table."""
 
     heading: str
     sentences: Sequence[str] = ()
     columns: Sequence[Column[Any]] = ()
     records: Sequence[Any] = ()
-    folded: str = ""
+    bullets: bool = False
 
 
 def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
@@ -55,6 +50,49 @@ def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
         )
 
 
+def means_parts(summary: Sequence[Incline]) -> list[Part]:
+    """Return the means of each measurand beside the model."""
+    words = (
+        "Eₙ is the difference from the prediction over the expanded uncertainty of that "
+        "difference, the scatter of single falls included: within ±1 they agree (ISO 13528)."
+    )
+    return [
+        Part(raised(f"{row.title} {row.symbol}"), [words], summary_columns(row), lines)
+        for row in averaged()
+        if (lines := [line for line in summary if row.name in line.means])
+    ]
+
+
+def budget_part(summary: Sequence[Incline]) -> Iterator[Part]:
+    """Yield the table of what makes the uncertainty of the means, where anything is known of it."""
+    lines = [
+        Mean(line, row)
+        for row in averaged()
+        for line in summary
+        if row.name in line.means and line.means[row.name].budget
+    ]
+    if lines:
+        words = "More runs reduce the first part, not the common one. U = k·u covers 95 %."
+        yield Part("Uncertainty of the means", [words], _BUDGET, lines)
+
+
+def _share(mean: Mean, name: str) -> str:
+    return fine(mean.row, mean.line.means[mean.row.name].budget.get(name))
+
+
+_BUDGET: tuple[Column[Mean], ...] = (
+    Column("quantity", lambda mean: f"{mean.row.symbol} ({mean.row.fine})", numeric=False),
+    *mean_columns(attrgetter("line")),
+    Column("u, runs / √n", lambda mean: _share(mean, "runs")),
+    Column("u, common", lambda mean: _share(mean, "common")),
+    Column("u", lambda mean: fine(mean.row, mean.line.means[mean.row.name].u)),
+    Column("U", lambda mean: fine(mean.row, mean.line.means[mean.row.name].expanded)),
+    Column(
+        "largest common sources",
+        lambda mean: ", ".join(list(mean.line.causes.get(mean.row.name, ()))[:2]),
+        numeric=False,
+    ),
+)
 _GATES: tuple[Column[GateMeans], ...] = (
     Column("channel", lambda one: str(one.mean.channel)),
     Column("height (mm)", lambda one: fixed(one.mean.height_m * 1e3, 1)),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cli import main
-from rig.report.method import SOFTWARE
+from rig.report.session_page import SOFTWARE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

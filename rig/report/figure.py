@@ -1,0 +1,142 @@
+"""A figure as plain data: what is drawn, and not how.
+
+Whoever draws it (`rig.report.layout` for pages and files) or writes it (`csv_table`) adds nothing
+to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any, Literal
+
+from rig.report.looks import INK, MODEL
+from rig.text_table import csv_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Values = Sequence[float] | NDArray[np.float64]
+
+Role = Literal[
+    "line", "dash", "band", "level", "limit", "gap", "shade",
+    "points", "mean", "ring", "square", "cross", "bar",
+]  # fmt: skip
+"""How a series looks.
+
+A `line` or `dash` joins its points; a `band` fills y ± u; a `level` or `limit` is a line across the
+panel at each y; a `shade` fills the panel between two y, a `gap` between two x; `points` are small,
+`mean`, `ring` and `square` large, with bars of u; a `cross` does not set the scale; a `bar` lies
+from `base` to x.
+"""
+
+
+_FEW = 40  # points that are drawn large
+_COLUMNS = ("panel", "x_axis", "y_axis", "series", "x", "y", "U95", "begins")
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What is drawn in one way.
+
+    Attributes
+    ----------
+    label
+        Written beside it; empty writes nothing.
+    x, y
+        In units of the axes.
+    role
+        See `Role`.
+    u
+        Half-widths along y, or along x where `across`.
+    base
+        Where each bar begins.
+    color
+        A place in `rig.report.looks.COLORS`.
+    """
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+    role: Role
+    color: int = 0
+    u: Sequence[float] = ()
+    base: Sequence[float] = ()
+    across: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PlotAxis:
+    """An axis: its label with the unit, names in place of numbers, limits, whole numbers only."""
+
+    label: str
+    names: Mapping[float, str] = field(default_factory=dict)
+    limits: tuple[float, float] | None = None
+    whole: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """Series on two axes, so many points high; neighbours with equal x axes share one."""
+
+    x: PlotAxis
+    y: PlotAxis
+    series: Sequence[Trace]
+    height: float = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Panels above each other.
+
+    Attributes
+    ----------
+    title
+        What is shown, for who hears the page.
+    caption
+        One line below the figure.
+    simulated
+        Whether to stamp it.
+    foot
+        Paragraphs below the panels, for a figure that stands alone.
+    """
+
+    title: str
+    caption: str
+    panels: Sequence[Panel]
+    simulated: bool = False
+    foot: Sequence[str] = ()
+
+
+def series(
+    label: str, x: Values, y: Values, role: Role, color: int = INK, u: Values = (),
+    scale: float = 1.0, **options: Any,
+) -> Trace:  # fmt: skip
+    """Return a `Trace` of any numbers, y and u times a factor."""
+    x, y, u = [*map(float, x)], [scale * float(value) for value in y], [*map(float, u)]
+    return Trace(label, x, y, role, color, [scale * value for value in u], **options)
+
+
+def residual_panel(x: PlotAxis, places: Values, ratios: Values) -> Panel:
+    """Return the panel below a curve: what is left over in units of U, ±1 shaded."""
+    most = 1.1 * max(2.0, *(abs(float(ratio)) for ratio in ratios))
+    lines = [
+        Trace("", (), (-1.0, 1.0), "shade", MODEL),
+        Trace("", (), (0.0,), "level", MODEL),
+        series("", places, ratios, "mean" if len(places) <= _FEW else "points"),
+    ]
+    return Panel(x, PlotAxis("residual\n/ U", limits=(-most, most)), lines, 42.0)
+
+
+def csv_table(figure: Chart) -> str:
+    """Write all numbers of a figure as CSV, a row a point."""
+    rows = [
+        [number, panel.x.label, panel.y.label, series.label or series.role, *point]
+        for number, panel in enumerate(figure.panels, 1)
+        for series in panel.series
+        for point in zip_longest(series.x, series.y, series.u, series.base)
+    ]
+    return csv_text(_COLUMNS, [dict(zip(_COLUMNS, row, strict=True)) for row in rows])
