@@ -19,10 +19,9 @@ from rig.errors import InputError, SessionError
 from rig.measurands import MEASURANDS
 from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
-from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
 from rig.report.page import parts_html
-from rig.report.parts import means_parts
+from rig.report.parts import means_parts, summary_table
 from rig.results import calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
 from rig.session.export import column_unit, result_tables

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rig.cache.entry import CacheEntry
@@ -42,10 +43,10 @@ def main(arguments: Namespace) -> int:
         entry = CacheEntry(dict, "estimate pictures", outcome.digest, fresh=fresh)
         drawn = entry.find()
         if drawn is None:
-            drawn = estimate_pictures(estimate, sections, simulated=simulated)
+            drawn = estimate_pictures(estimate, sections)
             drawn = drawn if sections.failed or estimate.failed else entry.keep(drawn)
         for name, figure in drawn.items():
-            write_figure(folder / f"{name}.svg", figure)
+            write_figure(folder / f"{name}.svg", replace(figure, simulated=simulated))
             say(f"{folder / name}.svg")
     for sentence in sections.failed.values():
         say(sentence)

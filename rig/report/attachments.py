@@ -27,22 +27,12 @@ _LARGE = ("edges.csv", "budget.csv", "pings.csv")
 
 
 class Attachment(NamedTuple):
-    """A file inside a page: its name, media type, bytes, and what is in it."""
+    """A file inside a page: its name, media type, bytes in letters, and what is in it."""
 
     name: str
     kind: str
-    content: bytes
+    data: str
     words: str
-
-    @property
-    def data(self) -> str:
-        """The content in letters."""
-        return base64.b64encode(self.content).decode("ascii")
-
-    @property
-    def kilobytes(self) -> int:
-        """Its size for people."""
-        return max(1, round(len(self.content) / 1000))
 
 
 def attachments(session: Reader, outcome: SessionResults) -> list[Attachment]:
@@ -55,9 +45,12 @@ def attachments(session: Reader, outcome: SessionResults) -> list[Attachment]:
         words = "results as CSV files, with the protocol; rig export also writes budgets and edges"
         packed = zipped({name: text for name, text in tables.items() if name not in _LARGE})
     return [
-        Attachment("data.zip", "application/zip", packed, words),
-        Attachment("summary.csv", "text/csv", tables["summary.csv"].encode(), "means only"),
-        Attachment(METHOD, "text/markdown", method_page().encode(), "the whole method"),
+        Attachment(name, kind, base64.b64encode(content).decode("ascii"), words)
+        for name, kind, content, words in (
+            ("data.zip", "application/zip", packed, words),
+            ("summary.csv", "text/csv", tables["summary.csv"].encode(), "means only"),
+            (METHOD, "text/markdown", method_page().encode(), "the whole method"),
+        )
     ]
 
 

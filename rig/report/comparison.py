@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
-from rig.report.columns import Column, aligned, summary_table, verdict_on
-from rig.report.figure import Chart, Panel, PlotAxis, Trace
+from rig.report.columns import table_parts
+from rig.report.figure import Panel, PlotAxis, chart, measured, series
 from rig.report.looks import MODEL, MUTED
-from rig.report.numbers import fixed, plus_minus
 from rig.report.page import PageSection, ReportPage, page_html
-from rig.report.parts import Part
+from rig.report.parts import summary_table
+from rig.report.templates import sentence
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from rig.measurands import Measurand
+    from rig.report.columns import Part
+    from rig.report.figure import Chart
     from rig.results.together import MeanDifference, TogetherResults
 
-_LESS = (
-    "Differences are each session's mean less that of {reference}. Eₙ is the difference over its "
-    "expanded uncertainty U (95 %): within ±1 both agree."
-)
-_SHARED = "Errors of what these have in common cancel: {words} ({names})."
-_NOTHING = "Nothing is taken to be the same rig: no errors cancel."
 _OWNERS = {
     "rig": "clock, gravity and air",
     "posts": "post zeros",
@@ -41,10 +38,9 @@ def shared_lines(results: TogetherResults) -> list[str]:
         for group in groups:
             if len(group) > 1:
                 owners.setdefault(tuple(group), []).append(_OWNERS.get(owner, owner))
-    return [
-        _SHARED.format(words=", ".join(words), names=", ".join(names))
-        for names, words in owners.items()
-    ] or [_NOTHING]
+    return [sentence("common", words, names) for names, words in owners.items()] or [
+        sentence("nothing_common")
+    ]
 
 
 def pooled_lines(results: TogetherResults) -> Iterator[str]:
@@ -61,44 +57,39 @@ def difference_lines(results: TogetherResults) -> Iterator[str]:
     if results.simulated:
         yield "SIMULATED DATA"
     for part in _tables(results):
-        yield from ["", *aligned(part.columns, part.records)]
-    yield from ["", _less(results), *shared_lines(results)]
+        yield from ["", *part.table]
+    yield from ["", *_claims(results)]
 
 
 def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
+    section = PageSection("results", "Results", _claims(results), [draw_comparison(results)],
+                          [*_tables(results)])  # fmt: skip
     title = f"Comparison with {results.fit.parts[0].name}"
-    claims = [_less(results), *shared_lines(results)]
-    figures, tables = [draw_comparison(results)], [*_tables(results)]
-    section = PageSection("results", "Results", claims, figures, tables)
     return page_html(ReportPage(title, [section], results.simulated))
 
 
 def draw_comparison(results: TogetherResults) -> Chart:
     """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
-    differences = results.differences()
     panels = [
-        _difference_panel(row, members)
+        _difference_panel(row, differences)
         for row in averaged()
-        if (members := [one for one in differences if one.quantity == row.name])
+        if (differences := _differences(results, row))
     ]
-    caption = "Differences of means with U (95 %). Across zero, both sessions agree."
-    return Chart("Differences of means", caption, panels, results.simulated)
+    return replace(chart("differences", panels), simulated=results.simulated)
 
 
-def _difference_panel(row: Measurand, members: Sequence[MeanDifference]) -> Panel:
-    places = [-float(number) for number in range(len(members))]
-    names = [", ".join(filter(None, [each.session, _runs(each)])) for each in members]
+def _difference_panel(row: Measurand, differences: Sequence[MeanDifference]) -> Panel:
+    places = [-float(number) for number in range(len(differences))]
+    names = [", ".join(filter(None, [each.session, _runs(each)])) for each in differences]
     limits = places[-1] - 0.6, 0.6
-    values = [each.value.value * row.fine_scale for each in members]
-    widths = [each.value.expanded * row.fine_scale for each in members]
-    zero = Trace("", (0.0, 0.0), limits, "line", MUTED)
-    points = Trace("", values, places, "mean", MODEL, widths, across=True)
+    values = zip(places, (each.value for each in differences), strict=True)
+    points = measured("", values, "mean", MODEL, row.fine_scale, across=True)
     return Panel(
         PlotAxis(f"difference of {row.title} {row.symbol} ± U ({row.fine})"),
         PlotAxis("", dict(zip(places, names, strict=True)), limits),
-        [zero, points],
-        16.0 * (len(members) + 0.5),
+        [series("", (0.0, 0.0), limits, "line", MUTED), points],
+        16.0 * (len(differences) + 0.5),
     )
 
 
@@ -108,51 +99,19 @@ def _runs(mean: MeanDifference | Incline) -> str:
     return "" if acceleration_in(names) else str(mean.condition)
 
 
+def _differences(results: TogetherResults, row: Measurand) -> list[MeanDifference]:
+    return [each for each in results.differences() if each.quantity == row.name]
+
+
 def _tables(results: TogetherResults) -> Iterator[Part]:
     """Yield the tables of each measurand."""
-    differences = results.differences()
     for row in averaged():
-        if means := _means(results, row):
-            yield Part(f"Means of {row.symbol}", (), _mean_columns(row), means)
-        if members := [one for one in differences if one.quantity == row.name]:
-            yield Part(f"Differences of {row.symbol}", (), _difference_columns(row), members)
+        means = ({"session": part.name, "line": line, "runs": _runs(line)}
+                 for part in results.fit.parts for line in part.analysis.summary
+                 if row.name in line.means)  # fmt: skip
+        yield from table_parts("sessions", means, row=row)
+        yield from table_parts("differences", _differences(results, row), row=row, runs=_runs)
 
 
-def _less(results: TogetherResults) -> str:
-    return _LESS.format(reference=results.fit.parts[0].name)
-
-
-def _means(results: TogetherResults, row: Measurand) -> list[tuple[str, Incline]]:
-    """Means of a measurand: the session's name, and the line of its summary."""
-    return [
-        (part.name, line)
-        for part in results.fit.parts
-        for line in part.analysis.summary
-        if row.name in line.means
-    ]
-
-
-def _mean_columns(row: Measurand) -> list[Column[tuple[str, Incline]]]:
-    return [
-        Column("session", lambda one: one[0], numeric=False),
-        Column("runs", lambda one: _runs(one[1]), numeric=False),
-        Column("n", lambda one: str(one[1].n)),
-        Column(
-            f"{row.symbol} ± U ({row.unit})",
-            lambda one: plus_minus(one[1].means[row.name], row.scale, row.decimals),
-        ),
-    ]
-
-
-def _difference_columns(row: Measurand) -> list[Column[MeanDifference]]:
-    return [
-        Column("session", lambda one: one.session, numeric=False),
-        Column("less", lambda one: one.reference, numeric=False),
-        Column("runs", _runs, numeric=False),
-        Column(
-            f"difference of {row.symbol} ± U ({row.fine})",
-            lambda one: plus_minus(one.value, row.fine_scale, row.fine_decimals),
-        ),
-        Column("Eₙ", lambda one: fixed(one.value.normalized_error, 2)),
-        Column("means", lambda one: verdict_on(one.value.normalized_error), numeric=False),
-    ]
+def _claims(results: TogetherResults) -> list[str]:
+    return [sentence("less", results.fit.parts[0].name), *shared_lines(results)]

@@ -6,34 +6,44 @@ to it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import zip_longest
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rig.report.columns import read_tables
 from rig.report.looks import INK, MODEL
 from rig.text_table import csv_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
 
+    from rig.analysis.result import Measured
+
     Values = Sequence[float] | NDArray[np.float64]
 
 Role = Literal[
-    "line", "dash", "band", "level", "limit", "gap", "shade",
-    "points", "mean", "ring", "square", "cross", "bar",
+    "line", "dash", "thick", "band", "level", "limit", "gap", "shade",
+    "points", "mean", "ring", "square", "cross", "bar", "words", "map", "levels",
 ]  # fmt: skip
 """How a series looks.
 
-A `line` or `dash` joins its points; a `band` fills y ± u; a `level` or `limit` is a line across the
-panel at each y; a `shade` fills the panel between two y, a `gap` between two x; `points` are small,
-`mean`, `ring` and `square` large, with bars of u; a `cross` does not set the scale; a `bar` lies
-from `base` to x.
+A `line`, `dash` or `thick` line joins its points, with a gap where one is not a number; a `band`
+fills y ± u; a `level` or `limit` is a line across the panel at
+each y; a `shade` fills the panel between two y, a `gap` between two x; `points` are small, `mean`,
+`ring` and `square` large, with bars of u; a `cross` does not set the scale; a `bar` lies from
+`base` to x; `words` are only the label, outwards from the point; a `map` shades the grid of x
+and y by z, in steps at the levels u, and `levels` are numbered lines there.
 """
 
 
+COLUMN_PT, WIDE_PT = 244.0, 400.0
+"""A journal's column of 86 mm, which is a telephone's width too, and the width of a page."""
+_WORDS = dict(read_tables(Path(__file__).with_name("figures.txt").read_text("utf-8")))
 _FEW = 40  # points that are drawn large
 _COLUMNS = ("panel", "x_axis", "y_axis", "series", "x", "y", "U95", "begins")
 
@@ -54,6 +64,8 @@ class Trace:
         Half-widths along y, or along x where `across`.
     base
         Where each bar begins.
+    z
+        Of a grid, row by row.
     color
         A place in `rig.report.looks.COLORS`.
     """
@@ -66,6 +78,7 @@ class Trace:
     u: Sequence[float] = ()
     base: Sequence[float] = ()
     across: bool = False
+    z: Sequence[float] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +93,16 @@ class PlotAxis:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Series on two axes, so many points high; neighbours with equal x axes share one."""
+    """Series on two axes, so many points high; neighbours with equal x axes share one.
+
+    Where the panel is `true`, a unit is as long on both axes.
+    """
 
     x: PlotAxis
     y: PlotAxis
     series: Sequence[Trace]
     height: float = 120.0
+    true: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +118,11 @@ class Chart:
     simulated
         Whether to stamp it.
     foot
-        Paragraphs below the panels, for a figure that stands alone.
+        Lines below the panels, for a figure that stands alone.
+    width
+        As a file, points.
+    facts
+        For programs, in the file's metadata.
     """
 
     title: str
@@ -109,6 +130,14 @@ class Chart:
     panels: Sequence[Panel]
     simulated: bool = False
     foot: Sequence[str] = ()
+    width: float = COLUMN_PT
+    facts: str = ""
+
+
+def chart(name: str, panels: Sequence[Panel], **values: object) -> Chart:
+    """Return a figure with its title and caption in ``figures.txt``."""
+    heading, caption, _ = _WORDS[name]
+    return Chart(heading.format(**values), caption.format(**values), panels)
 
 
 def series(
@@ -120,15 +149,43 @@ def series(
     return Trace(label, x, y, role, color, [scale * value for value in u], **options)
 
 
-def residual_panel(x: PlotAxis, places: Values, ratios: Values) -> Panel:
-    """Return the panel below a curve: what is left over in units of U, ±1 shaded."""
-    most = 1.1 * max(2.0, *(abs(float(ratio)) for ratio in ratios))
+def measured(
+    label: str, points: Iterable[tuple[float, Measured]], role: Role, color: int = INK,
+    scale: float = 1.0, *, across: bool = False,
+) -> Trace:  # fmt: skip
+    """Return a `Trace` of measured values at their places, large points with bars of U."""
+    rows = [(place, scale * value.value, scale * value.expanded) for place, value in points]
+    places, values, widths = map(list, zip(*rows, strict=True)) if rows else ([], [], [])
+    x, y = (values, places) if across else (places, values)
+    return Trace(
+        label, x, y, role, color, () if role in {"points", "cross"} else widths, (), across
+    )
+
+
+def residual_panels(x: PlotAxis, ratios: Iterable[tuple[float, float]]) -> list[Panel]:
+    """Return the panel below a curve: what is left over in units of U, ±1 shaded.
+
+    Parameters
+    ----------
+    ratios
+        Each at its place; those that are no numbers are left out, for there is no U.
+
+    Returns
+    -------
+    list of Panel
+        None where there is nothing to show.
+    """
+    rows = [(float(place), float(ratio)) for place, ratio in ratios if math.isfinite(ratio)]
+    if not rows:
+        return []
+    places, values = zip(*rows, strict=True)
+    most = 1.1 * max(2.0, *map(abs, values))
     lines = [
         Trace("", (), (-1.0, 1.0), "shade", MODEL),
         Trace("", (), (0.0,), "level", MODEL),
-        series("", places, ratios, "mean" if len(places) <= _FEW else "points"),
+        series("", places, values, "mean" if len(rows) <= _FEW else "points"),
     ]
-    return Panel(x, PlotAxis("residual\n/ U", limits=(-most, most)), lines, 42.0)
+    return [Panel(x, PlotAxis("residual\n/ U", limits=(-most, most)), lines, 42.0)]
 
 
 def csv_table(figure: Chart) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.measurands import ACCELERATION, GRAVITY, averaged
-from rig.report.columns import summary_incline
-from rig.report.numbers import fixed, plus_minus
+from rig.measurands import ACCELERATION, GRAVITY, acceleration_in, averaged
+from rig.report.numbers import plus_minus
+from rig.report.parts import means_of, summary_incline
+from rig.report.templates import sentence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,11 +25,17 @@ _REFERENCES = {
 
 
 class Number(NamedTuple):
-    """A number for a card: what it is, its value ± U, and its unit."""
+    """A number for a card: what it is, its value ± U, its unit, and of which incline."""
 
-    words: str
+    quantity: str
     value: str
     unit: str
+    place: str = ""
+
+    @property
+    def words(self) -> str:
+        """What it is, and where."""
+        return f"{self.quantity} at {self.place}" if self.place else self.quantity
 
 
 class ModelCheck(NamedTuple):
@@ -40,49 +47,21 @@ class ModelCheck(NamedTuple):
 
 def finding(analysis: Analysis) -> str:
     """Say how many drops there were, what they gave with U, and whether the model agrees."""
-    if not analysis.summary:
-        return f"{raised(counted(analysis))}.{' No mean can be given.' if analysis.runs else ''}"
-    numbers = "; ".join(
-        f"{number.words} = {number.value} {number.unit}" for number in headline(analysis.summary)
-    )
-    return (
-        f"{raised(counted(analysis))}. {numbers} (± U, 95 %). {verdict(analysis.summary).sentence}"
-    )
-
-
-def raised(text: str) -> str:
-    """Begin text with a capital; not for what begins with a symbol, since g is not G."""
-    return text[:1].upper() + text[1:]
-
-
-def counted(analysis: Analysis) -> str:
-    """Count runs, drops and what became of them."""
-    if not analysis.runs:
-        return "no run was recorded"
-    drops = (*analysis.runs, *analysis.superseded)
-    verdicts = [drop.verdict for drop in drops]
-    words = [count(len(analysis.runs), "run"), count(len(drops), "drop")]
-    words += [
-        f"{verdicts.count(name)} {name}"
-        for name in ("marginal", "void", "rejected")
-        if name in verdicts
-    ]
-    return ", ".join(words)
-
-
-def count(number: int, noun: str) -> str:
-    """Write a number with its noun."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    summary = analysis.summary
+    return sentence("finding", analysis, headline(summary), verdict(summary).sentence)
 
 
 def headline(summary: Sequence[Incline]) -> list[Number]:
     """Choose at most three numbers: the largest and least mean, or what one differs by."""
     numbers: list[Number] = []
     for row in averaged():
-        lines = sorted(_lines(summary, row), key=lambda line: -line.means[row.name].value)
-        several = len(lines) > 1
-        ends = [lines[0], lines[-1]] if several and not numbers else lines[:1]
-        numbers += [_number(line, row, several=several) for line in ends]
+        means = sorted(means_of(summary, row), key=lambda mean: -mean.mean.value)
+        for line, _ in means[:1] if numbers or len(means) < 2 else (means[0], means[-1]):
+            value = plus_minus(line.means[row.name], row.scale, row.decimals)
+            quantity = row.symbol if row in _REFERENCES else f"{row.title} {row.symbol}"
+            numbers.append(
+                Number(quantity, value, row.unit, _place(line) if len(means) > 1 else "")
+            )
     for row in averaged():
         if len(summary) == 1 and row.name in summary[0].differences:
             difference = summary[0].differences[row.name]
@@ -91,58 +70,27 @@ def headline(summary: Sequence[Incline]) -> list[Number]:
     return numbers[:MOST_NUMBERS]
 
 
+def claims(summary: Sequence[Incline]) -> list[str]:
+    """Say the numbers in a sentence."""
+    free = acceleration_in({name for line in summary for name in line.means})
+    return [sentence("claim", summary, headline(summary), free)] if summary else []
+
+
 def verdict(summary: Sequence[Incline]) -> ModelCheck:
     """Say in one sentence whether means and predictions agree within U."""
     rows = [row for row in averaged() if any(row.name in line.differences for line in summary)]
-    if not rows:
-        return ModelCheck("There is no prediction to compare with.", agrees=True)
-    off = [
-        (abs(error), line, row)
-        for row in rows
-        for line in _lines(summary, row)
-        if (error := line.normalized_error(row.name)) is not None and abs(error) > 1.0
-    ]
-    symbols = " and ".join(row.symbol for row in rows)
-    if not off:
-        number = {1: "", 2: " at both inclines"}
-        where = number.get(len(summary), f" at all {len(summary)} inclines")
-        verb = "agree" if len(rows) > 1 else "agrees"
-        return ModelCheck(
-            f"{symbols} {verb} with {_expected(rows[0])}{where}, within U.", agrees=True
-        )
-    _, line, row = max(off, key=lambda each: each[0])
-    difference = line.differences[row.name]
-    places = {(each.incline_deg, each.impact_chain) for _, each, _ in off}
-    often = f" at {len(places)} of {count(len(summary), 'incline')}" if len(summary) > 1 else ""
-    size, normal = (
-        fixed(abs(value) * row.fine_scale, max(0, row.fine_decimals - 1))
-        for value in (difference.value, difference.expanded)
-    )
-    where = f" at {_where(line)}" if len(summary) > 1 else ""
-    names = " and ".join(dict.fromkeys(each.symbol for _, _, each in off))
-    verb = "differ" if " and " in names else "differs"
-    return ModelCheck(
-        f"{names} {verb} from {_expected(row)}{often}: {row.symbol}{where} by {size} {row.fine}, "
-        f"where ± {normal} {row.fine} would be normal.",
-        agrees=False,
-    )
-
-
-def _lines(summary: Sequence[Incline], row: Measurand) -> list[Incline]:
-    return [line for line in summary if row.name in line.means]
-
-
-def _number(line: Incline, row: Measurand, *, several: bool) -> Number:
-    where = f" at {_where(line)}" if several else ""
-    value = plus_minus(line.means[row.name], row.scale, row.decimals)
-    words = f"{row.title} {row.symbol}{where}" if row not in _REFERENCES else row.symbol
-    return Number(words, value, row.unit)
+    off = [mean for row in rows for mean in means_of(summary, row) if abs(mean.error or 0.0) > 1.0]
+    worst = max(off, key=lambda mean: abs(mean.error or 0.0), default=None)
+    row = worst.row if worst else next(iter(rows), None)
+    where = f" at {_place(worst.line)}" if worst and len(summary) > 1 else ""
+    expected = _expected(row) if row else ""
+    return ModelCheck(sentence("verdict", summary, rows, off, worst, expected, where), not off)
 
 
 def _expected(row: Measurand) -> str:
     return _REFERENCES.get(row, "the model")
 
 
-def _where(line: Incline) -> str:
+def _place(line: Incline) -> str:
     striker = f", {line.impact_chain} strikes" if line.impact_chain else ""
     return f"{summary_incline(line)}°{striker}"

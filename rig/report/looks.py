@@ -1,16 +1,14 @@
-"""Colours and strokes of all figures, on light and on dark pages."""
+"""Colours of all figures, on light and on dark pages."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 COLORS = (
     ("#1f2328", "#e6e9ed"),
     ("#0062a3", "#5db8f0"),
     ("#b34700", "#ff9a55"),
-    ("#e69f00", "#e69f00"),
+    ("#e69f00", "#e69f01"),
     ("#009e73", "#1fb88c"),
-    ("#cc79a7", "#cc79a7"),
+    ("#cc79a7", "#cc79a8"),
     ("#56b4e9", "#3d8fc0"),
     ("#d9c72e", "#c9b82a"),
     ("#9aa3ad", "#77808a"),
@@ -27,31 +25,3 @@ REST, MUTED, RULE, PAPER = 8, 9, 10, 11
 
 SIZE = 8.0
 """Points, of all type in a figure."""
-FONT = "DejaVu Sans"  # ships with matplotlib: the same everywhere
-
-
-class Look(NamedTuple):
-    """How a path is drawn: its stroke's width in points, or filled where that is 0."""
-
-    width: float = 0.0
-    opacity: float = 1.0
-    dash: tuple[float, ...] = ()
-    cap: str = "butt"
-
-
-LOOKS = {
-    "line": Look(1.4),
-    "dash": Look(1.2, dash=(4.0, 2.5)),
-    "limit": Look(0.9, dash=(4.0, 2.5)),
-    "level": Look(0.9),
-    "thin": Look(0.5),
-    "axis": Look(0.7),
-    "whisker": Look(0.9),
-    "cross": Look(0.9),
-    "small": Look(2.2, 0.55, cap="round"),
-    "dot": Look(4.4, cap="round"),
-    "hole": Look(2.6, cap="round"),
-    "block": Look(4.2, cap="square"),
-    "band": Look(0.0, 0.2),
-    "bar": Look(),
-}

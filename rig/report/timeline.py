@@ -5,6 +5,9 @@ from __future__ import annotations
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.measurands import averaged
+from rig.report.numbers import plus_minus
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from fractions import Fraction
@@ -17,6 +20,9 @@ _LEFT, _WIDTH, _LANE = 112, 640, 15
 _STEPS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 _MOST_NUMBERS = 12
 _LONGEST = 2.0  # times as long as most: what falls later in a drop is not drawn
+_ROOM = 480_000
+"""Characters of all timelines together, see `rig.report.attachments`."""
+_AROUND = 900  # characters of a timeline's frame and caption
 _FINE = 2  # steps of a pixel: whole numbers keep a page with a hundred drops small
 
 
@@ -27,37 +33,62 @@ class Lanes(NamedTuple):
     span_ms: float
 
     @property
-    def foot(self) -> int:
-        """Where the axis of time is."""
-        return _LANE * len(self.gates)
-
-    @property
     def ticks(self) -> list[tuple[int, float]]:
         """Milliseconds on that axis, and where they are."""
         step = next((ms for ms in _STEPS_MS if self.span_ms / ms <= _MOST_NUMBERS), 1000)
         per_ms = _WIDTH / self.span_ms
         return [(ms, _LEFT + ms * per_ms) for ms in range(0, int(self.span_ms) + 1, step)]
 
-    def name(self, gate: Gate) -> str:
-        """Name a gate by its height and, where there are two, by its side."""
-        two_sides = len({gate.side for gate in self.gates}) > 1
-        return f"{gate.side + ' ' if two_sides else ''}{1e3 * gate.height:g} mm"
+
+class Timeline(NamedTuple):
+    """A drop's shadows and unexplained edges, as SVG path data, and what is said beside them."""
+
+    result: DropResult
+    bars: str
+    odd: str
+    numbers: str
+
+    @property
+    def anchor(self) -> str:
+        """Its place on the page."""
+        return f"drop-{self.result.run.number}-{self.result.attempt}"
 
 
-def lanes(gates: Sequence[Gate], drops: Sequence[tuple[Drop, float | Fraction]]) -> Lanes:
-    """Sort gates, the side that strikes first, and find the time that all drops need.
+def timelines(
+    gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
+) -> tuple[Lanes, dict[int, Timeline]]:
+    """Draw when each beam was blocked, as far as there is room.
 
     Parameters
     ----------
-    drops
-        Each with its calibrated ticks per second.
+    timed
+        Each raw record with its calibrated ticks per second and its result.
+
+    Returns
+    -------
+    Lanes, dict of int to Timeline
+        What all have in common; those drawn, by number.
     """
+    shared, shown, left = lanes(gates, timed), {}, _ROOM
+    # Those that do not count come first where not all have room.
+    for number in sorted(range(len(timed)), key=lambda n: (timed[n][-1].verdict == "accepted", n)):
+        drawn = timeline(shared, *timed[number])
+        left -= len(drawn.bars) + len(drawn.odd) + _AROUND
+        if drawn.bars and left > 0:
+            shown[number] = drawn
+    return shared, dict(sorted(shown.items()))
+
+
+def lanes(
+    gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
+) -> Lanes:
+    """Sort gates, the side that strikes first, and find the time that all drops need."""
     ordered = sorted(gates, key=lambda gate: (gate.side != "impact", -gate.height))
-    spans = [times[-1] for drop, hz in drops if (times := _times_ms(drop, hz))] or [1.0]
+    spans = [times[-1] for drop, hz, _ in timed if (times := _times_ms(drop, hz))] or [1.0]
     return Lanes(tuple(ordered), max(1.0, min(max(spans), _LONGEST * median(spans))))
 
 
-def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult) -> tuple[str, str]:
+def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult) -> Timeline:
     """Draw when each beam was blocked.
 
     Parameters
@@ -69,12 +100,7 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
     hz
         Calibrated ticks per second.
     result
-        Which of its edges were matched.
-
-    Returns
-    -------
-    bars, marks
-        SVG path data of shadows, and of unexplained edges where anything was matched.
+        Which of its edges were matched; where none was, none is unexplained.
     """
     places = [round(ms * _FINE * _WIDTH / lanes.span_ms) for ms in _times_ms(drop, hz)]
     bars = marks = ""
@@ -93,7 +119,12 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
         if result.matches:
             odd = [place for n, place in at.items() if n not in result.matches]
             marks += "".join(f"M{place} {y}m0-5v10" for place in odd)
-    return bars, marks
+    values = [
+        f", {row.symbol} {plus_minus(value, row.scale, row.decimals)} {row.unit}"
+        for row in averaged()
+        if (value := result.quantities.get(row.name)) is not None
+    ]
+    return Timeline(result, bars, marks, "".join(values))
 
 
 def _times_ms(drop: Drop, hz: float | Fraction) -> list[float]:

@@ -12,7 +12,8 @@ from bench.studies import resolved as bench_resolved
 from rig import cli
 from rig.bench import resolved_paper
 from rig.bench.resolved_paper import Ensemble
-from rig.report.film import film_svg
+from rig.report.files import figure_file
+from rig.report.film import film_figure
 from tests.report.test_figures import FILM
 
 
@@ -80,4 +81,6 @@ def test_what_others_published_is_kept_and_printed(tmp_path, monkeypatch, capsys
 def test_a_fall_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(bench_resolved, "film", lambda folder, incline: FILM)
     assert main(["resolved", "--film", "40", "-o", str(tmp_path)]) == 0
-    assert (tmp_path / "resolved-fall.svg").read_text() == film_svg(FILM)
+    assert (tmp_path / "resolved-fall.svg").read_text() == figure_file(
+        film_figure(FILM), "svg"
+    ).decode()

@@ -8,7 +8,8 @@ from unittest.mock import Mock
 
 import pytest
 
-from rig.report.bars import LABELS, bar
+from rig.measurands import SEPARATION
+from rig.report.parts import LABELS, Mean
 from rig.results import detailed
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS, rig, short
@@ -82,7 +83,7 @@ def test_the_report_has_the_stamp_all_figures_and_every_run(page, analysis, fini
     assert html.startswith("<!DOCTYPE html>")
     assert "<title>SIMULATED – A short campaign</title>" in html
     assert '<p class="stamp">SIMULATED DATA</p>' in html
-    figures = re.findall(r'<svg class="wide".*?</svg>', html, re.DOTALL)
+    figures = re.findall(r'<svg class="slim".*?</svg>', html, re.DOTALL)
     assert len(figures) == 5  # the result, the fall twice, the budget, the runs
     assert all("SIMULATED" in figure for figure in figures)
     assert html.count('<figure class="drop"') == 4  # what the gates saw of each drop
@@ -165,7 +166,7 @@ def test_bars_are_as_long_as_the_analysis_says(finished):
     words = {"U95": "U (95 %)", "SD": "SD of one run", "half-SD": "SD/2 of one run"}
     for bars, label in LABELS.items():
         assert label == words.get(bars, bars)
-        assert bar(drawn, "separation_m", bars) == pytest.approx(expected[bars], rel=1e-9), bars
+        assert Mean(drawn, SEPARATION).bars[bars] == pytest.approx(expected[bars], rel=1e-9), bars
 
 
 def test_the_reader_chooses_what_bars_stand_for(call, finished, tmp_path):

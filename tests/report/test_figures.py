@@ -9,7 +9,6 @@ from dataclasses import replace
 from itertools import combinations
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 from rig.analysis.result import Audit, DropResult, Measured
@@ -17,13 +16,12 @@ from rig.films import Film
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
 from rig.report.canvas import KINDS, canvas
-from rig.report.figure import Chart, csv_table
-from rig.report.figures import budget_figure, result_figures, runs_figure, variance_shares
+from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
+from rig.report.figures import budget_figure, result_figure, runs_figure, variance_shares
 from rig.report.files import figure_file, write_figures
 from rig.report.film import film_figure
-from rig.report.layout import COLUMN_PT, WIDE_PT, lay_out
-from rig.report.looks import SECOND
-from rig.report.svg import figure_svg
+from rig.report.looks import COLORS, SECOND
+from rig.report.plot import page_svg, plot
 from tests.report import fake_analysis
 
 TWO = fake_analysis.two_chains()
@@ -42,48 +40,47 @@ def figures() -> list[Chart]:
     causes = {"separation_m": {"datum": 4e-3, "beam heights": 3e-3, "width": 1e-5}}
     line = replace(TWO.summary[0], means=means, causes=causes)
     return [
-        *result_figures(TWO, CURVES, simulated=True),
-        *result_figures(fake_analysis.gravity(), {}, simulated=True, site_m_s2=9.82),
-        runs_figure(TWO, simulated=True, skew_limit_s=0.005),
-        budget_figure([line], simulated=True),
+        result_figure(TWO, CURVES),
+        result_figure(fake_analysis.gravity(), {}, site_m_s2=9.82),
+        runs_figure(TWO, 0.005),
+        budget_figure([line]),
         film_figure(FILM),
     ]
 
 
 @pytest.mark.parametrize("figure", figures(), ids=lambda figure: figure.title)
-@pytest.mark.parametrize("width", [COLUMN_PT, WIDE_PT])
-def test_a_figure_is_drawn_whole(figure, width):
-    drawing = lay_out(figure, width)
-    ElementTree.fromstring(figure_svg(drawing, figure.title, "wide"))
-    assert drawing.texts[0].words == "SIMULATED DATA"
-    for path in drawing.paths:
-        points = np.array([point for line in path.lines for point in line]).reshape(-1, 2)
-        assert np.isfinite(points).all()
-        assert (points >= 0.0).all()
-        assert (points <= (width, drawing.height)).all()
-    shown = {text.words for text in drawing.texts}
-    named = [series for panel in figure.panels for series in panel.series if series.label]
-    assert {series.label for series in named} <= shown
+@pytest.mark.parametrize("kind", ["slim", "wide"])
+def test_a_figure_is_drawn_whole(figure, kind):
+    width = {"slim": COLUMN_PT, "wide": WIDE_PT}[kind]
+    svg = page_svg(replace(figure, simulated=True), width, kind)
+    root = ElementTree.fromstring(svg)
+    assert root.get("class") == kind
+    assert float(root.get("viewBox").split()[2]) == width
+    shown = {(node.text or "").strip() for node in root.iter() if node.tag.endswith("text")}
+    assert "SIMULATED DATA" in shown
     for panel in figure.panels:
-        assert set(panel.y.label.split("\n")) <= shown | {""}
+        labels = {trace.label for trace in panel.series} | set(panel.y.label.split("\n"))
+        assert labels - {""} <= shown
+    assert not any(light in svg for light, _ in COLORS), "a dark page has other colours"
 
 
 @pytest.mark.parametrize("figure", figures(), ids=lambda figure: figure.title)
-def test_names_of_series_hide_no_other(figure):
-    names = {series.label for panel in figure.panels for series in panel.series} - {""}
-    drawing = lay_out(figure)
-    boxes = [
-        (text.x - (len(text.words) * 2.2 if text.anchor == "middle" else 0.0), text.y, text.words)
-        for text in drawing.texts
-        if text.words in names
-    ]
-    for (x, y, words), (other_x, other_y, other) in combinations(boxes, 2):
-        apart = x + 4.4 * len(words) <= other_x or other_x + 4.4 * len(other) <= x
-        assert apart or abs(y - other_y) > 6.0, (words, other)
+def test_names_of_series_hide_no_other_and_stay_inside(figure):
+    drawing = plot(figure)
+    for panel, axes in zip(figure.panels, drawing.axes, strict=True):
+        names = {trace.label for trace in panel.series} - {""}
+        texts = [text for text in axes.texts if text.get_text() in names]
+        assert {text.get_text() for text in texts} == names
+        boxes = [(text, text.get_window_extent()) for text in texts]
+        for (text, box), (other, beside) in combinations(boxes, 2):
+            assert not box.padded(-1.0).overlaps(beside.padded(-1.0)), (text, other)
+        for text, box in boxes:
+            assert box.x0 >= 0.0, text
+            assert box.x1 <= drawing.figure.bbox.x1 + 1.0, text
 
 
 def test_every_number_of_a_figure_is_in_its_table(tmp_path):
-    (figure,) = result_figures(TWO, CURVES, simulated=True)
+    figure = result_figure(TWO, CURVES)
     rows = list(csv.DictReader(io.StringIO(csv_table(figure))))
     means = [row for row in rows if row["series"] == "means" and row["panel"] == "1"]
     expected = [100.0 * line.means["separation_m"].expanded for line in TWO.summary]
@@ -96,29 +93,36 @@ def test_every_number_of_a_figure_is_in_its_table(tmp_path):
 
 
 def test_points_stand_at_the_incline_at_which_they_were_measured():
-    (figure,) = result_figures(TWO, CURVES, simulated=False)
+    figure = result_figure(TWO, CURVES)
     points = [series for series in figure.panels[0].series if series.role in {"points", "mean"}]
     assert {x for series in points for x in series.x} == set(fake_analysis.MODEL)
 
 
 def test_residuals_are_normalized_errors():
-    (figure,) = result_figures(TWO, CURVES, simulated=False)
+    figure = result_figure(TWO, CURVES)
     points = figure.panels[1].series[-1]
     assert list(points.y) == [line.normalized_error("separation_m") for line in TWO.summary]
     assert figure.panels[1].series[0].y == (-1.0, 1.0)
 
 
+def test_without_any_uncertainty_there_are_no_residuals():
+    """A protocol may state heights as exact."""
+    axis = PlotAxis("time (s)")
+    assert not residual_panels(axis, [(0.1, float("inf")), (0.2, float("nan"))])
+    assert residual_panels(axis, [(0.1, 0.5), (0.2, float("inf"))])
+
+
 def test_figures_follow_the_scene():
-    (single,) = result_figures(fake_analysis.single_chain(), {}, simulated=False)
+    single = result_figure(fake_analysis.single_chain(), {})
     assert "eparation" not in single.title
-    assert runs_figure(fake_analysis.gravity(), simulated=False) is None
-    (gravity,) = result_figures(fake_analysis.gravity(), {}, simulated=False)
+    assert runs_figure(fake_analysis.gravity()) is None
+    gravity = result_figure(fake_analysis.gravity(), {})
     assert [panel.x.label for panel in gravity.panels] == ["run"]
     void = DropResult(Run(1, 40.0, "A", "B"), 1, "void", (), Audit(0, 0, 50, 0, 0))
     for analysis in (fake_analysis.EMPTY, fake_analysis.analysis([void], [])):
-        assert not list(result_figures(analysis, CURVES, simulated=False))
-        assert runs_figure(analysis, simulated=False) is None
-        assert budget_figure(analysis.summary, simulated=False) is None
+        assert result_figure(analysis, CURVES) is None
+        assert runs_figure(analysis) is None
+        assert budget_figure(analysis.summary) is None
 
 
 def test_a_void_run_does_not_set_the_scale():
@@ -127,8 +131,8 @@ def test_a_void_run_does_not_set_the_scale():
     runs[number] = fake_analysis.measured(runs[number], separation_m=Measured(9.0, 0.001))
 
     def numbers(runs):
-        figure = runs_figure(replace(TWO, runs=tuple(runs)), simulated=False)
-        return [text.words for text in lay_out(figure).texts if text.anchor == "end"]
+        drawing = plot(runs_figure(replace(TWO, runs=tuple(runs))))
+        return [axes.get_ylim() for axes in drawing.axes]
 
     assert numbers(runs) == numbers(TWO.runs)
 

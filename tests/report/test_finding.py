@@ -113,19 +113,18 @@ def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
     result = DropResult(
         Run(1, 40.0, "A", "B"), 1, "marginal", (), Audit(5, 4, 0, 1, 0), {}, matches
     )
-    shared = lanes(GATES, [(drop, 1000)])
-    names = ["impact 60 mm", "impact 25 mm", "free 80 mm"]
-    assert [shared.name(gate) for gate in shared.gates] == names
+    shared = lanes(GATES, [(drop, 1000, result)])
+    assert [gate.channel for gate in shared.gates] == [0, 1, 8]  # from the top, impact first
     # 1280 steps for 500 ms: from 100 to 200 and what is not over; blocked from the start.
     bars = "M256 7.5h256m768 0h1M0 22.5h640M1024 37.5h256"
-    assert timeline(shared, drop, 1000, result) == (bars, "M1280 7.5m0-5v10")
-    assert timeline(shared, replace(drop, edges=()), 1000, result) == ("", "")
+    assert timeline(shared, drop, 1000, result) == (result, bars, "M1280 7.5m0-5v10", "")
+    assert timeline(shared, replace(drop, edges=()), 1000, result) == (result, "", "", "")
 
 
 def test_imported_edges_begin_where_they_begin():
     result = DropResult(Run(1, 40.0, "A", None), 1, "void", (), Audit(5, 0, 0, 5, 0))
     late = Drop(1, 1, 1000, tuple(edge._replace(tick=edge.tick + 10_000) for edge in EDGES))
-    bars, marks = timeline(lanes(GATES, [(late, 1000)]), late, 1000, result)
+    _, bars, marks, _ = timeline(lanes(GATES, [(late, 1000, result)]), late, 1000, result)
     assert bars.startswith("M0 7.5h320m")  # 100 of 400 ms
     assert not marks  # nothing was fitted, so nothing is odd
 
@@ -133,7 +132,8 @@ def test_imported_edges_begin_where_they_begin():
 def test_a_drop_that_lasts_long_does_not_squeeze_the_others():
     short = Drop(1, 1, 1000, EDGES, fire_tick=0)
     long = Drop(2, 1, 1000, (*EDGES, Edge(90_000, 0, False)), fire_tick=0)
-    assert lanes(GATES, [(short, 1000), (short, 1000), (long, 1000)]).span_ms == 1000.0
+    drops = [(drop, 1000, None) for drop in (short, short, long)]
+    assert lanes(GATES, drops).span_ms == 1000.0
 
 
 def test_the_same_files_are_the_same_bytes():

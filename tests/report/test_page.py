@@ -6,9 +6,12 @@ import base64
 import re
 import subprocess
 import sys
+from collections import defaultdict
 from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import yaml
 
@@ -16,13 +19,12 @@ from rig import __version__
 from rig.analysis.result import Audit, DropResult
 from rig.protocol.protocol import Run
 from rig.report.attachments import METHOD, Attachment, method_page
-from rig.report.columns import Column
+from rig.report.columns import Part
 from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.finding import Number
-from rig.report.page import PageSection, ReportPage, filled_table, page_html
-from rig.report.parts import Part
+from rig.report.page import PageSection, ReportPage, page_html
 from rig.report.session_page import PAPER, SOFTWARE
-from rig.report.timeline import Lanes
+from rig.report.timeline import Lanes, Timeline
 
 ROOT = Path(__file__).parents[2]
 VOID_TAGS = {"meta", "br", "hr", "img", "link"}
@@ -62,21 +64,28 @@ def parse(page: str) -> Balance:
 
 def page_with(text: str) -> ReportPage:
     """Return a page that says one text wherever a page says anything."""
-    panel = Panel(PlotAxis(text), PlotAxis(text), [Trace(text, [0.0, 1.0], [0.0, 1.0], "line")])
+    panel = Panel(PlotAxis(text), PlotAxis(text), [Trace(text[:8], [0.0, 1.0], [0.0, 1.0], "line")])
     figure = Chart(text, text, [panel])
-    part = Part(text, [text], [Column(text, lambda _: text, numeric=False)], [0])
+    part = Part(text, [text], [(text, False)], [[text]], off={0}, links={0: "drop-1-1"})
     result = DropResult(Run(1, 40.0, text, text), 1, text, (), Audit())
-    drop = {"anchor": "drop-1-1", "result": result, "numbers": text, "bars": "", "odd": "M0 0"}
-    section = PageSection(
-        "result", text, [text], [figure], [part], [part],
-        {"table": filled_table(text, part.columns, [0], {0}, {0: "drop-1-1"}),
-         "timelines": [drop], "lanes": Lanes((), 1.0), "raw": True, "hidden": 1},
-        {"struck": True, "apart": True, "pull": text, "together": False, "again": [text],
-         "files": [Attachment(text, text, b"1", text)], "paper": text, "software": text},
-        [(text, text)], (text, text),
-    )  # fmt: skip
+    drop = Timeline(result, "", "M0 0", text)
+    drops = {"table": part, "timelines": {0: drop}, "lanes": Lanes((), 1.0), "results": [result]}
+    session = Mock(
+        path=SimpleNamespace(name=text),
+        meta=defaultdict(lambda: text),
+        protocol_text=text,
+        protocol_source=text,
+    )
+    session.identities.return_value = [(0, text)]
+    method = defaultdict(lambda: text, session=session, outcome=Mock(), runs=[result],
+                         files=[Attachment(text, text, "1", text)], said=[text])  # fmt: skip
+    method["outcome"].clock.details = {text: text}
+    sections = [
+        PageSection("result", text, [text], [figure], [part], [part], "drops.html", drops),
+        PageSection("method", text, template="method.html", values=method),
+    ]
     return ReportPage(
-        text, [section], True, figure, [Number(text, text, text)], text, True, text, [text], text
+        text, sections, True, [figure], [Number(text, text, text)], text, True, text, [text], text
     )
 
 

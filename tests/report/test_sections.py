@@ -53,7 +53,7 @@ def test_a_single_chain_s_estimate_speaks_of_no_other(found):
     assert "Best single α" in text
     for word in ("free chain", "Δz"):
         assert word not in text
-    drawn = estimate_pictures(found, sections, simulated=True)
+    drawn = estimate_pictures(found, sections)
     assert "Δz" not in drawn["curves"].title + drawn["curves"].caption
     assert not sections.failed
 
@@ -75,11 +75,11 @@ def test_a_part_that_fails_takes_no_other_along(found):
     headings = [part.heading for part in page_parts(broken, sections)]
     assert "Best single α" in headings
     assert "The protocol's model" in headings
-    drawn = estimate_pictures(broken, sections, simulated=True)
-    whole = estimate_pictures(found, Sections(), simulated=True)
+    drawn = estimate_pictures(broken, sections)
+    whole = estimate_pictures(found, Sections())
     assert set(drawn) == set(whole) - {"impulses"}
     assert sections.failed["The picture of the impulses"].startswith(
-        "The picture of the impulses could not be made: TypeError: "
+        "The picture of the impulses could not be made: ValueError: "
     )
 
 
@@ -101,7 +101,7 @@ def test_a_posterior_without_spread_has_no_picture(found, what):
         ),
     )
     sections = Sections()
-    drawn = estimate_pictures(replace(found, coefficients=narrow), sections, simulated=True)
+    drawn = estimate_pictures(replace(found, coefficients=narrow), sections)
     assert "posterior" not in drawn
     assert not sections.failed
 
@@ -110,7 +110,7 @@ def test_a_page_says_what_it_lacks(single, monkeypatch):
     def fail(*_, **__):
         raise TypeError("must be real number, not str")
 
-    for name in ("budget_figure", "result_figures", "fall_figures"):
+    for name in ("budget_figure", "result_figure", "fall_figures"):
         monkeypatch.setattr(f"rig.report.session_page.{name}", fail)
     with Session.open(single, readonly=True) as session:
         material = Material(session, results(session))

@@ -37,6 +37,14 @@ def render(name: str, **values: object) -> str:
     return Markup(environment().get_template(name).render(values))  # noqa: S704 - just escaped
 
 
+def sentence(name: str, *values: object) -> str:
+    """Write a sentence of ``words.txt``."""
+    from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
+
+    write = getattr(environment().get_template("words.txt").module, name)
+    return Markup(write(*values)).unescape()  # noqa: S704 - for a terminal too
+
+
 def _prose(sentence: str) -> str:
     """Escape a sentence, and set its keys and commands in code type."""
     from markupsafe import Markup, escape  # noqa: PLC0415 - comes with Jinja2
