@@ -19,9 +19,9 @@ from rig.errors import InputError, SessionError
 from rig.measurands import MEASURANDS
 from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
-from rig.report.chapters import summary_html
-from rig.report.columns import summary_table
 from rig.report.numbers import plus_minus
+from rig.report.page import parts_html
+from rig.report.parts import means_parts, summary_table
 from rig.results import calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
 from rig.session.export import column_unit, result_tables
@@ -389,7 +389,7 @@ class Results:
     def _repr_html_(self) -> str:
         """Show the summary as notebooks do."""
         stamp = "<p>SIMULATED DATA</p>" if self._found.simulated else ""
-        return stamp + summary_html(self._found.summary)
+        return stamp + parts_html(means_parts(self._found.summary))
 
     def __str__(self) -> str:
         stamp = "SIMULATED DATA\n" if self._found.simulated else ""

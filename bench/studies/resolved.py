@@ -16,6 +16,7 @@ from rig.errors import RigError
 from rig.films import Film
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned
+from rig.report.files import figure_file
 from rig.report.film import film_figure
 from rig.text_table import text_table
 
@@ -40,7 +41,9 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     elif arguments.published:
         yield _published(measure("published_falls"))
     else:
-        drawing = film_figure(film(arguments.protocols, arguments.film))
+        drawing = figure_file(
+            film_figure(film(arguments.protocols, arguments.film)), "svg"
+        ).decode()
         yield Findings({}, ["resolved-fall.svg"], picture=drawing, name="resolved-fall")
 
 

@@ -11,9 +11,8 @@ from rig.commands.output import print_results, progress, show
 from rig.errors import InputError
 from rig.measurands import acceleration_in
 from rig.reasons import make_error
-from rig.report.columns import aligned
 from rig.report.numbers import plus_minus
-from rig.report.parts import effects_parts, gate_parts, prior_part, scatter_part
+from rig.report.parts import effects_parts, gate_parts, prior_parts, scatter_parts
 from rig.results import complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
@@ -51,11 +50,12 @@ def main(arguments: Namespace) -> int:
         members["video"] = video.json(_by_gates(outcome))
     code = print_results(outcome, as_json=arguments.json, members=members)
     if not arguments.json:
-        asked = [scatter_part(outcome.analysis.summary)] if arguments.scatter else []
-        asked += [prior_part(members["prior_sensitivity"])] if arguments.priors else []
-        asked += [*gate_parts(outcome.analysis.summary), *effects_parts(outcome.analysis.effects)]
+        summary = outcome.analysis.summary
+        asked = [*scatter_parts(summary)] if arguments.scatter else []
+        asked += prior_parts(members["prior_sensitivity"]) if arguments.priors else ()
+        asked += [*gate_parts(summary), *effects_parts(outcome.analysis.effects)]
         for part in asked:
-            show(["", part.heading, *aligned(part.columns, part.records)])
+            show(["", part.heading, *part.table])
         if video is not None and "video" in members:
             show(["", *_video_lines(video, _by_gates(outcome))])
         if "monte_carlo" in members:

@@ -76,6 +76,7 @@ def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
             figures=str(page.parent),
             bars="U95",
             fresh=False,
+            estimate=False,
         )
     )
     if arguments.open or _has_screen():

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rig.cache.entry import CacheEntry
 from rig.commands.output import print_json, progress, say, tell_damage
-from rig.files import make_folder, write_atomic
+from rig.files import make_folder
 from rig.report.estimate import estimate_text
 from rig.results import check_open, protocol_of, results
 from rig.results.estimated import session_estimate
@@ -37,14 +38,15 @@ def main(arguments: Namespace) -> int:
         print(estimate_text(estimate, sections, simulated=simulated))
     if folder is not None:
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
+        from rig.report.files import write_figure  # noqa: PLC0415 - likewise
 
         entry = CacheEntry(dict, "estimate pictures", outcome.digest, fresh=fresh)
         drawn = entry.find()
         if drawn is None:
-            drawn = estimate_pictures(estimate, sections, simulated=simulated)
+            drawn = estimate_pictures(estimate, sections)
             drawn = drawn if sections.failed or estimate.failed else entry.keep(drawn)
-        for name, picture in drawn.items():
-            write_atomic(folder / f"{name}.svg", picture.svg)
+        for name, figure in drawn.items():
+            write_figure(folder / f"{name}.svg", replace(figure, simulated=simulated))
             say(f"{folder / name}.svg")
     for sentence in sections.failed.values():
         say(sentence)

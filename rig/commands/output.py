@@ -166,7 +166,7 @@ def print_results(
             print("SIMULATED DATA")
         if outcome.blind:
             print("BLIND: results stay hidden until rig unblind SESSION")
-        from rig.report.columns import summary_table  # noqa: PLC0415 - few commands print one
+        from rig.report.parts import summary_table  # noqa: PLC0415 - few commands print one
         from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 
         if not outcome.blind:

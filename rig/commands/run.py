@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from rig.commands.narration import narrator
 from rig.commands.output import goes_on, print_results
 from rig.recorder.interrupts import Interrupts
-from rig.report.finding import counted, finding, raised
+from rig.report.finding import finding
+from rig.report.templates import sentence
 from rig.runner import run_protocol
 from rig.streams import ask, say
 
@@ -34,7 +35,7 @@ def main(arguments: Namespace) -> int:
         )
         code = print_results(outcome, as_json=arguments.json)
     say(f"session: {arguments.session}")
-    say(f"{raised(counted(outcome.analysis))}." if outcome.blind else finding(outcome.analysis))
+    say(f"{sentence('counted', outcome.analysis)}." if outcome.blind else finding(outcome.analysis))
     return code
 
 

@@ -68,7 +68,7 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
     facts = provenance(protocol, layout)
     if _drawn(output):
-        from rig.report.canvas import write_figure  # noqa: PLC0415 - it needs matplotlib
+        from rig.report.files import write_figure  # noqa: PLC0415 - it needs matplotlib
         from rig.report.sweep import sweep_figure  # noqa: PLC0415 - likewise
 
         write_figure(output, sweep_figure(facts, layout, swept))

@@ -15,7 +15,7 @@ from rig.analysis.joint_fit import by_itself
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import Adjusted
 from rig.measurands import SEPARATION
-from rig.model.fall import hits, kicks
+from rig.model.fall import kicks
 from rig.model.motion import Motion
 from rig.model.rods import rod_impacts
 from rig.protocol.contact import as_struck, at_contact
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from rig.analysis.joint_fit import JointFit
     from rig.analysis.joint_step import JointDrop
-    from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol, Run
 
     Array = NDArray[np.float64]
@@ -138,24 +137,24 @@ def _separations(drop: Adjusted, times: Array) -> Dual:
     return free - struck
 
 
-def _by_model(protocol: Protocol, run: Run) -> tuple[Chain, float, list[float]]:
-    """The chain that strikes, its drop, and what the model says it gains from each rod."""
+def motion_by_model(protocol: Protocol, run: Run) -> Motion:
+    """Return the model's fall of a run that strikes."""
     assert run.impact is not None
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     assert protocol.surface is not None
     chain, drop = as_struck(protocol, run.incline_deg, run.impact)
     impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
     gains = kicks(chain, [impact.alpha for impact in impacts], [impact.gamma for impact in impacts])
-    return chain, drop.value, gains
+    start = protocol.initial_speed.value
+    return Motion(chain, gains, drop.value, protocol.gravity.value, start)
 
 
 def _squares_by_model(protocol: Protocol, run: Run, heights: Array, top: float) -> Array:
     """V² by the model; `top` is the top rod's height above the bottom one."""
-    chain, drop, gains = _by_model(protocol, run)
-    gravity = protocol.gravity.value
-    struck = hits(chain, gains, drop, gravity)
-    before = np.array([-drop, *chain.heights[:-1]])
-    after = np.array([0.0, *(hit.speed_after for hit in struck[:-1])])
+    motion = motion_by_model(protocol, run)
+    begin, gravity = motion.at(0.0), protocol.gravity.value
+    before = np.array([-begin.height_m, *motion.chain.heights[:-1]])
+    after = np.array([begin.speed_m_s, *(hit.speed_after for hit in motion.hits[:-1])])
     fallen = top - heights
     leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)
     squares: Array = np.maximum(after[leg] ** 2 + 2.0 * gravity * (fallen - before[leg]), 0.0)
@@ -163,6 +162,5 @@ def _squares_by_model(protocol: Protocol, run: Run, heights: Array, top: float) 
 
 
 def _separations_by_model(protocol: Protocol, run: Run, times: Array) -> Array:
-    chain, drop, gains = _by_model(protocol, run)
-    motion = Motion(chain, gains, drop, protocol.gravity.value)
+    motion = motion_by_model(protocol, run)
     return np.array([motion.at(min(time, motion.end_s)).separation_m for time in times.tolist()])

@@ -1,59 +1,73 @@
-"""Files that a page carries inside itself, to be saved by whoever reads it."""
+"""What a page carries inside itself, to be saved by whoever reads it, as far as it stays small."""
 
 from __future__ import annotations
 
 import base64
 import io
 import zipfile
-from dataclasses import dataclass
-from html import escape
-from typing import TYPE_CHECKING
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.results import tick_rates
+from rig.session.export import csv_files
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from rig.results import SessionResults
+    from rig.session.reading import Reader
+
+METHOD = "method.md"
+_DATA = 120_000
+"""Bytes of packed tables at most, so that the page of 108 drops stays under 0.8 MB."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 """The first date that the format knows: the same files shall give the same bytes."""
+_LARGE = ("edges.csv", "budget.csv", "pings.csv")
 
 
-@dataclass(frozen=True, slots=True)
-class Attachment:
-    """A file inside a page.
-
-    Attributes
-    ----------
-    name
-        Under which it is saved.
-    kind
-        Its media type.
-    content
-        Its bytes.
-    words
-        What is in it.
-    """
+class Attachment(NamedTuple):
+    """A file inside a page: its name, media type, bytes in letters, and what is in it."""
 
     name: str
     kind: str
-    content: bytes
+    data: str
     words: str
 
 
-def zipped(files: Mapping[str, str]) -> bytes:
+def attachments(session: Reader, outcome: SessionResults) -> list[Attachment]:
+    """Pack a session's tables; without those that are too many for a page to carry."""
+    tables = csv_files(session, outcome.json(), tick_rates(session))
+    tables |= {"protocol.yaml": session.protocol_text}
+    words = "results, budgets and edges as CSV files, with the protocol"
+    packed = zipped(tables)
+    if len(packed) > _DATA:
+        words = "results as CSV files, with the protocol; rig export also writes budgets and edges"
+        packed = zipped({name: text for name, text in tables.items() if name not in _LARGE})
+    return [
+        Attachment(name, kind, base64.b64encode(content).decode("ascii"), words)
+        for name, kind, content, words in (
+            ("data.zip", "application/zip", packed, words),
+            ("summary.csv", "text/csv", tables["summary.csv"].encode(), "means only"),
+            (METHOD, "text/markdown", method_page().encode(), "the whole method"),
+        )
+    ]
+
+
+def zipped(texts: Mapping[str, str]) -> bytes:
     """Pack texts as UTF-8; the same texts give the same bytes."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name, text in files.items():
+        for name, text in texts.items():
             info = zipfile.ZipInfo(name, _EPOCH)
             info.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(info, text.encode("utf-8", "replace"))
     return packed.getvalue()
 
 
-def link(one: Attachment) -> str:
-    """Return a link that saves a file; the page needs no other place for it."""
-    data = base64.b64encode(one.content).decode("ascii")
-    size = max(1, round(len(one.content) / 1000))
-    return (
-        f'<a download="{escape(one.name)}" href="data:{escape(one.kind)};base64,{data}">'
-        f"{escape(one.name)}</a> ({size} kB): {escape(one.words)}"
-    )
+def method_page() -> str:
+    """Return the page on the method as Markdown; it travels with the program."""
+    packed = files("rig.report").joinpath(METHOD)
+    if packed.is_file():
+        return packed.read_text(encoding="utf-8")
+    return Path(__file__).parents[2].joinpath("docs", METHOD).read_text(encoding="utf-8")

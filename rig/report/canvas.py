@@ -1,95 +1,46 @@
-"""The look all figures share, and matplotlib figures as SVG text that never changes by itself."""
+"""What matplotlib draws, as files that never change by themselves."""
 
 from __future__ import annotations
 
 import io
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rig.ctrl_c import ctrl_c_waits
 from rig.errors import InputError
-from rig.files import replacing
+from rig.report import looks
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK = "#1f2328"
-MUTED = "#66707b"
-RULE = "#d5dae0"
-PAPER = "#fefefe"
-MODEL = "#0072b2"
-MODEL_BAND = "#cce3f0"
-SECOND = "#d55e00"
-"""Blue and vermilion of Okabe and Ito's palette; shapes and words say the same once more."""
-PARTS = (MODEL, "#e69f00", "#009e73", "#cc79a7", "#56b4e9", SECOND, "#f0e442", "#9aa3ad")
-"""Parts of a whole: the same palette, and grey for what is left."""
+INK, MODEL, SECOND, MUTED, PAPER = (
+    looks.COLORS[number][0]
+    for number in (looks.INK, looks.MODEL, looks.SECOND, looks.MUTED, looks.PAPER)
+)
 
 Kind = Literal["svg", "png", "pdf"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-_DPI = 200  # of PNG files: sharp in a column of a journal
-
-SIZE = 9.0
-"""Points, of all type in a figure."""
-
-CAPTION: Mapping[str, Any] = {"y": 0.0, "va": "bottom", "parse_math": False, "line": 0.19}
-"""Of a text below all panels; a title may have a $."""
-PASSES: Mapping[str, Any] = {"in_layout": False}
-"""It may pass under the next panel."""
-
-_STYLE: Any = {
-    "axes.axisbelow": True,
-    "axes.edgecolor": MUTED,
-    "axes.grid": True,
-    "axes.grid.axis": "y",
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.8,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "errorbar.capsize": 2.5,
-    "figure.titlesize": SIZE,
-    "figure.titleweight": "bold",
-    "figure.facecolor": PAPER,  # a ground of its own: viewers may be dark
-    "axes.facecolor": PAPER,
-    "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
-    "font.size": SIZE,
-    "grid.color": RULE,
-    "grid.linewidth": 0.6,
-    "axes.titlesize": SIZE,
-    "legend.edgecolor": "none",
-    "legend.facecolor": PAPER,
-    "legend.fancybox": False,
-    "legend.framealpha": 0.9,
-    "lines.linewidth": 1.6,
-    "pdf.fonttype": 42,  # text that can be searched, as journals ask for
-    "svg.fonttype": "path",
-    "svg.hashsalt": "rig",  # without it every run would give other ids
-    "text.color": INK,
-    "xtick.color": MUTED,
-    "xtick.labelcolor": INK,
-    "ytick.color": MUTED,
-    "ytick.labelcolor": INK,
+_UNSAID: dict[Kind, tuple[str, ...]] = {
+    "svg": ("Date", "Creator", "Format", "Type"),
+    "png": ("Software",),
+    "pdf": ("Creator", "Producer", "CreationDate"),
 }
+_SAID = {"pdf": "Subject"}
+STYLE = Path(__file__).with_suffix(".mplstyle")
 
 
+@dataclass(frozen=True, slots=True)
 class Canvas:
-    """A figure being drawn inside `canvas`.
+    """A figure of matplotlib, its panels row by row, and what it says of itself in its files."""
 
-    Attributes
-    ----------
-    axes
-        The panels row by row.
-    svg
-        The text, once the block has ended.
-    """
-
-    def __init__(self, figure: Figure, axes: list[Axes], description: str | None) -> None:
-        self.figure = figure
-        self.axes = axes
-        self._description = description
+    figure: Figure
+    axes: Sequence[Axes] = ()
+    description: str = ""
 
     @property
     def svg(self) -> str:
@@ -99,29 +50,14 @@ class Canvas:
     def file(self, kind: Kind) -> bytes:
         """Return the figure as a file of a kind; the same drawing gives the same bytes."""
         import matplotlib as mpl  # noqa: PLC0415 - as in `canvas`
-        from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415
 
-        made = io.BytesIO()
-        with ctrl_c_waits(), mpl.rc_context(_STYLE):
-            if kind == "svg":
-                # `savefig` would go through all that is drawn once more, only for the layout.
-                drawn: Any = FigureCanvasSVG(self.figure)
-                self.figure.set_dpi(_DPI)  # of pixels in it
-                drawn.print_svg(made, metadata=self._metadata(kind))
-            else:
-                self.figure.savefig(made, format=kind, dpi=_DPI, metadata=self._metadata(kind))
-        return made.getvalue()
-
-    def _metadata(self, kind: Kind) -> dict[str, Any]:
-        if kind == "png":
-            return {"Software": None, "Description": self._description or ""}
-        if kind == "pdf":
-            return {
-                "Creator": None, "Producer": None, "CreationDate": None,
-                "Subject": self._description,
-            }  # fmt: skip
-        unsaid = dict.fromkeys(("Date", "Creator", "Format", "Type"))
-        return {**unsaid, "Description": self._description}
+        written = io.BytesIO()
+        metadata: dict[str, Any] = dict.fromkeys(_UNSAID[kind]) | {
+            _SAID.get(kind, "Description"): self.description
+        }
+        with ctrl_c_waits(), mpl.rc_context(fname=STYLE):
+            self.figure.savefig(written, format=kind, metadata=metadata)
+        return written.getvalue()
 
 
 def kind_of(path: Path) -> Kind:
@@ -141,26 +77,6 @@ def kind_of(path: Path) -> Kind:
     return kind
 
 
-def write_figure(path: Path, drawing: Canvas) -> None:
-    """Write a figure as its file's ending says, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If it says nothing, or the file cannot be written.
-    """
-    content = drawing.file(kind_of(path))
-    with replacing(path) as stream:
-        stream.write(content)
-
-
-def annotate(
-    axes: Axes, words: str, at: tuple[float, float], points: tuple[float, float], **look: Any
-) -> None:
-    """Write words so many points from a place, which is in data unless `look` has ``xycoords``."""
-    axes.annotate(words, at, points, textcoords="offset points", **look)
-
-
 @contextmanager
 def canvas(
     heights: tuple[float, ...],
@@ -169,11 +85,8 @@ def canvas(
     simulated: bool,
     columns: int = 1,
     sharex: bool = True,
-    description: str | None = None,
-    caption: str = "",
-    caption_look: Mapping[str, Any] = CAPTION,
 ) -> Iterator[Canvas]:
-    """Set the style up, hand out empty panels, and make the SVG text at the end.
+    """Set the style up, and hand out empty panels.
 
     Parameters
     ----------
@@ -187,33 +100,16 @@ def canvas(
         Panels side by side in each row.
     sharex
         Whether all panels have one horizontal axis.
-    description
-        Kept in the file's metadata, where programs find it.
-    caption
-        Written below the panels, in lines as they are.
-    caption_look
-        How: properties of the text, with the vertical place ``y`` and the ``line`` height, inches.
     """
     import matplotlib as mpl  # noqa: PLC0415 - half a second that a headless run never pays
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    with ctrl_c_waits(), mpl.rc_context(_STYLE):
-        look = dict(caption_look)
-        line = look.pop("line")
-        heights += (line * (caption.count("\n") + 2),) if caption else ()
+    with ctrl_c_waits(), mpl.rc_context(fname=STYLE):
         figure = Figure(figsize=(width_in, sum(heights)), layout="constrained")
         panels = figure.subplots(
             len(heights), columns, sharex=sharex, squeeze=False, height_ratios=list(heights)
         )
-        shown, foot = (panels[:-1], panels[-1]) if caption else (panels, [])
-        drawing = Canvas(figure, list(shown.flat), description)
-        yield drawing
-        for panel in foot:
-            panel.axis("off")
-        if caption:
-            foot[0].text(0.0, look.pop("y"), caption, transform=foot[0].transAxes, **look)
-            for panel in shown[-1] if sharex else ():
-                panel.tick_params(labelbottom=True)  # which its panel below would take
+        yield Canvas(figure, list(panels.flat))
         figure.align_ylabels(panels.flat)
         if simulated:
             # In a strip of its own, where it hides nothing and nothing hides it.

@@ -1,29 +1,25 @@
-"""Result tables: their columns, for the terminal and the page alike, and as text."""
+"""Tables: their columns, for the terminal and the page alike, and as text."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
-from rig.analysis.result import COUNTS, Audit, Measured
-from rig.measurands import acceleration_in, averaged, listed
+from rig.analysis.result import Measured
+from rig.measurands import MEASURANDS
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Container, Iterable, Iterator, Sequence
 
-    from rig.analysis.result import DropResult
-    from rig.analysis.summary import Incline
     from rig.measurands import Measurand
 
 T = TypeVar("T")
-
-AGREES, DISAGREES = "agrees", "disagrees"
-"""What stands beside Eₙ."""
-
-AUDIT = tuple(field.name for field in fields(Audit))
-"""Counts of edges in the order in which the runs table gives them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,96 +31,80 @@ class Column(Generic[T]):
     numeric: bool = True
 
 
-class Mean(NamedTuple):
-    """A measurand of a line of the summary that has its mean."""
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A heading, sentences or bullets, and perhaps a table.
 
-    line: Incline
-    row: Measurand
-
-
-def summary_incline(line: Incline) -> str:
-    """Write the inclination of a mean; nothing where nothing is struck, so nothing is inclined."""
-    return "" if acceleration_in(line.means) else degrees(line.incline_deg)
-
-
-def run_incline(one: DropResult) -> str:
-    """Write the inclination of a run; likewise."""
-    return "" if one.run.impact is None else degrees(one.run.incline_deg)
-
-
-def main_error(line: Incline) -> float | None:
-    """Eₙ of the first of the quantities, which is what the scene is for."""
-    return line.normalized_error(next(iter(line.means)))
-
-
-def summary_columns(row: Measurand) -> list[Column[Incline]]:
-    """Columns of the means of a measurand beside the model; unlike chains have a line each.
-
-    Eₙ is the normalized error; within ±1 measurement and prediction agree.
+    Attributes
+    ----------
+    head, rows
+        Headings of columns and whether they are of numbers; the text of each row's cells.
+    off, links
+        Rows that do not count, and where the first cells of rows lead on the page.
     """
-    return [
-        *mean_columns(lambda line: line),
-        Column(_heading(row), lambda line: _written(row, line.means)),
-        Column(f"predicted ± U ({row.unit})", lambda line: _predicted(row, line)),
-        Column("Eₙ", lambda line: fixed(line.normalized_error(row.name), 2)),
-        Column("model", lambda line: verdict_on(line.normalized_error(row.name)), numeric=False),
-    ]
+
+    heading: str
+    sentences: Sequence[str] = ()
+    head: Sequence[tuple[str, bool]] = ()
+    rows: Sequence[Sequence[str]] = ()
+    bullets: bool = False
+    off: Container[int] = ()
+    links: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def table(self) -> list[str]:
+        """The table as lines of aligned text."""
+        words = {place for place, (_, numeric) in enumerate(self.head) if not numeric}
+        heading = [heading for heading, _ in self.head]
+        return text_table([heading, *self.rows], left=words, rule=True) if self.rows else []
+
+    @property
+    def lines(self) -> list[str]:
+        """All of it, for a terminal."""
+        return ["", self.heading, *self.table, *self.sentences]
 
 
-def mean_columns(of: Callable[[T], Incline]) -> tuple[Column[T], ...]:
-    """Columns that say of which runs a mean is."""
-    return (
-        Column("incline (°)", lambda record: summary_incline(of(record))),
-        Column("strikes", lambda record: of(record).impact_chain or "", numeric=False),
-        Column("n", lambda record: str(of(record).n)),
-    )
+def table_parts(
+    name: str, records: Iterable[Any] = (), words: Iterable[str] = (),
+    row: Measurand | None = None, **derived: Callable[[Any], Any],
+) -> Iterator[Part]:  # fmt: skip
+    """Yield a table of ``columns.txt``; nothing where there is nothing to say.
+
+    Parameters
+    ----------
+    name
+        Of the table there.
+    words
+        Said of it too.
+    row
+        The measurand of all its records; without it each record has its own, or none.
+    derived
+        What the table calls with ``()``, by name.
+    """
+    records, table = list(records), _TABLES[name]
+    written = partial(str.format, row=row, first=records[0] if records else None)
+    columns = [
+        Column(written(heading, row=kind).strip('"'),
+               partial(_cell, place, way, kind, derived), way.split()[0] not in _WORDS)
+        for heading, place, way, *each in table.rows
+        for kind in (_kinds(each[0]) if each else [row])
+    ]  # fmt: skip
+    if records or words:
+        sentences = [written(table.words), *words] if table.words else list(words)
+        yield filled_part(raised(written(table.heading)), columns, records, sentences)
 
 
-def fine(row: Measurand, value: float | None) -> str:
-    """Write a value of a measurand, SI, in its smaller unit; nothing for `None`."""
-    return "" if value is None else fixed(value * row.fine_scale, row.fine_decimals)
+def raised(text: str) -> str:
+    """Begin text with a capital; not for what begins with a symbol, since g is not G."""
+    return text[:1].upper() + text[1:]
 
 
-def verdict_on(error: float | None) -> str:
-    """Say what a normalized error means; nothing where nothing was compared."""
-    if error is None:
-        return ""
-    return AGREES if abs(error) <= 1.0 else DISAGREES
-
-
-def _predicted(row: Measurand, line: Incline) -> str:
-    """Write what the model says; one that knows its numbers exactly has no ±."""
-    model = line.predicted.get(row.name)
-    if model is None:
-        return ""
-    if not model.u:
-        return fixed(model.value * row.scale, row.decimals)
-    return plus_minus(Measured(model.value, model.u), row.scale)
-
-
-def _heading(row: Measurand) -> str:
-    return f"{row.symbol} ± U ({row.unit})"
-
-
-def _written(row: Measurand, quantities: Mapping[str, Measured]) -> str:
-    return plus_minus(quantities.get(row.name), row.scale, row.decimals)
-
-
-def run_columns() -> list[Column[DropResult]]:
-    """Columns of the runs; raw Δz is as it happened, not corrected to simultaneous release."""
-    return [
-        Column("run", lambda one: str(one.run.number)),
-        Column("attempt", lambda one: str(one.attempt)),
-        Column("verdict", lambda one: one.verdict, numeric=False),
-        Column("incline (°)", run_incline),
-        Column("impact chain", lambda one: one.run.impact or "", numeric=False),
-        *(_measured(row) for row in listed()),
-        Column("edges", lambda one: " / ".join(str(getattr(one.audit, name)) for name in COUNTS)),
-    ]
-
-
-def _measured(row: Measurand) -> Column[DropResult]:
-    return Column(_heading(row), lambda one: _written(row, one.quantities))
+def filled_part(
+    heading: str, columns: Sequence[Column[T]], records: Sequence[T], sentences: Sequence[str] = ()
+) -> Part:
+    """Fill a table."""
+    columns, rows = filled(columns, records)
+    return Part(heading, sentences, [(each.heading, each.numeric) for each in columns], rows)
 
 
 def filled(
@@ -144,24 +124,81 @@ def filled(
 
 def aligned(columns: Sequence[Column[T]], records: Sequence[T]) -> list[str]:
     """Write records as lines of aligned text below their headings; empty columns are left out."""
-    columns, rows = filled(columns, records)
-    words = {place for place, column in enumerate(columns) if not column.numeric}
-    return text_table([[column.heading for column in columns], *rows], left=words, rule=True)
+    return filled_part("", columns, records).table
 
 
-def summary_table(summary: Sequence[Incline]) -> str:
-    """Write the summary as aligned text, a block for each measurand, none wider than 80.
+class _Table(NamedTuple):
+    heading: str
+    words: str
+    rows: list[list[str]]
 
-    Returns
-    -------
-    str
-        Lines without an end of line at the last; one sentence where there is no summary.
-    """
-    if not summary:
-        return "No accepted runs, so no summary."
-    blocks = []
-    for row in averaged():
-        lines = [line for line in summary if row.name in line.means]
-        if lines:
-            blocks.append("\n".join(aligned(summary_columns(row), lines)))
-    return "\n\n".join(blocks)
+
+def read_tables(text: str) -> Iterator[tuple[str, _Table]]:
+    """Yield names with what stands below them in a file such as ``columns.txt``."""
+    for block in text.split("\n[")[1:]:
+        (name, heading), *rows = (
+            re.split(r"\] | {2,}", line) for line in block.strip().split("\n")
+        )
+        words = " ".join(row[0] for row in rows if len(row) == 1)
+        yield name, _Table(heading, words, [row for row in rows if len(row) > 1])
+
+
+def _kinds(each: str) -> list[Measurand]:
+    return [row for row in MEASURANDS.values() if getattr(row, each.removeprefix("each "))]
+
+
+def _cell(
+    place: str, way: str, row: Measurand | None, derived: Mapping[str, Callable[[Any], Any]],
+    record: Any,
+) -> str:  # fmt: skip
+    row, value = row or _member(record, "row"), record
+    for step in place.format(row=row).split("."):
+        name, call, _ = step.partition("()")
+        value = derived[name](value) if call else _member(value, name)
+    way, *numbers = way.split()
+    return _WAYS[way](value, row, *map(float, numbers))
+
+
+def _member(record: Any, name: str) -> Any:
+    return record.get(name) if isinstance(record, Mapping) else getattr(record, name, None)
+
+
+def _text(value: object, *_: object) -> str:
+    return "" if value is None else str(value)
+
+
+def _fixed(value: float | None, _: object, decimals: float, scale: float = 1.0) -> str:
+    return "" if value is None else fixed(scale * value, int(decimals))
+
+
+def _verdict(error: float | None, *_: object) -> str:
+    """Say what a normalized error means; nothing where nothing was compared."""
+    return "" if error is None else "agrees" if abs(error) <= 1.0 else "disagrees"
+
+
+def _predicted(model: Any, row: Measurand) -> str:
+    """Write what the model says; one that knows its numbers exactly has no ±."""
+    if model is None or not model.u:
+        return fixed(model and model.value * row.scale, row.decimals)
+    return plus_minus(Measured(model.value, model.u), row.scale)
+
+
+_TABLES = dict(read_tables(Path(__file__).with_suffix(".txt").read_text("utf-8")))
+_WORDS = ("words", "verdict", "quantity", "symbol")
+"""Ways that write no numbers."""
+_WAYS: dict[str, Callable[..., str]] = {
+    "words": _text,
+    "text": _text,
+    "verdict": _verdict,
+    "quantity": lambda row, _: f"{row.symbol} ({row.fine})",
+    "symbol": lambda name, _: MEASURANDS[name].symbol,
+    "degrees": lambda value, _: degrees(value),
+    "times": lambda value, _: f"× {value:.2f}",
+    "p": lambda value, _: "" if value is None else f"{value:.2g}",
+    "fixed": _fixed,
+    "fine": lambda value, row: _fixed(value, row, row.fine_decimals, row.fine_scale),
+    "predicted": _predicted,
+    "plus_minus": lambda value, _, scale=1.0: plus_minus(value, scale),
+    "usual": lambda value, row: plus_minus(value, row.scale, row.decimals),
+    "small": lambda value, row: plus_minus(value, row.fine_scale, row.fine_decimals),
+}

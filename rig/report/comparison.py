@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
-from rig.report.canvas import MODEL, MUTED, canvas
-from rig.report.chapters import Chapter
-from rig.report.columns import Column, aligned, summary_table, verdict_on
-from rig.report.embed import PageFigure, embedded
-from rig.report.html import page_html
-from rig.report.numbers import fixed, plus_minus
-from rig.report.tables import bullets, paragraphs, table
+from rig.report.columns import table_parts
+from rig.report.figure import Panel, PlotAxis, chart, measured, series
+from rig.report.looks import MODEL, MUTED
+from rig.report.page import PageSection, ReportPage, page_html
+from rig.report.parts import summary_table
+from rig.report.templates import sentence
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from rig.measurands import Measurand
-    from rig.report.canvas import Canvas
+    from rig.report.columns import Part
+    from rig.report.figure import Chart
     from rig.results.together import MeanDifference, TogetherResults
 
-_LESS = (
-    "Differences are each session's mean less that of {reference}. Eₙ is the difference over its "
-    "expanded uncertainty U (95 %): within ±1 both agree."
-)
-_SHARED = "Errors of what these have in common cancel: {words} ({names})."
-_NOTHING = "Nothing is taken to be the same rig: no errors cancel."
 _OWNERS = {
     "rig": "clock, gravity and air",
     "posts": "post zeros",
@@ -43,10 +38,9 @@ def shared_lines(results: TogetherResults) -> list[str]:
         for group in groups:
             if len(group) > 1:
                 owners.setdefault(tuple(group), []).append(_OWNERS.get(owner, owner))
-    return [
-        _SHARED.format(words=", ".join(words), names=", ".join(names))
-        for names, words in owners.items()
-    ] or [_NOTHING]
+    return [sentence("common", words, names) for names, words in owners.items()] or [
+        sentence("nothing_common")
+    ]
 
 
 def pooled_lines(results: TogetherResults) -> Iterator[str]:
@@ -62,48 +56,41 @@ def difference_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means of every session and their differences, as lines of text."""
     if results.simulated:
         yield "SIMULATED DATA"
-    for _, columns, records in _tables(results):
-        yield from ["", *aligned(columns, records)]
-    yield from ["", _less(results), *shared_lines(results)]
+    for part in _tables(results):
+        yield from ["", *part.table]
+    yield from ["", *_claims(results)]
 
 
 def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
+    section = PageSection("results", "Results", _claims(results), [draw_comparison(results)],
+                          [*_tables(results)])  # fmt: skip
     title = f"Comparison with {results.fit.parts[0].name}"
-    drawing = draw_comparison(results)
-    caption = "Differences of means with U (95 %). Across zero, both sessions agree."
-    figure = embedded(PageFigure(drawing.svg, "Differences of means", caption), 1)
-    lead = paragraphs([_less(results)], "lead") + bullets(shared_lines(results))
-    tables = "".join(table(*one) for one in _tables(results))
-    chapters = [Chapter("short", "Summary", lead), Chapter("results", "Results", figure + tables)]
-    return page_html(title, chapters, simulated=results.simulated)
+    return page_html(ReportPage(title, [section], results.simulated))
 
 
-def draw_comparison(results: TogetherResults) -> Canvas:
+def draw_comparison(results: TogetherResults) -> Chart:
     """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
-    differences = results.differences()
     panels = [
-        (row, members)
+        _difference_panel(row, differences)
         for row in averaged()
-        if (members := [one for one in differences if one.quantity == row.name])
+        if (differences := _differences(results, row))
     ]
-    heights = tuple(0.7 + 0.25 * len(members) for _, members in panels)
-    with canvas(heights, simulated=results.simulated, sharex=False) as drawing:
-        for (row, members), axes in zip(panels, drawing.axes, strict=True):
-            axes.axvline(0.0, color=MUTED, linewidth=1.0)
-            axes.errorbar(
-                [one.value.value * row.fine_scale for one in members],
-                range(len(members)),
-                xerr=[one.value.expanded * row.fine_scale for one in members],
-                fmt="o",
-                color=MODEL,
-                markersize=4.2,
-            )
-            names = [", ".join(filter(None, [one.session, _runs(one)])) for one in members]
-            axes.set_yticks(range(len(members)), names)
-            axes.set_ylim(len(members) - 0.5, -0.5)
-            axes.set_xlabel(f"difference of {row.title} {row.symbol} ± U ({row.fine})")
-    return drawing
+    return replace(chart("differences", panels), simulated=results.simulated)
+
+
+def _difference_panel(row: Measurand, differences: Sequence[MeanDifference]) -> Panel:
+    places = [-float(number) for number in range(len(differences))]
+    names = [", ".join(filter(None, [each.session, _runs(each)])) for each in differences]
+    limits = places[-1] - 0.6, 0.6
+    values = zip(places, (each.value for each in differences), strict=True)
+    points = measured("", values, "mean", MODEL, row.fine_scale, across=True)
+    return Panel(
+        PlotAxis(f"difference of {row.title} {row.symbol} ± U ({row.fine})"),
+        PlotAxis("", dict(zip(places, names, strict=True)), limits),
+        [series("", (0.0, 0.0), limits, "line", MUTED), points],
+        16.0 * (len(differences) + 0.5),
+    )
 
 
 def _runs(mean: MeanDifference | Incline) -> str:
@@ -112,53 +99,19 @@ def _runs(mean: MeanDifference | Incline) -> str:
     return "" if acceleration_in(names) else str(mean.condition)
 
 
-def _tables(
-    results: TogetherResults,
-) -> Iterator[tuple[str, Sequence[Column[Any]], Sequence[Any]]]:
-    """Yield name, columns and records of the tables of each measurand."""
-    differences = results.differences()
+def _differences(results: TogetherResults, row: Measurand) -> list[MeanDifference]:
+    return [each for each in results.differences() if each.quantity == row.name]
+
+
+def _tables(results: TogetherResults) -> Iterator[Part]:
+    """Yield the tables of each measurand."""
     for row in averaged():
-        if means := _means(results, row):
-            yield f"Means of {row.symbol}", _mean_columns(row), means
-        if members := [one for one in differences if one.quantity == row.name]:
-            yield f"Differences of {row.symbol}", _difference_columns(row), members
+        means = ({"session": part.name, "line": line, "runs": _runs(line)}
+                 for part in results.fit.parts for line in part.analysis.summary
+                 if row.name in line.means)  # fmt: skip
+        yield from table_parts("sessions", means, row=row)
+        yield from table_parts("differences", _differences(results, row), row=row, runs=_runs)
 
 
-def _less(results: TogetherResults) -> str:
-    return _LESS.format(reference=results.fit.parts[0].name)
-
-
-def _means(results: TogetherResults, row: Measurand) -> list[tuple[str, Incline]]:
-    """Means of a measurand: the session's name, and the line of its summary."""
-    return [
-        (part.name, line)
-        for part in results.fit.parts
-        for line in part.analysis.summary
-        if row.name in line.means
-    ]
-
-
-def _mean_columns(row: Measurand) -> list[Column[tuple[str, Incline]]]:
-    return [
-        Column("session", lambda one: one[0], numeric=False),
-        Column("runs", lambda one: _runs(one[1]), numeric=False),
-        Column("n", lambda one: str(one[1].n)),
-        Column(
-            f"{row.symbol} ± U ({row.unit})",
-            lambda one: plus_minus(one[1].means[row.name], row.scale, row.decimals),
-        ),
-    ]
-
-
-def _difference_columns(row: Measurand) -> list[Column[MeanDifference]]:
-    return [
-        Column("session", lambda one: one.session, numeric=False),
-        Column("less", lambda one: one.reference, numeric=False),
-        Column("runs", _runs, numeric=False),
-        Column(
-            f"difference of {row.symbol} ± U ({row.fine})",
-            lambda one: plus_minus(one.value, row.fine_scale, row.fine_decimals),
-        ),
-        Column("Eₙ", lambda one: fixed(one.value.normalized_error, 2)),
-        Column("means", lambda one: verdict_on(one.value.normalized_error), numeric=False),
-    ]
+def _claims(results: TogetherResults) -> list[str]:
+    return [sentence("less", results.fit.parts[0].name), *shared_lines(results)]

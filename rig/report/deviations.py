@@ -11,7 +11,7 @@ from rig.report.numbers import ranges
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from rig.analysis.session import Analysis
     from rig.protocol.protocol import Protocol
@@ -33,27 +33,23 @@ def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEnt
     list of str
         Sentences; `NONE` alone where there is no deviation.
     """
-    return list(_sentences(protocol, analysis, states)) or [NONE]
-
-
-def _sentences(
-    protocol: Protocol, analysis: Analysis, states: Sequence[StateEntry]
-) -> Iterator[str]:
+    words = []
     recorded = {drop.run.number for drop in analysis.runs}
     missing = [run.number for run in planned_runs(protocol) if run.number not in recorded]
     if missing:
-        yield f"Not recorded: {ranges('run', missing)}."
+        words.append(f"Not recorded: {ranges('run', missing)}.")
     for number, attempts in groupby(analysis.superseded, key=lambda drop: drop.run.number):
         earlier = [f"attempt {drop.attempt} was {drop.verdict}" for drop in attempts]
-        yield f"Run {number} was repeated ({', '.join(earlier)})."
+        words.append(f"Run {number} was repeated ({', '.join(earlier)}).")
     for entry in states:
         if entry.state is RunState.INTERRUPTED:
             why = f": {sentences(entry.reasons)}" if entry.reasons else ""
-            yield f"Run {entry.run}, attempt {entry.attempt} was interrupted{why}."
+            words.append(f"Run {entry.run}, attempt {entry.attempt} was interrupted{why}.")
     rejected = [drop.run.number for drop in analysis.runs if drop.verdict == "rejected"]
     if rejected:
-        yield f"Rejected by the operator: {ranges('run', rejected)}."
+        words.append(f"Rejected by the operator: {ranges('run', rejected)}.")
     first = list(dict.fromkeys(entry.run for entry in states if entry.state is RunState.RECORDED))
     late = [after for before, after in pairwise(first) if after < before]
     if late:
-        yield f"Out of the planned order: {ranges('run', late)}."
+        words.append(f"Out of the planned order: {ranges('run', late)}.")
+    return words or [NONE]

@@ -1,12 +1,13 @@
-"""What a session found, in plain sentences: a report's first paragraph, and a run's last words."""
+"""What a session says in plain sentences: the card of a report, the last words of a run."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from rig.measurands import ACCELERATION, GRAVITY, averaged
-from rig.report.columns import DISAGREES, summary_incline, verdict_on
-from rig.report.numbers import fixed, plus_minus
+from rig.measurands import ACCELERATION, GRAVITY, acceleration_in, averaged
+from rig.report.numbers import plus_minus
+from rig.report.parts import means_of, summary_incline
+from rig.report.templates import sentence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,94 +16,81 @@ if TYPE_CHECKING:
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
 
+MOST_NUMBERS = 3
+_REFERENCES = {
+    GRAVITY: "the protocol's gravity",
+    ACCELERATION: "the acceleration without friction",
+}
+"""What strikes nothing is compared with."""
 
-_FREE = {GRAVITY: "the protocol's gravity", ACCELERATION: "what there would be without friction"}
-"""What strikes nothing, and what it is compared with."""
+
+class Number(NamedTuple):
+    """A number for a card: what it is, its value ± U, its unit, and of which incline."""
+
+    quantity: str
+    value: str
+    unit: str
+    place: str = ""
+
+    @property
+    def words(self) -> str:
+        """What it is, and where."""
+        return f"{self.quantity} at {self.place}" if self.place else self.quantity
+
+
+class ModelCheck(NamedTuple):
+    """Whether measurement and prediction agree, in one sentence."""
+
+    sentence: str
+    agrees: bool
 
 
 def finding(analysis: Analysis) -> str:
-    """Say how many drops there were, what they gave with U, and whether the model agrees.
-
-    Returns
-    -------
-    str
-        Two or three sentences.
-    """
-    said = [raised(counted(analysis))]
-    if analysis.summary:
-        shown = [row for row in averaged() if _lines(analysis.summary, row)]
-        said.append("; ".join(_range(_lines(analysis.summary, row), row) for row in shown))
-        said.append(raised(_agreement(analysis.summary, shown)))
-    elif analysis.runs:
-        said.append("No mean can be given")
-    return " ".join(f"{one}." for one in said)
+    """Say how many drops there were, what they gave with U, and whether the model agrees."""
+    summary = analysis.summary
+    return sentence("finding", analysis, headline(summary), verdict(summary).sentence)
 
 
-def raised(text: str) -> str:
-    """Begin text with a capital; not for what begins with a symbol, since g is not G."""
-    return text[:1].upper() + text[1:]
+def headline(summary: Sequence[Incline]) -> list[Number]:
+    """Choose at most three numbers: the largest and least mean, or what one differs by."""
+    numbers: list[Number] = []
+    for row in averaged():
+        means = sorted(means_of(summary, row), key=lambda mean: -mean.mean.value)
+        for line, _ in means[:1] if numbers or len(means) < 2 else (means[0], means[-1]):
+            value = plus_minus(line.means[row.name], row.scale, row.decimals)
+            quantity = row.symbol if row in _REFERENCES else f"{row.title} {row.symbol}"
+            numbers.append(
+                Number(quantity, value, row.unit, _place(line) if len(means) > 1 else "")
+            )
+    for row in averaged():
+        if len(summary) == 1 and row.name in summary[0].differences:
+            difference = summary[0].differences[row.name]
+            value = plus_minus(difference, row.fine_scale, row.fine_decimals)
+            numbers.append(Number(f"{row.symbol} − {_expected(row)}", value, row.fine))
+    return numbers[:MOST_NUMBERS]
 
 
-def counted(analysis: Analysis) -> str:
-    """Count runs, drops and what became of them."""
-    if not analysis.runs:
-        return "no run was recorded"
-    drops = (*analysis.runs, *analysis.superseded)
-    words = [_many(len(analysis.runs), "run"), _many(len(drops), "drop")]
-    verdicts = [one.verdict for one in drops]
-    words += [
-        f"{verdicts.count(verdict)} {verdict}"
-        for verdict in ("marginal", "void", "rejected")
-        if verdict in verdicts
-    ]
-    return ", ".join(words)
+def claims(summary: Sequence[Incline]) -> list[str]:
+    """Say the numbers in a sentence."""
+    free = acceleration_in({name for line in summary for name in line.means})
+    return [sentence("claim", summary, headline(summary), free)] if summary else []
 
 
-def _many(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+def verdict(summary: Sequence[Incline]) -> ModelCheck:
+    """Say in one sentence whether means and predictions agree within U."""
+    rows = [row for row in averaged() if any(row.name in line.differences for line in summary)]
+    off = [mean for row in rows for mean in means_of(summary, row) if abs(mean.error or 0.0) > 1.0]
+    worst = max(off, key=lambda mean: abs(mean.error or 0.0), default=None)
+    row = worst.row if worst else next(iter(rows), None)
+    where = f" at {_place(worst.line)}" if worst and len(summary) > 1 else ""
+    expected = _expected(row) if row else ""
+    return ModelCheck(sentence("verdict", summary, rows, off, worst, expected, where), not off)
 
 
-def _lines(summary: Sequence[Incline], row: Measurand) -> list[Incline]:
-    return [line for line in summary if row.name in line.means]
+def _expected(row: Measurand) -> str:
+    return _REFERENCES.get(row, "the model")
 
 
-def _where(line: Incline) -> str:
+def _place(line: Incline) -> str:
     striker = f", {line.impact_chain} strikes" if line.impact_chain else ""
     return f"{summary_incline(line)}°{striker}"
-
-
-def _range(lines: Sequence[Incline], row: Measurand) -> str:
-    """Give the value, or the least and the greatest of several."""
-
-    def told(line: Incline) -> str:
-        value = plus_minus(line.means[row.name], row.scale, row.decimals)
-        return f"{value} {row.unit}" + ("" if row in _FREE else f" at {_where(line)}")
-
-    least, most = (pick(lines, key=lambda line: line.means[row.name].value) for pick in (min, max))
-    if least is most:
-        return f"{row.symbol} = {told(least)} (± U, 95 %)"
-    return f"{row.symbol} from {told(least)} to {told(most)} (± U, 95 %)"
-
-
-def _agreement(summary: Sequence[Incline], rows: Sequence[Measurand]) -> str:
-    """Say of each quantity at how many inclines measurement and prediction agree."""
-    whole, parts = [], []
-    for row in rows:
-        errors = [
-            (line, error)
-            for line in _lines(summary, row)
-            if (error := line.normalized_error(row.name)) is not None
-        ]
-        off = [(line, error) for line, error in errors if verdict_on(error) == DISAGREES]
-        if row in _FREE and errors:
-            words = "does not agree" if off else "agrees"
-            return f"within U it {words} with {_FREE[row]} (Eₙ {fixed(errors[0][1], 2)})"
-        if off:
-            named = ", ".join(f"{_where(line)}: Eₙ {fixed(error, 2)}" for line, error in off)
-            parts.append(f"{row.symbol} disagrees at {len(off)} of {len(errors)} ({named})")
-        elif errors:
-            whole.append(row.symbol)
-    if not whole and not parts:
-        return "there is no prediction to compare with"
-    agree = [f"{' and '.join(whole)} agree{'s' if len(whole) == 1 else ''}"] if whole else []
-    return f"with the model {', '.join([*agree, *parts])} within U"

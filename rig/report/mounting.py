@@ -7,30 +7,30 @@ the slope and into the board, unless there is a slot, or its uphill part stands 
 from __future__ import annotations
 
 import math
-import textwrap
 from typing import TYPE_CHECKING
 
-from rig.report.canvas import INK, MODEL, MUTED, PAPER, PASSES, SECOND, annotate, canvas
+from rig.report.figure import Chart, Panel, PlotAxis, series
+from rig.report.looks import INK, MODEL, MUTED, SECOND
+from rig.report.templates import render
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol, Side
-    from rig.report.canvas import Canvas
+    from rig.report.figure import Role, Trace
 
-_BEAMS: dict[Side, str] = {"impact": "full (impact chain)", "free": "dashed (free chain)"}
-_COLOURS: dict[Side, str] = {"impact": SECOND, "free": MODEL}
-_LEGEND = "At each beam: channel: height in mm."
-_WIDTH_IN = 9.0
-_WRAP = 100
-_CAPTION = {"y": 1.0, "va": "top", "family": "DejaVu Sans Mono", "line": 0.195}
+_SIDES: dict[Side, tuple[int, Role, int]] = {
+    "impact": (-1, "line", SECOND),
+    "free": (1, "dash", MODEL),
+}
+_WIDTH_PT, _HEIGHT_PT = 530.0, 330.0
 _NEAR_M = 0.16  # what is drawn larger once more
 _POST_M = 0.12  # from the chains to the posts, as drawn
+_LOW_M = -0.02  # shown below the zero
+_MM = 1e3
 
 
-def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
-    """Draw how the gates of a protocol are mounted.
+def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
+    """Draw how the gates of a protocol are mounted; lengths are in mm.
 
     Parameters
     ----------
@@ -38,70 +38,27 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Canvas:
         The scene.
     gates
         Its gates.
-
-    Returns
-    -------
-    Canvas
-        Lengths are in mm.
     """
-    if protocol.track is not None:
-        return _track_figure(protocol, protocol.track, gates)
     inclines = _inclines(protocol)
-    text = "\n".join(
-        [protocol.title, _LEGEND, "", *_zero(protocol, gates), *_slots(protocol, gates)]
-    )
-    with canvas(
-        (5.6,), _WIDTH_IN, simulated=False, columns=2, sharex=False,
-        description=protocol.title, caption=text, caption_look={**_CAPTION, **PASSES},
-    ) as drawing:  # fmt: skip
-        whole, close = drawing.axes
-        top = max(gate.height for gate in gates.gates)
-        low = min(gate.height for gate in gates.gates)
+    if protocol.track is not None:
+        panels = [_track(protocol, protocol.track, gates)]
+    else:
+        highest = max(gate.height for gate in gates.gates)
         hanging = protocol.drop.value + max(c.chain.length for c in protocol.chains.values())
-        near = max(_NEAR_M, 1.5 * low)
-        # What lies below is named in the other view, where there is room.
-        _side_view(whole, protocol, gates, 1.04 * max(top, hanging), named_above=near)
-        whole.set_ylabel("")
-        whole.set_title("posts and beams, from the side", loc="left")
-        _side_view(close, protocol, gates, near)
-        _name_inclines(close, protocol, 0.45 * near)
-        close.set_title(f"close to the {protocol.zero}" if inclines else "lowest gates", loc="left")
-    return drawing
-
-
-def _track_figure(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Canvas:
-    """Draw a track from the side, with beams across it; all lengths are along it, from one mark."""
-    slope = math.radians(track.incline_deg.value)
-    text = "\n".join([
-        protocol.title, _LEGEND, "",
-        *textwrap.wrap("Lengths are measured along the track from one mark (x), such as its lower "
-                  "end, to each beam and to the glider's middle before release.", _WRAP),
-    ])  # fmt: skip
-    with canvas(
-        (3.0,), _WIDTH_IN, simulated=False, sharex=False,
-        description=protocol.title, caption=text, caption_look=_CAPTION,
-    ) as drawing:  # fmt: skip
-        (side,) = drawing.axes
-        start = protocol.drop.value
-
-        def at(along: float, above: float = 0.0) -> tuple[float, float]:
-            return (
-                1e3 * ((start - along) * math.cos(slope) + above * math.sin(slope)),
-                1e3 * (along * math.sin(slope) + above * math.cos(slope)),
-            )
-
-        side.plot(*zip(at(1.05 * start), at(0.0), strict=True), color=INK, linewidth=2.0)
-        side.plot(*at(0.0), "x", color=INK)
-        side.plot(*at(start), "o", color=INK)
-        for gate in gates.gates:
-            ends = at(gate.height), at(gate.height, _POST_M)
-            side.plot(*zip(*ends, strict=True), color=MODEL, linewidth=0.9)
-            annotate(side, _label(gate), ends[1], (0, 4), ha="center", color=MODEL)
-        side.set_aspect("equal", adjustable="datalim")
-        side.set_xlabel("mm")
-        side.set_title(f"the track at {track.incline_deg.value:g}°, from the side", loc="left")
-        side.grid(visible=False)
-    return drawing
+        near = max(_NEAR_M, 1.5 * min(gate.height for gate in gates.gates))
+        lowest = f"close to the {protocol.zero}" if inclines else "lowest gates"
+        panels = [
+            # What lies below is named in the other view, where there is room.
+            _side_view(protocol, gates, 1.04 * max(highest, hanging), near,
+                       "posts and beams, from the side"),
+            _side_view(protocol, gates, near, 0.0, lowest),
+        ]  # fmt: skip
+    words = render(
+        "mounting.txt", protocol=protocol, gates=gates, inclines=inclines,
+        slots=_slots(protocol, gates),
+    )  # fmt: skip
+    foot = str(words).split("\n")
+    return Chart(protocol.title, protocol.title, panels, foot=foot, width=_WIDTH_PT)
 
 
 def face_below(protocol: Protocol, incline_deg: float) -> float:
@@ -139,97 +96,88 @@ def _inclines(protocol: Protocol) -> list[float]:
     return sorted(set(protocol.plan.inclines)) if protocol.surface is not None else []
 
 
+def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Panel:
+    """Draw a track from the side, with beams across it; all lengths are along it, from one mark."""
+    slope, start = math.radians(track.incline_deg.value), protocol.drop.value
+
+    def at(along: float, above: float = 0.0) -> tuple[float, float]:
+        return (
+            _MM * ((start - along) * math.cos(slope) + above * math.sin(slope)),
+            _MM * (along * math.sin(slope) + above * math.cos(slope)),
+        )
+
+    ends = {gate: (at(gate.height), at(gate.height, _POST_M)) for gate in gates.gates}
+    lines = [
+        _path("thick", at(1.05 * start), at(0.0)),
+        _path("cross", at(0.0)),
+        _path("mean", at(start)),
+        *(_path("line", *pair, color=MODEL) for pair in ends.values()),
+        *(_words(_name(gate), *end, MODEL) for gate, (_, end) in ends.items()),
+    ]
+    title = f"the track at {track.incline_deg.value:g}°, from the side (mm)"
+    return Panel(PlotAxis(title), PlotAxis("mm"), lines, 0.6 * _HEIGHT_PT, true=True)
+
+
 def _side_view(
-    axes: Axes, protocol: Protocol, gates: Gates, top: float, named_above: float = 0.0
-) -> None:
-    """Draw what is below a height, to scale, and name gates; y, uphill, goes to the right."""
+    protocol: Protocol, gates: Gates, top: float, named_above: float, title: str
+) -> Panel:
+    """Draw what is below a height, to scale, and name gates; uphill is to the right."""
+    inclines = _inclines(protocol)
     post = _POST_M if top > 2 * _POST_M else top / 2
-    for incline in _inclines(protocol):
-        fall = math.tan(math.radians(incline))
-        face = -face_below(protocol, incline)
-        ends = [(1e3 * y, 1e3 * (face + y * fall)) for y in (-0.5 * post, 1.2 * post)]
-        axes.plot(*zip(*ends, strict=True), color=MUTED, linewidth=1.0, zorder=1)
-    for y in (-post, post):
-        axes.plot([1e3 * y] * 2, [-20, 1e3 * top], color=INK, linewidth=3.0, zorder=2)
     chain = next(iter(protocol.chains.values()))
-    for height, width in zip(chain.chain.heights, chain.widths, strict=True):
-        z = protocol.drop.value + height
-        axes.plot(0, 1e3 * z, "o", color=INK, markersize=max(2.0, 100 * width), zorder=3)
+    rods = [protocol.drop.value + height for height in chain.chain.heights]
+    lines = [
+        series("", (), (0.0,), "limit"),
+        *(_board(protocol, incline, post) for incline in inclines),
+        *(series("", (x, x), (_LOW_M, top), "thick", scale=_MM) for x in (-_MM * post, _MM * post)),
+        series("", [0.0] * len(rods), rods, "mean", scale=_MM),
+        series("", (0.0,), (0.0,), "cross"),
+    ]  # fmt: skip
+    for place, incline in enumerate([] if named_above else inclines):
+        away = top * (0.3 if place % 2 else 0.45)  # neighbours' names would meet
+        slope, face = math.radians(incline), face_below(protocol, incline)
+        at = away * math.cos(slope), away * math.sin(slope) - face
+        lines.append(_words(f"{incline:g}°", _MM * at[0], _MM * at[1]))
     for gate in gates.gates:
-        if gate.height > top:
-            continue
-        side = -1 if gate.side == "impact" else 1
-        axes.plot(
-            [-1e3 * post, 1e3 * post], [1e3 * gate.height] * 2, color=_COLOURS[gate.side],
-            linewidth=0.9, linestyle="-" if side < 0 else (0, (4, 3)), zorder=2,
-        )  # fmt: skip
-        if gate.height < named_above:
-            continue
-        at, look = (1e3 * side * post, 1e3 * gate.height), {"ha": "right" if side < 0 else "left"}
-        color = _COLOURS[gate.side]
-        annotate(axes, _label(gate), at, (6 * side, 0), va="center", color=color, **look)
-    axes.axhline(0, color=INK, linewidth=0.8, linestyle=":")
-    axes.plot(0, 0, "x", color=INK, zorder=4)
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_xlim(-2.2e3 * post, 2.2e3 * post)
-    axes.set_ylim(-20, 1e3 * top)
-    axes.set_xlabel("mm, uphill to the right" if _inclines(protocol) else "mm")
-    axes.set_ylabel(f"mm {protocol.drop_from}" if _inclines(protocol) else "mm")
-    axes.grid(visible=False)
+        if gate.height <= top:
+            side, role, color = _SIDES[gate.side]
+            height = _MM * gate.height
+            lines.append(series("", (-_MM * post, _MM * post), (height, height), role, color))
+            if gate.height >= named_above:
+                lines.append(_words(_name(gate), 1.05 * side * _MM * post, height, color))
+    unit = "mm, uphill to the right" if inclines else "mm"
+    return Panel(
+        PlotAxis(f"{title} ({unit})", limits=(-2.4 * _MM * post, 2.4 * _MM * post)),
+        PlotAxis(f"mm {protocol.drop_from}" if inclines else "mm", {}, (_MM * _LOW_M, _MM * top)),
+        lines, _HEIGHT_PT, true=True,
+    )  # fmt: skip
 
 
-def _label(gate: Gate) -> str:
-    return f"{gate.channel}: {1e3 * gate.height:g}"
+def _board(protocol: Protocol, incline: float, post: float) -> Trace:
+    """Draw the board at an incline."""
+    face = -face_below(protocol, incline)
+    ends = [(y, face + y * math.tan(math.radians(incline))) for y in (-0.5 * post, 1.2 * post)]
+    return _path("line", *((_MM * y, _MM * z) for y, z in ends), color=MUTED)
 
 
-def _name_inclines(axes: Axes, protocol: Protocol, radius: float) -> None:
-    for place, incline in enumerate(_inclines(protocol)):
-        slope = math.radians(incline)
-        face = -face_below(protocol, incline)
-        away = radius * (1.0 if place % 2 else 1.45)  # neighbours' names would meet
-        at = (1e3 * away * math.cos(slope), 1e3 * (face + away * math.sin(slope)))
-        box = {"facecolor": PAPER, "edgecolor": "none", "pad": 0.6}
-        axes.text(*at, f"{incline:g}°", color=INK, ha="center", va="center", bbox=box)
+def _path(role: Role, *points: tuple[float, float], color: int = INK) -> Trace:
+    return series("", [x for x, _ in points], [y for _, y in points], role, color)
 
 
-def _zero(protocol: Protocol, gates: Gates) -> list[str]:
-    """Say where heights are counted from, and how that is carried to both posts."""
-    if not _inclines(protocol):
-        return [
-            "Measure all heights, of the drop and of every beam, from one level, such as the table."
-        ]
-    posts, marks, agree = "both posts at once", "its post's mark", "marks agree"
-    beams = f"Beams: {', '.join(_BEAMS[side] for side in gates.posts)}."
-    if len(gates.posts) == 1:
-        posts, marks, agree, beams = "the post", "that mark", "mark is right", ""
-    zero = (
-        "Zero: lay a rod on the board where the lowest rod will strike. Its middle is height 0, "
-        f"for the drop and for every beam. Transfer this level to {posts}, with a water hose or a "
-        f"spirit level on a straight bar, and mark it. Measure each beam from {marks} to "
-        f"± {1e3 * gates.height_u:g} mm (height_uncertainty); the {agree} to "
-        f"± {1e3 * gates.datum_u:g} mm (datum_uncertainty)."
-    )
-    if len(_inclines(protocol)) > 1:
-        zero += " To change the incline, turn the board about that rod: 0 stays."
-    return [*textwrap.wrap(zero, _WRAP), *filter(None, [beams]), ""]
+def _words(words: str, x: float, y: float, color: int = INK) -> Trace:
+    return series(words, [x], [y], "words", color)
+
+
+def _name(gate: Gate) -> str:
+    return f"{gate.channel}: {_MM * gate.height:g}"
 
 
 def _slots(protocol: Protocol, gates: Gates) -> list[str]:
     """Say where each beam of the side that strikes meets the board."""
-    inclines = [one for one in _inclines(protocol) if one > 0]
-    beams = sorted(gate.height for gate in gates.on("impact"))
-    if not inclines or not beams:
-        return []
-    rows = [["beam, mm", *(f"{one:g}°" for one in inclines)]]
-    for height in beams:
-        ends = [beam_ends(protocol, height, one) for one in inclines]
-        rows.append([f"{1e3 * height:g}", *(f"{1e3 * y:.0f} | {1e3 * s:.0f}" for y, s in ends)])
-    return [
-        *textwrap.wrap(
-            "Each beam crosses the rods front to back and meets the board at: mm uphill of the "
-            "rods | mm up along the board. Cut a slot there, a little wider than the beam. Or put "
-            "the uphill part closer to the rods than the first number.",
-            _WRAP,
-        ),
-        *text_table(rows),
-    ]
+    inclines = [incline for incline in _inclines(protocol) if incline > 0]
+    rows = [["beam, mm", *(f"{incline:g}°" for incline in inclines)]]
+    for height in sorted(gate.height for gate in gates.on("impact")):
+        ends = [beam_ends(protocol, height, incline) for incline in inclines]
+        cells = (f"{_MM * uphill:.0f} | {_MM * along:.0f}" for uphill, along in ends)
+        rows.append([f"{_MM * height:g}", *cells])
+    return text_table(rows) if inclines and len(rows) > 1 else []

@@ -24,13 +24,6 @@ def value_of(quantity: object) -> float | None:
     return float(quantity) if math.isfinite(quantity) else None
 
 
-def expanded(quantity: object) -> float | None:
-    """Return the expanded uncertainty U95 of a quantity, `None` where it has none."""
-    if isinstance(quantity, Mapping):
-        return value_of(quantity.get("U95"))
-    return value_of(getattr(quantity, "expanded", None))
-
-
 def fixed(value: float | None, decimals: int) -> str:
     """Write a number with that many decimals and a true minus sign; nothing for `None`."""
     if value is None:
@@ -73,7 +66,9 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
     default
         Decimals where there is no uncertainty.
     """
-    value, uncertainty = value_of(quantity), expanded(quantity)
+    value = value_of(quantity)
+    json = quantity if isinstance(quantity, Mapping) else {}
+    uncertainty = value_of(json.get("U95", getattr(quantity, "expanded", None)))
     if value is None:
         return ""
     if uncertainty is None:

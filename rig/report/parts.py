@@ -1,154 +1,163 @@
-"""Sections of a report beside the summary, for the page and the terminal alike."""
+"""Tables of a session's results, for the page and the terminal alike."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+import math
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from rig.measurands import MEASURANDS, averaged, told
-from rig.report.bars import bar
-from rig.report.columns import Column, Mean, fine, mean_columns
-from rig.report.numbers import degrees, fixed, plus_minus
+from rig.analysis.result import COUNTS
+from rig.measurands import MEASURANDS, acceleration_in, averaged
+from rig.reasons import remedies, sentences
+from rig.report.columns import table_parts
+from rig.report.numbers import degrees, signed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from rig.analysis.pairs import Effects
-    from rig.analysis.result import Measured
-    from rig.analysis.summary import GateMeans, Incline
+    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.summary import Incline
     from rig.measurands import Measurand
-    from rig.report.bars import Bars
+    from rig.report.columns import Part
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A heading, sentences, and perhaps a table.
-
-    Attributes
-    ----------
-    folded
-        What a long table is called while it is folded away; empty shows it.
-    """
-
-    heading: str
-    sentences: Sequence[str] = ()
-    columns: Sequence[Column[Any]] = ()
-    records: Sequence[Any] = ()
-    folded: str = ""
+Bars = Literal["U95", "u", "SE", "SD", "half-SD"]
+"""What the bars on a mean stand for, which is the reader's choice: its expanded or standard
+uncertainty, its standard error by scatter alone, the standard deviation of one run, or half of it,
+as in Pantaleone's figures."""
+LABELS: dict[Bars, str] = {
+    "U95": "U (95 %)",
+    "u": "u",
+    "SE": "SE",
+    "SD": "SD of one run",
+    "half-SD": "SD/2 of one run",
+}
 
 
-def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
-    """Yield the section on effects of chains and sides where there are any."""
-    if effects:
-        first, second = effects[0].first, effects[0].second
-        yield Part(
-            f"Differences: chain {first} − chain {second}, and sides",
-            [
-                f"Paired differences over blocks of {first}, {second}, {second}, {first}: the "
-                f"value when {first} strikes minus that when {second} strikes. A release skew that "
-                "stays when the chains change places belongs to the sides; it is positive where "
-                "the free side releases later."
-            ],
-            tuple(_effect_columns()),
-            effects,
-        )
+class Mean(NamedTuple):
+    """A measurand of a line of the summary that has its mean, as tables ask for it."""
+
+    line: Incline
+    row: Measurand
+
+    @property
+    def incline(self) -> str:
+        """The inclination of the line."""
+        return summary_incline(self.line)
+
+    @property
+    def mean(self) -> Measured:
+        """The mean."""
+        return self.line.means[self.row.name]
+
+    @property
+    def error(self) -> float | None:
+        """Eₙ: within ±1 measurement and prediction agree."""
+        return self.line.normalized_error(self.row.name)
+
+    @property
+    def causes(self) -> str:
+        """The largest of the common sources of its uncertainty."""
+        return ", ".join([*self.line.causes.get(self.row.name, ())][:2])
+
+    @property
+    def bars(self) -> dict[Bars, float | None]:
+        """Half the length of each kind of bar; `None` for the scatter of a single run."""
+        sd = self.line.deviations.get(self.row.name)
+        return {
+            "U95": self.mean.expanded,
+            "u": self.mean.u,
+            "SE": sd and sd / math.sqrt(self.line.n),
+            "SD": sd,
+            "half-SD": sd and sd / 2.0,
+        }
 
 
-_GATES: tuple[Column[GateMeans], ...] = (
-    Column("channel", lambda one: str(one.mean.channel)),
-    Column("height (mm)", lambda one: fixed(one.mean.height_m * 1e3, 1)),
-    Column("n", lambda one: str(one.n)),
-    Column("speed ± U (m/s)", lambda one: plus_minus(one.mean.speed, 1.0)),
-    Column("SD (mm/s)", lambda one: _scaled(one.speed_sd)),
-    Column("time since previous gate ± U (ms)", lambda one: plus_minus(one.mean.interval, 1e3)),
-    Column("SD (ms)", lambda one: _scaled(one.interval_sd)),
-)
+def means_of(summary: Sequence[Incline], row: Measurand) -> list[Mean]:
+    """Return the lines that have a mean of a measurand."""
+    return [Mean(line, row) for line in summary if row.name in line.means]
+
+
+def summary_incline(line: Incline) -> str:
+    """Write the inclination of a mean; nothing where nothing is struck, so nothing is inclined."""
+    return "" if acceleration_in(line.means) else degrees(line.incline_deg)
+
+
+def main_error(line: Incline) -> float | None:
+    """Eₙ of the first of the quantities, which is what the scene is for."""
+    return line.normalized_error(next(iter(line.means)))
+
+
+def means_parts(summary: Sequence[Incline]) -> list[Part]:
+    """Return the means of each measurand beside the model; unlike chains have a line each."""
+    return [
+        part for row in averaged() for part in table_parts("model", means_of(summary, row), row=row)
+    ]
+
+
+def value_parts(summary: Sequence[Incline]) -> Iterator[Part]:
+    """Yield the means without the model."""
+    return table_parts("means", summary, incline=summary_incline)
+
+
+def budget_parts(summary: Sequence[Incline]) -> Iterator[Part]:
+    """Yield the table of what makes the uncertainty of the means, where anything is known of it."""
+    means = [mean for row in averaged() for mean in means_of(summary, row)]
+    return table_parts("budget", (mean for mean in means if mean.mean.budget))
+
+
+def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
+    """Yield the table of scatter."""
+    return table_parts(
+        "scatter",
+        (mean for line in summary for row in averaged() for mean in means_of([line], row)),
+    )
+
+
+def prior_parts(moves: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
+    """Yield the table of what means move by with each prior, see `rig analyze --priors`."""
+    return table_parts("priors", ({**move, "row": MEASURANDS[move["quantity"]]} for move in moves))
 
 
 def gate_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the section on what each gate saw of one object, where there is one."""
-    for line in summary:
-        if line.gates:
-            caption = "Speed and time as the object's middle passes each beam: means of the runs."
-            yield Part("Gate by gate", [caption], _GATES, line.gates)
+    return table_parts("gates", (gate for line in summary for gate in line.gates))
 
 
-def _scaled(value: float | None) -> str:
-    return "" if value is None else fixed(value * 1e3, 3)
+def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
+    """Yield the section on effects of chains and sides where there are any."""
+    return table_parts("effects", effects)
 
 
-def _effect_columns() -> Iterator[Column[Effects]]:
-    yield Column("incline (°)", lambda one: degrees(one.incline_deg))
-    yield Column("blocks", lambda one: str(one.blocks))
-    for row in told():
-        if row.by_chain:
-            yield _effect(row.symbol, row, lambda one: one.chain)
-    for row in told():
-        if row.by_side:
-            yield _effect(f"sides' {row.symbol}", row, lambda one: one.side)
+def run_parts(drops: Iterable[DropResult]) -> Iterator[Part]:
+    """Yield the table of drops; raw Δz is as it happened, not corrected to simultaneous release."""
+    return table_parts("runs", drops, incline=_run_incline, edges=_edges)
 
 
-def _effect(
-    what: str, row: Measurand, of: Callable[[Effects], Mapping[str, Measured]]
-) -> Column[Effects]:
-    return Column(
-        f"{what} ± U ({row.fine})", lambda one: plus_minus(of(one).get(row.name), row.fine_scale)
-    )
+def verdict_parts(drops: Iterable[DropResult]) -> Iterator[Part]:
+    """Yield why drops are not accepted, and what to do about those that are void."""
+    return table_parts(
+        "verdicts", (drop for drop in drops if drop.verdict != "accepted"), incline=_run_incline,
+        reasons=lambda drop: signed(sentences(drop.reasons)),
+        remedies=lambda drop: "; ".join(remedies(drop.reasons)) if drop.verdict == "void" else "",
+    )  # fmt: skip
 
 
-def scatter_part(summary: Sequence[Incline]) -> Part:
-    """Make the table of scatter."""
-    return Part(
-        "Scatter of the runs",
-        [
-            "SD: standard deviation of one run. SE: standard error of the mean, by scatter alone. "
-            "u and U95: standard and expanded uncertainty of the mean, with the errors that all "
-            "runs share. SD/2: half of SD, as in the bars of Pantaleone's figures."
-        ],
-        tuple(_scatter_columns()),
-        [Mean(line, row) for line in summary for row in averaged() if row.name in line.means],
-    )
+def _run_incline(drop: DropResult) -> str:
+    return "" if drop.run.impact is None else degrees(drop.run.incline_deg)
 
 
-def _scatter_columns() -> Iterator[Column[Mean]]:
-    yield from mean_columns(attrgetter("line"))
-    yield Column("", lambda mean: f"{mean.row.symbol} ({mean.row.fine})", numeric=False)
-    yield Column("mean", lambda mean: fine(mean.row, mean.line.means[mean.row.name].value))
-    for heading, kind in _BARS.items():
-        yield _bar_column(heading, kind)
+def _edges(drop: DropResult) -> str:
+    return " / ".join(str(getattr(drop.audit, name)) for name in COUNTS)
 
 
-def _bar_column(heading: str, kind: Bars) -> Column[Mean]:
-    return Column(heading, lambda mean: fine(mean.row, bar(mean.line, mean.row.name, kind)))
+def summary_table(summary: Sequence[Incline]) -> str:
+    """Write the summary as aligned text, a block for each measurand, none wider than 80.
 
-
-_BARS: dict[str, Bars] = {"SD": "SD", "SE": "SE", "u": "u", "U95": "U95", "SD/2": "half-SD"}
-
-_MOVES: tuple[Column[Mapping[str, Any]], ...] = (
-    Column("prior", lambda row: str(row["prior"]), numeric=False),
-    Column("incline (°)", lambda row: degrees(row["incline_deg"])),
-    Column("strikes", lambda row: str(row.get("impact_chain", ""))),
-    Column("quantity", lambda row: _fine(row)[0], numeric=False),
-    Column("3× wider", lambda row: _fine(row)[1]),
-    Column("3× narrower", lambda row: _fine(row)[2]),
-    Column("U wider", lambda row: f"× {row['U95_ratio_wider']:.2f}"),
-    Column("U narrower", lambda row: f"× {row['U95_ratio_narrower']:.2f}"),
-)
-
-
-def prior_part(moves: Sequence[Mapping[str, Any]]) -> Part:
-    """Make the table of what means move by with each prior, see `rig analyze --priors`."""
-    return Part(
-        "Effect of each prior on the means",
-        ["Changes of the means when one prior becomes three times wider, or narrower."],
-        _MOVES,
-        [*moves],
-    )
-
-
-def _fine(row: Mapping[str, Any]) -> tuple[str, str, str]:
-    """Quantity with its unit, and both moves in it."""
-    one = MEASURANDS[row["quantity"]]
-    wider, narrower = (fine(one, row[word]) for word in ("wider", "narrower"))
-    return f"{one.symbol} ({one.fine})", wider, narrower
+    Returns
+    -------
+    str
+        Lines without an end of line at the last; one sentence where there is no summary.
+    """
+    blocks = ["\n".join(part.table) for part in means_parts(summary)]
+    return "\n\n".join(blocks) or "No accepted runs, so no summary."

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.measurands import averaged, told
 from rig.reasons import remedies, summarize_reasons
 from rig.report.numbers import decimals_for, fixed, plus_minus, ranges, signed
+from rig.report.templates import sentence
 from rig.results.improvements import improvements
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def remarks(results: SessionResults) -> list[str]:
         *([rig.likeness.sentence] if rig is not None and rig.likeness is not None else []),
         *alone_lines(results.analysis),
         *common_lines(results.analysis.summary),
-        *(one.sentence for one in improvements(results.analysis.summary)),
+        *(each.sentence for each in improvements(results.analysis.summary)),
         *clock_lines(results.calibration),
         *air_lines(None if rig is None else rig.drag),
     ]
@@ -46,12 +47,7 @@ def common_lines(summary: Sequence[Incline]) -> list[str]:
             most = {name: max(part.get(name, 0.0) for part in budgets) for name in budgets[0]}
             largest = [name for name, u in most.items() if u > 0.5 * max(most.values())]
             causes |= dict.fromkeys(sorted(largest, key=lambda name: -most[name]))
-    if not causes:
-        return []
-    return [
-        f"These means share systematic errors ({', '.join(causes)}). "
-        "More runs will not reduce them."
-    ]
+    return [sentence("shared", ", ".join(causes))] if causes else []
 
 
 def alone_lines(analysis: Analysis) -> list[str]:
@@ -65,10 +61,7 @@ def alone_lines(analysis: Analysis) -> list[str]:
         f"{row.symbol} {plus_minus(where[row.name], row.scale, row.decimals)} {row.unit}"
         for where in (last.alone, last.quantities)
     )
-    return [
-        f"By itself run {last.run.number} says {alone}, among all {len(runs)} runs {among}: "
-        "together they tell what is off in every run, and how much runs scatter."
-    ]
+    return [sentence("alone", last.run.number, alone, len(runs), among)]
 
 
 def void_lines(analysis: Analysis) -> list[str]:
@@ -111,23 +104,12 @@ def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
     calibration
         Member of ``rig analyze --json``.
     """
-    expanded, rate = _CLOCK_COVERAGE * calibration["u_ppm"], calibration["rate_ppm"]
+    expanded = _CLOCK_COVERAGE * calibration["u_ppm"]
     u = fixed(expanded, max(decimals_for(expanded) - 1, 0))
-    by = {"pings": "", "reference": " by the 1 Hz reference"}.get(calibration["source"])
-    if by is not None:
-        way = "slow" if rate < 0.0 else "fast"
-        sentence = f"Board clock: {abs(rate):.4g} ppm {way}, corrected{by} (± {u} ppm)."
-    else:
-        owner = "Board" if "nominal_tick_hz" in calibration else "Timer"
-        sentence = f"{owner} clock: used as stated, not compared (± {u} ppm)."
-    return [sentence, *calibration["notes"]]
+    return [sentence("clock", calibration, u), *calibration["notes"]]
 
 
 def air_lines(drag: Measured | None) -> list[str]:
     """State the air drag that a fit finds, where it is significant: predictions ignore it."""
-    if drag is None or abs(drag.value) <= _SIGNIFICANT * drag.u:
-        return []
-    return [
-        f"Air drag: κ = {plus_minus(drag)} per m in g − κv². "
-        "Predictions ignore air; the fit estimates it."
-    ]
+    significant = drag is not None and abs(drag.value) > _SIGNIFICANT * drag.u
+    return [sentence("air", plus_minus(drag))] if significant else []

@@ -3,137 +3,93 @@
 from __future__ import annotations
 
 import json
-import textwrap
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.measurands import SEPARATION, SPEED
-from rig.report.canvas import CAPTION, INK, MODEL, MODEL_BAND, MUTED, PASSES, SIZE, canvas
+from rig.report.figure import WIDE_PT, Chart, Panel, PlotAxis, Trace, series
+from rig.report.looks import INK, MODEL, MUTED
+from rig.report.templates import render
 from rig.sweep.compute import PILE
 from rig.sweep.variables import VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
-    from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
-
-    from rig.model.batch import Flags, Floats
-    from rig.report.canvas import Canvas
+    from rig.measurands import Measurand
+    from rig.model.batch import Floats
     from rig.sweep.compute import Swept
-    from rig.sweep.layout import Axis, Layout
+    from rig.sweep.layout import Layout
 
-_WRAP = 96
+_LEVELS = 7
+_SPAN = 0.995
+"""Share of the values that the levels span: next to a singular Eq. 13 speeds have no bound."""
 
 
-def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Canvas:
-    """Draw a sweep.
+def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Chart:
+    """Draw a sweep of one axis or two.
 
     Parameters
     ----------
     facts
         Its provenance: named below the picture, and whole in the file's metadata.
     layout, swept
-        With one axis or two; the first of two goes to the right.
+        The first of two axes goes to the right.
 
     Returns
     -------
-    Canvas
-        Where the model has no answer the picture is empty; where the point lies beyond its
-        domain, maps are hatched and curves dashed. Colours span what is found inside the domain.
+    Chart
+        Where the model has no answer the picture is empty; where the point lies beyond its domain,
+        lines are dashed. Levels span what is found inside the domain.
     """
-    flat = len(layout.grid.axes) == 2
+    across, *up = (
+        PlotAxis(VARIABLES[axis.name].label, limits=(axis.values[0], axis.values[-1]))
+        for axis in layout.grid.axes
+    )
     shown = [(SEPARATION, swept.separation_m)] if layout.two_chains else []
-    shown += [(SPEED, swept.speed_m_s)]
-    with canvas(
-        (3.4,) if flat else (2.9,) * len(shown),
-        9.0 if flat and len(shown) > 1 else 7.0,
-        simulated=False,
-        columns=len(shown) if flat else 1,
-        description=json.dumps(facts, ensure_ascii=False),
-        caption=_caption(facts),
-        caption_look={**CAPTION, **PASSES},
-    ) as drawing:
-        panels = drawing.axes
-        for panel, (row, found) in zip(panels, shown, strict=True):
-            if flat:
-                image = _map(panel, layout.grid.axes, row.scale * found, swept.in_domain)
-                drawing.figure.colorbar(image, ax=panel, label=row.axis)
-            else:
-                _curve(panel, layout.grid.axes[0], row.scale * found, swept)
-                panel.set_ylabel(row.axis)
-        panels[-1].set_xlabel(VARIABLES[layout.grid.axes[0].name].label)
-    return drawing
+    draw, height = (_map, 200.0) if up else (_curves, 150.0)
+    panels = [
+        # Each map has its own axis below, which says what its levels are.
+        Panel(replace(across, label=f"{row.axis} against {across.label}") if up else across,
+              up[0] if up else PlotAxis(row.axis), [*draw(row, layout, values, swept)], height)
+        for row, values in [*shown, (SPEED, swept.speed_m_s)]
+    ]  # fmt: skip
+    labels = {variable.column: variable.label for variable in VARIABLES.values()}
+    held = "; ".join(_with_unit(labels[name], value) for name, value in facts["fixed"].items())
+    foot = str(render("sweep.txt", facts=facts, held=held)).split("\n")
+    record = json.dumps(facts, ensure_ascii=False)
+    return Chart(facts["title"], foot[-1], panels, foot=foot, width=WIDE_PT, facts=record)
 
 
-def _caption(facts: Mapping[str, Any]) -> str:
-    """Say in a few lines where the picture comes from."""
-    labels = {one.column: one.label for one in VARIABLES.values()}
-    fixed = "; ".join(_valued(labels[name], value) for name, value in facts["fixed"].items())
-    lines = [
-        f"{facts['title']}; chain {facts['chain']['name']}",
-        f"fixed: {fixed or 'none'}",
-        f"{facts['made_by']}; protocol SHA-256 {facts['protocol_sha256'][:16]}…",
-        "hatched or dashed: outside the model's domain; empty: the model has no answer",
-    ]
-    return "\n".join(textwrap.fill(line, _WRAP) for line in lines)
-
-
-def _valued(label: str, value: float) -> str:
+def _with_unit(label: str, value: float) -> str:
     """Write a parameter as its axis would name it: ``drop = 0.18 m``."""
     name, _, unit = label.partition(" (")
     return f"{name} = {value:g} {unit.removesuffix(')')}".rstrip().replace(" °", "°")
 
 
-def _curve(panel: Axes, axis: Axis, values: Floats, swept: Swept) -> None:
+def _curves(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:
+    (axis,) = layout.grid.axes
     for piled in (False, True):
         # The step from the pile to the surface is no part of either curve.
         part = np.where(((swept.notes & PILE) > 0) == piled, values, np.nan)
-        panel.plot(axis.values, part, "--", color=MUTED, linewidth=1.2)
-        panel.plot(axis.values, np.where(swept.in_domain, part, np.nan), color=MODEL)
-    panel.margins(x=0.0)
+        yield series("", axis.values, part, "dash", MUTED, scale=row.scale)
+        inside = np.where(swept.in_domain, part, np.nan)
+        yield series("", axis.values, inside, "line", MODEL, scale=row.scale)
 
 
-def _map(panel: Axes, axes: tuple[Axis, ...], values: Floats, inside: Flags) -> AxesImage:
-    from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415 - see canvas
-    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
+def _map(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:
+    """Yield the whole map, and the levels inside the model's domain."""
+    across, up = (list(axis.values) for axis in layout.grid.axes)
+    whole = row.scale * values.T
+    inside = np.where(swept.in_domain.T, whole, np.nan)
+    shown = inside[np.isfinite(inside)]
+    shown = shown if shown.size else whole[np.isfinite(whole)]
+    if shown.size:
+        from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - only for maps
 
-    across, up = axes
-    found = np.isfinite(values)
-    # Next to a singular Eq. 13 speeds have no bound, and nothing else would show a difference.
-    scale = values[inside] if inside.any() else values[found]
-    low, high = (float(scale.min()), float(scale.max())) if scale.size else (0.0, 1.0)
-    image = panel.imshow(
-        values.T,
-        origin="lower",
-        aspect="auto",
-        extent=(*_sides(across), *_sides(up)),
-        interpolation="none",
-        vmin=low,
-        vmax=high,
-        cmap=LinearSegmentedColormap.from_list("model", [MODEL_BAND, MODEL]),
-    )
-    outside = found & ~inside
-    if outside.any():
-        hatched = panel.contourf(
-            across.values, up.values, outside.T, levels=[0.5, 1.5], colors="none", hatches=["////"]
-        )
-        hatched.set_edgecolor(MUTED)
-        hatched.set_linewidth(0.0)
-    levels = [level for level in MaxNLocator(7).tick_values(low, high) if low < level < high]
-    if levels:
-        lines = panel.contour(
-            across.values, up.values, values.T, levels=levels, colors=INK, linewidths=0.5
-        )
-        panel.clabel(lines, fontsize=SIZE)
-    panel.grid(visible=False)
-    panel.set_xlabel(VARIABLES[across.name].label)
-    panel.set_ylabel(VARIABLES[up.name].label)
-    return image
-
-
-def _sides(axis: Axis) -> tuple[float, float]:
-    """Return where an axis begins and ends so that each value is the middle of its cell."""
-    half = (axis.values[1] - axis.values[0]) / 2.0
-    return axis.values[0] - half, axis.values[-1] + half
+        ends = np.quantile(shown, (1.0 - _SPAN, _SPAN))
+        levels = [float(level) for level in MaxNLocator(_LEVELS).tick_values(*ends)]
+        yield Trace("", across, up, "map", MUTED, levels, z=whole.ravel().tolist())
+        yield Trace("", across, up, "levels", INK, levels, z=inside.ravel().tolist())

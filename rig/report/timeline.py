@@ -1,10 +1,12 @@
-"""Timeline of a drop: a line for each gate, with a bar while its beam was blocked."""
+"""Timelines of drops: a line for each gate, with a bar while its beam was blocked."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from html import escape
-from typing import TYPE_CHECKING
+from statistics import median
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.measurands import averaged
+from rig.report.numbers import plus_minus
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -14,115 +16,133 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Gate
     from rig.records import Drop
 
-_LEFT, _WIDTH, _RIGHT = 112.0, 640.0, 24.0
-_LANE, _FOOT = 15.0, 34.0
+_LEFT, _WIDTH, _LANE = 112, 640, 15
 _STEPS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 _MOST_NUMBERS = 12
+_LONGEST = 2.0  # times as long as most: what falls later in a drop is not drawn
+_ROOM = 480_000
+"""Characters of all timelines together, see `rig.report.attachments`."""
+_AROUND = 900  # characters of a timeline's frame and caption
 _FINE = 2  # steps of a pixel: whole numbers keep a page with a hundred drops small
 
 
-@dataclass(frozen=True, slots=True)
-class Timeline:
-    """A drop's picture.
+class Lanes(NamedTuple):
+    """What all timelines of a page have in common: gates from the top down, and the time shown."""
 
-    Attributes
-    ----------
-    result
-        What came of it.
-    svg
-        The picture; empty where no edge was recorded.
-    """
+    gates: tuple[Gate, ...]
+    span_ms: float
+
+    @property
+    def ticks(self) -> list[tuple[int, float]]:
+        """Milliseconds on that axis, and where they are."""
+        step = next((ms for ms in _STEPS_MS if self.span_ms / ms <= _MOST_NUMBERS), 1000)
+        per_ms = _WIDTH / self.span_ms
+        return [(ms, _LEFT + ms * per_ms) for ms in range(0, int(self.span_ms) + 1, step)]
+
+
+class Timeline(NamedTuple):
+    """A drop's shadows and unexplained edges, as SVG path data, and what is said beside them."""
 
     result: DropResult
-    svg: str
+    bars: str
+    odd: str
+    numbers: str
+
+    @property
+    def anchor(self) -> str:
+        """Its place on the page."""
+        return f"drop-{self.result.run.number}-{self.result.attempt}"
 
 
-def timeline(gates: Sequence[Gate], drop: Drop, hz: float | Fraction, result: DropResult) -> str:
+def timelines(
+    gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
+) -> tuple[Lanes, dict[int, Timeline]]:
+    """Draw when each beam was blocked, as far as there is room.
+
+    Parameters
+    ----------
+    timed
+        Each raw record with its calibrated ticks per second and its result.
+
+    Returns
+    -------
+    Lanes, dict of int to Timeline
+        What all have in common; those drawn, by number.
+    """
+    shared, shown, left = lanes(gates, timed), {}, _ROOM
+    # Those that do not count come first where not all have room.
+    for number in sorted(range(len(timed)), key=lambda n: (timed[n][-1].verdict == "accepted", n)):
+        drawn = timeline(shared, *timed[number])
+        left -= len(drawn.bars) + len(drawn.odd) + _AROUND
+        if drawn.bars and left > 0:
+            shown[number] = drawn
+    return shared, dict(sorted(shown.items()))
+
+
+def lanes(
+    gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
+) -> Lanes:
+    """Sort gates, the side that strikes first, and find the time that all drops need."""
+    ordered = sorted(gates, key=lambda gate: (gate.side != "impact", -gate.height))
+    spans = [times[-1] for drop, hz, _ in timed if (times := _times_ms(drop, hz))] or [1.0]
+    return Lanes(tuple(ordered), max(1.0, min(max(spans), _LONGEST * median(spans))))
+
+
+def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult) -> Timeline:
     """Draw when each beam was blocked.
 
     Parameters
     ----------
-    gates
-        Of the protocol: a lane each, the highest at the top, the side that strikes first.
+    lanes
+        Of all drops of the page.
     drop
         The raw record.
     hz
         Calibrated ticks per second.
     result
-        Which of its edges were matched; the others are drawn as marks.
-
-    Returns
-    -------
-    str
-        SVG for a page that has its colours; empty where there is no edge.
+        Which of its edges were matched; where none was, none is unexplained.
     """
-    if not drop.edges:
-        return ""
-    two_sides = len({gate.side for gate in gates}) > 1
-    ordered = sorted(gates, key=lambda gate: (gate.side != "impact", -gate.height))
+    places = [round(ms * _FINE * _WIDTH / lanes.span_ms) for ms in _times_ms(drop, hz)]
+    bars = marks = ""
+    for number, gate in enumerate(lanes.gates):
+        y = f"{_LANE * (number + 0.5):g}"
+        at = {
+            n: place
+            for n, (edge, place) in enumerate(zip(drop.edges, places, strict=True))
+            if edge.channel == gate.channel and place <= _FINE * _WIDTH
+        }
+        pen = 0
+        blocked = bool(drop.initial_state >> gate.channel & 1)
+        for begin, end in _spans(drop, at, blocked=blocked) if places else ():
+            bars += f"m{begin - pen} 0h{end - begin}" if pen else f"M{begin} {y}h{end - begin}"
+            pen = end
+        if result.matches:
+            odd = [place for n, place in at.items() if n not in result.matches]
+            marks += "".join(f"M{place} {y}m0-5v10" for place in odd)
+    values = [
+        f", {row.symbol} {plus_minus(value, row.scale, row.decimals)} {row.unit}"
+        for row in averaged()
+        if (value := result.quantities.get(row.name)) is not None
+    ]
+    return Timeline(result, bars, marks, "".join(values))
+
+
+def _times_ms(drop: Drop, hz: float | Fraction) -> list[float]:
+    """Return the time of each edge, ms."""
     times = [1e3 * float(edge.tick / hz) for edge in drop.edges]
     # Imported edges are counted from a whole second, not from the release.
-    begin = 0.0 if drop.fire_tick is not None and times[0] >= 0.0 else times[0]
-    per_ms = _WIDTH / max(times[-1] - begin, 1.0)
-    height = _LANE * len(ordered) + _FOOT
-    parts = [
-        f'<svg viewBox="0 0 {_LEFT + _WIDTH + _RIGHT:g} {height:g}" class="lanes" role="img" '
-        f'aria-label="{escape(_alt(result))}">'
-    ]
-    for place, gate in enumerate(ordered):
-        y = _LANE * (place + 0.5)
-        side = f"{gate.side} " if two_sides else ""
-        parts.append(
-            f'<text x="{_LEFT - 6:g}" y="{y + 3.5:g}" text-anchor="end">{side}'
-            f'{1e3 * gate.height:g} mm</text><path class="lane" d="M{_LEFT:g} {y:g}h{_WIDTH:g}"/>'
-        )
-        at = {
-            n: round(_FINE * (times[n] - begin) * per_ms)
-            for n, edge in enumerate(drop.edges)
-            if edge.channel == gate.channel
-        }
-        bars = "".join(_bars(drop, at, blocked=bool(drop.initial_state >> gate.channel & 1)))
-        odd = "".join(f"M{x}-5v10" for n, x in at.items() if n not in result.matches)
-        placed = f'transform="translate({_LEFT:g} {y:g})scale({1 / _FINE:g} 1)"'
-        parts += [f'<path class="blocked" {placed} d="{bars}"/>'] if bars else []
-        parts += [f'<path class="odd" {placed} d="{odd}"/>'] if odd and result.matches else []
-    parts += _axis(_LANE * len(ordered), times[-1] - begin, per_ms)
-    return "".join([*parts, "</svg>"])
+    begin = 0.0 if drop.fire_tick is not None and times[:1] >= [0.0] else min(times, default=0.0)
+    return [time - begin for time in times]
 
 
-def _bars(drop: Drop, at: dict[int, int], *, blocked: bool) -> Iterator[str]:
-    """Yield a stroke for each time a beam was blocked, from the first edge or from the start."""
-    since, pen = 0 if blocked else None, 0
-    spans = []
-    for n, x in at.items():
-        if drop.edges[n].blocked:
-            since = x if since is None else since
+def _spans(drop: Drop, at: dict[int, int], *, blocked: bool) -> Iterator[tuple[int, int]]:
+    """Yield from where to where a beam was blocked, from the first edge or from the start."""
+    since = 0 if blocked else None
+    for number, place in at.items():
+        if drop.edges[number].blocked:
+            since = place if since is None else since
         elif since is not None:
-            spans.append((since, max(x, since + 1)))
+            yield since, max(place, since + 1)
             since = None
     if since is not None:
-        spans.append((since, round(_FINE * _WIDTH)))
-    for begin, end in spans:
-        yield f"{'m' if pen else 'M'}{begin - pen} 0h{end - begin}"
-        pen = end
-
-
-def _axis(y: float, span_ms: float, per_ms: float) -> Iterator[str]:
-    step = next((one for one in _STEPS_MS if span_ms / one <= _MOST_NUMBERS), 1000)
-    yield f'<path class="axis" d="M{_LEFT:g} {y:g}h{_WIDTH:g}"/>'
-    for value in range(0, int(span_ms) + 1, step):
-        x = _LEFT + value * per_ms
-        yield f'<path class="axis" d="M{x:.1f} {y:g}v4"/>'
-        yield f'<text x="{x:.1f}" y="{y + 15:g}" text-anchor="middle">{value}</text>'
-    yield (
-        f'<text x="{_LEFT + _WIDTH / 2:g}" y="{y + 30:g}" text-anchor="middle">'
-        "time since the release (ms)</text>"
-    )
-
-
-def _alt(result: DropResult) -> str:
-    audit = result.audit
-    return (
-        f"When the gates were blocked in run {result.run.number}, attempt {result.attempt}: "
-        f"{audit.matched} edges matched, {audit.missed} missed, {audit.spurious} unexplained"
-    )
+        yield since, max(_FINE * _WIDTH, since + 1)

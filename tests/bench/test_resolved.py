@@ -9,6 +9,7 @@ from bench.studies import resolved as bench_resolved
 from rig import cli
 from rig.bench import resolved_paper
 from rig.bench.resolved_paper import Ensemble
+from rig.report.files import figure_file
 from rig.report.film import film_figure
 from tests.report.test_figures import FILM
 
@@ -42,4 +43,6 @@ def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
 def test_a_fall_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(bench_resolved, "film", lambda folder, incline: FILM)
     assert main(["resolved", "--film", "40", "-o", str(tmp_path)]) == 0
-    assert (tmp_path / "resolved-fall.svg").read_text() == film_figure(FILM)
+    assert (tmp_path / "resolved-fall.svg").read_text() == figure_file(
+        film_figure(FILM), "svg"
+    ).decode()

@@ -33,7 +33,10 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
     assert not door.open(session).analyze().runs[0].quantities.keys() - {"release_skew_s"}
     report = call("report", session, "-o", page)
     assert report.code == 0, report.err
-    assert "No accepted runs" not in page.read_text("utf-8")
+    html = page.read_text("utf-8")
+    assert "hidden until <code>rig unblind</code>" in html
+    for absent in ("No accepted runs", "Δz", "m/s<", "separation", "end speed"):
+        assert absent not in html
     for refused in (("estimate", session), ("analyze", session, "--budget", "1")):
         done = call(*refused)
         assert done.code != 0

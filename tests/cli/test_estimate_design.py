@@ -49,7 +49,9 @@ def test_pictures_of_an_estimate_are_stamped(estimated):
     assert all("SIMULATED" in path.read_text("utf-8") for path in estimated.iterdir())
 
 
-def test_a_report_has_the_impacts_too(page):
+def test_a_report_may_have_the_impacts_too(call, finished, tmp_path):
+    page = tmp_path / "r.html"
+    assert call("report", finished.session, "-o", page, "--estimate").code == 0
     html = page.read_text("utf-8")
     for heading in ("Best single α", "End correction", "Single impulses"):
         assert f"<h3>{heading}</h3>" in html

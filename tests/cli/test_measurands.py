@@ -76,7 +76,7 @@ def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path):
     assert BLOW.meaning in (tmp_path / "csv" / "README.txt").read_text("utf-8")
     assert call("report", session, "-o", tmp_path / "r.html").code == 0
     page = (tmp_path / "r.html").read_text("utf-8")
-    assert page.count("Ef ± U (kJ)") == 2  # the summary's table, and that of the runs
+    assert page.count("Ef ± U (kJ)") == 3  # means, their comparison, and the runs
     assert "could not be made" not in page
     screens = {name: text for name, *_, text in seen(session, KEYS, (), SIZE, ["dark"], text_of)}
     for screen, text in (("result", BLOW.label), ("session", BLOW.symbol)):

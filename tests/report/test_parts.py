@@ -5,8 +5,7 @@ from __future__ import annotations
 from rig.analysis.pairs import Effects
 from rig.analysis.result import Measured
 from rig.analysis.summary import Incline
-from rig.report.columns import aligned
-from rig.report.parts import effects_parts, scatter_part
+from rig.report.parts import effects_parts, scatter_parts
 
 
 def test_effects_have_the_digits_that_they_deserve():
@@ -17,7 +16,7 @@ def test_effects_have_the_digits_that_they_deserve():
     )  # fmt: skip
     (part,) = effects_parts([one])
     assert part.heading.startswith("Differences: chain A − chain B")
-    text = "\n".join(aligned(part.columns, part.records))
+    text = "\n".join(part.table)
     assert "\n       42.5 " in text
     assert "1.234 ± 0.098" in text
     assert "−4.0 ± 5.9" in text
@@ -29,8 +28,8 @@ def test_effects_have_the_digits_that_they_deserve():
 
 def test_scatter_has_the_paper_s_bars():
     means = {"separation_m": Measured(0.115, 2e-4), "speed_m_s": Measured(6.9, 1e-3)}
-    part = scatter_part([Incline(42.5, 4, means, {"separation_m": 8e-4}, {})])
-    head, _, first, second = (row.split() for row in aligned(part.columns, part.records))
+    (part,) = scatter_parts([Incline(42.5, 4, means, {"separation_m": 8e-4}, {})])
+    head, _, first, second = (row.split() for row in part.table)
     assert head[-5:] == ["SD", "SE", "u", "U95", "SD/2"]
     assert first == [
         "42.5",

@@ -6,8 +6,8 @@ import pytest
 
 from rig.analysis.result import Measured
 from rig.analysis.summary import Incline
-from rig.report.columns import aligned, run_columns, summary_table
 from rig.report.numbers import decimals_for, fixed, plus_minus
+from rig.report.parts import run_parts, summary_table
 from rig.report.remarks import clock_lines
 from rig.units import Quantity
 from tests.report import fake_analysis
@@ -74,10 +74,12 @@ def test_where_nothing_is_struck_nothing_is_inclined() -> None:
     fence = fake_analysis.gravity()
     assert "incline" not in summary_table(fence.summary)
     void = replace(fence.runs[0], verdict="void", quantities={})
-    heading = aligned(run_columns(), [void, fence.runs[1]])[0]
+    (part,) = run_parts([void, fence.runs[1]])
+    heading = part.table[0]
     assert "incline" not in heading
     assert "impact" not in heading
-    assert "incline" in aligned(run_columns(), fake_analysis.single_chain().runs)[0]
+    (part,) = run_parts(fake_analysis.single_chain().runs)
+    assert "incline" in part.table[0]
 
 
 def test_the_clock_is_told_in_plain_numbers() -> None:

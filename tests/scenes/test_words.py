@@ -14,7 +14,7 @@ from rig.campaign.machine import Flow
 from rig.cli import main
 from rig.ready import ready_protocol
 from rig.records import Job
-from rig.report.method import SOFTWARE
+from rig.report.session_page import SOFTWARE
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp
 from rig.tui.context import Options

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cli import main
-from rig.report.method import SOFTWARE
+from rig.report.session_page import SOFTWARE
 from tests.scenes.draw import Scene
 
 LONGEST_S = 60.0

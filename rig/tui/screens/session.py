@@ -13,8 +13,8 @@ from rig.analysis.joint_fit import FEWEST
 from rig.campaign.plan import done
 from rig.measurands import averaged
 from rig.protocol.protocol import Condition
-from rig.report.columns import main_error
 from rig.report.numbers import fixed, plus_minus
+from rig.report.parts import main_error
 from rig.tui.plots import control_pictures, inclined, meaning
 from rig.tui.screens.page import Page
 from rig.tui.widgets.banner import LOOKS

@@ -1,0 +1,130 @@
+"""The page: whole, self-contained, and no text of a file becomes part of it."""
+
+from __future__ import annotations
+
+import base64
+import re
+import subprocess
+import sys
+from collections import defaultdict
+from hashlib import sha256
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
+
+import yaml
+
+from rig import __version__
+from rig.analysis.result import Audit, DropResult
+from rig.protocol.protocol import Run
+from rig.report.attachments import METHOD, Attachment, method_page
+from rig.report.columns import Part
+from rig.report.figure import Chart, Panel, PlotAxis, Trace
+from rig.report.finding import Number
+from rig.report.page import PageSection, ReportPage, page_html
+from rig.report.session_page import PAPER, SOFTWARE
+from rig.report.timeline import Lanes, Timeline
+
+ROOT = Path(__file__).parents[2]
+VOID_TAGS = {"meta", "br", "hr", "img", "link"}
+BAD = '<script>alert("x")</script>&\'</pre></style>'
+
+
+class Balance(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [values[key] for key in ("href", "src") if key in values]
+        if tag not in VOID_TAGS:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID_TAGS:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def parse(page: str) -> Balance:
+    parser = Balance()
+    parser.feed(page)
+    parser.close()
+    assert not parser.open
+    return parser
+
+
+def page_with(text: str) -> ReportPage:
+    """Return a page that says one text wherever a page says anything."""
+    panel = Panel(PlotAxis(text), PlotAxis(text), [Trace(text[:8], [0.0, 1.0], [0.0, 1.0], "line")])
+    figure = Chart(text, text, [panel])
+    part = Part(text, [text], [(text, False)], [[text]], off={0}, links={0: "drop-1-1"})
+    result = DropResult(Run(1, 40.0, text, text), 1, text, (), Audit())
+    drop = Timeline(result, "", "M0 0", text)
+    drops = {"table": part, "timelines": {0: drop}, "lanes": Lanes((), 1.0), "results": [result]}
+    session = Mock(
+        path=SimpleNamespace(name=text),
+        meta=defaultdict(lambda: text),
+        protocol_text=text,
+        protocol_source=text,
+    )
+    session.identities.return_value = [(0, text)]
+    method = defaultdict(lambda: text, session=session, outcome=Mock(), runs=[result],
+                         files=[Attachment(text, text, "1", text)], said=[text])  # fmt: skip
+    method["outcome"].clock.details = {text: text}
+    sections = [
+        PageSection("result", text, [text], [figure], [part], [part], "drops.html", drops),
+        PageSection("method", text, template="method.html", values=method),
+    ]
+    return ReportPage(
+        text, sections, True, [figure], [Number(text, text, text)], text, True, text, [text], text
+    )
+
+
+def test_the_page_is_whole_and_needs_nothing_else():
+    page = page_html(page_with("Text"))
+    parser = parse(page)
+    assert len(parser.ids) == len(set(parser.ids))
+    places = [link[1:] for link in parser.links if not link.startswith("data:")]
+    assert set(places) <= set(parser.ids)
+    assert "SIMULATED DATA" in page
+    assert page == page_html(page_with("Text"))
+    (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    digest = base64.b64encode(sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in page
+
+
+def test_text_is_escaped():
+    plain, bad = page_html(page_with("Text")), page_html(page_with(BAD))
+    parse(bad)
+    for tag in ("<script", "</style>", "</pre>"):
+        assert bad.count(tag) == plain.count(tag)
+    assert bad.count("&lt;script&gt;") >= plain.count("Text")
+
+
+def test_page_and_citation_file_name_the_same():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    assert cited["version"] == __version__
+    assert __version__ in SOFTWARE
+    assert cited["title"].partition(":")[2].strip() in SOFTWARE
+    (paper,) = cited["references"]
+    assert paper["title"] in PAPER
+    assert paper["identifiers"][0]["value"] in PAPER
+    assert method_page() == (ROOT / "docs" / METHOD).read_text("utf-8")
+
+
+def test_importing_loads_neither_matplotlib_nor_jinja2():
+    code = (
+        "import sys, rig.report.page, rig.report.figures, rig.report.columns, rig.session.export,"
+        "rig.session.store\n"
+        "assert not {'matplotlib', 'numpy', 'jinja2'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": str(ROOT)})
