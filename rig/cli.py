@@ -10,19 +10,21 @@ import sys
 import threading
 from contextlib import contextmanager
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rig import __version__
 from rig.boards import GATES
 from rig.command_help import build_parser, runnable
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
+from rig.units import Dimension, parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from rig.command_help import Parser
 
+T = TypeVar("T")
 BAD_INPUT = 2
 INTERRUPTED = 130
 OPTIONAL = ("distributed", "mpmath")
@@ -119,53 +121,46 @@ def _parser() -> Parser:
     return build_parser(f"rig {__version__}", _KINDS, {"import": "import_edges"})
 
 
+def _accept(accepted: str, read: Callable[[str], object]) -> Callable[[str], dict[str, Any]]:
+    """Return a kind of value; text that `read` refuses is answered by what is accepted."""
+
+    def convert(text: str) -> object:
+        try:
+            return read(text)
+        except ValueError:
+            message = f"found '{text}'; accepted: {accepted}"
+            raise argparse.ArgumentTypeError(message) from None
+
+    return lambda _: {"type": convert}
+
+
+def _insist(value: T, *, holds: bool) -> T:
+    if not holds:
+        raise ValueError(value)
+    return value
+
+
 def _count(text: str) -> int:
-    try:
-        number = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: a whole number") from None
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"found {text}; accepted: 1 or more")
-    return number
+    return _insist(int(text), holds=int(text) >= 1)
 
 
 def _gates(text: str) -> int:
-    channels = text.split(",")
-    if not all(channel.isdecimal() and int(channel) < GATES for channel in channels):
-        raise argparse.ArgumentTypeError(
-            f"found '{text}'; accepted: numbers from 0 to {GATES - 1}, with commas between"
-        )
-    return sum(1 << channel for channel in set(map(int, channels)))
-
-
-def _trials(text: str) -> int | str:
-    if text == "adaptive":
-        return text
-    if not text.lstrip("+-").isdecimal():
-        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: a whole number or adaptive")
-    return _count(text)
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal() or int(text) >= 2**63:
-        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: a whole number from 0 to 2^63")
-    return int(text)
-
-
-def _port(text: str) -> str:
-    if not text:
-        raise argparse.ArgumentTypeError("no port is named: a device path, or a URL such as sim://")
-    return text
+    channels = set(map(int, text.split(",")))
+    return _insist(sum(1 << channel for channel in channels), holds=channels <= set(range(GATES)))
 
 
 def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not 0.0 < seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text!r}; accepted: a time in seconds above 0")
-    return seconds
+    return _insist(float(text), holds=0.0 < float(text) < math.inf)
+
+
+def _length(text: str) -> float:
+    length = parse(text, Dimension.LENGTH).value
+    return _insist(length, holds=length > 0.0)
+
+
+def _share(text: str) -> float:
+    share = parse(text, Dimension.NUMBER).value
+    return _insist(share, holds=0.0 <= share < 0.1)
 
 
 def _place(name: str) -> Callable[[str], str]:
@@ -180,18 +175,18 @@ def _place(name: str) -> Callable[[str], str]:
     return place
 
 
-def _typed(read: Callable[[str], object]) -> Callable[[str], dict[str, Any]]:
-    return lambda _: {"type": read}
-
-
 _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
-    "int": _typed(int),
-    "count": _typed(_count),
-    "gates": _typed(_gates),
-    "trials": _typed(_trials),
-    "seed": _typed(_seed),
-    "port": _typed(_port),
-    "seconds": _typed(_seconds),
+    "int": lambda _: {"type": int},
+    "count": _accept("a whole number, 1 or more", _count),
+    "gates": _accept(f"numbers from 0 to {GATES - 1}, with commas between", _gates),
+    "length": _accept("a length above 0", _length),
+    "port": _accept("a device path, or a URL such as sim://", lambda t: _insist(t, holds=bool(t))),
+    "seconds": _accept("a time in seconds above 0", _seconds),
+    "seed": _accept(
+        "a whole number from 0 to 2^63", lambda t: _insist(int(t), holds=0 <= int(t) < 1 << 63)
+    ),
+    "share": _accept("a share from 0 to 10 %, as in 50 ppm", _share),
+    "trials": _accept("a whole number or adaptive", lambda t: t if t == "adaptive" else _count(t)),
     "file": lambda name: {"type": _place(name)},
     "formats": lambda _: {"action": _ListFormats, "nargs": 0},
 }

@@ -20,7 +20,6 @@ from rig.protocol.measurable import check_measurable
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
 from rig.text_table import text_table
-from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -45,11 +44,7 @@ def main(arguments: Namespace) -> int:
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
     components = stated(protocol) if arguments.learned is None else _read_scatter(arguments.learned)
-    lowest, highest, spacing = (
-        _read_length(f"--{name}", getattr(arguments, name))
-        for name in ("lowest", "highest", "spacing")
-    )
-    limits = room(protocol, lowest, highest, spacing or SPACING_M)
+    limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing or SPACING_M)
     if limits.lowest > limits.highest:
         raise InputError(
             "--lowest is above --highest", "the highest beam is below the start of the drop"
@@ -79,18 +74,6 @@ def _read_scatter(path: str) -> Components:
     if joint is None:
         raise InputError(f"{path}: too few good drops for a scatter", "leave out --learned")
     return joint.components
-
-
-def _read_length(option: str, text: str | None) -> float | None:
-    if text is None:
-        return None
-    try:
-        value = parse(text, Dimension.LENGTH).value
-    except UnitError as error:
-        raise InputError(f"{option}: {error}") from None
-    if value <= 0.0:
-        raise InputError(f"{option}: found {text}; accepted: a length above 0")
-    return value
 
 
 def _forecast(
