@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
-from rig.link.frames import PAYLOAD_LIMIT, FrameError, cobs_decode
-from rig.link.wiretypes import EVENTS, Event, Events, read_field
+from rig.link.frames import FrameError, cobs_decode
+from rig.link.wiretypes import EVENTS, Event
 from tests.examples import examples
-from tests.link.strategies import LONG, MESSAGES
+from tests.link.strategies import LONG
 
 STATES = st.integers(0, 2**16 - 1) | st.integers(0, 3)
 EVENT_LISTS = st.lists(st.builds(Event, LONG, STATES), max_size=12)
@@ -49,52 +49,6 @@ def test_cobs_is_what_its_authors_tell(data):
             cobs_decode(data)
     else:
         assert cobs_decode(data) == plain
-
-
-def field_by_field(code: int, payload: bytes) -> list | None:
-    values, at = [], 0
-    try:
-        for field in wire.FIELDS[wire.TABLE[code]]:
-            value, at = read_field(field, payload, at)
-            values.append(value)
-    except (wire.MessageError, KeyError):
-        return None
-    return values if at == len(payload) else None
-
-
-@examples(300)
-@given(
-    MESSAGES.map(wire.pack)
-    | st.tuples(st.sampled_from(list(wire.TABLE)), st.binary(max_size=PAYLOAD_LIMIT))
-    | st.tuples(st.integers(0, 255), st.binary(max_size=8)),
-    st.integers(-3, 1),
-)
-def test_a_message_is_its_fields_one_by_one(packed, cut):
-    code, payload = packed
-    payload = payload[:cut] if cut < 0 else payload + bytes(cut)
-    values = field_by_field(code, payload)
-    if values is None:
-        with pytest.raises(wire.MessageError):
-            wire.unpack(code, payload)
-        return
-    message = wire.unpack(code, payload)
-    fields = wire.FIELDS[type(message)]
-    assert [getattr(message, field.name) for field in fields] == values
-
-
-@given(EVENT_LISTS, st.data())
-def test_events_are_a_tuple_of_them(events, data):
-    kept = Events(EVENTS, EVENTS.pack(events))
-    assert kept == tuple(events) == tuple(kept)
-    assert kept == Events(EVENTS, kept.raw)
-    assert (len(kept), hash(kept), repr(kept)) == (len(events), hash((*events,)), repr((*events,)))
-    assert list(EVENTS.rows(kept)) == list(EVENTS.rows(tuple(events))) == events
-    if events:
-        at = data.draw(st.integers(-len(events), len(events) - 1))
-        assert (kept[at], kept[at:]) == (events[at], tuple(events[at:]))
-        assert kept != tuple(events[1:])
-        with pytest.raises(ValueError, match="cut short"):
-            Events(EVENTS, kept.raw[:-1])
 
 
 def edges_one_by_one(known, certificate, fire_tick):
