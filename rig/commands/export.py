@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+from rig.bundle.tables import csv_files
 from rig.cache.entry import recall
 from rig.commands.output import progress, say, tell_damage
 from rig.files import make_folder, write_atomic
 from rig.results import results, tick_rates
-from rig.session.export import csv_files
 from rig.session.store import Session
 
 if TYPE_CHECKING:

@@ -13,20 +13,13 @@ from rig.recover.pages import MAGIC, read_pages
 from rig.recover.rows import Rows, find_rows
 from rig.recover.snapshot import SessionCopy, take_snapshot
 from rig.session.drop_check import Fate
-from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
+from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping, Sequence
 
-_NUMBERED = {
-    "bytes": "chunks of bytes",
-    "ping": "clock samples",
-    "reference": "reference pulses",
-    "run_state": "run states",
-    "identity": "identities of the device",
-    "drop": "drops",
-}
+_NUMBERED = {name: table.meaning for name, table in TABLES.items() if table.numbered}
 _GOOD = (Fate.CONFIRMED, Fate.IMPORTED)
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
@@ -100,7 +93,8 @@ def examine(path: str | os.PathLike[str]) -> ExaminedFile:
         **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
         **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
     }
-    return ExaminedFile(snapshot, rows, drops, "", _true(damage), _true(lost))
+    damaged = [*_true(damage), *rows.chain_faults()]
+    return ExaminedFile(snapshot, rows, drops, "", damaged, _true(lost))
 
 
 def describe(session: ExaminedFile) -> list[str]:

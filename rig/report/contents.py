@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.bundle.tables import csv_files
 from rig.report.attachments import Attachment, zipped
 from rig.report.method import METHOD, method_page
 from rig.report.timeline import Timeline, timeline
 from rig.results import tick_rates
-from rig.session.export import csv_files
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol

@@ -58,6 +58,14 @@ class ByteChunk(NamedTuple):
     data: bytes
 
 
+class AttachedFile(NamedTuple):
+    """A file that was attached to a session, and when (UTC)."""
+
+    added: str
+    name: str
+    data: bytes
+
+
 class Reader:
     """Everything that can be asked of an open session.
 
@@ -164,6 +172,10 @@ class Reader:
     def host_breaks(self) -> list[HostBreak]:
         """When the host slept or its clock was set, in order."""
         return [HostBreak(*row[1:]) for row in self._rows("host_break", "ORDER BY id")]
+
+    def attached_files(self) -> list[AttachedFile]:
+        """All files that were attached, in order."""
+        return [AttachedFile(*row[1:]) for row in self._rows("attachment", "ORDER BY id")]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording, compared with its bytes.

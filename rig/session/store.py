@@ -303,6 +303,11 @@ class Session(Reader):
         text = encodable(write_reasons(reasons))
         self.add_rows("run_state", [(run, attempt, str(state), text, host_ns)])
 
+    def attach(self, name: str, data: bytes) -> None:
+        """Add a file, such as a photograph of the rig."""
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        self.add_rows("attachment", [(now, encodable(name), data)])
+
     def unblind(self) -> None:
         """Record, once and on the disk, that from now on the numbers may be seen.
 
