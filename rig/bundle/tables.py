@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import hashlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -178,3 +180,45 @@ def describe_column(table: str, column: str) -> tuple[str, str]:
         return "", ""
     meaning = _MEANINGS.get(f"{table}: {column}", _MEANINGS.get(column, ""))
     return column_unit(column), meaning
+
+
+def data_package(tables: Mapping[str, str]) -> dict[str, Any]:
+    """Describe CSV files for other programs (Frictionless): types, units, meanings, hashes.
+
+    Parameters
+    ----------
+    tables
+        Texts by file name.
+    """
+    resources = [_resource(name, text) for name, text in sorted(tables.items())]
+    return {"profile": "tabular-data-package", "name": "rig-tables", "resources": resources}
+
+
+def _resource(table: str, text: str) -> dict[str, Any]:
+    header, *rows = csv.reader(text.splitlines()) if text.strip() else [[]]
+    fields = []
+    for number, name in enumerate(header):
+        unit, meaning = describe_column(table, name)
+        kind = _type_of([row[number] for row in rows if row[number]])
+        field = {"name": name, "type": kind, "unit": unit, "description": meaning}
+        fields.append({key: value for key, value in field.items() if value})
+    return {
+        "name": table.removesuffix(".csv"),
+        "path": table,
+        "profile": "tabular-data-resource",
+        "format": "csv",
+        "encoding": "utf-8",
+        "bytes": len(text.encode()),
+        "hash": f"sha256:{hashlib.sha256(text.encode()).hexdigest()}",
+        "schema": {"fields": fields, "missingValues": [""]},
+    }
+
+
+def _type_of(cells: list[str]) -> str:
+    for kind, read in (("integer", int), ("number", float)):
+        try:
+            [read(cell) for cell in cells]
+        except ValueError:
+            continue
+        return kind if cells else "string"
+    return "string"

@@ -147,8 +147,11 @@ def _version(package: str) -> str:
 
 
 def _operator_notes(session: Session) -> list[str]:
-    """Tell what operators noted to drops."""
-    return [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()]
+    """Tell what the protocol and operators noted, and which files they attached."""
+    own, noted = protocol_of(session).notes, notes(session).items()
+    runs = [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in noted]
+    attached = [f"Attached {file.added}: {file.name}" for file in session.attached_files()]
+    return [*([f"Protocol: {own}"] if own else []), *runs, *attached]
 
 
 def _estimate(session: Session, outcome: SessionResults, *, fresh: bool) -> SessionEstimate | None:

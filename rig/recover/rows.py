@@ -52,9 +52,10 @@ class Rows:
 
     def gaps(self, table: str) -> int:
         """Count the rows that are missing: a session numbers its rows from 1 without gaps."""
-        hashed = (last for _, covered, last, _ in self.in_order("hash") if covered == table)
         numbers = self.tables[table]
-        return max([0, *hashed, *numbers]) - len(numbers)
+        hashed = (last for _, covered, last, _ in self.in_order("hash") if covered == table)
+        missing: int = max([0, *hashed, *numbers]) - len(numbers)
+        return missing
 
     def chain_faults(self) -> list[str]:
         """List what the chain of hashes says was altered; nothing where there is no chain."""

@@ -62,8 +62,14 @@ def _data(session: Reader, found: SessionResults) -> list[Attachment]:
     if len(packed) > _DATA:
         words = "results and budgets as CSV files, with the protocol; rig export also writes edges"
         packed = zipped({**{n: t for n, t in files.items() if n != "edges.csv"}, **protocol})
+    attached = [
+        Attachment(file.name, "application/octet-stream", file.data, f"attached {file.added}")
+        for file in session.attached_files()
+        if len(file.data) <= _DATA
+    ]
     return [
         Attachment("data.zip", "application/zip", packed, words),
         Attachment("summary.csv", "text/csv", files["summary.csv"].encode(), "means only"),
         Attachment(METHOD, "text/markdown", method_page().encode(), "the whole method"),
+        *attached,
     ]

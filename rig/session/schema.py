@@ -207,6 +207,9 @@ CREATE TABLE result (run INTEGER NOT NULL, attempt INTEGER NOT NULL, analysis_ve
 """
 
 
+_MARK_OLDER = f"INSERT INTO hash VALUES (1, '{OLDER}', 0, x'');"  # noqa: S608 - a constant
+
+
 def create_script(version: int = SCHEMA_VERSION) -> str:
     """Return the script that makes an empty session of a format inside a transaction."""
     tables = [(name, table) for name, table in TABLES.items() if table.since <= version]
@@ -223,7 +226,7 @@ def upgrade_script(version: int) -> str:
     for name, table in TABLES.items():
         if table.since == version:
             script += table.script(name, version)
-            script += f"INSERT INTO hash VALUES (1, '{OLDER}', 0, x'');" if name == "hash" else ""
+            script += _MARK_OLDER if name == "hash" else ""
         else:
             added = (column.sql for column in table.columns if column.since == version)
             script += "".join(f'ALTER TABLE "{name}" ADD COLUMN {sql};\n' for sql in added)
