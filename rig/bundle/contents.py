@@ -56,7 +56,7 @@ def bundle_files(
     session: Reader,
     data: bytes,
     results: SessionResults,
-    drawn: Mapping[str, bytes],
+    drawn: Mapping[str, str],
     history: Sequence[str],
 ) -> dict[str, bytes]:
     """Make all files of a bundle.
@@ -80,15 +80,17 @@ def bundle_files(
     protocol = protocol_of(session)
     texts = csv_files(session, results.json(), tick_rates(session))
     readme = texts.pop("README.txt")
-    tables = {**texts, **mean_tables(protocol, results.analysis)}
-    encoded = {f"tables/{name}": text.encode() for name, text in tables.items()}
-    files = {
-        **encoded,
+    # What drops have in common, and so covariances, only a joint fit knows.
+    tables = {**texts, **mean_tables(protocol, results.complete or results.analysis)}
+    texts = {
+        **{f"tables/{name}": text for name, text in tables.items()},
         **drawn,
+        "README.txt": readme,
+        "protocol.yaml": session.protocol_text,
+        HISTORY: "\n".join([*history, ""]),
+    }
+    files = {name: text.encode() for name, text in texts.items()} | {
         "tables/datapackage.json": to_json(data_package(tables)),
-        "README.txt": readme.encode(),
-        "protocol.yaml": session.protocol_text.encode(),
-        HISTORY: "\n".join([*history, ""]).encode(),
         RESULTS: to_json(results.json()),
         ENVIRONMENT: to_json(_environment()),
         SESSION: data,

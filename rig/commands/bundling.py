@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
-from contextlib import redirect_stderr
-from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bundle.archive import pack
 from rig.bundle.contents import SESSION, bundle_files, copy_session
-from rig.commands import report
 from rig.commands.output import progress, say, tell_damage
+from rig.commands.report import make_page
 from rig.files import check_place, replacing
 from rig.recover.examine import examine
 from rig.report.deviations import deviations
@@ -21,6 +18,7 @@ from rig.session.hashes import protocol_first
 from rig.session.store import Session
 
 if TYPE_CHECKING:
+    from argparse import Namespace
     from collections.abc import Iterator
 
     from rig.analysis.session import Analysis
@@ -64,20 +62,17 @@ def derive_bundle(data: bytes) -> DerivedBundle:
         It cannot be read.
     """
     with TemporaryDirectory(prefix="rig-bundle-") as folder:
-        place = Path(folder)
-        copy, page, figures = place / SESSION, place / "report.html", place / "figures"
+        copy = Path(folder) / SESSION
         copy.write_bytes(data)
         examined = examine(copy)
-        with redirect_stderr(StringIO()):  # of files that nobody will see
-            # Every number from the raw edges: what is kept of earlier results proves nothing.
-            drawing = Namespace(session=copy, output=page, figures=figures, bars="U95", fresh=True)
-            report.main(drawing)
-        drawn = {
-            path.relative_to(place).as_posix(): path.read_bytes()
-            for path in [page, *sorted(figures.iterdir())]
-        }
         with Session.open(copy, readonly=True) as session:
-            outcome = results(session, progress("analysing run"))
+            # Every number from the raw edges: what is kept of earlier results proves nothing.
+            show = progress("analysing run")
+            outcome = results(session, show, fresh=True, with_joint_fit=True)
+            page = make_page(session, outcome, "U95", fresh=True)
+            drawn = {"report.html": page.html} | {
+                f"figures/figure-{number}.svg": svg for number, svg in enumerate(page.figures, 1)
+            }
             history = [*describe_history(session, examined, outcome.analysis)]
             files = bundle_files(session, data, outcome, drawn, history)
     return DerivedBundle(files, outcome.analysis, examined)
