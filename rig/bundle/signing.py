@@ -23,25 +23,31 @@ _LONGEST = 4096
 """Bytes of a key file; minisign writes fewer than 300."""
 
 
-def sign(files: Mapping[str, bytes], key: str | os.PathLike[str]) -> dict[str, bytes]:
-    """Add the public key and a signature of the list of hashes to the files of a bundle.
-
-    The same files and key give the same bytes.
+def read_secret(key: str | os.PathLike[str]) -> SecretKey:
+    """Read a secret key, and ask for its password if it has one.
 
     Raises
     ------
     InputError
         The key cannot be used; of one with a password, that there is no terminal to ask at.
     """
-    with _usable(key) as content, SecretKey.from_bytes(content) as secret:
+    with _usable(key) as content:
+        secret = SecretKey.from_bytes(content)
         if secret.is_encrypted():
             if not sys.stdin.isatty():
                 raise make_error(InputError, "key_locked", path=key)
             secret.decrypt(getpass(f"password of {key}: "))
-        public = _text(secret.get_public_key())
-        rest = {name: files[name] for name in files if name != SUMS}
-        signed = list_hashes({**rest, PUBLIC_KEY: public})
-        signature = secret.sign(signed[SUMS], untrusted_comment=_COMMENT, trusted_comment=_COMMENT)
+    return secret
+
+
+def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
+    """Add the public key and a signature of the list of hashes to the files of a bundle.
+
+    The same files and key give the same bytes.
+    """
+    rest = {name: files[name] for name in files if name != SUMS}
+    signed = list_hashes({**rest, PUBLIC_KEY: _text(secret.get_public_key())})
+    signature = secret.sign(signed[SUMS], untrusted_comment=_COMMENT, trusted_comment=_COMMENT)
     return {**signed, SIGNATURE: _text(signature)}
 
 
@@ -83,8 +89,6 @@ def _usable(key: str | os.PathLike[str]) -> Iterator[bytes]:
     try:
         yield read_input(key, _LONGEST)
     except (OSError, Error) as error:
-        if isinstance(error, InputError):
-            raise
         raise make_error(InputError, "key_unusable", path=key, text=error) from error
 
 

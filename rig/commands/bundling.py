@@ -39,14 +39,15 @@ class DerivedBundle(NamedTuple):
 def write_bundle(arguments: Namespace) -> int:
     """Write a session as a bundle; the same session gives the same bytes."""
     check_place(arguments.bundle)
+    secret = None
+    if arguments.sign is not None:
+        from rig.bundle import signing  # noqa: PLC0415 - an extra that few need
+
+        secret = signing.read_secret(arguments.sign)
     with Session.open(arguments.session, readonly=True) as session:
         data = copy_session(session)
     derived = derive_bundle(data)
-    files = derived.files
-    if arguments.sign is not None:
-        from rig.bundle.signing import sign  # noqa: PLC0415 - an extra that few need
-
-        files = sign(files, arguments.sign)
+    files = signing.sign(derived.files, secret) if secret else derived.files
     with replacing(arguments.bundle) as stream:
         stream.write(pack(files))
     say(f"bundle: {arguments.bundle}; rig verify {arguments.bundle} checks it")

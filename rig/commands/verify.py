@@ -9,7 +9,8 @@ from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, is_bundle, read_bundle
 from rig.bundle.contents import ENVIRONMENT, HISTORY, SESSION, compare
 from rig.commands.bundling import derive_bundle, describe_history
 from rig.commands.output import VOID, progress, show
-from rig.errors import SessionError
+from rig.errors import InputError, SessionError
+from rig.reasons import make_error
 from rig.recover.examine import examine
 from rig.results import results
 from rig.session.store import Session
@@ -26,8 +27,12 @@ def main(arguments: Namespace) -> int:
     """Check a bundle, the folder that it was unpacked into, or a session file."""
     lines: list[str] = []
     faults: list[str] = []
-    verify = _verify_bundle if is_bundle(arguments.file) else _verify_session
-    verify(arguments, lines, faults)
+    if is_bundle(arguments.file):
+        _verify_bundle(arguments, lines, faults)
+    elif arguments.key is None:
+        _verify_session(arguments, lines, faults)
+    else:
+        raise make_error(InputError, "key_without_bundle", path=arguments.file)
     verdict = "not as recorded" if faults else "as recorded"
     show([*lines, *(f"wrong: {text}" for text in dict.fromkeys(faults)), f"verdict: {verdict}"])
     return VOID if faults else 0

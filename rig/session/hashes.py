@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import deque
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.session.schema import OLDER, TABLES, insert_statement
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     KeyedRow = tuple[int, Sequence[Any]]
 
 _NAMED = 12
-"""Altered rows of a table that are named, at most."""
+"""Altered rows that are named, at most: of a table, and of a commit."""
 HASHED = [name for name in TABLES if name != "hash"]
 
 
@@ -100,13 +101,13 @@ def check_chain(
         if number != due:
             faults.append(f"table hash: rows {due} to {number - 1} are missing")
         elif table != OLDER and digest != _digest(before, table, batch):
-            covered = range(since[table] + 1, last + 1)
-            altered.setdefault(table, []).extend(covered)
+            # A damaged file may say that it goes on for ever.
+            altered.setdefault(table, []).extend(islice(range(since[table] + 1, last + 1), _NAMED))
         since[table], before, due = last, digest, number + 1
     for table, numbers in altered.items():
         names = drops if table in {"drop", "edge"} else {}
         rows_named = [names.get(number, f"row {number}") for number in numbers[:_NAMED]]
-        more = f" and {len(numbers) - _NAMED} more" if len(numbers) > _NAMED else ""
+        more = ", and more" if len(numbers) > _NAMED else ""
         faults.append(f"table {table}: not as recorded: {'; '.join(rows_named)}{more}")
     if due > 1:
         faults += [
