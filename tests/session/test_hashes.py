@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
-import subprocess
-import sys
-import time
 
 import pytest
 
@@ -103,28 +98,3 @@ def test_what_is_saved_of_a_damaged_file_does_not_claim_to_be_the_record(sound, 
     new = tmp_path / "saved"
     save(examine(sound), new)
     assert (faults(new), first(new)) == ([], None)
-
-
-WRITE = """
-import sys
-from rig.session.store import Session
-from tests.session.test_hashes import record
-with Session.open(sys.argv[1]) as session:
-    for run in range(6, 10_000):
-        record(session, run)
-        print(run, flush=True)
-"""
-
-
-def test_sigkill_at_any_moment_leaves_the_chain_whole(sound, tmp_path):
-    path = tmp_path / "killed"
-    shutil.copy(sound, path)
-    for moment in range(4):
-        command = [sys.executable, "-c", WRITE.replace("6,", f"{6 + 100 * moment},"), path]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, env={**os.environ}) as child:
-            child.stdout.readline()
-            time.sleep(0.003 * moment)
-            child.send_signal(signal.SIGKILL)
-        assert faults(path) == []
-    with Session.open(path, readonly=True) as session:
-        assert len(session.states()) > 5

@@ -335,6 +335,7 @@ for count in range(10**9):
         stamps = [chunk.host_ns for chunk in session.byte_log()]
     # The row after the last announced one may have been committed before the kill.
     assert stamps in (list(range(last + 1)), list(range(last + 2)))
+    assert examine(path).rows.chain_faults() == []
 
 
 def test_sigkill_before_the_commit_leaves_a_whole_session(path):
@@ -344,6 +345,7 @@ def test_sigkill_before_the_commit_leaves_a_whole_session(path):
     with Session.open(path) as session:
         assert list(session.byte_log()) == []
         session.log_bytes("rx", 1, b"goes on")
+    assert examine(path).rows.chain_faults() == []
 
 
 def test_one_writer_even_within_a_process(path):
