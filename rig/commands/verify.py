@@ -94,7 +94,9 @@ def _describe(
     since = ", begun later than the session" if any(not link[3] for link in links) else ""
     words = f"{len(links)}, {states}{since}" if links else "none; an older program recorded it"
     lines.append(f"linked hashes of rows: {words}")
-    faults += [*examined.troubles, *analysis.damage]
+    lost = examined.lost
+    faults += [f"lost: {text}" if text in lost else text for text in examined.troubles]
+    faults += analysis.damage
 
 
 def _versions(text: bytes) -> str:

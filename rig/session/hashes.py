@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import deque
-from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.session.schema import OLDER, TABLES, insert_statement
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     KeyedRow = tuple[int, Sequence[Any]]
 
 _NAMED = 12
-"""Altered rows that are named, at most: of a table, and of a commit."""
+"""Commits with altered rows of a table that are named, at most."""
 HASHED = [name for name in TABLES if name != "hash"]
 
 
@@ -88,7 +87,7 @@ def check_chain(
     """
     faults: list[str] = []
     ahead = {table: deque(rows[table]) for table in HASHED}
-    altered: dict[str, list[int]] = {}
+    altered: dict[str, list[tuple[int, int]]] = {}
     drops = {number: f"run {row[1]}, attempt {row[2]}" for number, row in ahead["drop"]}
     before, due, since = b"", 1, dict.fromkeys([*HASHED, OLDER], 0)
     for number, table, last, digest in links:
@@ -101,14 +100,15 @@ def check_chain(
         if number != due:
             faults.append(f"table hash: rows {due} to {number - 1} are missing")
         elif table != OLDER and digest != _digest(before, table, batch):
-            # A damaged file may say that it goes on for ever.
-            altered.setdefault(table, []).extend(islice(range(since[table] + 1, last + 1), _NAMED))
+            altered.setdefault(table, []).append((since[table] + 1, last))
         since[table], before, due = last, digest, number + 1
-    for table, numbers in altered.items():
-        names = drops if table in {"drop", "edge"} else {}
-        rows_named = [names.get(number, f"row {number}") for number in numbers[:_NAMED]]
-        more = ", and more" if len(numbers) > _NAMED else ""
-        faults.append(f"table {table}: not as recorded: {'; '.join(rows_named)}{more}")
+    for table, ranges in altered.items():
+        names = [f"rows {first} to {last}" for first, last in ranges]
+        if table in {"drop", "edge"}:
+            own = (n for n in drops if any(first <= n <= last for first, last in ranges))
+            names = [drops[n] for n in own] or names
+        more = ", and more" if len(names) > _NAMED else ""
+        faults.append(f"table {table}: not as recorded: {'; '.join(names[:_NAMED])}{more}")
     if due > 1:
         faults += [
             f"table {table}: rows after {since[table]} are in no hash"

@@ -127,7 +127,7 @@ def test_a_byte_altered_anywhere_is_found_and_named(bundle, tmp_path):
     ("sql", "named"),
     [
         ('UPDATE edge SET tick = tick + 1 WHERE "drop" = 3 AND idx = 2', "run 3, attempt 1"),
-        ("DELETE FROM run_state WHERE id = 5", "table run_state: not as recorded: row 5"),
+        ("DELETE FROM run_state WHERE id = 5", "table run_state: not as recorded: rows 5"),
     ],
 )
 def test_an_altered_row_is_named_even_where_all_is_hashed_anew(sql, named, files, call, tmp_path):
