@@ -48,10 +48,10 @@ _KEY = ("session", "run", "attempt")
 _HEAD = """\
 # Falling chains: who reads them how well
 
-`./run bench dataset --repeats {repeats}{only}`: every entrant reads the same {drops} drops of the
-resolved world. The interval score is the width of a 95 % interval, plus 40 times what the truth
-lies outside of it (Gneiting and Raftery, 2007, Eq. 43): smaller is better. An entrant that states
-no interval gets twice the standard deviation of its repeats. Void are drops without an interval."""
+`./run bench dataset --repeats {repeats}{only}`: {drops} drops of the resolved world, read by each.
+The interval score is the width of a 95 % interval plus 40 times what the truth lies outside of it
+(Gneiting and Raftery, 2007, Eq. 43): smaller is better. Who states no interval gets twice the
+standard deviation of repeats. Void: no interval."""
 _README = """\
 # Falling rod chains: simulated sessions with hidden truth
 
