@@ -81,6 +81,10 @@ def examine(path: str | os.PathLike[str]) -> ExaminedFile:
         torn: pages.missing,
         snapshot.trouble: snapshot.trouble,
         f"{rows.bad} records cannot be read": rows.bad,
+        "table hash: all its rows are missing": (
+            int.from_bytes(pages.pages.get(1, b"")[60:64], "big") >= TABLES["hash"].since
+            and not rows.tables["hash"]
+        ),
         f"nothing says what drops {orphans} groups of edges belong to": orphans,
     }
     facts = "whether it is simulated, when and by what it was made"
@@ -88,19 +92,18 @@ def examine(path: str | os.PathLike[str]) -> ExaminedFile:
         facts: "simulated" not in rows.meta,
         "the protocol file": rows.protocol is None,
         "the protocol's text has changed since the session was made": (
-            rows.protocol and not protocol_sound(rows)
+            rows.protocol and not protocol_sound(rows, rows.protocol[1])
         ),
         **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
         **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
     }
-    damaged = [*_true(damage), *rows.chain_faults()]
+    damaged = _true(damage) + rows.chain_faults()
     return ExaminedFile(snapshot, rows, drops, "", damaged, _true(lost))
 
 
 def describe(session: ExaminedFile) -> list[str]:
     """Say it in lines, safe for a terminal whatever stands in the file."""
-    lines = _lines(session)
-    return [printable(line).replace("\n", " ").replace("\t", " ") for line in lines]
+    return [printable(line).replace("\n", " ").replace("\t", " ") for line in _lines(session)]
 
 
 def _lines(session: ExaminedFile) -> list[str]:
@@ -162,9 +165,7 @@ def _describe_fate(recovered: RecoveredDrop) -> str:
     return f"run {recovered.drop.run}, attempt {recovered.drop.attempt}: {recovered.fate}"
 
 
-def protocol_sound(rows: Rows) -> bool:
-    """Whether the protocol's text is the one that the session was made with, as far as known."""
-    if rows.protocol is None:
-        return False
-    digest = hashlib.sha256(rows.protocol[1].encode()).hexdigest()
+def protocol_sound(rows: Rows, text: str) -> bool:
+    """Whether a protocol's text is the one that the session was made with, as far as known."""
+    digest = hashlib.sha256(text.encode()).hexdigest()
     return rows.meta.get("protocol_sha256", digest) == digest

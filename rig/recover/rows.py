@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rig.recover.pages import read_cells
-from rig.session.hashes import HASHED, check_chain
+from rig.session.hashes import check_chain
 from rig.session.rows import RowError, check_row
 from rig.session.schema import SCHEMA_VERSION, TABLES
 
@@ -54,15 +54,13 @@ class Rows:
         """Count the rows that are missing: a session numbers its rows from 1 without gaps."""
         numbers = self.tables[table]
         hashed = (last for _, covered, last, _ in self.in_order("hash") if covered == table)
-        missing: int = max([0, *hashed, *numbers]) - len(numbers)
-        return missing
+        return int(max([0, *hashed, *numbers])) - len(numbers)
 
     def chain_faults(self) -> list[str]:
         """List what the chain of hashes says was altered; nothing where there is no chain."""
         rows = {
             name: [(key[0] if name == "edge" else key, row) for key, row in sorted(table.items())]
             for name, table in self.tables.items()
-            if name in HASHED
         }
         return check_chain(self.in_order("hash"), rows)
 

@@ -72,11 +72,12 @@ def _protocol(examined: ExaminedFile, file: str | None) -> tuple[str, str]:
             return Path(file).name, read_input(file).decode()
         except (OSError, UnicodeDecodeError) as error:
             raise SessionError(f"cannot read {file}: {error}") from error
-    if examined.rows.protocol is None or not protocol_sound(examined.rows):
+    rows = examined.rows
+    if rows.protocol is None or not protocol_sound(rows, rows.protocol[1]):
         raise SessionError(
             f"{examined.snapshot.path} has lost its protocol file", "give it: --protocol FILE"
         )
-    return examined.rows.protocol
+    return rows.protocol
 
 
 def _find_world(rows: Rows) -> tuple[bool, list[str]]:

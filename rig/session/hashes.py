@@ -35,8 +35,8 @@ class ChainEnd(NamedTuple):
 def read_end(connection: sqlite3.Connection) -> ChainEnd:
     """Read where the chain of a session ends."""
     last = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
-    tip = connection.execute("SELECT digest FROM hash ORDER BY id DESC LIMIT 1")
-    return ChainEnd(dict(last), next(tip, (b"",))[0])
+    tip = connection.execute("SELECT digest FROM hash ORDER BY id DESC LIMIT 1").fetchone()
+    return ChainEnd(dict(last), tip[0] if tip else b"")
 
 
 def extend_chain(connection: sqlite3.Connection, end: ChainEnd | None = None) -> ChainEnd:
@@ -53,18 +53,16 @@ def extend_chain(connection: sqlite3.Connection, end: ChainEnd | None = None) ->
         Where it ends once the transaction is committed.
     """
     last, digest = end or read_end(connection)
-    last = dict(last)
+    last = {**last}
     for table in HASHED:
         # A table that is kept as an index has no number of its own; edges go by their drop's.
-        key = '"drop", idx' if table == "edge" else "rowid"
-        order = f"WHERE {key.partition(',')[0]} > ? ORDER BY {key}"
-        sql = f'SELECT {key}, * FROM "{table}" {order}'  # noqa: S608 - a constant of tables.txt
-        numbered = connection.execute(sql, (last.get(table, 0),)).fetchall()
-        if numbered:
-            rows = [row[2 if table == "edge" else 1 :] for row in numbered]
-            last[table], digest = numbered[-1][0], _digest(digest, table, rows)
-            link = (None, table, last[table], digest)
-            connection.execute(insert_statement("hash"), link)
+        key, then = ('"drop"', ", idx") if table == "edge" else ("rowid", "")
+        sql = f'SELECT {key}, * FROM "{table}" WHERE {key} > ? ORDER BY {key}{then}'  # noqa: S608
+        rows = connection.execute(sql, (last.get(table, 0),)).fetchall()
+        if rows:
+            last[table] = rows[-1][0]
+            digest = _digest(digest, table, (row[1:] for row in rows))
+            connection.execute(insert_statement("hash"), (None, table, last[table], digest))
     return ChainEnd(last, digest)
 
 
@@ -103,10 +101,9 @@ def check_chain(
             altered.setdefault(table, []).append((since[table] + 1, last))
         since[table], before, due = last, digest, number + 1
     for table, ranges in altered.items():
-        names = [f"rows {first} to {last}" for first, last in ranges]
-        if table in {"drop", "edge"}:
-            own = (n for n in drops if any(first <= n <= last for first, last in ranges))
-            names = [drops[n] for n in own] or names
+        known = drops if table in {"drop", "edge"} else {}
+        own = [known[n] for n in known if any(first <= n <= last for first, last in ranges)]
+        names = own or [f"rows {first} to {last}" for first, last in ranges]
         more = ", and more" if len(names) > _NAMED else ""
         faults.append(f"table {table}: not as recorded: {'; '.join(names[:_NAMED])}{more}")
     if due > 1:
@@ -116,21 +113,6 @@ def check_chain(
             if left
         ]
     return faults
-
-
-def protocol_first(links: Sequence[Sequence[Any]]) -> bool | None:
-    """Whether the protocol was hashed, once, before any run; `None` where there is no whole chain.
-
-    Parameters
-    ----------
-    links
-        As for `check_chain`, which must find no fault in them.
-    """
-    tables = [table for _, table, *_ in links]
-    if not tables or OLDER in tables:
-        return None
-    runs = [tables.index(table) for table in ("drop", "run_state") if table in tables]
-    return tables.count("protocol") == 1 and tables.index("protocol") < min(runs, default=2)
 
 
 def _digest(before: bytes, table: str, rows: Iterable[Sequence[Any]]) -> bytes:

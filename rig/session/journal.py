@@ -135,9 +135,9 @@ class Journal:
             target.execute("PRAGMA synchronous = FULL")
             rescue = Journal(target, place)
             rescue._pending = self._pending
-            waiting = len(self._pending)
+            refused = len(self._pending)
             rescue._run()
-            refused = waiting - len(self._pending)
+            refused -= len(self._pending)
             rescue._commit()
         self._failed = False
         return refused
