@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 BAD_INPUT = 2
 INTERRUPTED = 130
-OPTIONAL = ("distributed", "mpmath")
-"""Packages that few need: clusters for `rig sweep`, 50 digits for some of `rig bench`."""
+OPTIONAL = {"distributed": "distributed", "mpmath": "mpmath", "minisign": "py-minisign"}
+"""Packages that few need, with their names for pip: clusters for `rig sweep`, 50 digits for some of
+`rig bench`, signatures."""
 
 
 class _ListFormats(argparse.Action):
@@ -94,7 +95,8 @@ def _run(argv: Sequence[str] | None) -> int:
             raise
         from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-        say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
+        install = f"{quote(sys.executable)} -m pip install {OPTIONAL[package]}"
+        say(f"rig: this needs {OPTIONAL[package]}: {install}")
         return BAD_INPUT
     except OSError as error:
         named = error.strerror and error.filename

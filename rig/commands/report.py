@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 _NUMERICS = ("numpy", "scipy")
 
 
-class _Page(NamedTuple):
+class ReportPage(NamedTuple):
     """A report as it is kept: its HTML and its figures, each as text, and what failed."""
 
     html: str
@@ -56,10 +56,10 @@ def main(arguments: Namespace) -> int:
         outcome = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=True)
         # The page has the file's name; how simulated chains moved lies beside the file.
         content = session.path.name, arguments.bars, film_digest(session.path)
-        entry = CacheEntry(_Page, outcome.digest, content, fresh=fresh)
+        entry = CacheEntry(ReportPage, outcome.digest, content, fresh=fresh)
         page = entry.find()
         if page is None:
-            page = _page(session, outcome, arguments.bars, fresh=fresh)
+            page = make_page(session, outcome, arguments.bars, fresh=fresh)
             page = page if page.failed else entry.keep(page)
     write_atomic(arguments.output, page.html)
     if arguments.figures is not None:
@@ -70,7 +70,7 @@ def main(arguments: Namespace) -> int:
     return tell_damage(outcome.analysis)
 
 
-def _page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: bool) -> _Page:
+def make_page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: bool) -> ReportPage:
     """Draw the figures and write the page around them."""
     protocol = protocol_of(session)
     sections = Sections()
@@ -139,7 +139,7 @@ def _page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: bool)
     )
     stage("")
     failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
-    return _Page(html, tuple(picture.svg for picture in figures), failed)
+    return ReportPage(html, tuple(picture.svg for picture in figures), failed)
 
 
 def _version(package: str) -> str:
@@ -147,8 +147,11 @@ def _version(package: str) -> str:
 
 
 def _operator_notes(session: Session) -> list[str]:
-    """Tell what operators noted to drops."""
-    return [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()]
+    """Tell what the protocol and operators noted, and which files they attached."""
+    own, noted = protocol_of(session).notes, notes(session).items()
+    runs = [f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in noted]
+    attached = [f"Attached {file.added}: {file.name}" for file in session.attached_files()]
+    return [*([f"Protocol: {own}"] if own else []), *runs, *attached]
 
 
 def _estimate(session: Session, outcome: SessionResults, *, fresh: bool) -> SessionEstimate | None:

@@ -197,7 +197,7 @@ def _drops(context: ReportContext) -> str:
     if odd:
         html += f"<h3>Reasons for verdicts</h3>{table('Verdicts', _VERDICTS, odd)}"
     if context.operator_notes:
-        html += f"<h3>Operator's notes</h3>{bullets(context.operator_notes)}"
+        html += f"<h3>Notes</h3>{bullets(context.operator_notes)}"
     if context.deviations:
         html += f"<h3>Deviations from the plan</h3>{bullets(context.deviations)}"
     runs = context.sections.make("The table of runs", lambda: _runs(context))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rig.bundle.tables import csv_files
 from rig.report.attachments import Attachment, zipped
 from rig.report.method import METHOD, method_page
 from rig.report.timeline import Timeline, timeline
 from rig.results import tick_rates
-from rig.session.export import csv_files
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
@@ -62,8 +62,14 @@ def _data(session: Reader, found: SessionResults) -> list[Attachment]:
     if len(packed) > _DATA:
         words = "results and budgets as CSV files, with the protocol; rig export also writes edges"
         packed = zipped({**{n: t for n, t in files.items() if n != "edges.csv"}, **protocol})
+    attached = [
+        Attachment(file.name, "application/octet-stream", file.data, f"attached {file.added}")
+        for file in session.attached_files()
+        if len(file.data) <= _DATA
+    ]
     return [
         Attachment("data.zip", "application/zip", packed, words),
         Attachment("summary.csv", "text/csv", files["summary.csv"].encode(), "means only"),
         Attachment(METHOD, "text/markdown", method_page().encode(), "the whole method"),
+        *attached,
     ]

@@ -78,10 +78,8 @@ class ByteReplay:
 
     def drops(self) -> dict[Job, Drop]:
         """Give every drop once, as it was told last."""
-        drops = {Job(drop.run, drop.attempt): drop for drop in self.acknowledged_drops()}
-        for drop in self.unfinished_drops():
-            drops.setdefault(Job(drop.run, drop.attempt), drop)
-        return drops
+        drops = [*self.unfinished_drops(), *self.acknowledged_drops()]
+        return {Job(drop.run, drop.attempt): drop for drop in drops}
 
 
 def check_drop(stored: Drop, replayed: Mapping[Job, Drop], *, torn: bool = False) -> Fate:

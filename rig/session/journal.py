@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.session.faults import as_session_error
+from rig.session.hashes import extend_chain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
+
+    from rig.session.hashes import ChainEnd
 
 
 class Statement(NamedTuple):
@@ -56,6 +59,7 @@ class Journal:
         self._applied = 0  # how many of the pending the open transaction holds
         self._failed = False
         self._begun_s: float | None = None
+        self._chain_end: ChainEnd | None = None  # as committed, once that is known
 
     def __len__(self) -> int:
         """Count the records not yet on the disk."""
@@ -126,26 +130,24 @@ class Journal:
             It cannot be read, or not be written there.
         """
         self._give_up()
-        refused = 0
         with closing(sqlite3.connect(place, isolation_level=None)) as target:
             self._connection.backup(target)
             target.execute("PRAGMA synchronous = FULL")
-            target.execute("BEGIN")
-            for statements in self._pending:
-                try:
-                    for sql, rows in statements:
-                        target.executemany(sql, rows)
-                except _BAD_ROW:
-                    refused += 1
-            target.execute("COMMIT")
-        self._pending.clear()
+            rescue = Journal(target, place)
+            rescue._pending = self._pending
+            refused = len(self._pending)
+            rescue._run()
+            refused -= len(self._pending)
+            rescue._commit()
         self._failed = False
         return refused
 
     def _commit(self) -> None:
         refusal = self._run()
         if self._connection.in_transaction:
+            end = extend_chain(self._connection, self._chain_end)
             self._connection.execute("COMMIT")
+            self._chain_end = end
         self._pending.clear()
         self._applied = 0
         self._report(refusal)

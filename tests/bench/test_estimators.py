@@ -40,11 +40,7 @@ def test_the_bench_draws_one_picture(tmp_path, capsys, monkeypatch):
     assert main([*arguments, "--repeats", "4", "--budget", "1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     names = [one["name"] for one in found["estimators"]]
-    assert {"camera reading", "one-run fit", "session fit", "Monte Carlo, draws"} <= set(names)
-    by_name = {one["name"]: one for one in found["estimators"]}
-    assert by_name["camera reading"]["seconds"] is None
-    camera, ours = (by_name[name] for name in ("camera reading", "session fit"))
-    assert ours["separation_median_m"] < camera["separation_median_m"]
+    assert {"one-run fit", "session fit", "Monte Carlo, draws"} <= set(names)
     assert found["times_lstsq"].keys() == {"one-run fit", "joint fit alone"}
     assert found["times_lstsq"]["one-run fit"] > 1.0  # it solves at least one such system
     assert any("M = 1e+06" in one for one in found["left_out"])

@@ -78,13 +78,6 @@ def test_every_table_is_written(exported, analysis, finished):
     assert (exported / "README.txt").read_text("utf-8").startswith("SIMULATED DATA")
 
 
-def test_exporting_twice_gives_the_same_files(call, finished, exported, tmp_path):
-    done = call("export", finished.session, "--csv", tmp_path / "deep" / "er")
-    assert (done.code, done.out) == (0, "")
-    for path in exported.iterdir():
-        assert (tmp_path / "deep" / "er" / path.name).read_bytes() == path.read_bytes()
-
-
 def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_path):
     done = bring("--clock-uncertainty", "10 ppm", "--simulated")
     assert (done.code, done.out) == (0, "")

@@ -117,14 +117,6 @@ def test_changed_bytes_are_found(call, fenced, share):
     assert done.err == ""
 
 
-def test_the_guards_refuse_what_was_done_here(fenced):
-    with (
-        closing(sqlite3.connect(fenced)) as connection,
-        pytest.raises(sqlite3.IntegrityError, match="never altered"),
-    ):
-        connection.execute("UPDATE edge SET tick = 1")
-
-
 def test_a_drop_whose_acknowledgement_was_lost_is_replayed_once(call, tmp_path, fence, monkeypatch):
     """The host stored it and said so into a dead cable: the next connection says it again."""
     receive, lost = VirtualBoard.receive, []

@@ -121,17 +121,6 @@ def test_a_torn_file_gives_what_is_before_the_tear(part, copy, truth, tmp_path):
     assert set(again["states"]) <= set(truth["states"]) or missing
 
 
-def test_the_further_the_tear_the_more_is_saved(copy, truth, tmp_path):
-    whole = copy.read_bytes()
-    counts = []
-    for pages in range(6, len(whole) // 4096 + 1, 5):
-        copy.write_bytes(whole[: pages * 4096])
-        fates = [one.fate for one in examine(copy).drops]
-        counts.append(sum(fate is not Fate.PARTIAL for fate in fates))
-    assert counts == sorted(counts)
-    assert 0 < counts[-2] <= counts[-1] == len(truth["drops"])
-
-
 def test_edges_that_are_lost_come_again_from_the_bytes(copy, truth, tmp_path):
     alter(
         copy,

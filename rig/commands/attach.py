@@ -1,0 +1,33 @@
+"""``rig attach``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+from rig.files import read_input
+from rig.reasons import make_error
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+LARGEST = 1 << 25
+"""Bytes; half of what a value of a session file may have."""
+
+
+def main(arguments: Namespace) -> int:
+    """Add a file to a session, for its report and its bundle."""
+    path = arguments.file
+    try:
+        data = read_input(path, LARGEST + 1)
+    except OSError as error:
+        raise make_error(InputError, "attachment_unreadable", path=path, text=error) from error
+    if not 0 < len(data) <= LARGEST:
+        text = f"it has {'no' if not data else f'more than {LARGEST}'} bytes"
+        raise make_error(InputError, "attachment_unreadable", path=path, text=text)
+    with Session.open(arguments.session) as session:
+        session.attach(Path(path).name, data)
+    print(f"attached to {arguments.session}: {path}, {len(data)} bytes")
+    return 0
