@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import mimetypes
 import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,19 +34,6 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 _LOCAL_HEADER = 30
 """Bytes before a member's name (APPNOTE.TXT, 4.3.7)."""
 _LARGEST = 1 << 31
-_KINDS = {
-    "csv": "text/csv",
-    "html": "text/html",
-    "jpg": "image/jpeg",
-    "json": "application/json",
-    "pdf": "application/pdf",
-    "png": "image/png",
-    "session": "application/vnd.sqlite3",
-    "svg": "image/svg+xml",
-    "txt": "text/plain",
-    "yaml": "application/yaml",
-}
-"""Media types by ending: the system's own list differs between systems."""
 
 
 def sha256(data: bytes) -> str:
@@ -68,12 +56,13 @@ def seal(files: Mapping[str, bytes], about: Mapping[str, str]) -> dict[str, byte
     about
         The crate's ``name``, ``description`` and ``datePublished``.
     """
+    kinds = mimetypes.MimeTypes()  # Python's own list: the system's differs between systems
     described = [
         {
             "@id": f"./{name}",
             "@type": "File",
             "name": name.rpartition("/")[2],
-            "encodingFormat": _KINDS.get(name.rpartition(".")[2], "application/octet-stream"),
+            "encodingFormat": kinds.guess_type(name)[0] or "application/octet-stream",
             "contentSize": str(len(content)),
             "sha256": sha256(content),
         }
@@ -105,11 +94,9 @@ def pack(files: Mapping[str, bytes]) -> bytes:
 
 
 def is_bundle(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is meant to be a bundle, by its beginning or its name; or a folder of one."""
+    """Whether a bundle is meant: an archive, by its name or its end, or a folder."""
     place = Path(path)
-    return (
-        place.suffix == ".eln" or place.is_dir() or (place.is_file() and zipfile.is_zipfile(place))
-    )
+    return place.suffix == ".eln" or place.is_dir() or zipfile.is_zipfile(place)
 
 
 def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[str]]:
@@ -135,23 +122,16 @@ def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[st
         files = _members(place, data)
     if SUMS not in files:
         raise _foreign(place, f"it has no {ROOT}{SUMS}")
-    faults = _check_hashes(files)
+    # No hash can cover the list itself, and what signs it.
+    covered = {name: files[name] for name in files if name not in {SUMS, SIGNATURE}}
+    lists = (files[SUMS], list_hashes(covered)[SUMS])
+    rows, again = (text.decode("utf-8", "replace").splitlines() for text in lists)
+    names = sorted({row.partition("  ")[2] for row in {*rows} ^ {*again}})
+    faults = [f"{name} is not as {SUMS} has it" for name in names]
+    if not faults and rows != again:
+        faults = [f"{SUMS} is not as rig writes it"]
     # The archive has a checksum of each file too: an altered file shows around it as well.
     return files, faults if faults or place.is_dir() else _check_archive(files, data)
-
-
-def _check_hashes(files: Mapping[str, bytes]) -> list[str]:
-    lines = files[SUMS].decode("utf-8", "replace").splitlines()
-    sums = {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
-    outside = {SUMS, SIGNATURE}  # no hash can cover the list itself, and what signs it
-    inside = files.keys() - outside
-    faults = [f"{name} is not in {SUMS}" for name in sorted(inside - sums.keys())]
-    faults += [f"{name}, in {SUMS}, is missing" for name in sorted(sums.keys() - inside)]
-    both = sorted(inside & sums.keys())
-    differ = [name for name in both if sha256(files[name]) != sums[name]]
-    faults += [f"{name} does not have the hash in {SUMS}" for name in differ]
-    again = list_hashes({name: files[name] for name in both})[SUMS]
-    return faults or [f"{SUMS} is not as rig writes it"] * (again != files[SUMS])
 
 
 def _members(place: Path, data: bytes) -> dict[str, bytes]:
@@ -163,13 +143,12 @@ def _members(place: Path, data: bytes) -> dict[str, bytes]:
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OverflowError) as error:
         raise _foreign(place, f"its archive cannot be read ({error})") from error
     for member in members:
-        name = member.filename
-        if not name.startswith(ROOT) or ".." in name.split("/"):
-            raise _foreign(place, f"it has {name!r:.60}, outside of {ROOT}")
-        if member.compress_type != zipfile.ZIP_STORED:
-            raise _foreign(place, f"{name!r:.60} is compressed; rig stores files as they are")
+        name, size = member.filename, member.compress_size
         begin = member.header_offset + _LOCAL_HEADER + len(name.encode())
-        files[name.removeprefix(ROOT)] = data[begin : begin + member.compress_size]
+        is_stored = member.compress_type == zipfile.ZIP_STORED
+        if not (is_stored and name.startswith(ROOT) and ".." not in name.split("/")):
+            raise _foreign(place, f"{name!r:.60} is compressed, or outside of {ROOT}")
+        files[name.removeprefix(ROOT)] = data[begin : begin + size]
     if sum(map(len, files.values())) > len(data):
         raise _foreign(place, "its members overlap")
     return files
@@ -182,10 +161,10 @@ def _check_archive(files: Mapping[str, bytes], data: bytes) -> list[str]:
         return []
     at = next((n for n, (a, b) in enumerate(zip(data, again, strict=False)) if a != b), len(again))
     with zipfile.ZipFile(io.BytesIO(again)) as archive:
-        members = [m.filename for m in archive.infolist() if m.header_offset <= at]
-        directory = at >= archive.start_dir
-    where = "in its directory" if directory else f"in the header of {members[-1]}"
-    return [f"the archive itself was altered at byte {at}, {where}"]
+        parts = {m.header_offset: f"the header of {m.filename}" for m in archive.infolist()}
+        parts[archive.start_dir] = "its directory"
+    where = parts[max(begin for begin in parts if begin <= at)]
+    return [f"the archive itself was altered at byte {at}, in {where}"]
 
 
 def _read(path: Path) -> bytes:

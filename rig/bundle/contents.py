@@ -12,7 +12,7 @@ import re
 import sqlite3
 from contextlib import closing
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 SESSION, RESULTS, ENVIRONMENT = "record.session", "results.json", "environment.json"
 HISTORY = "deviations.txt"
+WRONG = "wrong: "
+"""A finding that begins so says what was altered."""
 DIGITS = 6
 """Significant digits that other versions of the numerics must give again; a report shows two."""
 _ALL = 17
@@ -135,56 +137,36 @@ def _environment() -> dict[str, str]:
     }
 
 
-class BundleComparison(NamedTuple):
-    """A bundle beside what follows from its session now.
-
-    Attributes
-    ----------
-    numbers
-        How many results were compared.
-    digits
-        Significant digits in which all agree.
-    differences
-        A line for each file or number that does not agree.
-    """
-
-    numbers: int
-    digits: int
-    differences: list[str]
-
-    def __str__(self) -> str:
-        agree = "all digits agree" if self.digits == _ALL else f"{self.digits} digits agree"
-        return f"numbers: {self.numbers} derived again from the raw edges; {agree}"
-
-
-def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> BundleComparison:
+def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> Iterator[str]:
     """Compare a bundle with what follows from its session now.
 
     Results are compared number by number. All other files must have the same bytes, where program
     and numerics have the same versions; pictures and last digits differ between versions.
+
+    Yields
+    ------
+    str
+        In how many digits all results agree, then a line that begins with `WRONG` for each file or
+        number that does not.
     """
-    differences: list[str] = []
-    if stored.get(ENVIRONMENT) == derived[ENVIRONMENT]:
-        names = sorted(derived.keys() - {SUMS, CRATE, RESULTS})
-        differences = [
-            f"{name} does not follow from {SESSION}"
-            for name in names
-            if stored.get(name) != derived[name]
-        ]
     try:
         before = dict(_leaves("", json.loads(stored.get(RESULTS, b"{}"))))
     except ValueError:
         before = {}
     after = dict(_leaves("", json.loads(derived[RESULTS])))
-    digits = _ALL
-    for place in [*before, *(place for place in after if place not in before)]:
-        equal = _equal_digits(before.get(place), after.get(place))
-        if equal >= DIGITS:
-            digits = min(digits, equal)
-        else:
+    equal = {place: _equal_digits(before.get(place), after.get(place)) for place in before | after}
+    digits = min([n for n in equal.values() if n >= DIGITS], default=_ALL)
+    agree = "all digits agree" if digits == _ALL else f"{digits} digits agree"
+    count = sum(type(value) is float for value in after.values())
+    yield f"numbers: {count} derived again from the raw edges; {agree}"
+    if stored.get(ENVIRONMENT) == derived[ENVIRONMENT]:
+        for name in sorted(derived.keys() - {SUMS, CRATE, RESULTS}):
+            if stored.get(name) != derived[name]:
+                yield f"{WRONG}{name} does not follow from {SESSION}"
+    for place, n in equal.items():
+        if n < DIGITS:
             words = [f"{side.get(place, 'nothing')!s:.40}" for side in (before, after)]
-            differences.append(f"{RESULTS}, {place}: {words[0]}; derived: {words[1]}")
-    return BundleComparison(sum(type(n) is float for n in after.values()), digits, differences)
+            yield f"{WRONG}{RESULTS}, {place}: {words[0]}; derived: {words[1]}"
 
 
 def _leaves(place: str, value: Any) -> Iterator[tuple[str, object]]:

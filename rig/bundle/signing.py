@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import sys
-from contextlib import contextmanager
 from getpass import getpass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from minisign import Error, PublicKey, SecretKey, Signature
 
 from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, SUMS, list_hashes
+from rig.bundle.contents import WRONG
 from rig.errors import InputError
 from rig.files import read_input
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Mapping
 
+Key = TypeVar("Key")
 _COMMENT = "rig export --bundle"
 _LONGEST = 4096
 """Bytes of a key file; minisign writes fewer than 300."""
@@ -31,13 +32,16 @@ def read_secret(key: str | os.PathLike[str]) -> SecretKey:
     InputError
         The key cannot be used; of one with a password, that there is no terminal to ask at.
     """
-    with _usable(key) as content:
+
+    def unlock(content: bytes) -> SecretKey:
         secret = SecretKey.from_bytes(content)
         if secret.is_encrypted():
             if not sys.stdin.isatty():
                 raise make_error(InputError, "key_locked", path=key)
             secret.decrypt(getpass(f"password of {key}: "))
-    return secret
+        return secret
+
+    return _read_key(key, unlock)
 
 
 def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
@@ -51,45 +55,35 @@ def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
     return {**signed, SIGNATURE: _text(signature)}
 
 
-def check_signature(
-    files: Mapping[str, bytes], key: str | os.PathLike[str] | None
-) -> tuple[str, bool]:
+def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | None) -> str:
     """Check the signature of a bundle with a public key, or with the one that is in it.
 
     Returns
     -------
-    sentence, sound
-        The finding, and whether nothing is wrong.
+    str
+        The finding; it begins with `WRONG` unless the signature is right.
 
     Raises
     ------
     InputError
         The key cannot be read, or is no public key of minisign.
     """
+    stated = None if key is None else _read_key(key, PublicKey.from_bytes)
     try:
-        if key is None:
-            public = PublicKey.from_bytes(files.get(PUBLIC_KEY, b""))
-        else:
-            with _usable(key) as content:
-                public = PublicKey.from_bytes(content)
-        signature = Signature.from_bytes(files.get(SIGNATURE, b""))
-        public.verify(files[SUMS], signature)
+        public = stated or PublicKey.from_bytes(files.get(PUBLIC_KEY, b""))
+        public.verify(files[SUMS], Signature.from_bytes(files.get(SIGNATURE, b"")))
     except Error as error:
-        return f"signature: wrong ({error})", False
-    signature.untrusted_comment = _COMMENT  # the only part that is not signed
-    if _text(signature) != files[SIGNATURE]:
-        return f"signature: {SIGNATURE} was altered", False
+        return f"{WRONG}signature ({error})"
     whose = "compare it with the signer's own" if key is None else f"of {key}"
-    return f"signature: right, by the key {public.to_base64().decode()} ({whose})", True
+    return f"signature: right, by the key {public.to_base64().decode()} ({whose})"
 
 
-@contextmanager
-def _usable(key: str | os.PathLike[str]) -> Iterator[bytes]:
-    """Provide the content of a key file; minisign's complaints about it become ours."""
+def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key:
+    """Read a key file; minisign's complaints about it become ours."""
     try:
-        yield read_input(key, _LONGEST)
+        return read(read_input(path, _LONGEST))
     except (OSError, Error) as error:
-        raise make_error(InputError, "key_unusable", path=key, text=error) from error
+        raise make_error(InputError, "key_unusable", path=path, text=error) from error
 
 
 def _text(part: object) -> bytes:

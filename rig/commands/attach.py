@@ -25,8 +25,7 @@ def main(arguments: Namespace) -> int:
     except OSError as error:
         raise make_error(InputError, "attachment_unreadable", path=path, text=error) from error
     if not 0 < len(data) <= LARGEST:
-        text = f"it has {'no' if not data else f'more than {LARGEST}'} bytes"
-        raise make_error(InputError, "attachment_unreadable", path=path, text=text)
+        raise make_error(InputError, "attachment_size", path=path)
     with Session.open(arguments.session) as session:
         session.attach(Path(path).name, data)
     print(f"attached to {arguments.session}: {path}, {len(data)} bytes")

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 _NUMBERED = {name: table.meaning for name, table in TABLES.items() if table.numbered}
+FAULTS = ("damaged: ", "lost: ")
+"""How lines begin that say what is wrong with a file."""
 _GOOD = (Fate.CONFIRMED, Fate.IMPORTED)
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
@@ -127,13 +129,16 @@ def _lines(session: ExaminedFile) -> list[str]:
             missing = rows.gaps(table)
             gap = f"{missing} before the last are missing" if missing else "no gap"
             lines.append(f"{count} {name}: {gap}")
+    if not rows.tables["hash"]:
+        lines.append("no chain of hashes: an older program recorded it")
+    elif any(not link[3] for link in rows.in_order("hash")):
+        lines.append("its chain of hashes began later than the session")
     for recovered in session.drops:
         drop = recovered.drop
         name = f"run {drop.run}, attempt {drop.attempt}: {len(drop.edges)} edges: {recovered.fate}"
         faults = f" (recorded with faults: {sentences(drop.faults)})" if drop.faults else ""
         lines.append(name + faults)
-    lines += [f"damaged: {text}" for text in session.damage]
-    lines += [f"lost: {text}" for text in session.lost]
+    lines += [FAULTS[text in session.lost] + text for text in session.troubles]
     if session.whole:
         lines.append("everything is whole")
     states = rows.in_order("run_state")
