@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.files import read_input
 from rig.reasons import make_error
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 LARGEST = 1 << 25
 """Bytes; half of what a value of a session file may have."""

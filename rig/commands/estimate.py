@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from argparse import Namespace
+from typing import Any
 
 from rig.cache.entry import CacheEntry
 from rig.commands.output import print_json, progress, say, tell_damage
@@ -12,9 +13,6 @@ from rig.results import check_open, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 from rig.commands.output import goes_on, say
 from rig.errors import InputError
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.steps import flash, flash_drive
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 from rig.errors import InputError
 from rig.reasons import make_error, plain_reason
 from rig.session.store import Session
 from rig.wordings import NOTE
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

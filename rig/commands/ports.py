@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections import Counter
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
@@ -13,10 +15,6 @@ from rig.flash.drive import UNMOUNTED, sees_boot_pico, waiting_drives
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
 from rig.usb.listing import SerialPort, serial_ports
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Mapping
 
 
 def main(arguments: Namespace) -> int:

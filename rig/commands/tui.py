@@ -6,19 +6,16 @@ import asyncio
 import gc
 import os
 import sys
+from argparse import Namespace
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.ports import check_name
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

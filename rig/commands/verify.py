@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from argparse import Namespace
+from collections.abc import Iterator, Mapping
 
 from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, is_bundle, read_bundle
 from rig.bundle.contents import ENVIRONMENT, HISTORY, SESSION, WRONG, compare
@@ -14,10 +15,6 @@ from rig.reasons import make_error
 from rig.recover.examine import FAULTS, describe, examine
 from rig.results import results
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator, Mapping
 
 
 def main(arguments: Namespace) -> int:

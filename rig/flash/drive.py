@@ -5,16 +5,13 @@ from __future__ import annotations
 import os
 import re
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.boards import DRIVE
 from rig.usb.listing import serial_ports
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _MOUNTS = Path("/proc/mounts")
 _ABOUT = "INFO_UF2.TXT"  # the boot program's file about the board

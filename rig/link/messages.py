@@ -20,9 +20,10 @@ armed gates is 0; the other gates are left out of every event.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar, dataclass_transform
+from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
 from rig.boards import Capabilities
 from rig.link.frames import PAYLOAD_LIMIT
@@ -42,9 +43,6 @@ from rig.link.wiretypes import (
     wire_fields,
     write_field,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 __all__ = ["Event", "MessageError"]  # besides what is defined here
 

@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.boards import GATES
 from rig.session.reason_rows import read_reasons
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
