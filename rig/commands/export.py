@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.bundle.tables import csv_files
-from rig.cache.entry import recall
 from rig.commands.output import progress, say, tell_damage
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
@@ -16,8 +14,6 @@ from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
-
-    from rig.results import SessionResults
 
 
 def main(arguments: Namespace) -> int:
@@ -31,13 +27,8 @@ def main(arguments: Namespace) -> int:
     with Session.open(arguments.session, readonly=True) as session:
         folder = make_folder(arguments.csv)
         outcome = results(session, progress("analysing run"), fresh=arguments.fresh)
-        make = partial(_tables, session, outcome)
-        tables = recall(dict, make, "tables", outcome.digest, fresh=arguments.fresh)
+        tables = csv_files(session, outcome.json(), tick_rates(session))
         for name, text in tables.items():
             write_atomic(folder / name, text)
     say(f"CSV files: {arguments.csv}")
     return tell_damage(outcome.analysis)
-
-
-def _tables(session: Session, outcome: SessionResults) -> dict[str, str]:
-    return csv_files(session, outcome.json(), tick_rates(session))

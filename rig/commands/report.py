@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from rig.report.parts import Part
     from rig.results import SessionResults
 
-_NUMERICS = ("numpy", "scipy")
-
 
 class ReportPage(NamedTuple):
     """A report as it is kept: its HTML and its figures, each as text, and what failed."""
@@ -104,6 +102,7 @@ def make_page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: b
     timelines, data = timelines_and_data(session, protocol, outcome)
     figures = in_order(figures)
     name = session.path.name
+    numerics = (f"{package} {version(package)}" for package in ("numpy", "scipy"))
     html = report_html(
         ReportContext(
             title=protocol.title,
@@ -118,7 +117,7 @@ def make_page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: b
                 "created": session.meta["created"],
                 "origin": session.meta["origin"].partition("?")[0],
                 "recorded with": f"rig {session.meta['rig_version']}",
-                "analysed with": f"rig {__version__}, {', '.join(map(_version, _NUMERICS))}",
+                "analysed with": ", ".join([f"rig {__version__}", *numerics]),
             },
             identities=[identity for _, identity in session.identities()],
             clock=outcome.clock.details,
@@ -140,10 +139,6 @@ def make_page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: b
     stage("")
     failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
     return ReportPage(html, tuple(picture.svg for picture in figures), failed)
-
-
-def _version(package: str) -> str:
-    return f"{package} {version(package)}"
 
 
 def _operator_notes(session: Session) -> list[str]:

@@ -54,6 +54,8 @@ class Exchange:
         Called with everything that becomes known.
     tries
         How often a request is sent before the device counts as silent.
+    give_way
+        Called all the time while an answer is waited for; what it raises ends the waiting.
 
     Attributes
     ----------
@@ -65,12 +67,16 @@ class Exchange:
         How many were sent, and how often one was sent again.
     rx_bytes, tx_bytes
         How much went over the line.
-    give_way
-        Called all the time while an answer is waited for; what it raises ends the waiting.
     """
 
     def __init__(
-        self, port: Port, clock: Clock, tap: Tap | None, on_record: OnRecord | None, tries: int
+        self,
+        port: Port,
+        clock: Clock,
+        tap: Tap | None = None,
+        on_record: OnRecord | None = None,
+        tries: int = 8,
+        give_way: Callable[[], None] = lambda: None,
     ) -> None:
         self.transcript = Transcript()
         self.clock = clock
@@ -78,7 +84,7 @@ class Exchange:
         self.expect_boot = False
         self.requests = self.repeats = 0
         self.rx_bytes = self.tx_bytes = 0
-        self.give_way: Callable[[], None] = lambda: None
+        self.give_way = give_way
         self._port = port
         self._tap = tap
         self._on_record = on_record

@@ -116,7 +116,7 @@ class BoardUnderTest:
     """
 
     def __init__(self, port: Port, clock: Clock, options: SelftestOptions) -> None:
-        self.line = Exchange(port, clock, None, None, _TRIES)
+        self.line = Exchange(port, clock)
         self.line.expect_boot = True  # to be restarted ends no check by itself
         self.clock = clock
         self.options = options
