@@ -17,6 +17,7 @@ from rig.files import check_place, write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
+from rig.reasons import make_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
 from rig.text_table import text_table
@@ -35,7 +36,7 @@ SPACING_M = 0.01
 def main(arguments: Namespace) -> int:
     """Predict the uncertainties of a layout, and search for a better layout."""
     if arguments.output and arguments.no_search:
-        raise InputError("-o needs a proposal; leave --no-search out")
+        raise make_error(InputError, "proposal_unwanted")
     if arguments.output:
         check_place(arguments.output)
     protocol = reader.read(arguments.protocol)
@@ -46,9 +47,7 @@ def main(arguments: Namespace) -> int:
     components = stated(protocol) if arguments.learned is None else _read_scatter(arguments.learned)
     limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing or SPACING_M)
     if limits.lowest > limits.highest:
-        raise InputError(
-            "--lowest is above --highest", "the highest beam is below the start of the drop"
-        )
+        raise make_error(InputError, "beams_reversed")
     layouts: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
         "scatter": "stated" if arguments.learned is None else "learned",
@@ -72,7 +71,7 @@ def _read_scatter(path: str) -> Components:
     with Session.open(path, readonly=True) as session:
         joint = detailed(session)[0].joint
     if joint is None:
-        raise InputError(f"{path}: too few good drops for a scatter", "leave out --learned")
+        raise make_error(InputError, "scatter_unknown", path=path)
     return joint.components
 
 

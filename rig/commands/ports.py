@@ -11,9 +11,10 @@ from typing import Any
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
-from rig.flash.drive import UNMOUNTED, sees_boot_pico, waiting_drives
+from rig.flash.drive import sees_boot_pico, waiting_drives
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
+from rig.reasons import make_reason
 from rig.usb.listing import SerialPort, serial_ports
 
 
@@ -36,7 +37,7 @@ def main(arguments: Namespace) -> int:
     for drive in waiting_drives():
         say(f"a Pico waits for firmware at {drive}: rig flash --board pico")
     if sees_boot_pico() and not waiting_drives():
-        say(f"{UNMOUNTED}: rig flash --board pico")
+        say(f"{make_reason('pico_unmounted').text}: rig flash --board pico")
     if not any(port.candidate for port in ports):
         say("no board found: check its plug, and use a USB cable with data wires")
     return 0

@@ -12,6 +12,7 @@ from rig.files import check_place, write_atomic
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import group_notes, predictions
 from rig.protocol import reader
+from rig.reasons import make_error
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import csv_text, text_table
 
@@ -28,16 +29,12 @@ def main(arguments: Namespace) -> int:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
         if arguments.protocol is not None:
-            raise InputError(
-                f"--figure {arguments.figure} draws the paper's own chains",
-                f"leave {arguments.protocol} out; rig sweep PROTOCOL draws yours",
-            )
+            values = {"figure": arguments.figure, "path": arguments.protocol}
+            raise make_error(InputError, "figure_of_paper", **values)
         _write_figure(arguments.figure, arguments.output, resolved=arguments.resolved)
         return 0
     if arguments.protocol is None:
-        raise InputError(
-            "PROTOCOL is missing", "rig predict PROTOCOL, or rig predict --figure 3 -o FILE.svg"
-        )
+        raise make_error(InputError, "predict_nothing")
     protocol = reader.read(arguments.protocol)
     lines = predictions(protocol)
     data = {"predictions": [line.json() for line in lines]}
@@ -93,7 +90,7 @@ def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
 
     if output is None:
-        raise InputError("-o FILE.svg is missing", f"rig predict --figure {number} -o FILE.svg")
+        raise make_error(InputError, "figure_nowhere", figure=number)
     path = Path(output)
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
     kind_of(picture)
@@ -119,7 +116,7 @@ def _resolve(number: int) -> dict[str, list[float]]:
     from rig.bench import resolved_paper  # noqa: PLC0415 - only where chains really fall
 
     if number not in {3, 4}:
-        raise InputError(f"figure {number} has no resolved falls", "use figure 3 or 4")
+        raise make_error(InputError, "figure_unresolved", figure=number)
     say("simulating drops rod by rod; this takes some minutes")
     if number == 3:
         return resolved_paper.figure_3(resolved_paper.uniform())
