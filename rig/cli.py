@@ -8,9 +8,9 @@ import os
 import signal
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.boards import GATES
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from rig.command_help import Parser
 
-T = TypeVar("T")
 BAD_INPUT = 2
 INTERRUPTED = 130
 OPTIONAL = {"distributed": "distributed", "mpmath": "mpmath", "minisign": "py-minisign"}
@@ -123,46 +122,19 @@ def _parser() -> Parser:
     return build_parser(f"rig {__version__}", _KINDS, {"import": "import_edges"})
 
 
-def _accept(accepted: str, read: Callable[[str], object]) -> Callable[[str], dict[str, Any]]:
-    """Return a kind of value; text that `read` refuses is answered by what is accepted."""
+def _accept(
+    accepted: str, read: Callable[[str], Any], holds: Callable[[Any], bool]
+) -> Callable[[str], dict[str, Any]]:
+    """Return a kind of value; text that cannot be read so, or does not hold, is refused."""
 
     def convert(text: str) -> object:
-        try:
-            return read(text)
-        except ValueError:
-            message = f"found '{text}'; accepted: {accepted}"
-            raise argparse.ArgumentTypeError(message) from None
+        with suppress(ValueError):
+            value = read(text)
+            if holds(value):
+                return value
+        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: {accepted}")
 
     return lambda _: {"type": convert}
-
-
-def _insist(value: T, *, holds: bool) -> T:
-    if not holds:
-        raise ValueError(value)
-    return value
-
-
-def _count(text: str) -> int:
-    return _insist(int(text), holds=int(text) >= 1)
-
-
-def _gates(text: str) -> int:
-    channels = set(map(int, text.split(",")))
-    return _insist(sum(1 << channel for channel in channels), holds=channels <= set(range(GATES)))
-
-
-def _seconds(text: str) -> float:
-    return _insist(float(text), holds=0.0 < float(text) < math.inf)
-
-
-def _length(text: str) -> float:
-    length = parse(text, Dimension.LENGTH).value
-    return _insist(length, holds=length > 0.0)
-
-
-def _share(text: str) -> float:
-    share = parse(text, Dimension.NUMBER).value
-    return _insist(share, holds=0.0 <= share < 0.1)
 
 
 def _place(name: str) -> Callable[[str], str]:
@@ -179,16 +151,28 @@ def _place(name: str) -> Callable[[str], str]:
 
 _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     "int": lambda _: {"type": int},
-    "count": _accept("a whole number, 1 or more", _count),
-    "gates": _accept(f"numbers from 0 to {GATES - 1}, with commas between", _gates),
-    "length": _accept("a length above 0", _length),
-    "port": _accept("a device path, or a URL such as sim://", lambda t: _insist(t, holds=bool(t))),
-    "seconds": _accept("a time in seconds above 0", _seconds),
-    "seed": _accept(
-        "a whole number from 0 to 2^63", lambda t: _insist(int(t), holds=0 <= int(t) < 1 << 63)
+    "count": _accept("a whole number, 1 or more", int, lambda n: n >= 1),
+    "gates": _accept(
+        f"numbers from 0 to {GATES - 1}, with commas between",
+        lambda text: sum(1 << channel for channel in set(map(int, text.split(",")))),
+        lambda mask: mask < 1 << GATES,
     ),
-    "share": _accept("a share from 0 to 10 %, as in 50 ppm", _share),
-    "trials": _accept("a whole number or adaptive", lambda t: t if t == "adaptive" else _count(t)),
+    "length": _accept(
+        "a length above 0", lambda text: parse(text, Dimension.LENGTH).value, lambda m: m > 0.0
+    ),
+    "port": _accept("a device path, or a URL such as sim://", str, bool),
+    "seconds": _accept("a time in seconds above 0", float, lambda s: 0.0 < s < math.inf),
+    "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),
+    "share": _accept(
+        "a share from 0 to 10 %, as in 50 ppm",
+        lambda text: parse(text, Dimension.NUMBER).value,
+        lambda share: 0.0 <= share < 0.1,
+    ),
+    "trials": _accept(
+        "a whole number or adaptive",
+        lambda text: text if text == "adaptive" else int(text),
+        lambda trials: trials == "adaptive" or trials >= 1,
+    ),
     "file": lambda name: {"type": _place(name)},
     "formats": lambda _: {"action": _ListFormats, "nargs": 0},
 }

@@ -25,7 +25,7 @@ _STYLES = (("o", MUTED), ("s", INK), ("D", MODEL), ("*", SECOND), ("^", MUTED), 
 
 
 def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
-    """Draw the error of each estimator over its processor time.
+    """Draw them; what takes no processor time is a line across.
 
     Parameters
     ----------
@@ -43,8 +43,11 @@ def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
             for name, group in groupby(found, key=itemgetter("name")):
                 points = list(group)
                 values = [one[field] * scale for one in points]
+                if points[0]["seconds"] is None:
+                    axes.axhline(values[0], color=MUTED, linestyle=(0, (1, 2)), label=name)
+                    continue
                 marker, color = next(styles)
-                times = [one["seconds"] for one in points]
+                times = [one["seconds"] or 0.0 for one in points]
                 words = f"{name} (M = 10² …)" if points[0]["trials"] else name
                 axes.plot(times, values, marker=marker, color=color, linewidth=0.9, label=words)
             axes.set_xscale("log")

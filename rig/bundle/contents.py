@@ -20,7 +20,6 @@ from rig.bundle.means import mean_tables
 from rig.bundle.tables import csv_files, data_package
 from rig.results import protocol_of, tick_rates
 from rig.session.faults import translate_errors
-from rig.session.schema import OLDER
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -108,21 +107,6 @@ def bundle_files(
         "datePublished": session.meta["created"],  # the only date: no other would come again
     }
     return seal(files, about)
-
-
-def protocol_first(links: Sequence[Sequence[Any]]) -> bool | None:
-    """Whether the protocol was hashed, once, before any run; `None` where there is no whole chain.
-
-    Parameters
-    ----------
-    links
-        As for `rig.session.hashes.check_chain`, which must find no fault in them.
-    """
-    tables = [table for _, table, *_ in links]
-    if not tables or OLDER in tables:
-        return None
-    runs = [tables.index(table) for table in ("drop", "run_state") if table in tables]
-    return tables.count("protocol") == 1 and tables.index("protocol") < min(runs, default=2)
 
 
 def _environment() -> dict[str, str]:

@@ -15,7 +15,7 @@ LARGEST = 1 << 25
 
 
 def main(arguments: Namespace) -> int:
-    """Add a file to a session, for its report and its bundle."""
+    """Add a file to a session, for its report."""
     path = arguments.file
     try:
         data = read_input(path, LARGEST + 1)

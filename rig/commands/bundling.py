@@ -7,13 +7,14 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bundle.archive import pack
-from rig.bundle.contents import SESSION, bundle_files, copy_session, protocol_first
+from rig.bundle.contents import SESSION, bundle_files, copy_session
 from rig.commands.output import progress, say, tell_damage
 from rig.commands.report import make_page
 from rig.files import check_place, replacing
 from rig.recover.examine import examine
 from rig.report.deviations import deviations
 from rig.results import protocol_of, results
+from rig.session.hashes import protocol_first
 from rig.session.store import Session
 
 if TYPE_CHECKING:

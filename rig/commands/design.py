@@ -83,14 +83,17 @@ def _forecast(
     layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
     expected: Forecast = forecast(protocol, layout, sure=True)
     outcome = trials(with_beams(protocol, beams))
-    text = trials_text(outcome, protocol.vocabulary)
     return {
         "gates": [
             {"channel": gate.channel, "side": side, "height_m": height}
             for gate, (side, height) in zip(protocol.gates.gates, beams, strict=True)
         ],
         "readable": readable(protocol, beams),
-        "trials": {"drops": outcome.drops, "read": outcome.read, "text": text},
+        "trials": {
+            "drops": outcome.drops,
+            "read": outcome.read,
+            "text": trials_text(outcome, protocol.vocabulary),
+        },
         "measurands": [
             {
                 "name": name,

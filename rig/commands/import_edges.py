@@ -125,7 +125,7 @@ def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     if strangers:
         values = {"run": strangers[0], "protocol": protocol.source, "planned": planned}
         raise refusal(source, "run_unplanned", **values)
-    used = gates.mask
-    idle = sorted({e.channel for drop in drops for e in drop.edges if not used >> e.channel & 1})
+    seen = {edge.channel for drop in drops for edge in drop.edges}
+    idle = sorted(channel for channel in seen if not gates.mask >> channel & 1)
     if idle:
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

@@ -113,16 +113,15 @@ def write_study(
     whole, table, picture
         All that was found; every line of it as CSV; as SVG, where there is a picture.
     """
-    json_text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-    for kind, text in {"json": json_text, "csv": table, "svg": picture}.items():
-        if text is not None:
+    texts = {
+        "json": json.dumps(data, indent=2, ensure_ascii=False) + "\n",
+        "csv": table,
+        "svg": picture,
+        "md": "\n".join([head, "", "```text", *lines, "```", ""]),
+    }
+    for kind, text in texts.items():
+        if text:
             write_atomic(folder / f"{name}.{kind}", text)
-    write_page(folder, name, head, lines)
-
-
-def write_page(folder: Path, name: str, head: str, lines: Iterable[str]) -> None:
-    """Write a study's page: what stands above, in Markdown, and its tables as text."""
-    write_atomic(folder / f"{name}.md", "\n".join([head, "", "```text", *lines, "```", ""]))
 
 
 def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bool) -> None:
@@ -130,7 +129,7 @@ def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bo
     if as_json:
         print_json(data)
     else:
-        print(text())
+        show(text().splitlines())
 
 
 def print_json(data: Mapping[str, Any]) -> None:

@@ -50,8 +50,7 @@ def _identify(path: str) -> dict[str, Any]:
             identity = Device(port, port_clock(port), tries=3).connect()
     except DeviceError as error:
         return {"identity": None, "trouble": str(error)}
-    fields = asdict(identity) | {"unique_id": identity.unique_id.hex()}
-    return {"identity": fields, "trouble": None}
+    return {"identity": identity.json(), "trouble": None}
 
 
 def _all(ports: list[SerialPort], asked: Mapping[str, object]) -> list[SerialPort]:

@@ -37,27 +37,27 @@ def main(arguments: Namespace) -> int:
         raise make_error(InputError, "predict_nothing")
     protocol = reader.read(arguments.protocol)
     lines = predictions(protocol)
-    data = {"predictions": [line.json() for line in lines]}
-    print_found(data, lambda: table(protocol, lines), as_json=arguments.json)
+    print_found(
+        {"predictions": [line.json() for line in lines]},
+        lambda: table(protocol, lines),
+        as_json=arguments.json,
+    )
     return 0
 
 
 def table(protocol: Protocol, lines: list[PredictedIncline]) -> str:
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     apart, end = SEPARATION, SPEED
-
-    def separation(line: PredictedIncline) -> str:
-        return _written(line.separation_m, line.separation_u_m, apart)
-
-    def speed(line: PredictedIncline) -> str:
-        return _written(line.speed_m_s, line.speed_u_m_s, end)
-
     columns: dict[str, Callable[[PredictedIncline], str]] = {
         "incline (°)": lambda line: degrees(line.incline_deg),
         "strikes": lambda line: line.impact_chain or "",
         "α": lambda line: fixed(line.alpha, 4),
-        f"{apart.symbol} ± U ({apart.unit})": separation,
-        f"{end.symbol} ± U ({end.unit})": speed,
+        f"{apart.symbol} ± U ({apart.unit})": lambda line: _written(
+            line.separation_m, line.separation_u_m, apart
+        ),
+        f"{end.symbol} ± U ({end.unit})": lambda line: _written(
+            line.speed_m_s, line.speed_u_m_s, end
+        ),
         "t (s)": lambda line: fixed(line.fall_time_s, 5),
         "model": lambda line: line.model,
     }

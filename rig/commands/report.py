@@ -84,11 +84,12 @@ def make_page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: b
         films=read_films(session.path) if session.simulated else None,
         sections=sections,
     )
-    effects = outcome.analysis.effects
-    compared = sections.make("The paired differences", lambda: list(effects_parts(effects)))
+    analysis = outcome.analysis
+    compared = sections.make(
+        "The paired differences", lambda: list(effects_parts(analysis.effects))
+    )
     stage("estimating the impacts")
-    summary = outcome.analysis.summary
-    gates = sections.make("The table of gates", lambda: list(gate_parts(summary)))
+    gates = sections.make("The table of gates", lambda: list(gate_parts(analysis.summary)))
     estimated = sections.make(
         "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
     )
@@ -106,7 +107,7 @@ def make_page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: b
     html = report_html(
         ReportContext(
             title=protocol.title,
-            analysis=outcome.analysis,
+            analysis=analysis,
             simulated=session.simulated,
             figures=figures,
             protocol_text=session.protocol_text,
@@ -121,9 +122,9 @@ def make_page(session: Session, outcome: SessionResults, bars: Bars, *, fresh: b
             },
             identities=[identity for _, identity in session.identities()],
             clock=outcome.clock.details,
-            notes=[*outcome.analysis.damage, *remarks(outcome)],
+            notes=[*analysis.damage, *remarks(outcome)],
             operator_notes=_operator_notes(session),
-            deviations=deviations(protocol, outcome.analysis, session.states()),
+            deviations=deviations(protocol, analysis, session.states()),
             parts=parts,
             effects=[*(gates or ()), *(compared or ())],
             timelines=timelines,

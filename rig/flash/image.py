@@ -64,7 +64,11 @@ def read_image(path: Path, target: Target) -> Image:
         data = read_input(path)
     except OSError as error:
         raise make_error(InputError, "image_unreadable", path=path, text=error) from None
-    flash = read_blocks(data, path) if target is DRIVE else _records(data, path)
+    flash = (
+        read_blocks(data, path)
+        if target is DRIVE
+        else _flash(data.decode("ascii", "replace"), path)
+    )
     versions = set(_VERSION.findall(flash))
     boards_known = {one.board for one in (*TARGETS.values(), DRIVE)}
     boards = [board for board in boards_known if board.name.encode() + b"\0" in flash]
@@ -83,14 +87,6 @@ def shipped_firmware(board: str) -> str:
         if target.board.name == board:
             return read_image(target.shipped, target).firmware
     return ""
-
-
-def _records(data: bytes, path: Path) -> bytes:
-    """Read Intel HEX."""
-    try:
-        return _flash(data.decode("ascii"), path)
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is no Intel HEX file") from None
 
 
 def _flash(text: str, path: Path) -> bytes:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from typing import TYPE_CHECKING
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
 
 from rig.boards import GATES
 from rig.link.messages import EVENTS_PER_FRAME, DropCertificate2, PulseEnd, unpack_label
@@ -61,8 +62,7 @@ class Assembly:
     @property
     def begun(self) -> bool:
         """Whether anything of the drop itself was seen."""
-        known = self._events or self.certificate
-        return bool(known) or self.fire_tick is not None
+        return bool(self._events or self.certificate) or self.fire_tick is not None
 
     def add(self, frame: EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
@@ -180,11 +180,10 @@ class Assembly:
 
 def _account(seen: DropCertificate) -> Certificate:
     sense = ticks_since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
-    counts = (seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late, sense)
-    if not isinstance(seen, DropCertificate2):
-        return Certificate(*counts)
-    supply = (seen.supply_mv, seen.lowest_mv)
-    return Certificate(*counts, seen.pulse_ticks, seen.pulse_end, seen.restarts, *supply)
+    values: dict[str, Any] = {
+        field.name: getattr(seen, field.name, None) for field in fields(Certificate)
+    }
+    return Certificate(**values | {"release_sense": sense})
 
 
 def edges(

@@ -187,7 +187,11 @@ class Exchange:
             raise _lost(error) from error
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
-            raise _strange(self.rx_bytes, self.transcript.rx.good)
+            lacking = (
+                "and no word of who is there" if self.transcript.rx.good else "that are no frames"
+            )
+            size_mb = self.rx_bytes / 1e6
+            raise make_error(DeviceError, "bytes_strange", size_mb=size_mb, lacking=lacking)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE
@@ -283,8 +287,3 @@ def _lost(error: OSError) -> DeviceError:
     is_gone = isinstance(error.__context__, serial.SerialException)
     text = "the port is gone" if is_gone else str(error)
     return make_error(DeviceError, "connection_lost", text=text)
-
-
-def _strange(size: int, frames: int) -> DeviceError:
-    lacking = "and no word of who is there" if frames else "that are no frames"
-    return make_error(DeviceError, "bytes_strange", size_mb=size / 1e6, lacking=lacking)

@@ -21,7 +21,7 @@ armed gates is 0; the other gates are left out of every event.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import IntEnum
 from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
@@ -237,11 +237,19 @@ class Identity(DeviceMessage):
     late_ticks: U16
     channels: Line
 
+    def json(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return asdict(self) | {"unique_id": self.unique_id.hex()}
+
     def capabilities(self) -> Capabilities:
         """What this board can do, as it says itself."""
-        pulse = self.max_pulse_us / 1e6
         return Capabilities(
-            self.board, self.gates, self.releases, pulse, self.capacity, bool(self.streams)
+            self.board,
+            self.gates,
+            self.releases,
+            self.max_pulse_us / 1e6,
+            self.capacity,
+            bool(self.streams),
         )
 
 

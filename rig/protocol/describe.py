@@ -44,11 +44,10 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
     Returns
     -------
     str
-        Title and sections ``Notes``, ``Scene``, ``Gates``, ``Assumed``, ``Plan and limits`` and
+        Title and sections ``Scene``, ``Gates``, ``Assumed``, ``Plan and limits`` and
         ``Left out``; empty sections do not appear. Ends without a newline.
     """
     sections = {
-        "Notes": protocol.notes.splitlines(),
         "Scene": [*_scene(protocol)],
         "Gates": [*_gates(protocol)],
         "Assumed (change it if you know better)": [*_priors(protocol)],

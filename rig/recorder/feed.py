@@ -6,7 +6,6 @@ certificate vouches for.
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
@@ -55,9 +54,7 @@ class StateFeed:
         match record.message:
             case wire.Identity() as identity:
                 self._tick_hz = identity.tick_hz
-                self._published.set(
-                    device=asdict(identity) | {"unique_id": identity.unique_id.hex()}
-                )
+                self._published.set(device=identity.json())
             case wire.State(phase=phase, gates=gates):
                 self._published.set(gates={"blocked": gates}, phase=_PHASES[phase])
             case wire.Disarmed():
@@ -89,7 +86,7 @@ class StateFeed:
 
     def show_drop(self, drop: Drop) -> None:
         """Show a drop as it was stored."""
-        self._label = wire.pack_label(drop.run, drop.attempt)
+        self._label = wire.pack_label(*drop.job)
         self._fire_tick = drop.fire_tick
         self._next = drop.certificate.events if drop.certificate else len(drop.edges)
         shown: Sequence[Edge] = () if self._blind else drop.edges

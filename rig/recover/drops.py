@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.reasons import make_reason
-from rig.records import Job
 from rig.session.drop_check import ByteReplay, Fate, check_drop
 from rig.session.rows import drop_of, named_values
 
@@ -40,11 +39,10 @@ def recover_drops(rows: Rows) -> list[RecoveredDrop]:
     for row in rows.in_order("drop"):
         values, own = named_values(row), edges.get(row[0], [])
         stored = drop_of(row, own)
-        job = Job(stored.run, stored.attempt)
         fate = check_drop(stored, replayed, torn=any(edge[1] != n for n, edge in enumerate(own)))
-        best = _best(stored, replayed.get(job), fate)
+        best = _best(stored, replayed.get(stored.job), fate)
         drops.append(RecoveredDrop(best, fate, values["host_ns"], values["provenance"]))
-    stored_jobs = {Job(each.drop.run, each.drop.attempt) for each in drops}
+    stored_jobs = {each.drop.job for each in drops}
     # What was never stored is only worth having whole.
     return drops + [
         RecoveredDrop(drop, Fate.RESTORED)

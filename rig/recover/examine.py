@@ -135,7 +135,7 @@ def _lines(session: ExaminedFile) -> list[str]:
         lines.append("its chain of hashes began later than the session")
     for recovered in session.drops:
         drop = recovered.drop
-        name = f"run {drop.run}, attempt {drop.attempt}: {len(drop.edges)} edges: {recovered.fate}"
+        name = f"{drop.job}: {len(drop.edges)} edges: {recovered.fate}"
         faults = f" (recorded with faults: {sentences(drop.faults)})" if drop.faults else ""
         lines.append(name + faults)
     lines += [FAULTS[text in session.lost] + text for text in session.troubles]
@@ -167,7 +167,7 @@ def _true(sentences: Mapping[str, object]) -> list[str]:
 
 
 def _describe_fate(recovered: RecoveredDrop) -> str:
-    return f"run {recovered.drop.run}, attempt {recovered.drop.attempt}: {recovered.fate}"
+    return f"{recovered.drop.job}: {recovered.fate}"
 
 
 def protocol_sound(rows: Rows, text: str) -> bool:

@@ -74,10 +74,11 @@ def find_rows(pages: Pages) -> Rows:
     """
     rows = Rows()
     for number in sorted(pages.pages):
-        cells, bad = read_cells(pages, number)
-        rows.bad += bad
-        for cell in cells:
-            _sort(rows, cell)
+        for cell in read_cells(pages, number):
+            if cell is None:
+                rows.bad += 1
+            else:
+                _sort(rows, cell)
     return rows
 
 

@@ -95,9 +95,9 @@ def _drops(session: Session, examined: ExaminedFile) -> list[str]:
     """Add drops and the log of states; a drop that no state tells of gets one."""
     seen = set()
     for drop, _, host_ns, provenance in examined.drops:
-        if (drop.run, drop.attempt) not in seen:
+        if drop.job not in seen:
             session.add_drop(drop, host_ns=host_ns, provenance=provenance)
-        seen.add((drop.run, drop.attempt))
+        seen.add(drop.job)
     states = examined.rows.in_order("run_state")
     session.add_rows("run_state", [row[1:] for row in states])
     last_ns = states[-1][-1] if states else 0

@@ -10,8 +10,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import deque
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from rig.records import Job
 from rig.session.schema import OLDER, TABLES, insert_statement
 
 if TYPE_CHECKING:
@@ -23,45 +24,21 @@ if TYPE_CHECKING:
 HASHED = [name for name in TABLES if name != "hash"]
 
 
-class ChainEnd(NamedTuple):
-    """Where a chain ends: the last row of each table that it covers, and the last hash."""
-
-    last: Mapping[str, int]
-    digest: bytes
-
-
-def read_end(connection: sqlite3.Connection) -> ChainEnd:
-    """Read where the chain of a session ends."""
-    last = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
+def extend_chain(connection: sqlite3.Connection) -> None:
+    """Hash all rows that no hash covers, in the open transaction."""
+    ends = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
+    last: dict[str, int] = dict(ends)
     tip = connection.execute("SELECT digest FROM hash ORDER BY id DESC LIMIT 1").fetchone()
-    return ChainEnd(dict(last), tip[0] if tip else b"")
-
-
-def extend_chain(connection: sqlite3.Connection, end: ChainEnd | None = None) -> ChainEnd:
-    """Hash all rows that no hash covers, in the open transaction.
-
-    Parameters
-    ----------
-    end
-        Where the committed chain ends, if that is known.
-
-    Returns
-    -------
-    ChainEnd
-        Where it ends once the transaction is committed.
-    """
-    last, digest = end or read_end(connection)
-    last = {**last}
+    digest = tip[0] if tip else b""
     for table in HASHED:
         # A table that is kept as an index has no number of its own; edges go by their drop's.
         key, then = ('"drop"', ", idx") if table == "edge" else ("rowid", "")
         sql = f'SELECT {key}, * FROM "{table}" WHERE {key} > ? ORDER BY {key}{then}'  # noqa: S608
         rows = connection.execute(sql, (last.get(table, 0),)).fetchall()
         if rows:
-            last[table] = rows[-1][0]
             digest = _digest(digest, table, (row[1:] for row in rows))
-            connection.execute(insert_statement("hash"), (None, table, last[table], digest))
-    return ChainEnd(last, digest)
+            link = (None, table, rows[-1][0], digest)
+            connection.execute(insert_statement("hash"), link)
 
 
 def check_chain(
@@ -83,7 +60,7 @@ def check_chain(
     """
     faults: list[str] = []
     ahead = {table: deque(rows[table]) for table in HASHED}
-    drops = {number: f"run {row[1]}, attempt {row[2]}" for number, row in ahead["drop"]}
+    drops = {number: str(Job(*row[1:3])) for number, row in ahead["drop"]}
     before, due, since = b"", 1, dict.fromkeys(HASHED, 0)
     for number, table, last, digest in links:
         if number != due:
@@ -105,6 +82,21 @@ def check_chain(
             if left
         ]
     return faults
+
+
+def protocol_first(links: Sequence[Sequence[Any]]) -> bool | None:
+    """Whether the protocol was hashed, once, before any run; `None` where there is no whole chain.
+
+    Parameters
+    ----------
+    links
+        As for `check_chain`, which must find no fault in them.
+    """
+    tables = [table for _, table, *_ in links]
+    if not tables or OLDER in tables:
+        return None
+    runs = [tables.index(table) for table in ("drop", "run_state") if table in tables]
+    return tables.count("protocol") == 1 and tables.index("protocol") < min(runs, default=2)
 
 
 def _digest(before: bytes, table: str, rows: Iterable[Sequence[Any]]) -> bytes:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
+from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.session.faults import as_session_error
 from rig.session.hashes import extend_chain
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
-    from rig.session.hashes import ChainEnd
 
 
 class Statement(NamedTuple):
@@ -59,7 +55,6 @@ class Journal:
         self._applied = 0  # how many of the pending the open transaction holds
         self._failed = False
         self._begun_s: float | None = None
-        self._chain_end: ChainEnd | None = None  # as committed, once that is known
 
     def __len__(self) -> int:
         """Count the records not yet on the disk."""
@@ -145,9 +140,8 @@ class Journal:
     def _commit(self) -> None:
         refusal = self._run()
         if self._connection.in_transaction:
-            end = extend_chain(self._connection, self._chain_end)
+            extend_chain(self._connection)
             self._connection.execute("COMMIT")
-            self._chain_end = end
         self._pending.clear()
         self._applied = 0
         self._report(refusal)

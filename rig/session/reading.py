@@ -233,7 +233,7 @@ class Reader:
                     pass
         for drop in self.drops():
             if drop.damage:
-                raise self._damage(f"run {drop.run}, attempt {drop.attempt}: {drop.damage}")
+                raise self._damage(f"{drop.job}: {drop.damage}")
         _ = self.protocol_text
 
     def _open_connection(self) -> sqlite3.Connection:

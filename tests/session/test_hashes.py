@@ -6,10 +6,10 @@ import shutil
 
 import pytest
 
-from rig.bundle.contents import protocol_first
 from rig.records import ClockSample, Drop, Edge
 from rig.recover.examine import examine
 from rig.recover.save import save
+from rig.session.hashes import protocol_first
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.session.altering import unguarded
