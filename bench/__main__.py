@@ -140,6 +140,12 @@ BENCHES = {
         _option("--world", nargs="+", choices=WORLDS,
                 help="only these; all but mujoco by default, which needs pip install mujoco"),
     )),
+    "dataset": Bench("studies.dataset", "an open data set, and who reads it well", (
+        _folder("folder for data set, page, CSV and JSON"),
+        _number("--repeats", "drops at each incline (default 2)", 2),
+        _option("--only", metavar="TEXT", default="", help='sessions such as "graded" or "dead"'),
+        _option("--score", metavar="FILE", help="only score these readings of that data set"),
+    )),
     "diagnoses": Bench("studies.diagnoses", "which faults of a rig are named rightly", (
         _FILES, _LAYOUT, _JOBS,
         _number("--drops", "with each fault of each size on each layout"),

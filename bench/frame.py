@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rig.commands.output import print_found, write_page
+from rig.commands.output import print_found, write_study
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
 
@@ -73,10 +72,10 @@ def carry_out(name: str, bench: Bench, arguments: Namespace) -> int:
 def _write(folder: Path, name: str, findings: Findings) -> None:
     columns = dict.fromkeys(column for row in findings.rows for column in row)
     table = csv_text(columns, findings.rows) if columns else ""
-    record = json.dumps(findings.record, indent=2, ensure_ascii=False) + "\n"
-    record = record if findings.head else ""
-    for kind, text in {"json": record, "csv": table, "svg": findings.picture}.items():
+    head, lines, picture = findings.head, findings.lines, findings.picture
+    if head:
+        write_study(folder, name, head, lines, findings.record, table, picture)
+        return
+    for kind, text in {"csv": table, "svg": picture}.items():
         if text:
             write_atomic(folder / f"{name}.{kind}", text)
-    if findings.head:
-        write_page(folder, name, findings.head, findings.lines)

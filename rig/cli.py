@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from rig.boards import GATES
 from rig.command_help import build_parser, runnable
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
+from rig.units import Dimension, parse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-OPTIONAL = ("distributed", "mpmath")
-"""Packages that few need: clusters for `rig sweep`, 50 digits for some of `rig bench`."""
+OPTIONAL = {"distributed": "distributed", "mpmath": "mpmath", "minisign": "py-minisign"}
+"""Packages that few need, with their names for pip: clusters for `rig sweep`, 50 digits for some of
+`rig bench`, signatures."""
 
 
 class _ListFormats(argparse.Action):
@@ -92,7 +94,8 @@ def _run(argv: Sequence[str] | None) -> int:
             raise
         from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-        say(f"rig: this needs {package}: {quote(sys.executable)} -m pip install {package}")
+        install = f"{quote(sys.executable)} -m pip install {OPTIONAL[package]}"
+        say(f"rig: this needs {OPTIONAL[package]}: {install}")
         return BAD_INPUT
     except OSError as error:
         named = error.strerror and error.filename
@@ -119,53 +122,19 @@ def _parser() -> Parser:
     return build_parser(f"rig {__version__}", _KINDS, {"import": "import_edges"})
 
 
-def _count(text: str) -> int:
-    try:
-        number = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: a whole number") from None
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"found {text}; accepted: 1 or more")
-    return number
+def _accept(
+    accepted: str, read: Callable[[str], Any], holds: Callable[[Any], bool]
+) -> Callable[[str], dict[str, Any]]:
+    """Return a kind of value; text that cannot be read so, or does not hold, is refused."""
 
+    def convert(text: str) -> object:
+        with suppress(ValueError):
+            value = read(text)
+            if holds(value):
+                return value
+        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: {accepted}")
 
-def _gates(text: str) -> int:
-    channels = text.split(",")
-    if not all(channel.isdecimal() and int(channel) < GATES for channel in channels):
-        raise argparse.ArgumentTypeError(
-            f"found '{text}'; accepted: numbers from 0 to {GATES - 1}, with commas between"
-        )
-    return sum(1 << channel for channel in set(map(int, channels)))
-
-
-def _trials(text: str) -> int | str:
-    if text == "adaptive":
-        return text
-    if not text.lstrip("+-").isdecimal():
-        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: a whole number or adaptive")
-    return _count(text)
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal() or int(text) >= 2**63:
-        raise argparse.ArgumentTypeError(f"found '{text}'; accepted: a whole number from 0 to 2^63")
-    return int(text)
-
-
-def _port(text: str) -> str:
-    if not text:
-        raise argparse.ArgumentTypeError("no port is named: a device path, or a URL such as sim://")
-    return text
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not 0.0 < seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"found {text!r}; accepted: a time in seconds above 0")
-    return seconds
+    return lambda _: {"type": convert}
 
 
 def _place(name: str) -> Callable[[str], str]:
@@ -180,18 +149,30 @@ def _place(name: str) -> Callable[[str], str]:
     return place
 
 
-def _typed(read: Callable[[str], object]) -> Callable[[str], dict[str, Any]]:
-    return lambda _: {"type": read}
-
-
 _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
-    "int": _typed(int),
-    "count": _typed(_count),
-    "gates": _typed(_gates),
-    "trials": _typed(_trials),
-    "seed": _typed(_seed),
-    "port": _typed(_port),
-    "seconds": _typed(_seconds),
+    "int": lambda _: {"type": int},
+    "count": _accept("a whole number, 1 or more", int, lambda n: n >= 1),
+    "gates": _accept(
+        f"numbers from 0 to {GATES - 1}, with commas between",
+        lambda text: sum(1 << channel for channel in set(map(int, text.split(",")))),
+        lambda mask: mask < 1 << GATES,
+    ),
+    "length": _accept(
+        "a length above 0", lambda text: parse(text, Dimension.LENGTH).value, lambda m: m > 0.0
+    ),
+    "port": _accept("a device path, or a URL such as sim://", str, bool),
+    "seconds": _accept("a time in seconds above 0", float, lambda s: 0.0 < s < math.inf),
+    "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),
+    "share": _accept(
+        "a share from 0 to 10 %, as in 50 ppm",
+        lambda text: parse(text, Dimension.NUMBER).value,
+        lambda share: 0.0 <= share < 0.1,
+    ),
+    "trials": _accept(
+        "a whole number or adaptive",
+        lambda text: text if text == "adaptive" else int(text),
+        lambda trials: trials == "adaptive" or trials >= 1,
+    ),
     "file": lambda name: {"type": _place(name)},
     "formats": lambda _: {"action": _ListFormats, "nargs": 0},
 }

@@ -6,14 +6,12 @@ import argparse
 import os
 import re
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from rig.streams import say
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
 
 
 class Command(NamedTuple):
@@ -126,12 +124,13 @@ _WORDS: dict[str, dict[str, Any]] = {
     "append": {"action": "append"},
     "required": {"required": True},
     "either": {},
+    "one-of": {},
     "?": {"nargs": "?"},
     "*": {"nargs": "*"},
     "+": {"nargs": "+"},
 }
 """What the words of the page's second column mean to argparse, beside ``=DEFAULT``, ``{CHOICES}``
-and kinds of values; of several with ``either`` only one is accepted."""
+and kinds of values; of several with ``either`` at most one is accepted, of ``one-of`` just one."""
 
 
 def _add_argument(
@@ -201,7 +200,9 @@ def build_parser(
         parsers[name].set_defaults(module=modules.get(name, name.replace(" ", "_")))
         either = None
         for row in command.arguments:
-            if " either " in row:
-                either = either or parsers[name].add_mutually_exclusive_group()
-            _add_argument(either if either and " either " in row else parsers[name], row, kinds)
+            alone = {"either", "one-of"} & set(row.split("|")[1].split())
+            if alone:
+                needed = "one-of" in alone
+                either = either or parsers[name].add_mutually_exclusive_group(required=needed)
+            _add_argument(either if either and alone else parsers[name], row, kinds)
     return parser

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from rig.analysis.result import GOOD, optional_package
+from rig.bundle.tables import column_unit, result_tables
 from rig.errors import InputError, SessionError
 from rig.measurands import MEASURANDS
 from rig.predictions import PredictedIncline, predictions
@@ -24,7 +25,6 @@ from rig.report.page import parts_html
 from rig.report.parts import means_parts, summary_table
 from rig.results import calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
-from rig.session.export import column_unit, result_tables
 from rig.session.store import Session
 
 if TYPE_CHECKING:

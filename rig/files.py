@@ -5,15 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 from rig.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 
 _KINDS = {
     stat.S_IFDIR: "a folder",

@@ -7,12 +7,10 @@ A new measurand is a row of ``measurands.txt`` and the function that computes it
 from __future__ import annotations
 
 import re
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from collections.abc import Container, Iterator
+from typing import Any
 
 _UNIT = re.compile(r"(_(m|kg|s|A|K|mol|cd|rad|sr|Hz|N|Pa|J|W|C|V|F|Ohm|S|Wb|T|H|lm|lx)[1-9]?)+$")
 """The SI unit at a name's end: base units and those with names of their own (SI brochure, 2.3)."""

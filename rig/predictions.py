@@ -201,8 +201,8 @@ def _vary_coefficients(
 
 
 def notes(protocol: Protocol) -> list[str]:
-    """Every note on a planned incline, the same ones of several inclines together."""
-    return group_notes(predictions(protocol))
+    """Its author's notes, and those on planned inclines, the same of several together."""
+    return [*protocol.notes.splitlines(), *group_notes(predictions(protocol))]
 
 
 def group_notes(lines: Sequence[PredictedIncline]) -> list[str]:

@@ -30,6 +30,9 @@ class Job(NamedTuple):
     run: int
     attempt: int
 
+    def __str__(self) -> str:
+        return f"run {self.run}, attempt {self.attempt}"
+
 
 class ClockSample(NamedTuple):
     """One clock sample: host time before and after, and the device's tick between (u32)."""
@@ -138,3 +141,8 @@ class Drop:
     certificate: Certificate | None = None
     faults: tuple[Reason, ...] = ()
     damage: str = ""
+
+    @property
+    def job(self) -> Job:
+        """The attempt that it was."""
+        return Job(self.run, self.attempt)

@@ -7,7 +7,6 @@ fall straight from the simulation into the analysis. What is true goes to the ta
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from statistics import fmean, median
@@ -16,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bench.frame import Findings
-from bench.studies.baselines import plain_fit, two_gate_timer
 from bench.studies.disturbances import DOUBLED, STACK
 from bench.studies.errors import Errors, shares_held
 from bench.studies.sessions import SimulatedSession, with_device, without_device
@@ -58,8 +56,6 @@ class AccuracyTally:
     """Everything counted over all sessions."""
 
     quantities: dict[str, Errors] = field(default_factory=lambda: defaultdict(Errors))
-    camera: dict[str, Errors] = field(default_factory=lambda: defaultdict(Errors))
-    timer: dict[str, Errors] = field(default_factory=lambda: defaultdict(Errors))
     verdicts: Counter[str] = field(default_factory=Counter)
     edges: int = 0
     wrong_rods: int = 0
@@ -67,7 +63,6 @@ class AccuracyTally:
     speed_shares: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
     analysis_s: float = 0.0
-    plain_s: float = 0.0
 
     def add(self, session: SimulatedSession) -> None:
         """Compare the drops of a session with their truths; only accepted ones have results."""
@@ -76,7 +71,6 @@ class AccuracyTally:
             if result.verdict in GOOD:
                 self._matches(result, fall, scale.hz)
                 self._quantities(result, fall.truth)
-                self._baselines(session.protocol, result, fall, scale.hz)
         self.seconds.append(session.wall_s)
         self.analysis_s += session.analysis_s
 
@@ -87,20 +81,6 @@ class AccuracyTally:
         if "speed_m_s" in result.quantities:
             speed = result.quantities["speed_m_s"].value
             self.speed_shares.append(speed / truth["speed_m_s"] - 1.0)
-
-    def _baselines(
-        self, protocol: Protocol, result: DropResult, fall: SimulatedDrop, hz: float
-    ) -> None:
-        truth, timer = fall.truth, two_gate_timer(protocol, fall.drop, hz)
-        for name, true_name in (("separation_m", "separation_raw_m"), ("speed_m_s", "speed_m_s")):
-            true, reading = truth.get(true_name), truth.get(f"camera_{name}")
-            if true is not None and reading is not None:
-                self.camera[name].errors.append(reading - true)
-            if true is not None and timer is not None:
-                self.timer[name].errors.append(getattr(timer, name) - true)
-        begin = time.process_time()
-        plain_fit(protocol, fall.drop, result, hz)
-        self.plain_s += time.process_time() - begin
 
     def _matches(self, result: DropResult, fall: SimulatedDrop, hz: float) -> None:
         """Count edges taken for another rod than they came from."""
@@ -132,13 +112,7 @@ class AccuracyTally:
         if self.speed_shares:
             squares = (share**2 for share in self.speed_shares)
             figures["speed_rms_relative"] = math.sqrt(fmean(squares))
-        for baseline, errors in (("camera_480_fps", self.camera), ("two_gate_timer", self.timer)):
-            if errors:
-                figures[baseline] = {name: errors[name].sizes() for name in errors}
         figures["analysis_ms_per_run"] = 1e3 * self.analysis_s / self.verdicts.total()
-        if self.plain_s:
-            good = sum(self.verdicts[verdict] for verdict in GOOD)
-            figures["plain_fit_ms_per_run"] = 1e3 * self.plain_s / good
         return figures | {"wall_time_s": self.seconds}
 
 
@@ -220,31 +194,26 @@ def _table(figures: Figures) -> list[str]:
     rows = [["error of one run", "rms", "bias", "worst", "mean U95", "bias/U", "in U95", "rms / u"]]
     for name, errors in figures["quantities"].items():
         rows.append([
-            *_sizes("", name, errors, "rms", "bias", "worst", "mean_U95"),
+            *_sizes(name, errors, "rms", "bias", "worst", "mean_U95"),
             f"{errors['bias_over_U']:.2f}", " ".join(shares_held(errors, 1)).rstrip(),
             f"{errors['times_u']:.2f}",
         ])  # fmt: skip
-    for baseline, label in (("camera_480_fps", "camera "), ("two_gate_timer", "two-gate timer ")):
-        for name, errors in figures.get(baseline, {}).items():
-            rows.append([*_sizes(label, name, errors, "rms", "bias", "worst"), *[""] * 4])
-    own, plain = figures["analysis_ms_per_run"], figures.get("plain_fit_ms_per_run")
-    ratio = f", {own / plain:.0f} times a plain least-squares fit" if plain else ""
+    own = figures["analysis_ms_per_run"]
     return [
         f"{figures['sessions']} simulated sessions, drops: {verdicts}",
         f"{figures['edges_matched']} edges matched, {figures['edges_given_to_a_wrong_rod']} to a "
         f"wrong rod, {figures['strays_taken_for_a_rod']} strays taken for a rod",
         *text_table(rows, left={0}),
-        f"analysis of a run with learning: {own:.0f} ms of processor time{ratio}",
+        f"analysis of a run with learning: {own:.0f} ms of processor time",
         f"wall time of a session: median {median(figures['wall_time_s']):.1f} s",
     ]
 
 
-def _sizes(label: str, name: str, errors: Figures, *sizes: str) -> list[str]:
+def _sizes(name: str, errors: Figures, *sizes: str) -> list[str]:
     """Write a measurand's name, and sizes in its fine unit."""
     row = MEASURANDS[name]
-    symbol = row.symbol if label else row.label
     return [
-        f"{label}{symbol} ({row.fine})",
+        f"{row.label} ({row.fine})",
         *(f"{errors[size] * row.fine_scale:.3f}" for size in sizes),
     ]
 

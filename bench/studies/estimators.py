@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bench.frame import Findings
-from bench.studies.baselines import TimerReading, line_fit, plain_fit, two_gate_timer
+from bench.studies.baselines import TimerReading, plain_fit
 from bench.studies.errors import Errors
 from bench.studies.figures import estimators_figure
 from bench.studies.sessions import with_device
@@ -25,7 +25,7 @@ from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from bench.studies.sessions import SimulatedSession
     from rig.analysis.fit import Fit
@@ -58,7 +58,7 @@ class Estimator:
     runs
         How many runs it gave a value for.
     seconds
-        Processor time per run; `None` where a person reads a picture.
+        Processor time per run.
     separation_rms_m, speed_rms_m_s, separation_median_m, speed_median_m_s
         Of estimate less truth; median of its size.
     """
@@ -66,7 +66,7 @@ class Estimator:
     name: str
     trials: int
     runs: int
-    seconds: float | None
+    seconds: float
     separation_rms_m: float
     speed_rms_m_s: float
     separation_median_m: float
@@ -77,7 +77,7 @@ _COLUMNS: tuple[Column[Estimator], ...] = (
     Column("estimator", lambda point: point.name, numeric=False),
     Column("M", lambda point: f"{point.trials:.0e}" if point.trials else ""),
     Column("runs", lambda point: str(point.runs)),
-    Column("ms per run", lambda point: f"{1e3 * point.seconds:.3g}" if point.seconds else ""),
+    Column("ms per run", lambda point: f"{1e3 * point.seconds:.3g}"),
     Column("Δz rms (mm)", lambda point: f"{1e3 * point.separation_rms_m:.3f}"),
     Column("median", lambda point: f"{1e3 * point.separation_median_m:.3f}"),
     Column("V rms (mm/s)", lambda point: f"{1e3 * point.speed_rms_m_s:.2f}"),
@@ -153,11 +153,8 @@ def estimators(
     truths = [fall.truth for _, fall, _ in good]
     own = [case.fall.truth for case in cases]
     whole = [_reading(result.quantities) for result, _, _ in good]
-    points = [_point("camera reading", 0, None, [*map(_camera, truths)], truths)]
-    for name, plain in (("two-gate timer", two_gate_timer), ("line fits", line_fit)):
-        points += _plain_point(name, plain, cases)
     alone = [_reading(measurands(case.fit.model, case.fit.estimate.x)) for case in cases]
-    points.append(_point("one-run fit", 0, alone_s, alone, own))
+    points = [_point("one-run fit", 0, alone_s, alone, own)]
     session_s = session.analysis_s / len(session.drops)
     points.append(_point("session fit", 0, session_s, whole, truths))
     left_out: list[str] = []
@@ -217,12 +214,6 @@ def _reading(quantities: Mapping[str, Any]) -> TimerReading:
     return TimerReading(*(quantities[name].value for name in _NAMES))
 
 
-def _camera(truth: Truth) -> TimerReading:
-    """Give what a camera reads, as of simultaneous release."""
-    late = truth["separation_raw_m"] - truth["separation_m"]
-    return TimerReading(truth["camera_separation_m"] - late, truth["camera_speed_m_s"])
-
-
 def _readjusted(case: _Case, trials: int) -> TimerReading:
     means = monte_carlo(case.fit, trials, SEED)
     return TimerReading(*(means[name].mean for name in _NAMES))
@@ -232,26 +223,10 @@ def _draws(case: _Case, trials: int) -> TimerReading:
     return mean_of_draws(case.fit, trials, SEED)
 
 
-def _plain_point(
-    name: str, read: Callable[..., TimerReading | None], cases: Sequence[_Case]
-) -> Iterator[Estimator]:
-    """These know no release times: their Δz is as it happened, and compared with that."""
-    begin = time.process_time()
-    readings = [read(case.protocol, case.fall.drop, case.scale.hz) for case in cases]
-    seconds = _since(begin, cases)
-    truths = [
-        {**case.fall.truth, "separation_m": case.fall.truth["separation_raw_m"]} for case in cases
-    ]
-    pairs = [pair for pair in zip(readings, truths, strict=True) if pair[0] is not None]
-    if pairs:
-        yield _point(name, 0, seconds, [reading for reading, _ in pairs if reading],
-                     [truth for _, truth in pairs])  # fmt: skip
-
-
 def _point(
     name: str,
     trials: int,
-    seconds: float | None,
+    seconds: float,
     readings: Sequence[TimerReading],
     truths: Sequence[Truth],
 ) -> Estimator:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from rig.model.chain import Chain
 from rig.model.surface import Surface
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 TIGHT = 1e-13
 """Relative error allowed inside the domain."""

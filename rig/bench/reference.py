@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import decimal
 import math
+from collections.abc import Sequence
 from decimal import Decimal
 from itertools import accumulate
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import mpmath
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 DIGITS = 50
 _SPARE = 25  # lost to the differences above at α = 1e-15

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from rig.cache.plain import from_text, to_text
 from rig.cache.store import CacheFile
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Kept = TypeVar("Kept")
 

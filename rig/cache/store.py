@@ -10,14 +10,12 @@ import os
 import sqlite3
 import stat
 import zlib
+from collections.abc import Callable
 from contextlib import closing, suppress
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from pathlib import Path
+from typing import NamedTuple, TypeVar
 
 import platformdirs
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 Answer = TypeVar("Answer")
 

@@ -112,7 +112,7 @@ class FireTimes:
 
     def when(self, drop: Drop) -> float | None:
         """Find when a drop was fired, s of host time, by its tick among the samples around it."""
-        fired_ns = self.fired_ns.get((drop.run, drop.attempt))
+        fired_ns = self.fired_ns.get(drop.job)
         if fired_ns is None or drop.fire_tick is None:
             return None
         # Restarts of the host leave open which of its times a log entry means; the tick decides.

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 from rig.records import HostBreak
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 TOLERANCE_NS = 50_000_000
 """Differences below this are the reading's own: a process can be held up between two clocks."""

@@ -15,13 +15,10 @@ from rig.clock.wander import Readings, Track
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.clock.epochs import Epochs
     from rig.clock.samples import Samples
     from rig.records import ClockSample, Pulse
-
-    Array = NDArray[np.float64]
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
 _PASSES = 5

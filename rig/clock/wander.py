@@ -17,7 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Array = NDArray[np.float64]
+    from rig.arrays import Array
+
     Index = NDArray[np.intp]
 
 STEADY = 5e-6 / 60.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, fields
 from functools import partial
 from itertools import groupby
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rig.bench.figures import precision_figure
 from rig.bench.precision import Point, as_json, precision
-from rig.commands.output import print_found, say, write_page
+from rig.commands.output import print_found, say, write_study
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
 
@@ -75,11 +74,9 @@ def _write(folder: Path, study: Precision) -> None:
     """Write ``precision.csv``, ``precision.json`` and a picture for each scene so far."""
     columns = [field.name for field in fields(Point)]
     table = csv_text(columns, (asdict(point) for point in study.points))
-    write_atomic(folder / "precision.csv", table)
-    text = json.dumps(as_json(study), indent=2, ensure_ascii=False, allow_nan=False)
-    write_atomic(folder / "precision.json", text + "\n")
     for name, title in study.scenes:
         points = [point for point in study.points if point.scene == name]
         write_atomic(folder / f"precision-{name}.svg", precision_figure(title, points))
     pictures = [f"![{title}](precision-{name}.svg)" for name, title in study.scenes]
-    write_page(folder, "precision", "\n\n".join([_HEAD, *pictures]), summary(study).splitlines())
+    head, lines = "\n\n".join([_HEAD, *pictures]), summary(study).splitlines()
+    write_study(folder, "precision", head, lines, as_json(study), table)

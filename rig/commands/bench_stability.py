@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.bench.stability import StabilityRow, sonic_lengths, stability
 from rig.commands.output import print_found, write_study
 from rig.files import make_folder
 from rig.text_table import csv_text
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 FAILED = 1
 _HEAD = """\

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.commands.output import VOID, print_json, progress, say, show
+from rig.commands.output import VOID, print_found, progress, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.reasons import make_error
@@ -31,10 +31,8 @@ def main(arguments: Namespace) -> int:
     if arguments.output is not None:
         check_place(arguments.output)
     together = read_together(arguments)
-    if arguments.json:
-        print_json(together.comparison_json())
-    else:
-        show(difference_lines(together))
+    lines = difference_lines(together)
+    print_found(together.comparison_json(), lambda: "\n".join(lines), as_json=arguments.json)
     if arguments.output is not None:
         if arguments.output.endswith((".html", ".htm")):
             write_atomic(arguments.output, comparison_page(together))
@@ -51,10 +49,8 @@ def analyze_together(arguments: Namespace) -> int:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in options)
         raise make_error(InputError, "option_for_one_session", options=names)
     together = read_together(arguments)
-    if arguments.json:
-        print_json(together.json())
-    else:
-        show(pooled_lines(together))
+    lines = pooled_lines(together)
+    print_found(together.json(), lambda: "\n".join(lines), as_json=arguments.json)
     return VOID if together.void else 0
 
 

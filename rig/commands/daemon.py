@@ -6,9 +6,10 @@ import logging
 import os
 import queue
 import threading
+from argparse import Namespace
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.commands.output import say
 from rig.daemon.listener import notify_systemd
@@ -16,10 +17,6 @@ from rig.daemon.server import serve
 from rig.daemon.socket_path import default_socket
 from rig.link.port import check_url
 from rig.printable import printable
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator
 
 _WAITING = 1000  # lines that a terminal which does not take them may be behind
 _LAST_S = 1.0  # for the last lines, when it still does not

@@ -79,7 +79,10 @@ def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
             estimate=False,
         )
     )
-    if arguments.open or _has_screen():
+    # A browser in a terminal would be in the way.
+    screens = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))
+    has_screen = sys.stdout.isatty() and (sys.platform == "darwin" or any(screens))
+    if arguments.open or has_screen:
         import webbrowser  # noqa: PLC0415 - only where somebody looks
 
         webbrowser.open(page.absolute().as_uri())
@@ -142,9 +145,3 @@ def impacts(session: Session, results: SessionResults) -> str:
         if value.identified
     ]
     return f"from all impacts: {', '.join(parts).replace('-', '−') or 'too few drops'}"
-
-
-def _has_screen() -> bool:
-    """Whether a page can be shown to somebody: a browser in a terminal would be in the way."""
-    seen = sys.platform == "darwin" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
-    return sys.stdout.isatty() and bool(seen)

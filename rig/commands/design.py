@@ -17,10 +17,10 @@ from rig.files import check_place, write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
+from rig.reasons import make_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
 from rig.text_table import text_table
-from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -36,7 +36,7 @@ SPACING_M = 0.01
 def main(arguments: Namespace) -> int:
     """Predict the uncertainties of a layout, and search for a better layout."""
     if arguments.output and arguments.no_search:
-        raise InputError("-o needs a proposal; leave --no-search out")
+        raise make_error(InputError, "proposal_unwanted")
     if arguments.output:
         check_place(arguments.output)
     protocol = reader.read(arguments.protocol)
@@ -45,15 +45,9 @@ def main(arguments: Namespace) -> int:
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
     components = stated(protocol) if arguments.learned is None else _read_scatter(arguments.learned)
-    lowest, highest, spacing = (
-        _read_length(f"--{name}", getattr(arguments, name))
-        for name in ("lowest", "highest", "spacing")
-    )
-    limits = room(protocol, lowest, highest, spacing or SPACING_M)
+    limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing or SPACING_M)
     if limits.lowest > limits.highest:
-        raise InputError(
-            "--lowest is above --highest", "the highest beam is below the start of the drop"
-        )
+        raise make_error(InputError, "beams_reversed")
     layouts: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
         "scatter": "stated" if arguments.learned is None else "learned",
@@ -77,20 +71,8 @@ def _read_scatter(path: str) -> Components:
     with Session.open(path, readonly=True) as session:
         joint = detailed(session)[0].joint
     if joint is None:
-        raise InputError(f"{path}: too few good drops for a scatter", "leave out --learned")
+        raise make_error(InputError, "scatter_unknown", path=path)
     return joint.components
-
-
-def _read_length(option: str, text: str | None) -> float | None:
-    if text is None:
-        return None
-    try:
-        value = parse(text, Dimension.LENGTH).value
-    except UnitError as error:
-        raise InputError(f"{option}: {error}") from None
-    if value <= 0.0:
-        raise InputError(f"{option}: found {text}; accepted: a length above 0")
-    return value
 
 
 def _forecast(
@@ -101,14 +83,17 @@ def _forecast(
     layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
     expected: Forecast = forecast(protocol, layout, sure=True)
     outcome = trials(with_beams(protocol, beams))
-    text = trials_text(outcome, protocol.vocabulary)
     return {
         "gates": [
             {"channel": gate.channel, "side": side, "height_m": height}
             for gate, (side, height) in zip(protocol.gates.gates, beams, strict=True)
         ],
         "readable": readable(protocol, beams),
-        "trials": {"drops": outcome.drops, "read": outcome.read, "text": text},
+        "trials": {
+            "drops": outcome.drops,
+            "read": outcome.read,
+            "text": trials_text(outcome, protocol.vocabulary),
+        },
         "measurands": [
             {
                 "name": name,

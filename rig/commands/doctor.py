@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
@@ -23,10 +24,6 @@ from rig.link.port import open_port, port_clock
 from rig.reasons import make_reason
 from rig.selftest.findings import Finding, explain, make_check
 from rig.usb.listing import serial_ports
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Callable, Iterator, Mapping
 
 
 def main(arguments: Namespace) -> int:

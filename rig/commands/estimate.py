@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.cache.entry import CacheEntry
 from rig.commands.output import print_json, progress, say, tell_damage
@@ -13,9 +14,6 @@ from rig.results import check_open, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
-from rig.cache.entry import recall
+from rig.bundle.tables import csv_files
 from rig.commands.output import progress, say, tell_damage
+from rig.errors import InputError
 from rig.files import make_folder, write_atomic
+from rig.reasons import make_error
 from rig.results import results, tick_rates
-from rig.session.export import csv_files
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from rig.results import SessionResults
-
 
 def main(arguments: Namespace) -> int:
-    """Write a session as CSV files."""
+    """Write a session as CSV files, or as one file that another person can check."""
+    if arguments.sign is not None and arguments.bundle is None:
+        raise make_error(InputError, "sign_without_bundle")
+    if arguments.bundle is not None:
+        from rig.commands.bundling import write_bundle  # noqa: PLC0415 - it draws a report
+
+        return write_bundle(arguments)
     with Session.open(arguments.session, readonly=True) as session:
         folder = make_folder(arguments.csv)
         outcome = results(session, progress("analysing run"), fresh=arguments.fresh)
-        make = partial(_tables, session, outcome)
-        tables = recall(dict, make, "tables", outcome.digest, fresh=arguments.fresh)
+        tables = csv_files(session, outcome.json(), tick_rates(session))
         for name, text in tables.items():
             write_atomic(folder / name, text)
     say(f"CSV files: {arguments.csv}")
     return tell_damage(outcome.analysis)
-
-
-def _tables(session: Session, outcome: SessionResults) -> dict[str, str]:
-    return csv_files(session, outcome.json(), tick_rates(session))

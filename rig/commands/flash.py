@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 from rig.commands.output import goes_on, say
 from rig.errors import InputError
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.steps import flash, flash_drive
-
-if TYPE_CHECKING:
-    from argparse import Namespace
+from rig.reasons import make_error
 
 
 def main(arguments: Namespace) -> int:
@@ -23,14 +21,12 @@ def _flash(arguments: Namespace) -> int:
     board, port = arguments.board, arguments.port
     if board not in TARGETS:
         if arguments.avrdude is not None:
-            raise InputError(f"--avrdude does not write a {DRIVE.board.name}", "leave it out")
+            raise make_error(InputError, "avrdude_for_pico", board=DRIVE.board.name)
         identity = flash_drive(arguments.drive, port, arguments.hex, say)
     elif arguments.drive is not None:
-        raise InputError(f"--drive is for a {DRIVE.board.name}", "an Arduino has a --port")
+        raise make_error(InputError, "drive_of_arduino", board=DRIVE.board.name)
     elif port is None:
-        raise InputError(
-            "rig flash: --port is missing", "such as --port /dev/ttyACM0; rig ports lists the ports"
-        )
+        raise make_error(InputError, "flash_without_port")
     else:
         identity = flash(board, port, arguments.hex, arguments.avrdude, say)
     print(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections import Counter
 from functools import partial
 from pathlib import Path
@@ -27,7 +26,6 @@ from rig.timers.importing import FallMatch, import_drops
 from rig.timers.lines import check_is_file
 from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
-from rig.units import Dimension, UnitError, parse
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -62,7 +60,7 @@ def main(arguments: Namespace) -> int:
         timer |= {"beams": beams, **reasons_json(imported.notes)}
     timer["sha256"] = hashlib.sha256(Path(arguments.events).read_bytes()).hexdigest()
     if arguments.clock_uncertainty is not None:
-        timer["clock_u"] = _read_share(arguments.clock_uncertainty)
+        timer["clock_u"] = arguments.clock_uncertainty
     now_ns = SystemClock().now_ns()
     with Session.create(
         arguments.session, protocol.text, source, simulated=arguments.simulated, origin=events
@@ -118,17 +116,6 @@ def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:
         yield f"run {drop.run}: {len(drop.edges)} edges in {span:.4g} s; by channel {counts}"
 
 
-def _read_share(text: str) -> float:
-    try:
-        value = parse(text, Dimension.NUMBER).value
-    except UnitError:
-        value = math.nan
-    if not 0.0 <= value < 0.1:
-        accepted = "a share from 0 to 10 %, as in 50 ppm"
-        raise refusal("--clock-uncertainty", "not_accepted", text=text, accepted=accepted)
-    return value
-
-
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     """Refuse runs that are not planned; remark on channels that are not gates."""
     gates = check_gates(protocol)
@@ -138,7 +125,7 @@ def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     if strangers:
         values = {"run": strangers[0], "protocol": protocol.source, "planned": planned}
         raise refusal(source, "run_unplanned", **values)
-    used = gates.mask
-    idle = sorted({e.channel for drop in drops for e in drop.edges if not used >> e.channel & 1})
+    seen = {edge.channel for drop in drops for edge in drop.edges}
+    idle = sorted(channel for channel in seen if not gates.mask >> channel & 1)
     if idle:
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from rig.commands.output import say
 from rig.protocol import reader
 from rig.runner import Operator
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def narrator(source: str, ask: Callable[[str], None] | None) -> Operator:

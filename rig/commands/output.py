@@ -113,16 +113,15 @@ def write_study(
     whole, table, picture
         All that was found; every line of it as CSV; as SVG, where there is a picture.
     """
-    json_text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-    for kind, text in {"json": json_text, "csv": table, "svg": picture}.items():
-        if text is not None:
+    texts = {
+        "json": json.dumps(data, indent=2, ensure_ascii=False) + "\n",
+        "csv": table,
+        "svg": picture,
+        "md": "\n".join([head, "", "```text", *lines, "```", ""]),
+    }
+    for kind, text in texts.items():
+        if text:
             write_atomic(folder / f"{name}.{kind}", text)
-    write_page(folder, name, head, lines)
-
-
-def write_page(folder: Path, name: str, head: str, lines: Iterable[str]) -> None:
-    """Write a study's page: what stands above, in Markdown, and its tables as text."""
-    write_atomic(folder / f"{name}.md", "\n".join([head, "", "```text", *lines, "```", ""]))
 
 
 def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bool) -> None:
@@ -130,29 +129,12 @@ def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bo
     if as_json:
         print_json(data)
     else:
-        print(text())
+        show(text().splitlines())
 
 
 def print_json(data: Mapping[str, Any]) -> None:
-    """Print one JSON object; what lies deeper than a run's members has one line."""
-    print(_indent(data, 1))
-
-
-_DEEPEST = 3
-_encoded = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
-
-
-def _indent(value: object, level: int) -> str:
-    # Indenting all there is takes a tenth of the time of an analysis.
-    if level > _DEEPEST or not isinstance(value, dict | list | tuple) or not value:
-        return _encoded(value)
-    begin, end = "{}" if isinstance(value, dict) else "[]"
-    if isinstance(value, dict):
-        parts = [f"{_encoded(key)}: {_indent(item, level + 1)}" for key, item in value.items()]
-    else:
-        parts = [_indent(item, level + 1) for item in value]
-    margin = "\n" + level * "  "
-    return f"{begin}{margin}{f',{margin}'.join(parts)}\n{(level - 1) * '  '}{end}"
+    """Print one JSON object."""
+    print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def print_results(

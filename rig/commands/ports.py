@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections import Counter
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
-from rig.flash.drive import UNMOUNTED, sees_boot_pico, waiting_drives
+from rig.flash.drive import sees_boot_pico, waiting_drives
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
+from rig.reasons import make_reason
 from rig.usb.listing import SerialPort, serial_ports
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Mapping
 
 
 def main(arguments: Namespace) -> int:
@@ -38,7 +37,7 @@ def main(arguments: Namespace) -> int:
     for drive in waiting_drives():
         say(f"a Pico waits for firmware at {drive}: rig flash --board pico")
     if sees_boot_pico() and not waiting_drives():
-        say(f"{UNMOUNTED}: rig flash --board pico")
+        say(f"{make_reason('pico_unmounted').text}: rig flash --board pico")
     if not any(port.candidate for port in ports):
         say("no board found: check its plug, and use a USB cable with data wires")
     return 0
@@ -51,8 +50,7 @@ def _identify(path: str) -> dict[str, Any]:
             identity = Device(port, port_clock(port), tries=3).connect()
     except DeviceError as error:
         return {"identity": None, "trouble": str(error)}
-    fields = asdict(identity) | {"unique_id": identity.unique_id.hex()}
-    return {"identity": fields, "trouble": None}
+    return {"identity": identity.json(), "trouble": None}
 
 
 def _all(ports: list[SerialPort], asked: Mapping[str, object]) -> list[SerialPort]:

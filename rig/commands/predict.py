@@ -12,6 +12,7 @@ from rig.files import check_place, write_atomic
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import group_notes, predictions
 from rig.protocol import reader
+from rig.reasons import make_error
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import csv_text, text_table
 
@@ -28,39 +29,35 @@ def main(arguments: Namespace) -> int:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
         if arguments.protocol is not None:
-            raise InputError(
-                f"--figure {arguments.figure} draws the paper's own chains",
-                f"leave {arguments.protocol} out; rig sweep PROTOCOL draws yours",
-            )
+            values = {"figure": arguments.figure, "path": arguments.protocol}
+            raise make_error(InputError, "figure_of_paper", **values)
         _write_figure(arguments.figure, arguments.output, resolved=arguments.resolved)
         return 0
     if arguments.protocol is None:
-        raise InputError(
-            "PROTOCOL is missing", "rig predict PROTOCOL, or rig predict --figure 3 -o FILE.svg"
-        )
+        raise make_error(InputError, "predict_nothing")
     protocol = reader.read(arguments.protocol)
     lines = predictions(protocol)
-    data = {"predictions": [line.json() for line in lines]}
-    print_found(data, lambda: table(protocol, lines), as_json=arguments.json)
+    print_found(
+        {"predictions": [line.json() for line in lines]},
+        lambda: table(protocol, lines),
+        as_json=arguments.json,
+    )
     return 0
 
 
 def table(protocol: Protocol, lines: list[PredictedIncline]) -> str:
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     apart, end = SEPARATION, SPEED
-
-    def separation(line: PredictedIncline) -> str:
-        return _written(line.separation_m, line.separation_u_m, apart)
-
-    def speed(line: PredictedIncline) -> str:
-        return _written(line.speed_m_s, line.speed_u_m_s, end)
-
     columns: dict[str, Callable[[PredictedIncline], str]] = {
         "incline (°)": lambda line: degrees(line.incline_deg),
         "strikes": lambda line: line.impact_chain or "",
         "α": lambda line: fixed(line.alpha, 4),
-        f"{apart.symbol} ± U ({apart.unit})": separation,
-        f"{end.symbol} ± U ({end.unit})": speed,
+        f"{apart.symbol} ± U ({apart.unit})": lambda line: _written(
+            line.separation_m, line.separation_u_m, apart
+        ),
+        f"{end.symbol} ± U ({end.unit})": lambda line: _written(
+            line.speed_m_s, line.speed_u_m_s, end
+        ),
         "t (s)": lambda line: fixed(line.fall_time_s, 5),
         "model": lambda line: line.model,
     }
@@ -94,7 +91,7 @@ def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
 
     if output is None:
-        raise InputError("-o FILE.svg is missing", f"rig predict --figure {number} -o FILE.svg")
+        raise make_error(InputError, "figure_nowhere", figure=number)
     path = Path(output)
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
     kind_of(picture)
@@ -120,7 +117,7 @@ def _resolve(number: int) -> dict[str, list[float]]:
     from rig.bench import resolved_paper  # noqa: PLC0415 - only where chains really fall
 
     if number not in {3, 4}:
-        raise InputError(f"figure {number} has no resolved falls", "use figure 3 or 4")
+        raise make_error(InputError, "figure_unresolved", figure=number)
     say("simulating drops rod by rod; this takes some minutes")
     if number == 3:
         return resolved_paper.figure_3(resolved_paper.uniform())

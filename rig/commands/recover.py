@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 from rig.commands.output import say
 from rig.errors import SessionError
 from rig.recover.examine import describe, examine
 from rig.recover.save import save
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

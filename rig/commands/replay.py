@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 from rig.commands.output import progress
 from rig.replay import replay
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 DIFFERENT = 1
 

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 
     from rig.estimate.session import SessionEstimate
     from rig.report.figure import Chart
+    from rig.report.parts import Bars
     from rig.results import SessionResults
 
 
-class _Report(NamedTuple):
+class Report(NamedTuple):
     """A report as it is kept: its HTML, its figures, and what failed."""
 
     html: str
@@ -41,10 +42,10 @@ def main(arguments: Namespace) -> int:
         outcome = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=estimate)
         # The page has the file's name; how simulated chains moved lies beside the file.
         content = session.path.name, arguments.bars, estimate, film_digest(session.path)
-        entry = CacheEntry(_Report, outcome.digest, content, fresh=fresh)
+        entry = CacheEntry(Report, outcome.digest, content, fresh=fresh)
         report = entry.find()
         if report is None:
-            report = _report(session, outcome, arguments)
+            report = make_report(session, outcome, arguments.bars, estimate=estimate, fresh=fresh)
             report = report if report.failed else entry.keep(report)
     write_atomic(arguments.output, report.html)
     if arguments.figures is not None:
@@ -59,21 +60,22 @@ def main(arguments: Namespace) -> int:
     return tell_damage(outcome.analysis)
 
 
-def _report(session: Session, outcome: SessionResults, arguments: Namespace) -> _Report:
+def make_report(
+    session: Session, outcome: SessionResults, bars: Bars, *, estimate: bool, fresh: bool
+) -> Report:
     """Write the page from what was found."""
     sections, estimated = Sections(), None
-    if arguments.estimate:
+    if estimate:
         stage("estimating the impacts")
         estimated = sections.make(
-            "The estimate of the impacts",
-            lambda: _estimate(session, outcome, fresh=arguments.fresh),
+            "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
         )
     stage("writing the page")
-    page = session_page(Material(session, outcome, arguments.bars, estimated, sections))
+    page = session_page(Material(session, outcome, bars, estimated, sections))
     html = page_html(page)
     stage("")
     failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
-    return _Report(html, tuple(page.figures), failed)
+    return Report(html, tuple(page.figures), failed)
 
 
 def _estimate(session: Session, outcome: SessionResults, *, fresh: bool) -> SessionEstimate | None:

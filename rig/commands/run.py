@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.commands.narration import narrator
 from rig.commands.output import goes_on, print_results
@@ -13,9 +13,6 @@ from rig.report.finding import finding
 from rig.report.templates import sentence
 from rig.runner import run_protocol
 from rig.streams import ask, say
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from contextlib import closing
-from typing import TYPE_CHECKING
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
@@ -13,9 +13,6 @@ from rig.reasons import remedies
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

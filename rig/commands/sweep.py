@@ -12,6 +12,7 @@ from rig.commands.output import goes_on, say, stage
 from rig.errors import InputError
 from rig.files import check_place, replacing
 from rig.protocol import reader
+from rig.reasons import make_error
 from rig.report.canvas import KINDS
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
@@ -87,10 +88,9 @@ def _drawn(output: Path) -> bool:
 def _check_output(output: Path) -> None:
     """Find out before a long computation what would go wrong after it."""
     if output.suffix not in _KINDS:
-        raise InputError(
-            f"{output}: the ending {output.suffix or 'is missing and'} says no kind of file",
-            f"end the name in one of {', '.join(_KINDS)}",
-        )
+        ending = output.suffix or "is missing and"
+        kinds = ", ".join(_KINDS)
+        raise make_error(InputError, "no_kind_of_sweep", path=output, ending=ending, kinds=kinds)
     check_place(output)
     if _drawn(output):
         import_module("matplotlib")
@@ -100,14 +100,10 @@ def _check_drawable(layout: Layout) -> None:
     axes = layout.grid.axes
     if layout.layered:
         inclines = ", ".join(f"{value:g}" for value in axes[0].values)
-        raise InputError(
-            f"a picture shows one incline, and the plan has {inclines} degrees",
-            f"choose one, as in --vary incline={axes[0].values[-1]:g}deg, or write .csv or .npz",
-        )
+        last = f"{axes[0].values[-1]:g}"
+        raise make_error(InputError, "sweep_of_inclines", inclines=inclines, last=last)
     if len(axes) > 2:
-        raise InputError(
-            f"a picture has one axis or two, not {len(axes)}", "hold some, or write .csv or .npz"
-        )
+        raise make_error(InputError, "sweep_of_axes", axes=len(axes))
 
 
 def _summary(swept: Swept) -> str:

@@ -6,19 +6,16 @@ import asyncio
 import gc
 import os
 import sys
+from argparse import Namespace
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.ports import check_name
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:
@@ -64,11 +61,11 @@ def _options(arguments: Namespace) -> Options:
         arguments.port or arguments.protocol or arguments.socket
     )
     check_name(arguments.port or "")  # before a daemon is started for it
-    session = Path(arguments.session) if arguments.session else _fresh()
+    fresh = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session"
     return Options(
         files=files,
         port=arguments.port or "",
-        session=session,
+        session=Path(arguments.session or fresh),
         seed=arguments.seed,
         socket=Path(arguments.socket).absolute() if arguments.socket else None,
         offline=offline,
@@ -85,8 +82,3 @@ def _last() -> Path | None:
         with suppress(OSError):  # gone meanwhile
             sessions.append((path.stat().st_mtime_ns, path))
     return max(sessions)[1] if sessions else None
-
-
-def _fresh() -> Path:
-    """Name a session file that is not there yet."""
-    return Path(f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session")

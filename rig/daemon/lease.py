@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from rig.errors import DeviceError
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 LEASE_S = 2.0
 """Control lapses when its holder was not heard for so long."""

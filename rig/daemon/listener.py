@@ -6,16 +6,13 @@ import json
 import os
 import socket
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.daemon import rpc
 from rig.daemon.socket_path import prepare_folder, token_file
 from rig.errors import InputError
 from rig.files import identity_of, write_atomic
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _PROBE_S = 1.0
 _BACKLOG = 1024  # that many may come at once; the kernel has a limit of its own besides

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.components import Components
     from rig.analysis.trajectory import Trajectory
+    from rig.arrays import Array
     from rig.protocol.protocol import Protocol
     from rig.protocol.protocol import Side as Role
 
-    Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
 CLOCK_U = 1e-6

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.arrays import Array
     from rig.design.cases import Block, Case, Cases
     from rig.model.chain import Chain
     from rig.protocol.protocol import Condition, Protocol
     from rig.units import Quantity
 
-    Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
 

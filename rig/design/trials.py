@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.identify import Identification
     from rig.analysis.trajectory import Trajectory
+    from rig.arrays import Array
     from rig.protocol.protocol import Protocol, Run
     from rig.vocabulary import Vocabulary
 
-    Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
 DROPS = 20

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rig.link.messages import unpack_label
 from rig.link.restarts import Restart, causes
+from rig.records import Drop, Job
 from rig.recover.examine import examine
 from rig.selftest.findings import CheckFailedError, make_check
 from rig.session.drop_check import ByteReplay
@@ -15,7 +16,6 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from rig.records import Drop
     from rig.recover.examine import ExaminedFile
     from rig.selftest.findings import Finding
 
@@ -63,12 +63,11 @@ def check_restarts(restarts: Iterable[Restart], drops: Iterable[Drop]) -> str:
     for restart in restarts:
         when = restart.when + _because(restart.cause)
         if restart.label is not None:
-            when = "run {}, attempt {}: ".format(*unpack_label(restart.label)) + when
+            when = f"{Job(*unpack_label(restart.label))}: {when}"
         counts[when] += 1
     for drop in drops:
         if drop.certificate and drop.certificate.restarts:
-            cause = _because(drop.certificate.restarts)
-            counts[f"{_name(drop)}: before it, unseen{cause}"] = 1
+            counts[f"{drop.job}: before it, unseen{_because(drop.certificate.restarts)}"] = 1
     if not counts:
         return "none"
     text = "; ".join(when + (f", {n} times" if n > 1 else "") for when, n in counts.items())
@@ -78,7 +77,7 @@ def check_restarts(restarts: Iterable[Restart], drops: Iterable[Drop]) -> str:
 def describe_supply(drops: Iterable[Drop]) -> str:
     """Say how far the board's supply sank while something fell."""
     dips = [
-        (seen.lowest_mv / seen.supply_mv, _name(drop), seen.supply_mv / 1e3, seen.lowest_mv / 1e3)
+        (seen.lowest_mv / seen.supply_mv, str(drop.job), seen.supply_mv / 1e3, seen.lowest_mv / 1e3)
         for drop in drops
         if (seen := drop.certificate) and seen.supply_mv and seen.lowest_mv
     ]
@@ -91,7 +90,3 @@ def describe_supply(drops: Iterable[Drop]) -> str:
 def _because(mask: int) -> str:
     words = causes(mask)
     return f" ({words})" if words else ""
-
-
-def _name(drop: Drop) -> str:
-    return f"run {drop.run}, attempt {drop.attempt}"

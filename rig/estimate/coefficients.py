@@ -15,15 +15,12 @@ from rig.model.impact import impact_on
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
     from rig.units import Quantity
-
-    Array = NDArray[np.float64]
 
 CONTACT_U = 1e-3
 """How far the contact point may move when the board is inclined anew, m."""

@@ -21,13 +21,10 @@ from rig.model.rods import rod_impacts
 from rig.protocol.contact import as_struck, at_contact
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rig.analysis.joint_fit import JointFit
     from rig.analysis.joint_step import JointDrop
+    from rig.arrays import Array
     from rig.protocol.protocol import Protocol, Run
-
-    Array = NDArray[np.float64]
 
 POINTS = 120
 

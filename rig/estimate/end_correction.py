@@ -18,13 +18,10 @@ from rig.model.rods import rod_impacts
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol
-
-    Array = NDArray[np.float64]
 
 STRONG = 10.0
 """ΔAIC from which the worse model has essentially no support (Burnham and Anderson 2002)."""

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.arrays import Array
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.model.surface import Surface
 
-    Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"

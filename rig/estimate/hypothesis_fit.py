@@ -15,11 +15,8 @@ from rig.errors import RigError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.estimate.quadratic_forms import QuadraticForm
-
-    Array = NDArray[np.float64]
 
 ANYTHING = 1.0
 """How far a parameter may be from where the search begins when nothing is known of it: coefficients

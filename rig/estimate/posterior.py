@@ -19,13 +19,10 @@ from rig.estimate.hypotheses import MU
 from rig.estimate.hypothesis_fit import Parameter, fit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.hypothesis_fit import HypothesisFit
     from rig.protocol.protocol import Protocol
-
-    Array = NDArray[np.float64]
 
 NODES = 41
 _REACH = 6.0  # standard uncertainties on either side

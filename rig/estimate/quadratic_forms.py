@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from rig.analysis.joint_step import JointDrop
     from rig.analysis.trajectory import Trajectory
     from rig.analysis.unknowns import SharedUnknowns
+    from rig.arrays import Array
     from rig.model.chain import Chain
     from rig.protocol.protocol import Run
 
-    Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
 EXTRA = ("contact", "drag")

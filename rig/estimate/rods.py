@@ -18,13 +18,10 @@ from rig.estimate.likelihood_ratio import LikelihoodRatio
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.estimate.hypothesis_fit import Hypothesis
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Condition, Protocol
-
-    Array = NDArray[np.float64]
 
 RESOLVED = 0.5
 """U95 over the predicted impulse: rods known less well are taken together with the next ones."""

@@ -26,11 +26,9 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from rig.analysis.comparison import Comparison
     from rig.analysis.session import Analysis
+    from rig.arrays import Array
     from rig.estimate.alphas import SingleAlphas
     from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.curves import DropCurves
@@ -40,8 +38,6 @@ if TYPE_CHECKING:
     from rig.estimate.rods import Impulses
     from rig.protocol.protocol import Condition, Protocol
     from rig.units import Quantity
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, InputError
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,26 +19,17 @@ if TYPE_CHECKING:
     from rig.flash.boards import AvrTarget
 
 _LOOK_S = 0.2
-_RESET = "wrong --board (nano-old for an old Nano)? Press the board's reset button and try again"
-_CAUSES = (
+_CAUSES = {
     # What it says, in lower case, over the versions 6 and 7; the first that fits counts.
-    (
-        "expected signature for",
-        "the chip on this port is another one than --board says",
-        "look at what is printed on the board: --board mega or --board uno",
-    ),
-    (
-        "mismatch",
-        "what was read back is not what was written",
-        "try once more, with another cable; if it stays so, the board's flash is worn out",
-    ),
-    ("permission denied", "permission denied", "join the group that owns it (often dialout)"),
-    ("busy", "another program uses it", "close that program"),
-    ("no such file", "it is gone", "was the board unplugged?"),
-    ("programmer is not responding", "its boot loader does not answer", _RESET),
-    ("timeout", "its boot loader does not answer", _RESET),
-    ("not in sync", "its boot loader does not answer", _RESET),
-)
+    "expected signature for": "flash_other_chip",
+    "mismatch": "flash_mismatch",
+    "permission denied": "flash_denied",
+    "busy": "flash_busy",
+    "no such file": "flash_port_gone",
+    "programmer is not responding": "flash_no_loader",
+    "timeout": "flash_no_loader",
+    "not in sync": "flash_no_loader",
+}
 
 
 def find_avrdude(path: str | None) -> str:
@@ -57,8 +49,8 @@ def find_avrdude(path: str | None) -> str:
     if program:
         return program
     if path:
-        raise InputError(f"{path} is no program that can be run")
-    raise InputError("avrdude is not installed", "apt-get install avrdude, or say --avrdude PATH")
+        raise make_error(InputError, "no_program", path=path)
+    raise make_error(InputError, "no_avrdude")
 
 
 def write_flash(avrdude: str, target: AvrTarget, port: str, image: Path) -> None:
@@ -92,16 +84,15 @@ def write_flash(avrdude: str, target: AvrTarget, port: str, image: Path) -> None
             bufsize=0,
         )
     except OSError as error:
-        raise InputError(f"cannot run {avrdude}: {error.strerror}") from error
+        raise make_error(InputError, "program_failed", path=avrdude, text=error) from error
     with child:
         output = _relay_output(child, port)
     if not os.path.lexists(port):
-        raise DeviceError(
-            f"flashing {port} failed: the connection broke",
-            "plug the board in again and flash it once more: its boot loader was not touched",
-        )
+        raise make_error(DeviceError, "flash_broke_off", port=port)
     if child.returncode:
-        raise DeviceError(*_cause(port, child.returncode, output))
+        codes = (code for clue, code in _CAUSES.items() if clue in output.lower())
+        code = next(codes, "flash_failed")
+        raise make_error(DeviceError, code, port=port, exit_code=child.returncode)
 
 
 def _relay_output(child: subprocess.Popen[bytes], port: str) -> str:
@@ -120,11 +111,3 @@ def _relay_output(child: subprocess.Popen[bytes], port: str) -> str:
             with suppress(OSError):
                 sys.stderr.write(chunk.decode(errors="replace"))
                 sys.stderr.flush()
-
-
-def _cause(port: str, code: int, output: str) -> tuple[str, str]:
-    lower = output.lower()
-    for clue, cause, hint in _CAUSES:
-        if clue in lower:
-            return f"flashing {port} failed: {cause}", hint
-    return f"flashing {port} failed: avrdude ended with {code}", "see its last lines above"

@@ -5,28 +5,20 @@ from __future__ import annotations
 import os
 import re
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.boards import DRIVE
+from rig.reasons import make_error
 from rig.usb.listing import serial_ports
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _MOUNTS = Path("/proc/mounts")
 _ABOUT = "INFO_UF2.TXT"  # the boot program's file about the board
 _BOARD = "RPI-RP2"
 _USB = Path("/sys/bus/usb/devices")
 _BOOT = ["2e8a", "0003"]  # USB vendor and product of the RP2040's boot program
-UNMOUNTED = f"a Pico waits for firmware, but its drive {_BOARD} is not mounted"
-_MOUNT = f"mount /dev/disk/by-label/{_BOARD} (as with udisksctl mount -b) and say --drive FOLDER"
-_HOW = (
-    f"hold its BOOTSEL button while you put in the plug: a drive {_BOARD} appears; "
-    "if nothing mounts it by itself, mount it and say --drive FOLDER"
-)
 _OCTAL = re.compile(r"\\([0-7]{3})")
 _LOOK_S = 0.2
 
@@ -64,18 +56,17 @@ def choose_drive(folder: str | None, mounts: Path = _MOUNTS, devices: Path = _US
     """
     if folder is not None:
         if not _is_drive(Path(folder)):
-            raise InputError(f"{folder} is no drive of a Pico: it has no {_ABOUT} of one", _HOW)
+            raise make_error(InputError, "not_a_pico", path=folder, file=_ABOUT)
         return Path(folder)
     drives = waiting_drives(mounts)
     if len(drives) == 1:
         return drives[0]
     if drives:
         names = ", ".join(map(str, drives))
-        hint = "choose one with --drive FOLDER"
-        raise DeviceError(f"{len(drives)} Picos wait for firmware: {names}", hint)
+        raise make_error(DeviceError, "many_picos", count=len(drives), names=names)
     if sees_boot_pico(devices):
-        raise DeviceError(UNMOUNTED, _MOUNT)
-    raise DeviceError("no Pico waits for firmware", _HOW)
+        raise make_error(DeviceError, "pico_unmounted")
+    raise make_error(DeviceError, "no_pico")
 
 
 def copy_to(drive: Path, image: Path) -> None:
@@ -89,7 +80,7 @@ def copy_to(drive: Path, image: Path) -> None:
     try:
         file = os.open(drive / "chainrig.uf2", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     except OSError as error:
-        raise DeviceError(f"cannot write to {drive}: {error.strerror}", _HOW) from None
+        raise make_error(DeviceError, "drive_unwritable", path=drive, text=error) from None
     try:
         with open(file, "wb") as stream:  # noqa: PTH123 - of the handle
             stream.write(image.read_bytes())
@@ -99,7 +90,7 @@ def copy_to(drive: Path, image: Path) -> None:
         # The board may be gone before the computer has noticed that everything was written: who it
         # is afterwards decides.
         if _is_drive(drive):
-            raise DeviceError(f"writing to {drive} failed: {error.strerror}", _HOW) from None
+            raise make_error(DeviceError, "drive_failed", path=drive, text=error) from None
 
 
 def new_port(before: set[str], patience_s: float = 10.0) -> str:
@@ -122,10 +113,7 @@ def new_port(before: set[str], patience_s: float = 10.0) -> str:
         for path in pico_ports() - before:
             return path
         if time.monotonic() > end:
-            raise DeviceTimeoutError(
-                "the firmware was copied, but no port of a Pico appears",
-                "pull its plug and put it in again, then rig ports",
-            )
+            raise make_error(DeviceTimeoutError, "no_pico_port")
         time.sleep(_LOOK_S)
 
 

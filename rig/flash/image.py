@@ -14,6 +14,7 @@ from rig.errors import InputError, Problem
 from rig.files import read_input
 from rig.flash.boards import DRIVE, FIRMWARE, TARGETS
 from rig.flash.uf2 import read_blocks
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -62,13 +63,17 @@ def read_image(path: Path, target: Target) -> Image:
     try:
         data = read_input(path)
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    flash = read_blocks(data, path) if target is DRIVE else _records(data, path)
+        raise make_error(InputError, "image_unreadable", path=path, text=error) from None
+    flash = (
+        read_blocks(data, path)
+        if target is DRIVE
+        else _flash(data.decode("ascii", "replace"), path)
+    )
     versions = set(_VERSION.findall(flash))
     boards_known = {one.board for one in (*TARGETS.values(), DRIVE)}
     boards = [board for board in boards_known if board.name.encode() + b"\0" in flash]
     if len(versions) != 1 or len(boards) != 1:
-        raise InputError(f"{path} is no firmware of this rig", "make -C firmware prebuilt makes it")
+        raise make_error(InputError, "image_foreign", path=path)
     if boards != [target.board]:
         raise InputError(f"{path} is for {boards[0].one}, not for {target.board.one}")
     if len(flash) > target.flash_limit:
@@ -82,14 +87,6 @@ def shipped_firmware(board: str) -> str:
         if target.board.name == board:
             return read_image(target.shipped, target).firmware
     return ""
-
-
-def _records(data: bytes, path: Path) -> bytes:
-    """Read Intel HEX."""
-    try:
-        return _flash(data.decode("ascii"), path)
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is no Intel HEX file") from None
 
 
 def _flash(text: str, path: Path) -> bytes:

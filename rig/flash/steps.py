@@ -14,6 +14,7 @@ from rig.flash.drive import choose_drive, copy_to, new_port, pico_ports
 from rig.flash.image import read_image
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,10 +59,7 @@ def flash(
         The port cannot be used, flashing failed, or the board does not say what it should.
     """
     if "://" in port:
-        raise InputError(
-            f"{port} is no board that can be flashed",
-            "give the device path of a real one, such as /dev/ttyACM0",
-        )
+        raise make_error(InputError, "not_flashable", port=port)
     target = TARGETS[board]
     program = find_avrdude(avrdude)
     file = read_image(target.shipped if image is None else Path(image), target)
@@ -132,16 +130,10 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
         try:
             identity = Device(opened, port_clock(opened)).connect()
         except DeviceTimeoutError as error:
-            raise DeviceTimeoutError(
-                f"{port} was flashed, but the firmware does not answer",
-                "pull the board's plug, put it in again, then rig selftest",
-            ) from error
+            raise make_error(DeviceTimeoutError, "flashed_silent", port=port) from error
     if (identity.board, identity.firmware) != (target.board.name, firmware):
-        raise DeviceError(
-            f"{port} was flashed with {firmware} for {target.board.one}, but answers as "
-            f"{identity.board}, {identity.firmware}",
-            "is this the port of the board that was flashed? rig ports",
-        )
+        names = {"board": target.board.one, "answer": f"{identity.board}, {identity.firmware}"}
+        raise make_error(DeviceError, "flashed_other", port=port, firmware=firmware, **names)
     return identity
 
 

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.errors import InputError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _BLOCK = 512
 _MAGIC = (0x0A324655, 0x9E5D5157)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from typing import TYPE_CHECKING
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
 
 from rig.boards import GATES
 from rig.link.messages import EVENTS_PER_FRAME, DropCertificate2, PulseEnd, unpack_label
@@ -56,21 +57,16 @@ class Assembly:
         self.certificate: DropCertificate | None = None
         self.reset = False
         self.first_kept = 0
-        self._raw = bytearray()  # the events' records, each at its number's place
-        self._mask = bytearray()  # 1 where there is one
+        self._events: dict[int, tuple[int, int]] = {}  # tick and state by number
 
     @property
     def begun(self) -> bool:
         """Whether anything of the drop itself was seen."""
-        return 1 in self._mask or self.fire_tick is not None or self.certificate is not None
+        return bool(self._events or self.certificate) or self.fire_tick is not None
 
     def add(self, frame: EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
-        first, raw = frame.first, EVENTS.pack(frame.events)
-        end = first + len(frame.events)
-        self._reserve(end)
-        self._raw[first * EVENTS.size : end * EVENTS.size] = raw
-        self._mask[first:end] = b"\1" * (end - first)
+        self._events |= enumerate(frame.events, frame.first)
 
     def missing(
         self, at_most: int = EVENTS_PER_FRAME, *, readable: bool = False
@@ -89,23 +85,26 @@ class Assembly:
         list of (first, count)
             Empty when nothing is missing, and while there is no certificate to say how many.
         """
+        gaps: list[tuple[int, int]] = []
         total = self.certificate.events if self.certificate else 0
-        self._reserve(total)
-        return [
-            (at, min(at_most, end - at))
-            for first, end in self._stretches(0, self.first_kept if readable else 0, total)
-            for at in range(first, end, at_most)
-        ]
+        for number in range(self.first_kept if readable else 0, total):
+            if number not in self._events:
+                first, count = gaps[-1] if gaps else (number, at_most)
+                if count < at_most and first + count == number:
+                    gaps[-1] = first, count + 1
+                else:
+                    gaps.append((number, 1))
+        return gaps
 
     def sound(self) -> bool:
         """Whether every event and the certificate are in and agree."""
-        certificate = self.certificate
-        return certificate is not None and not self.missing() and self._crc() == certificate.crc32
+        seen = self.certificate
+        return seen is not None and not self.missing() and self._crc(seen.events) == seen.crc32
 
     def forget_events(self, latest: int | None = None) -> None:
         """Drop the events, to read them again; only the latest so many, when said."""
-        first = max(0, self._mask.count(1) - latest) if latest is not None else 0
-        del self._mask[first:], self._raw[first * EVENTS.size :]
+        first = max(0, len(self._events) - latest) if latest is not None else 0
+        self._events = {n: event for n, event in self._events.items() if n < first}
 
     def drop(self, tick_hz: int) -> Drop:
         """Make the raw record of what is known now.
@@ -136,42 +135,24 @@ class Assembly:
             faults=tuple(self._faults(tick_hz)),
         )
 
-    @property
-    def _end(self) -> int:
-        """One more than the last number an event can have."""
-        return self.certificate.events if self.certificate else len(self._mask)
+    def _crc(self, count: int) -> int:
+        """CRC-32 over so many events; none is missing."""
+        return zlib.crc32(EVENTS.pack([self._events[number] for number in range(count)]))
 
-    def _reserve(self, end: int) -> None:
-        """Make room for the events before a number."""
-        lacking = max(0, end - len(self._mask))
-        self._mask += bytes(lacking)
-        self._raw += bytes(lacking * EVENTS.size)
-
-    def _stretches(self, value: int, first: int, end: int) -> Iterator[tuple[int, int]]:
-        """List from where to where events are there (1) or not (0)."""
-        first = self._mask.find(value, first, end)
-        while first >= 0:
-            stop = self._mask.find(1 - value, first, end)
-            yield first, end if stop < 0 else stop
-            first = self._mask.find(value, stop, end) if stop >= 0 else -1
-
-    def _crc(self) -> int:
-        """CRC-32 over all events; none is missing."""
-        return zlib.crc32(self._raw[: self._end * EVENTS.size])
-
-    def _edges(self, initial: int, fire_tick: int | None) -> tuple[Edge, ...]:
+    def _edges(self, state: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
             return ()
-        gates = self.certificate.gates if self.certificate else self.gates
+        seen = self.certificate
         rows: list[tuple[int, int, bool]] = []
-        for first, end in self._stretches(1, 0, min(self._end, len(self._mask))):
-            raw = self._raw[first * EVENTS.size : end * EVENTS.size]
-            events, state = EVENTS.layout.iter_unpack(raw), initial
-            if first:
-                # Behind a gap it is not known when the gates changed: no edge is better than a
-                # wrong one.
-                _, state = next(events)
-            rows += edges(events, state, gates, fire_tick)
+        due = 0
+        for number, event in sorted(self._events.items()):
+            if seen and number >= seen.events:
+                break
+            # Behind a gap it is not known when the gates changed: no edge is better than a
+            # wrong one.
+            before = state if number == due else event[1]
+            rows += edges([event], before, seen.gates if seen else self.gates, fire_tick)
+            state, due = event[1], number + 1
         return tuple(map(Edge._make, rows))
 
     def _faults(self, tick_hz: int) -> Iterator[Reason]:
@@ -189,7 +170,7 @@ class Assembly:
             code = "events_overwritten" if first < self.first_kept else "events_missing"
             missing = sum(count for _, count in gaps)
             yield make_reason(code, missing=missing, events=seen.events, first=first)
-        elif self._crc() != seen.crc32:
+        elif self._crc(seen.events) != seen.crc32:
             yield make_reason("crc_mismatch")
         if seen.overflows:
             yield make_reason("edges_lost", lost=seen.overflows)
@@ -199,11 +180,10 @@ class Assembly:
 
 def _account(seen: DropCertificate) -> Certificate:
     sense = ticks_since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
-    counts = (seen.events, seen.crc32, seen.overflows, seen.glitches, seen.late, sense)
-    if not isinstance(seen, DropCertificate2):
-        return Certificate(*counts)
-    supply = (seen.supply_mv, seen.lowest_mv)
-    return Certificate(*counts, seen.pulse_ticks, seen.pulse_end, seen.restarts, *supply)
+    values: dict[str, Any] = {
+        field.name: getattr(seen, field.name, None) for field in fields(Certificate)
+    }
+    return Certificate(**values | {"release_sense": sense})
 
 
 def edges(

@@ -17,10 +17,7 @@ from rig.records import ClockSample
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.clock.host import Clock
     from rig.link.assembly import Assembly
-    from rig.link.exchange import OnRecord, Tap
-    from rig.link.port import Port
     from rig.link.transcript import Record
     from rig.records import Drop
 
@@ -43,38 +40,15 @@ def _is_boot(got: Received) -> bool:
 class Device(Exchange):
     """A device on an open port. Not for use from several threads at once.
 
-    Parameters
-    ----------
-    port
-        From `rig.link.port.open_port`.
-    clock
-        From `rig.link.port.port_clock`.
-    tap
-        Called with every byte written or read, before anything else is done with it, so that
-        what was recorded is never behind what was acted upon; see `rig.link.exchange.Exchange`.
-    on_record
-        Called with everything that becomes known, see `Transcript.feed`.
-    tries
-        How often a request is sent before the device counts as silent.
-    give_way
-        As for `rig.link.exchange.Exchange`.
+    A tap is called with every byte before anything else is done with it, so that what was recorded
+    is never behind what was acted upon; for the parameters see `rig.link.exchange.Exchange`.
     """
 
-    def __init__(
-        self,
-        port: Port,
-        clock: Clock,
-        tap: Tap | None = None,
-        *,
-        on_record: OnRecord | None = None,
-        tries: int = 8,
-        give_way: Callable[[], None] = lambda: None,
-    ) -> None:
-        super().__init__(port, clock, tap, on_record, tries)
-        self.give_way = give_way
-        self._sample: ClockSample | None = None
-        self._record_ms: dict[int, int] = {}  # of the last armed drop, by label
-        self._disarmed: wire.DisarmReason | None = None  # by itself, since it was armed
+    _sample: ClockSample | None = None
+    _armed: tuple[int, int] = (0, 0)
+    """Label and recording time, ms, of the drop that was armed last."""
+    _disarmed: wire.DisarmReason | None = None
+    """Why it disarmed itself since it was armed."""
 
     def _note(self, record: Record) -> None:
         match record:
@@ -185,7 +159,7 @@ class Device(Exchange):
         """
         request = wire.Arm(label, gates, release, pulse_us, timeout_ms, record_ms)
         token = self.request(request, wire.Armed).token
-        self._record_ms = {label: record_ms}
+        self._armed = label, record_ms
         return token
 
     def fire(self, token: int) -> int:
@@ -261,7 +235,8 @@ class Device(Exchange):
             The board restarted, lost the drop, or fell silent.
         """
         if timeout is None:
-            timeout = self._record_ms.get(label, 0) / 1000 + _LATE_S
+            armed, record_ms = self._armed
+            timeout = (record_ms / 1000 if label == armed else 0.0) + _LATE_S
         drop = self.transcript.assembly(label)
         now_ns = self.clock.now_ns
         hopeless = now_ns() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)

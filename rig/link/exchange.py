@@ -54,6 +54,8 @@ class Exchange:
         Called with everything that becomes known.
     tries
         How often a request is sent before the device counts as silent.
+    give_way
+        Called all the time while an answer is waited for; what it raises ends the waiting.
 
     Attributes
     ----------
@@ -65,12 +67,16 @@ class Exchange:
         How many were sent, and how often one was sent again.
     rx_bytes, tx_bytes
         How much went over the line.
-    give_way
-        Called all the time while an answer is waited for; what it raises ends the waiting.
     """
 
     def __init__(
-        self, port: Port, clock: Clock, tap: Tap | None, on_record: OnRecord | None, tries: int
+        self,
+        port: Port,
+        clock: Clock,
+        tap: Tap | None = None,
+        on_record: OnRecord | None = None,
+        tries: int = 8,
+        give_way: Callable[[], None] = lambda: None,
     ) -> None:
         self.transcript = Transcript()
         self.clock = clock
@@ -78,7 +84,7 @@ class Exchange:
         self.expect_boot = False
         self.requests = self.repeats = 0
         self.rx_bytes = self.tx_bytes = 0
-        self.give_way: Callable[[], None] = lambda: None
+        self.give_way = give_way
         self._port = port
         self._tap = tap
         self._on_record = on_record
@@ -181,7 +187,11 @@ class Exchange:
             raise _lost(error) from error
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
-            raise _strange(self.rx_bytes, self.transcript.rx.good)
+            lacking = (
+                "and no word of who is there" if self.transcript.rx.good else "that are no frames"
+            )
+            size_mb = self.rx_bytes / 1e6
+            raise make_error(DeviceError, "bytes_strange", size_mb=size_mb, lacking=lacking)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE
@@ -277,8 +287,3 @@ def _lost(error: OSError) -> DeviceError:
     is_gone = isinstance(error.__context__, serial.SerialException)
     text = "the port is gone" if is_gone else str(error)
     return make_error(DeviceError, "connection_lost", text=text)
-
-
-def _strange(size: int, frames: int) -> DeviceError:
-    lacking = "and no word of who is there" if frames else "that are no frames"
-    return make_error(DeviceError, "bytes_strange", size_mb=size / 1e6, lacking=lacking)

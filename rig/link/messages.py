@@ -20,9 +20,10 @@ armed gates is 0; the other gates are left out of every event.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar, dataclass_transform
+from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
 from rig.boards import Capabilities
 from rig.link.frames import PAYLOAD_LIMIT
@@ -38,13 +39,10 @@ from rig.link.wiretypes import (
     MessageError,
     Name,
     UniqueId,
-    payload_reader,
+    read_payload,
     wire_fields,
     write_field,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 __all__ = ["Event", "MessageError"]  # besides what is defined here
 
@@ -239,11 +237,19 @@ class Identity(DeviceMessage):
     late_ticks: U16
     channels: Line
 
+    def json(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return asdict(self) | {"unique_id": self.unique_id.hex()}
+
     def capabilities(self) -> Capabilities:
         """What this board can do, as it says itself."""
-        pulse = self.max_pulse_us / 1e6
         return Capabilities(
-            self.board, self.gates, self.releases, pulse, self.capacity, bool(self.streams)
+            self.board,
+            self.gates,
+            self.releases,
+            self.max_pulse_us / 1e6,
+            self.capacity,
+            bool(self.streams),
         )
 
 
@@ -383,7 +389,6 @@ class DropCertificate2(DropCertificate):
 
 CODES = {message: code for code, message in TABLE.items()}
 FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}
-_READERS = {kind: payload_reader(fields) for kind, fields in FIELDS.items()}
 
 
 def pack(message: Message) -> tuple[int, bytes]:
@@ -430,7 +435,7 @@ def unpack(code: int, payload: bytes) -> Message:
     kind: type[Any] | None = TABLE.get(code)
     if kind is None:
         raise MessageError(f"unknown message code 0x{code:02X}")
-    message: Message = kind(*_READERS[kind](payload))
+    message: Message = kind(*read_payload(FIELDS[kind], payload))
     return message
 
 

@@ -186,8 +186,7 @@ def _why_unreachable(error: OSError) -> str:
     error
         Pyserial's, which has the cause in its text and its context only.
     """
-    cause = error.__context__
-    match cause:
+    match error.__context__:
         case socket.gaierror():
             return "there is no computer of that name"
         case TimeoutError():

@@ -50,11 +50,14 @@ class Transcript:
         What is read of the device's bytes, and how much of it was good.
     unreadable
         Frames with a good CRC whose payload was no message.
+    misreading
+        Why the last of them was none.
     """
 
     def __init__(self) -> None:
         self.identity: Identity | None = None
         self.unreadable = 0
+        self.misreading = ""
         self._tx = Decoder()
         self.rx = Decoder()
         self._request: tuple[int, Message] = (0, wire.Status())
@@ -95,8 +98,9 @@ class Transcript:
         for frame in decoder.feed(data):
             try:
                 message = wire.unpack(frame.type, frame.payload)
-            except wire.MessageError:
+            except wire.MessageError as error:
                 self.unreadable += 1
+                self.misreading = str(error)
             else:
                 records += take(host_ns, frame, message)
         return records

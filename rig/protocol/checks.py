@@ -110,8 +110,8 @@ def _check_plan(plan: Section, *, struck: bool, turns: bool) -> None:
             plan.faults.add(item.place, f"{plan.key('incline')}[{n}]", message)
         elif inclines[n] is not None:
             lines[inclines[n]] = item.place.line
-    if plan.is_sound("incline", "repeats") and len(inclines) * plan["repeats"] > MOST_RUNS:
-        runs = len(inclines) * plan["repeats"]
+    runs = len(inclines) * plan["repeats"] if plan.is_sound("incline", "repeats") else 0
+    if runs > MOST_RUNS:
         plan.fault("repeats", f"found {runs} runs; at most {MOST_RUNS} are accepted")
 
 

@@ -306,6 +306,8 @@ class Protocol:
         `None` for a scene that is only predicted.
     blind
         Whether numbers are kept back until the session is unblinded.
+    notes
+        What its author wrote to it.
     text
         The file as read, kept word for word in the session.
     stated
@@ -329,6 +331,7 @@ class Protocol:
     reference_u: float = PPS_U
     priors: Priors = field(default_factory=Priors)
     blind: bool = False
+    notes: str = ""
     text: str = ""
     source: str = ""
     stated: Protocol | None = None

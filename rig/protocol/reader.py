@@ -148,6 +148,7 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
         reference_u=top["reference"],
         priors=Priors(**_arguments(top["priors"])),
         blind=top["blind"],
+        notes=top["notes"] or "",
         text=text,
         source=faults.source,
     )

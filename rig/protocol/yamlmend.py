@@ -7,15 +7,13 @@ change that lets it go on; so changes are tried around the place, and the parser
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import yaml
 
 from rig.units import quoted
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MOST_PARSED = 150_000
 """Characters parsed in search of a change: about a second, and fifty changes of a page."""

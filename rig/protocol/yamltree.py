@@ -8,17 +8,15 @@ are bounded while reading, so that no file can exhaust the stack or the memory.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 
 from rig.errors import InputError, Problem
 from rig.printable import one_line
 from rig.units import quoted
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MAX_DEPTH = 32
 MAX_NODES = 10_000

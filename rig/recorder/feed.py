@@ -6,13 +6,11 @@ certificate vouches for.
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Received
-from rig.link.wiretypes import EVENTS
 from rig.reasons import published_reasons
 from rig.session.schema import RunState
 
@@ -56,9 +54,7 @@ class StateFeed:
         match record.message:
             case wire.Identity() as identity:
                 self._tick_hz = identity.tick_hz
-                self._published.set(
-                    device=asdict(identity) | {"unique_id": identity.unique_id.hex()}
-                )
+                self._published.set(device=identity.json())
             case wire.State(phase=phase, gates=gates):
                 self._published.set(gates={"blocked": gates}, phase=_PHASES[phase])
             case wire.Disarmed():
@@ -90,7 +86,7 @@ class StateFeed:
 
     def show_drop(self, drop: Drop) -> None:
         """Show a drop as it was stored."""
-        self._label = wire.pack_label(drop.run, drop.attempt)
+        self._label = wire.pack_label(*drop.job)
         self._fire_tick = drop.fire_tick
         self._next = drop.certificate.events if drop.certificate else len(drop.edges)
         shown: Sequence[Edge] = () if self._blind else drop.edges
@@ -121,8 +117,7 @@ class StateFeed:
     def _events(self, frame: wire.EventsFrame) -> None:
         if frame.first < self._next or self._fire_tick is None:
             return
-        events = list(EVENTS.rows(frame.events))
-        state = self._state
+        events, state = frame.events, self._state
         if frame.first > self._next and events:
             state = events[0][1]  # it is not known when the gates changed
         found = edges(events, state, ALL_GATES, self._fire_tick)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _PATIENCE = 3
 

@@ -8,11 +8,9 @@ is that of the state itself, however fast the device talks.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 EDGES_LIMIT = 1 << 16
 """Edges shown of one drop; all of them are in the session file."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import random
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Self
 
 from rig.clock.host import HostWatch, SystemClock
@@ -129,8 +128,7 @@ class Recorder:
                     give_way=self._give_way,
                 )  # fmt: skip
                 identity = self._device.connect(BOOT_WAIT_S if port is None else 0.0)
-                record = asdict(identity) | {"unique_id": identity.unique_id.hex()}
-                record |= {"port": told(self.url)} | self._meet(identity)
+                record = identity.json() | {"port": told(self.url)} | self._meet(identity)
                 self.session.add_identity(record, self.clock.now_ns())
                 self.session.commit()
             except BaseException:
@@ -361,7 +359,7 @@ class Recorder:
 
     def _acknowledge(self, drop: Drop) -> None:
         if drop.certificate is not None:
-            self.device.acknowledge(pack_label(drop.run, drop.attempt), drop.certificate.crc32)
+            self.device.acknowledge(pack_label(*drop.job), drop.certificate.crc32)
             self.session.commit()
 
     def _log(self, direction: Direction, host_ns: int, data: bytes) -> None:

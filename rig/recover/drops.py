@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.reasons import make_reason
-from rig.records import Job
 from rig.session.drop_check import ByteReplay, Fate, check_drop
 from rig.session.rows import drop_of, named_values
 
@@ -36,16 +35,14 @@ def recover_drops(rows: Rows) -> list[RecoveredDrop]:
     edges: dict[int, list[Row]] = {}
     for edge in rows.in_order("edge"):
         edges.setdefault(edge[0], []).append(edge)
-    stored_jobs = set()
     drops: list[RecoveredDrop] = []
     for row in rows.in_order("drop"):
         values, own = named_values(row), edges.get(row[0], [])
         stored = drop_of(row, own)
-        job = Job(stored.run, stored.attempt)
         fate = check_drop(stored, replayed, torn=any(edge[1] != n for n, edge in enumerate(own)))
-        best = _best(stored, replayed.get(job), fate)
+        best = _best(stored, replayed.get(stored.job), fate)
         drops.append(RecoveredDrop(best, fate, values["host_ns"], values["provenance"]))
-        stored_jobs.add(job)
+    stored_jobs = {each.drop.job for each in drops}
     # What was never stored is only worth having whole.
     return drops + [
         RecoveredDrop(drop, Fate.RESTORED)
@@ -60,9 +57,6 @@ def _best(stored: Drop, replayed: Drop | None, fate: Fate) -> Drop:
     if replayed is not None and fate is Fate.RESTORED:
         return replayed
     longer = replayed is not None and len(replayed.edges) > len(stored.edges)
-    return _partial(replayed if replayed is not None and longer else stored)
-
-
-def _partial(drop: Drop) -> Drop:
-    """Make a drop void that is not whole any more: its missing edges are no missed rods."""
-    return replace(drop, faults=(*drop.faults, make_reason("record_torn")))
+    torn = replayed if replayed is not None and longer else stored
+    # A drop that is not whole any more is void: its missing edges are no missed rods.
+    return replace(torn, faults=(*torn.faults, make_reason("record_torn")))

@@ -13,20 +13,15 @@ from rig.recover.pages import MAGIC, read_pages
 from rig.recover.rows import Rows, find_rows
 from rig.recover.snapshot import SessionCopy, take_snapshot
 from rig.session.drop_check import Fate
-from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, RunState
+from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping, Sequence
 
-_NUMBERED = {
-    "bytes": "chunks of bytes",
-    "ping": "clock samples",
-    "reference": "reference pulses",
-    "run_state": "run states",
-    "identity": "identities of the device",
-    "drop": "drops",
-}
+_NUMBERED = {name: table.meaning for name, table in TABLES.items() if table.numbered}
+FAULTS = ("damaged: ", "lost: ")
+"""How lines begin that say what is wrong with a file."""
 _GOOD = (Fate.CONFIRMED, Fate.IMPORTED)
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
@@ -88,6 +83,10 @@ def examine(path: str | os.PathLike[str]) -> ExaminedFile:
         torn: pages.missing,
         snapshot.trouble: snapshot.trouble,
         f"{rows.bad} records cannot be read": rows.bad,
+        "table hash: all its rows are missing": (
+            int.from_bytes(pages.pages.get(1, b"")[60:64], "big") >= TABLES["hash"].since
+            and not rows.tables["hash"]
+        ),
         f"nothing says what drops {orphans} groups of edges belong to": orphans,
     }
     facts = "whether it is simulated, when and by what it was made"
@@ -95,18 +94,18 @@ def examine(path: str | os.PathLike[str]) -> ExaminedFile:
         facts: "simulated" not in rows.meta,
         "the protocol file": rows.protocol is None,
         "the protocol's text has changed since the session was made": (
-            rows.protocol and not protocol_sound(rows)
+            rows.protocol and not protocol_sound(rows, rows.protocol[1])
         ),
         **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
         **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
     }
-    return ExaminedFile(snapshot, rows, drops, "", _true(damage), _true(lost))
+    damaged = _true(damage) + rows.chain_faults()
+    return ExaminedFile(snapshot, rows, drops, "", damaged, _true(lost))
 
 
 def describe(session: ExaminedFile) -> list[str]:
     """Say it in lines, safe for a terminal whatever stands in the file."""
-    lines = _lines(session)
-    return [printable(line).replace("\n", " ").replace("\t", " ") for line in lines]
+    return [printable(line).replace("\n", " ").replace("\t", " ") for line in _lines(session)]
 
 
 def _lines(session: ExaminedFile) -> list[str]:
@@ -130,13 +129,16 @@ def _lines(session: ExaminedFile) -> list[str]:
             missing = rows.gaps(table)
             gap = f"{missing} before the last are missing" if missing else "no gap"
             lines.append(f"{count} {name}: {gap}")
+    if not rows.tables["hash"]:
+        lines.append("no chain of hashes: an older program recorded it")
+    elif any(not link[3] for link in rows.in_order("hash")):
+        lines.append("its chain of hashes began later than the session")
     for recovered in session.drops:
         drop = recovered.drop
-        name = f"run {drop.run}, attempt {drop.attempt}: {len(drop.edges)} edges: {recovered.fate}"
+        name = f"{drop.job}: {len(drop.edges)} edges: {recovered.fate}"
         faults = f" (recorded with faults: {sentences(drop.faults)})" if drop.faults else ""
         lines.append(name + faults)
-    lines += [f"damaged: {text}" for text in session.damage]
-    lines += [f"lost: {text}" for text in session.lost]
+    lines += [FAULTS[text in session.lost] + text for text in session.troubles]
     if session.whole:
         lines.append("everything is whole")
     states = rows.in_order("run_state")
@@ -165,12 +167,10 @@ def _true(sentences: Mapping[str, object]) -> list[str]:
 
 
 def _describe_fate(recovered: RecoveredDrop) -> str:
-    return f"run {recovered.drop.run}, attempt {recovered.drop.attempt}: {recovered.fate}"
+    return f"{recovered.drop.job}: {recovered.fate}"
 
 
-def protocol_sound(rows: Rows) -> bool:
-    """Whether the protocol's text is the one that the session was made with, as far as known."""
-    if rows.protocol is None:
-        return False
-    digest = hashlib.sha256(rows.protocol[1].encode()).hexdigest()
+def protocol_sound(rows: Rows, text: str) -> bool:
+    """Whether a protocol's text is the one that the session was made with, as far as known."""
+    digest = hashlib.sha256(text.encode()).hexdigest()
     return rows.meta.get("protocol_sha256", digest) == digest

@@ -8,11 +8,9 @@ sections are given where they are used.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from typing import NamedTuple, TypeAlias
 
 Value: TypeAlias = int | float | str | bytes | None
 
@@ -74,15 +72,8 @@ class PageCell(NamedTuple):
     values: tuple[Value, ...]
 
 
-class PageRecords(NamedTuple):
-    """The records of a page, and how many of its cells are none."""
-
-    cells: list[PageCell]
-    bad: int
-
-
-def read_cells(pages: Pages, number: int) -> PageRecords:
-    """Read all records of a page; a page without records has none.
+def read_cells(pages: Pages, number: int) -> Iterator[PageCell | None]:
+    """Read all records of a page, `None` for each that is none; a page without records has none.
 
     Parameters
     ----------
@@ -95,19 +86,17 @@ def read_cells(pages: Pages, number: int) -> PageRecords:
     start = _HEADER if number == 1 else 0
     kind = page[start]
     if kind not in {TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR}:
-        return PageRecords([], 0)
+        return
     count = int.from_bytes(page[start + 3 : start + 5], "big")
     pointers = start + (12 if kind == INDEX_INTERIOR else 8)
     if pointers + 2 * count > pages.usable:
-        return PageRecords([], 1)
-    cells, bad = [], 0
-    for n in range(count):
-        at = int.from_bytes(page[pointers + 2 * n : pointers + 2 * n + 2], "big")
+        yield None
+        return
+    for place in range(pointers, pointers + 2 * count, 2):
         try:
-            cells.append(_cell(pages, page, kind, at))
+            yield _cell(pages, page, kind, int.from_bytes(page[place : place + 2], "big"))
         except (ValueError, IndexError):
-            bad += 1
-    return PageRecords(cells, bad)
+            yield None
 
 
 def _cell(pages: Pages, page: bytes, kind: int, at: int) -> PageCell:

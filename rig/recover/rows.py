@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rig.recover.pages import read_cells
+from rig.session.hashes import check_chain
 from rig.session.rows import RowError, check_row
 from rig.session.schema import SCHEMA_VERSION, TABLES
 
@@ -25,7 +26,7 @@ _TRIP_NS = 60 * 10**9  # no answer takes longer
 class Rows:
     """The rows of a session by table, each by its key; `bad` counts unreadable ones.
 
-    The key is the row's number, in ``meta`` its name, and of an edge the drop's number and its own.
+    The key is the row's number, and of an edge the drop's number and its own.
     """
 
     tables: dict[str, dict[Any, Row]] = field(default_factory=lambda: {name: {} for name in TABLES})
@@ -52,7 +53,16 @@ class Rows:
     def gaps(self, table: str) -> int:
         """Count the rows that are missing: a session numbers its rows from 1 without gaps."""
         numbers = self.tables[table]
-        return max(numbers) - len(numbers) if numbers else 0
+        hashed = (last for _, covered, last, _ in self.in_order("hash") if covered == table)
+        return int(max([0, *hashed, *numbers])) - len(numbers)
+
+    def chain_faults(self) -> list[str]:
+        """List what the chain of hashes says was altered; nothing where there is no chain."""
+        rows = {
+            name: [(key[0] if name == "edge" else key, row) for key, row in sorted(table.items())]
+            for name, table in self.tables.items()
+        }
+        return check_chain(self.in_order("hash"), rows)
 
 
 def find_rows(pages: Pages) -> Rows:
@@ -64,21 +74,22 @@ def find_rows(pages: Pages) -> Rows:
     """
     rows = Rows()
     for number in sorted(pages.pages):
-        cells, bad = read_cells(pages, number)
-        rows.bad += bad
-        for cell in cells:
-            _sort(rows, cell)
+        for cell in read_cells(pages, number):
+            if cell is None:
+                rows.bad += 1
+            else:
+                _sort(rows, cell)
     return rows
 
 
 def _sort(rows: Rows, cell: PageCell) -> None:
     """Put a record where it belongs by its shape; one that is no row of a session is left out."""
-    for name, table in TABLES.items():
+    for name in TABLES:
         row: Row = cell.values
-        if table.numbered and row[:1] == (None,):  # SQLite leaves the number out of the record
+        if row[:1] == (None,):  # SQLite leaves the number out of the record
             row = (cell.rowid, *row[1:])
         if (cell.rowid is None) == (name == "edge") and _fits(name, row):
-            rows.tables[name].setdefault(row[:2] if name == "edge" else row[0], row)
+            rows.tables[name].setdefault(row[:2] if name == "edge" else cell.rowid, row)
             return
 
 

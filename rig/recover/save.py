@@ -10,7 +10,7 @@ from rig.errors import SessionError
 from rig.files import read_input
 from rig.ports import is_simulated
 from rig.recover.examine import protocol_sound
-from rig.session.schema import RunState
+from rig.session.schema import OLDER, RunState
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -57,9 +57,11 @@ def save(
         origin=rows.meta.get("origin", f"recovered from {examined.snapshot.path.name}"),
     )
     with session:
-        for table in ("identity", "ping", "reference", "host_break", "bytes"):
+        for table in ("identity", "ping", "reference", "host_break", "bytes", "attachment"):
             session.add_rows(table, [row[1:] for row in rows.in_order(table)])
         notes += _drops(session, examined)
+        # The chain of hashes begins with these rows: it proves nothing of how they came to be.
+        session.add_rows("hash", [(OLDER, 0, b"")])
         session.commit()
     return [*examined.lost, *notes]
 
@@ -70,11 +72,12 @@ def _protocol(examined: ExaminedFile, file: str | None) -> tuple[str, str]:
             return Path(file).name, read_input(file).decode()
         except (OSError, UnicodeDecodeError) as error:
             raise SessionError(f"cannot read {file}: {error}") from error
-    if examined.rows.protocol is None or not protocol_sound(examined.rows):
+    rows = examined.rows
+    if rows.protocol is None or not protocol_sound(rows, rows.protocol[1]):
         raise SessionError(
             f"{examined.snapshot.path} has lost its protocol file", "give it: --protocol FILE"
         )
-    return examined.rows.protocol
+    return rows.protocol
 
 
 def _find_world(rows: Rows) -> tuple[bool, list[str]]:
@@ -92,9 +95,9 @@ def _drops(session: Session, examined: ExaminedFile) -> list[str]:
     """Add drops and the log of states; a drop that no state tells of gets one."""
     seen = set()
     for drop, _, host_ns, provenance in examined.drops:
-        if (drop.run, drop.attempt) not in seen:
+        if drop.job not in seen:
             session.add_drop(drop, host_ns=host_ns, provenance=provenance)
-        seen.add((drop.run, drop.attempt))
+        seen.add(drop.job)
     states = examined.rows.in_order("run_state")
     session.add_rows("run_state", [row[1:] for row in states])
     last_ns = states[-1][-1] if states else 0

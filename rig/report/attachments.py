@@ -9,8 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.bundle.tables import csv_files
 from rig.results import tick_rates
-from rig.session.export import csv_files
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -50,6 +50,11 @@ def attachments(session: Reader, outcome: SessionResults) -> list[Attachment]:
             ("data.zip", "application/zip", packed, words),
             ("summary.csv", "text/csv", tables["summary.csv"].encode(), "means only"),
             (METHOD, "text/markdown", method_page().encode(), "the whole method"),
+            *(
+                (file.name, "application/octet-stream", file.data, f"attached {file.added}")
+                for file in session.attached_files()
+                if len(file.data) <= _DATA
+            ),
         )
     ]
 

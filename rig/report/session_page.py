@@ -201,9 +201,13 @@ def _model_parts(material: Material) -> Iterator[Part]:
 
 def _odd_parts(material: Material) -> Iterator[Part]:
     yield from parts.verdict_parts(material.drops)
-    said = [f"Run {job.run}, attempt {job.attempt}: {text}"
-            for job, text in notes(material.session).items()]  # fmt: skip
-    yield from (replace(part, bullets=True) for part in table_parts("notes", (), said))
+    session, own = material.session, protocol_of(material.session).notes
+    lines = [
+        *([f"Protocol: {own}"] if own else []),
+        *(f"Run {job.run}, attempt {job.attempt}: {text}" for job, text in notes(session).items()),
+        *(f"Attached {file.added}: {file.name}" for file in session.attached_files()),
+    ]
+    yield from (replace(part, bullets=True) for part in table_parts("notes", (), lines))
 
 
 def _drops(

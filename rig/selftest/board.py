@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from rig.link import messages as wire
-from rig.link.frames import DELIMITER, Decoder, Frame, encode
+from rig.link.exchange import Exchange
+from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.gatewatch import watch_gates
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
+from rig.link.transcript import Received
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from rig.clock.host import Clock
     from rig.link.gatewatch import GateStates
@@ -41,56 +43,6 @@ class RawRequest(NamedTuple):
 
     code: int
     payload: bytes = b""
-
-
-class Heard(NamedTuple):
-    """One message of the device; `ack` is 0 when it came unasked."""
-
-    at_ns: int
-    ack: int
-    message: wire.Message
-
-
-class RawLine:
-    """A port without any of the client's courtesies: nothing is repeated, nothing is added.
-
-    Parameters
-    ----------
-    port, clock
-        The open port and its time.
-    """
-
-    def __init__(self, port: Port, clock: Clock) -> None:
-        self.port = port
-        self.clock = clock
-        self._decoder = Decoder()
-        self._waiting: deque[Heard] = deque()  # came together with what somebody waited for
-
-    def send(self, code: int, payload: bytes, seq: int) -> None:
-        """Send a frame, be it a message or not."""
-        self.port.write(encode(Frame(code, seq, 0, payload)))
-
-    def say(self, message: wire.Message, seq: int) -> None:
-        """Send a message."""
-        self.send(*wire.pack(message), seq)
-
-    def listen(self, seconds: float) -> Iterator[Heard]:
-        """Give messages as they come, until the time is over.
-
-        Raises
-        ------
-        MessageError
-            A frame that is no message.
-        """
-        end = self.clock.now_ns() + round(seconds * 1e9)
-        while True:
-            while self._waiting:
-                yield self._waiting.popleft()
-            if self.clock.now_ns() >= end:
-                return
-            for frame in self._decoder.feed(self.port.read(max(1, self.port.in_waiting))):
-                message = wire.unpack(frame.type, frame.payload)
-                self._waiting.append(Heard(self.clock.now_ns(), frame.ack, message))
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,14 +116,16 @@ class BoardUnderTest:
     """
 
     def __init__(self, port: Port, clock: Clock, options: SelftestOptions) -> None:
-        self.line = RawLine(port, clock)
+        self.line = Exchange(port, clock)
+        self.line.expect_boot = True  # to be restarted ends no check by itself
         self.clock = clock
         self.options = options
         self.identity: wire.Identity | None = None
         self.foreign = 0
         self.slowest_s = 0.0
         self._seq = 0
-        self._unasked: deque[Heard] = deque()
+        self._waiting: deque[Received] = deque()  # came together with what somebody waited for
+        self._unasked: deque[Received] = deque()
         self._may_release = False
         self._gates: GateStates | None = None
 
@@ -181,6 +135,11 @@ class BoardUnderTest:
         """Give a seq that the request before did not have."""
         self._seq = self._seq % 255 + 1
         return self._seq
+
+    def send(self, request: wire.HostMessage | RawRequest, seq: int) -> None:
+        """Send a request once, be it a message or not."""
+        code, payload = request if isinstance(request, RawRequest) else wire.pack(request)
+        self.line.write(encode(Frame(code, seq, 0, payload)))
 
     def ask(self, request: wire.HostMessage | RawRequest, seq: int = 0) -> wire.Message:
         """Send a request, a few times if need be, and give its answer.
@@ -194,10 +153,9 @@ class BoardUnderTest:
             self._may_release = True
         if isinstance(request, wire.Fire) and self._may_release:
             raise CheckFailedError("fire_withheld")
-        frame = request if isinstance(request, RawRequest) else RawRequest(*wire.pack(request))
         seq = seq or self.next_seq()
         for _ in range(_TRIES):
-            self.line.send(*frame, seq)
+            self.send(request, seq)
             heard = self.wait(_ANSWER_S, lambda heard: heard.ack == seq)
             if heard is not None:
                 return heard.message
@@ -224,19 +182,24 @@ class BoardUnderTest:
         insist(name, answer, wire.Refused(reason, answer.detail if detail is None else detail))
         return answer
 
-    def wait(self, seconds: float, accepts: Callable[[Heard], bool]) -> Heard | None:
+    def wait(self, seconds: float, accepts: Callable[[Received], bool]) -> Received | None:
         """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
-        try:
-            for heard in self.line.listen(seconds):
+        transcript, end_ns = self.line.transcript, self.clock.now_ns() + round(seconds * 1e9)
+        while True:
+            while self._waiting:
+                heard = self._waiting.popleft()
                 if accepts(heard):
                     return heard
                 if heard.ack == 0:
                     self._unasked.append(heard)
-        except wire.MessageError as error:
-            raise CheckFailedError("invalid_message", text=str(error)) from error
-        return None
+            if self.clock.now_ns() >= end_ns:
+                return None
+            before, records = transcript.unreadable, self.line.receive()
+            self._waiting += [record for record in records if isinstance(record, Received)]
+            if transcript.unreadable > before:
+                raise CheckFailedError("invalid_message", text=transcript.misreading)
 
-    def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Heard | None:
+    def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Received | None:
         """Give the next message of some kinds that came, or comes in time, of its own accord."""
         while self._unasked:
             heard = self._unasked.popleft()
@@ -325,7 +288,7 @@ class BoardUnderTest:
         CheckFailedError
             It does not come to rest.
         """
-        self.line.port.write(DELIMITER)
+        self.line.write(DELIMITER)
         self._unasked.clear()
         for _ in range(4):
             state = self.answer(wire.Status(), wire.State)

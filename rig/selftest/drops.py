@@ -10,6 +10,7 @@ from statistics import fmean, stdev
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
+from rig.link.assembly import ticks_since
 from rig.link.messages import TEST_RUN, Phase, RefusalReason
 from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from rig.selftest.board import BoardUnderTest
 
 _BUSY_MS = 400
-_WRAP = 1 << 32
 
 
 def compare_certificate(board: BoardUnderTest) -> None:
@@ -143,5 +143,4 @@ def _sync_edge(board: BoardUnderTest, gate: int) -> int:
     states = [event.state for event in recorded.events]
     if states != [mask] or recorded.certificate.glitches:
         raise CheckFailedError("sync_edges", gate=gate, events=len(states))
-    tick = recorded.events[0].tick - recorded.certificate.fire_tick
-    return (tick + _WRAP // 2) % _WRAP - _WRAP // 2
+    return ticks_since(recorded.certificate.fire_tick, recorded.events[0].tick)

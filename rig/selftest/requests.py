@@ -37,7 +37,7 @@ _UNKNOWN_CODES = (0x55, 0x00, 0x82, 0xFF)
 
 def identify(board: BoardUnderTest) -> str:
     """See that the board introduces itself, sensibly and twice alike."""
-    board.line.port.write(DELIMITER)
+    board.line.write(DELIMITER)
     board.wait_unasked(BOOT_WAIT_S, wire.Boot)
     identity = board.answer(wire.Identify(), wire.Identity)
     board.identity = identity

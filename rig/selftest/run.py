@@ -107,12 +107,8 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
             yield finding
             if finding.verdict is Verdict.FAILED:
                 lost = _why_lost(board)
-    except OSError as error:
-        raise DeviceError(
-            f"the connection broke: {error}", "check the cable, then start again"
-        ) from error
     finally:
-        with suppress(CheckEndedError, OSError):
+        with suppress(CheckEndedError, DeviceError):
             board.settle()
 
 

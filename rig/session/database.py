@@ -14,6 +14,7 @@ from rig.files import replacing, require_file
 from rig.reasons import make_error
 from rig.session.faults import not_a_session, translate_errors
 from rig.session.foreign import check_schema, guard
+from rig.session.hashes import extend_chain
 from rig.session.lock import writer_of
 from rig.session.schema import (
     SCHEMA_VERSION,
@@ -46,6 +47,7 @@ def build(path: Path, meta: dict[str, str], protocol_source: str, protocol_text:
         memory.executescript(f"BEGIN;\n{create_script()}COMMIT;")
         memory.executemany(insert_statement("meta"), meta.items())
         memory.execute(insert_statement("protocol"), (1, protocol_source, protocol_text))
+        extend_chain(memory)
         content = memory.serialize()
     try:
         with replacing(path) as stream:

@@ -78,10 +78,8 @@ class ByteReplay:
 
     def drops(self) -> dict[Job, Drop]:
         """Give every drop once, as it was told last."""
-        drops = {Job(drop.run, drop.attempt): drop for drop in self.acknowledged_drops()}
-        for drop in self.unfinished_drops():
-            drops.setdefault(Job(drop.run, drop.attempt), drop)
-        return drops
+        drops = [*self.unfinished_drops(), *self.acknowledged_drops()]
+        return {drop.job: drop for drop in drops}
 
 
 def check_drop(stored: Drop, replayed: Mapping[Job, Drop], *, torn: bool = False) -> Fate:
@@ -96,7 +94,7 @@ def check_drop(stored: Drop, replayed: Mapping[Job, Drop], *, torn: bool = False
     torn
         Whether rows of it are missing, or cannot be.
     """
-    again = replayed.get(Job(stored.run, stored.attempt))
+    again = replayed.get(stored.job)
     if again is None:
         whole = not torn and _sound(stored) and not _under_another_name(stored, replayed)
         good = Fate.IMPORTED if stored.certificate is None else Fate.UNCONFIRMED

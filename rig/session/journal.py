@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
+from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.session.faults import as_session_error
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
+from rig.session.hashes import extend_chain
 
 
 class Statement(NamedTuple):
@@ -126,25 +125,22 @@ class Journal:
             It cannot be read, or not be written there.
         """
         self._give_up()
-        refused = 0
         with closing(sqlite3.connect(place, isolation_level=None)) as target:
             self._connection.backup(target)
             target.execute("PRAGMA synchronous = FULL")
-            target.execute("BEGIN")
-            for statements in self._pending:
-                try:
-                    for sql, rows in statements:
-                        target.executemany(sql, rows)
-                except _BAD_ROW:
-                    refused += 1
-            target.execute("COMMIT")
-        self._pending.clear()
+            rescue = Journal(target, place)
+            rescue._pending = self._pending
+            refused = len(self._pending)
+            rescue._run()
+            refused -= len(self._pending)
+            rescue._commit()
         self._failed = False
         return refused
 
     def _commit(self) -> None:
         refusal = self._run()
         if self._connection.in_transaction:
+            extend_chain(self._connection)
             self._connection.execute("COMMIT")
         self._pending.clear()
         self._applied = 0

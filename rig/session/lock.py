@@ -6,13 +6,10 @@ import errno
 import fcntl
 import os
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.errors import SessionError
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class WriterLock:

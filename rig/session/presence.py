@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.files import identity_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class Presence:

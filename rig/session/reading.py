@@ -6,7 +6,7 @@ import hashlib
 from contextlib import contextmanager
 from itertools import chain
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 from rig.boards import GATES
 from rig.errors import SessionError
@@ -21,12 +21,13 @@ from rig.session.schema import TABLES, RunState, read_identity
 
 if TYPE_CHECKING:
     import sqlite3
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from rig.reasons import Reason
     from rig.records import Job
 
+T = TypeVar("T")
 Direction = Literal["rx", "tx"]
 """``rx``: from the device to the host; ``tx``: from the host to the device."""
 
@@ -55,6 +56,14 @@ class ByteChunk(NamedTuple):
 
     host_ns: int
     direction: Direction
+    data: bytes
+
+
+class AttachedFile(NamedTuple):
+    """A file that was attached to a session, and when (UTC)."""
+
+    added: str
+    name: str
     data: bytes
 
 
@@ -148,22 +157,24 @@ class Reader:
 
         They are read as they are asked for.
         """
-        rows = self._rows("bytes", "WHERE id > ? ORDER BY id", after)
-        return (ByteChunk(*row[1:]) for row in rows)
+        return self._records(ByteChunk, "bytes", after)
 
     def pings(self, after: int = 0) -> list[ClockSample]:
         """Clock samples in order, all but the first so many."""
         # Nothing is ever deleted, so rows are numbered from 1 without gaps.
-        rows = self._rows("ping", "WHERE id > ? ORDER BY id", after)
-        return [ClockSample(*row[1:]) for row in rows]
+        return [*self._records(ClockSample, "ping", after)]
 
     def pulses(self) -> list[Pulse]:
         """All pulses of the 1 Hz reference that were asked for, in order."""
-        return [Pulse(*row[1:]) for row in self._rows("reference", "ORDER BY id")]
+        return [*self._records(Pulse, "reference")]
 
     def host_breaks(self) -> list[HostBreak]:
         """When the host slept or its clock was set, in order."""
-        return [HostBreak(*row[1:]) for row in self._rows("host_break", "ORDER BY id")]
+        return [*self._records(HostBreak, "host_break")]
+
+    def attached_files(self) -> list[AttachedFile]:
+        """All files that were attached, in order."""
+        return [*self._records(AttachedFile, "attachment")]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording, compared with its bytes.
@@ -222,7 +233,7 @@ class Reader:
                     pass
         for drop in self.drops():
             if drop.damage:
-                raise self._damage(f"run {drop.run}, attempt {drop.attempt}: {drop.damage}")
+                raise self._damage(f"{drop.job}: {drop.damage}")
         _ = self.protocol_text
 
     def _open_connection(self) -> sqlite3.Connection:
@@ -260,6 +271,10 @@ class Reader:
         for row in self._raw(table, which, *values):
             self._check(table, row)
             yield row
+
+    def _records(self, kind: Callable[..., T], table: str, after: int = 0) -> Iterator[T]:
+        rows = self._rows(table, "WHERE id > ? ORDER BY id", after)
+        return (kind(*row[1:]) for row in rows)
 
     def _check(self, table: str, row: tuple[Any, ...]) -> None:
         try:
@@ -306,5 +321,4 @@ class Reader:
 
 
 def _state(row: tuple[Any, ...]) -> StateEntry:
-    _, run, attempt, state, reasons, host_ns = row
-    return StateEntry(run, attempt, RunState(state), host_ns, read_reasons(reasons))
+    return StateEntry(row[1], row[2], RunState(row[3]), row[5], read_reasons(row[4]))

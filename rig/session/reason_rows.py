@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from rig.reasons import Reason, make_reason, plain_reason, read_record
 from rig.wordings import NOTE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 _OLD_NOTE = "note: "
 

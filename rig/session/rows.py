@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.printable import encodable
 from rig.records import Certificate, Drop, Edge
 from rig.session.reason_rows import read_reasons, write_reasons
 from rig.session.schema import TABLES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 _DROP = TABLES["drop"].names()
 _ACCOUNT = [field.name for field in fields(Certificate)]

@@ -88,7 +88,7 @@ class Session(Reader):
             If something is already there or the place cannot be written.
         """
         meta = {
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "created": _now(),
             "rig_version": __version__,
             "python_version": platform.python_version(),
             "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
@@ -303,6 +303,10 @@ class Session(Reader):
         text = encodable(write_reasons(reasons))
         self.add_rows("run_state", [(run, attempt, str(state), text, host_ns)])
 
+    def attach(self, name: str, data: bytes) -> None:
+        """Add a file, such as a photograph of the rig."""
+        self.add_rows("attachment", [(_now(), encodable(name), data)])
+
     def unblind(self) -> None:
         """Record, once and on the disk, that from now on the numbers may be seen.
 
@@ -311,7 +315,7 @@ class Session(Reader):
         SessionError
             That was recorded before, or the disk fails.
         """
-        now = datetime.now(UTC).isoformat(timespec="seconds")
+        now = _now()
         self.add_rows("meta", [(UNBLINDED, now)])
         self.commit()
         self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
@@ -323,6 +327,10 @@ class Session(Reader):
         if self.readonly:
             raise make_error(SessionError, "session_read_only", path=self.path)
         return self._journal
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _unused_name(path: Path) -> Path:

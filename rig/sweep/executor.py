@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig import __version__
 from rig.errors import RigError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 PATIENCE_S = 8.0
 

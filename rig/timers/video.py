@@ -16,11 +16,8 @@ from rig.timers.vocabulary import is_number
 if TYPE_CHECKING:
     import os
 
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.timers.table import Row
-
-    Array = NDArray[np.float64]
 
 FEWEST = 6
 """Frames that tell an acceleration and how much they scatter."""

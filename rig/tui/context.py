@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.campaign.machine import COUNTDOWN_S
 from rig.tui.stillness import STILL_S
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
 
 def ascii_only(environment: Mapping[str, str]) -> bool:

@@ -6,17 +6,14 @@ import os
 import re
 import tomllib
 import unicodedata
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from textual.keys import Keys
 
 from rig.errors import InputError
 from rig.files import read_input
 from rig.tui.actions import ACTIONS, BY_NAME
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 ALWAYS = {"stop": "f9", "go_on": "enter"}
 """Keys that stay, whatever others an action is given: who knows only one key knows these."""

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from rig.analysis.chain_records import EdgeTrain
     from rig.analysis.trajectory import Trajectory
+    from rig.arrays import Array
     from rig.protocol.protocol import Protocol, Run
 
-    Array = NDArray[np.float64]
     Table = Iterable[Sequence[int]] | NDArray[np.int64]
 
 _FIRST = 4

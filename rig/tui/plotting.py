@@ -12,9 +12,8 @@ from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from numpy.typing import NDArray
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
     Numbers = Sequence[float] | Array
 
 _COLORS = ("foreground", "accent", "warning", "secondary", "primary", "success", "error")

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from time import monotonic
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Hashable
 
 STILL_S = 0.5
 """Longer than between two letters of somebody who types, or two repeats of a key held down."""

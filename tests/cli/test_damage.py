@@ -152,17 +152,6 @@ def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     assert "1 of 3 drops (run 2, attempt 1)" in page.read_text("utf-8")
 
 
-def test_what_recover_saves_of_a_damaged_drop_is_whole_again(call, sound, tmp_path):
-    path, new = tmp_path / "altered", tmp_path / "new.session"
-    path.write_bytes(sound.read_bytes())
-    with unguarded(path) as connection:
-        connection.execute('UPDATE edge SET tick = tick + 64 WHERE "drop" = 2 AND idx = 5')
-    assert call("recover", path, "-o", new).code == 0
-    assert call("analyze", new).code == call("analyze", sound).code == 0
-    with Session.open(new, readonly=True) as again, Session.open(sound, readonly=True) as before:
-        assert [*again.drops()] == [*before.drops()]
-
-
 def test_a_byte_of_the_log_altered_costs_no_drop(call, sound, tmp_path):
     """The edges have their certificate's CRC."""
     path = tmp_path / "altered"

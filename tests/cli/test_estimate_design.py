@@ -115,7 +115,7 @@ def test_a_design_by_the_scatter_that_a_session_taught(call, finished):
     [
         (["--lowest", "7 kg"], "--lowest: "),
         (["--highest", "1 mm"], "--lowest is above --highest"),
-        (["--spacing", "-1 mm"], "--spacing: found -1 mm; accepted: a length above 0"),
+        (["--spacing", "-1 mm"], "--spacing: found '-1 mm'; accepted: a length above 0"),
     ],
 )
 def test_bad_limits_are_said(call, more, said):

@@ -11,12 +11,19 @@ import sys
 
 import pytest
 
+from rig.bundle.archive import list_hashes, pack
 from rig.cli import _parser
 from rig.files import write_atomic
 from tests.cli.lab import ROOT, command
 from tests.waiting import PATIENCE_S
 
 COMMANDS = {
+    ("attach", "file"): "SESSION X",
+    ("attach", "session"): "X CSV",
+    ("export", "sign"): "SESSION --bundle OUT --sign X",
+    ("notes", "session"): "X --run 1 text",
+    ("verify", "file"): "X",
+    ("verify", "key"): "BUNDLE --key X",
     ("analyze", "session"): "X",
     ("analyze", "video"): "SESSION --video X",
     ("check", "protocol"): "X",
@@ -51,7 +58,15 @@ def places(tmp_path, finished, fence):
     session, csv = tmp_path / "session", tmp_path / "edges.csv"
     shutil.copy(finished.session, session)
     csv.write_text("run,channel,time_s,state\n1,0,0.1,1\n", "utf-8")
-    return {"SESSION": session, "CSV": csv, "FENCE": fence, "OUT": tmp_path / "out"}
+    bundle = tmp_path / "b.eln"
+    bundle.write_bytes(pack(list_hashes({"a": b""})))
+    return {
+        "BUNDLE": bundle,
+        "SESSION": session,
+        "CSV": csv,
+        "FENCE": fence,
+        "OUT": tmp_path / "out",
+    }
 
 
 @pytest.fixture
@@ -89,7 +104,18 @@ def test_every_command_that_takes_a_file_is_tried():
     (commands,) = (
         action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction)
     )
-    files = {"protocol", "session", "events", "video", "learned", "hex", "keys"}
+    files = {
+        "protocol",
+        "session",
+        "events",
+        "video",
+        "learned",
+        "hex",
+        "keys",
+        "file",
+        "sign",
+        "key",
+    }
     taken = {
         (name, action.dest)
         for name, parser in commands.choices.items()

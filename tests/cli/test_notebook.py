@@ -6,8 +6,8 @@ import sys
 import pytest
 
 import rig
+from rig.bundle.tables import column_unit
 from rig.errors import InputError
-from rig.session.export import column_unit
 from tests.cli.lab import PROTOCOLS
 
 

@@ -32,6 +32,7 @@ COMMANDS = [
     ("report", "SESSION", "-o", "OUT/page.html"),
     ("export", "SESSION", "--csv", "OUT/tables"),
     ("replay", "SESSION"),
+    ("verify", "SESSION"),
     ("recover", "SESSION"),
     ("recover", "SESSION", "-o", "OUT/saved"),
     ("doctor", "--session", "SESSION"),
@@ -44,8 +45,8 @@ def fresh(session):
 
 def of_the_first_format(session):
     with closing(sqlite3.connect(session)) as connection:
-        connection.execute("DROP TABLE reference")
-        connection.execute("DROP TABLE host_break")
+        for table in ("reference", "host_break", "attachment", "hash"):
+            connection.execute(f"DROP TABLE {table}")
         for column in ("release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv"):
             connection.execute(f'ALTER TABLE "drop" DROP COLUMN {column}')
         connection.execute('ALTER TABLE "drop" DROP COLUMN lowest_mv')

@@ -165,5 +165,5 @@ def test_a_file_that_must_not_be_flashed(tmp_path, change, message):
 def test_an_image_of_another_kind(tmp_path):
     with pytest.raises(InputError):
         read_image(TARGETS["mega"].shipped, DRIVE)
-    with pytest.raises(InputError, match="is no Intel HEX file"):
+    with pytest.raises(InputError, match="no record of an Intel HEX file"):
         read_image(DRIVE.shipped, TARGETS["mega"])

@@ -82,7 +82,7 @@ def test_every_damaged_digit_is_found(file):
         (record(0, b"", kind=9) + END, r"it\.hex:1:1: an unknown kind of record: 9"),
         (record(0, b"\xff\xff", kind=4) + image(*GOOD), r"it\.hex:2:1: an address beyond"),
         (record(0x7E00, b"x") + image(*GOOD), "would overwrite the boot loader"),
-        (b"\xff\xfe\x00", "is no Intel HEX file"),
+        (b"\xff\xfe\x00", "no record of an Intel HEX file"),
     ],
 )
 def test_what_must_not_be_flashed(file, text, says):

@@ -4,7 +4,7 @@ import random
 
 from rig.link import messages as wire
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.selftest.board import RawLine
+from rig.link.frames import Decoder, Frame, encode
 from tests.link.bench import GATES, LABEL, Bench
 
 ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "record_ms": 150}
@@ -61,21 +61,28 @@ class LossyPort(NoisyPort):
         return b"" if self.clock.now_ns() < self.lose_rx_until_ns else data
 
 
-class Wire(RawLine):
+class Wire:
     """Speaks in single frames, with any seq, once the device has booted."""
 
     def __init__(self, bench: Bench) -> None:
-        super().__init__(bench.port(), bench.clock())
+        self.port, self.clock, self.decoder = bench.port(), bench.clock(), Decoder()
         self.port.write(b"\0")
         self.hear(BOOT_WAIT_S, until=lambda _, message: isinstance(message, wire.Boot))
 
+    def send(self, code: int, payload: bytes, seq: int) -> None:
+        self.port.write(encode(Frame(code, seq, 0, payload)))
+
+    def say(self, message: wire.Message, seq: int) -> None:
+        self.send(*wire.pack(message), seq)
+
     def hear(self, seconds: float = 0.1, until=None) -> list[tuple[int, wire.Message]]:
         """Listen for some time, and only a little longer once `until` was heard."""
-        heard = []
-        for _, ack, message in self.listen(seconds):
-            heard.append((ack, message))
-            if until is not None and until(ack, message):
-                return heard + [(ack, message) for _, ack, message in self.listen(0.02)]
+        heard, end = [], self.clock.now_ns() + round(seconds * 1e9)
+        while self.clock.now_ns() < end:
+            for frame in self.decoder.feed(self.port.read(max(1, self.port.in_waiting))):
+                heard.append((frame.ack, wire.unpack(frame.type, frame.payload)))
+                if until is not None and until(*heard[-1]):
+                    until, end = None, self.clock.now_ns() + 20_000_000
         return heard
 
     def ask(self, message: wire.Message, seq: int) -> wire.Message:

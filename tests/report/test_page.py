@@ -123,7 +123,7 @@ def test_page_and_citation_file_name_the_same():
 
 def test_importing_loads_neither_matplotlib_nor_jinja2():
     code = (
-        "import sys, rig.report.page, rig.report.figures, rig.report.columns, rig.session.export,"
+        "import sys, rig.report.page, rig.report.figures, rig.report.columns, rig.bundle.tables,"
         "rig.session.store\n"
         "assert not {'matplotlib', 'numpy', 'jinja2'} & set(sys.modules)"
     )

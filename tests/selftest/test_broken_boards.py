@@ -127,5 +127,5 @@ def test_a_cable_that_is_pulled_is_said(monkeypatch):
         raise OSError("device disconnected")
 
     monkeypatch.setattr(port, "read", gone)
-    with pytest.raises(DeviceError, match="the connection broke: device disconnected"):
+    with pytest.raises(DeviceError, match="connection lost: device disconnected"):
         list(tests)

@@ -14,6 +14,7 @@ from bench.mutants import make_session
 from bench.process_fixture import FENCE
 from rig.errors import DeviceError, InputError, SessionError
 from rig.recorder.controller import Controller
+from rig.recover.examine import examine
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -109,6 +110,7 @@ def test_what_is_not_committed_yet_is_saved_too_and_once(rig):
     assert "but for" not in caught.value.message
     with Session.open(session.with_name("session.saved-1"), readonly=True) as found:
         assert [chunk.data for chunk in found.byte_log()].count(b"once") == 1
+    assert examine(session.with_name("session.saved-1")).rows.chain_faults() == []
 
 
 def test_where_its_folder_is_gone_too_all_is_saved_in_the_state_folder(rig, tmp_path, monkeypatch):

@@ -63,6 +63,7 @@ def fill(session):
     session.add_drop(IMPORTED)
     session.add_state(2, 0, RunState.PLANNED, 1)
     session.add_state(2, 1, RunState.VOID, 2, [plain_reason("skew 7 ms"), plain_reason("β ≠ 0.5")])
+    session.attach("rig µ.jpg", b"\xff\xd8")
 
 
 @contextmanager
@@ -86,7 +87,7 @@ session = Session.create(sys.argv[1], "p", "p", simulated=True, origin="sim://")
 def test_everything_comes_back_as_it_went_in(path):
     with make(path) as session:
         fill(session)
-        assert session.pending == 11
+        assert session.pending == 12
         session.commit()
         assert session.pending == 0
     with Session.open(path, readonly=True) as session:
@@ -97,6 +98,7 @@ def test_everything_comes_back_as_it_went_in(path):
         assert session.identities() == [(3, {"serial": "µ1", "tick_hz": 2_000_000})]
         assert session.pings() == [ClockSample(1, 2, 3), ClockSample(4, 5, 2**32 - 1)]
         assert (session.pulses(), session.host_breaks()) == ([PULSE], [BREAK])
+        assert [file[1:] for file in session.attached_files()] == [("rig µ.jpg", b"\xff\xd8")]
         assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
         assert session.latest_drops() == [IMPORTED, DEVICE_DROP]
         assert [entry.state for entry in session.states()] == [RunState.PLANNED, RunState.VOID]
@@ -113,6 +115,7 @@ LATER = {  # columns and tables that formats after the first have added
     2: ["release_sense"],
     3: ["reference", "host_break"],
     4: ["pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"],
+    5: ["attachment", "hash"],
 }
 
 
@@ -122,10 +125,11 @@ def make_older(path, version):
         fill(session)
     with closing(sqlite3.connect(path)) as connection:
         for name in (name for since, names in LATER.items() if since > version for name in names):
-            table = name in LATER[3]
+            table = name in TABLES
             sql = f"DROP TABLE {name}" if table else f'ALTER TABLE "drop" DROP COLUMN {name}'
             connection.execute(sql)
         connection.execute(f"PRAGMA user_version = {version}")
+        connection.execute("VACUUM")
 
 
 @pytest.mark.parametrize("version", range(1, SCHEMA_VERSION))
@@ -331,6 +335,7 @@ for count in range(10**9):
         stamps = [chunk.host_ns for chunk in session.byte_log()]
     # The row after the last announced one may have been committed before the kill.
     assert stamps in (list(range(last + 1)), list(range(last + 2)))
+    assert examine(path).rows.chain_faults() == []
 
 
 def test_sigkill_before_the_commit_leaves_a_whole_session(path):
@@ -340,6 +345,7 @@ def test_sigkill_before_the_commit_leaves_a_whole_session(path):
     with Session.open(path) as session:
         assert list(session.byte_log()) == []
         session.log_bytes("rx", 1, b"goes on")
+    assert examine(path).rows.chain_faults() == []
 
 
 def test_one_writer_even_within_a_process(path):

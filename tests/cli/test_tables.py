@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from rig.bundle.tables import csv_files, flatten
 from rig.files import make_folder, write_atomic
 from rig.reasons import plain_reason
 from rig.records import ClockSample, Drop, Edge
-from rig.session.export import csv_files, flatten
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.timers.edges import read_edges

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import csv
+import hashlib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import MEASURANDS
 from rig.reasons import sentences
+from rig.session.schema import TABLES
 from rig.text_table import csv_text
 from rig.timers.edge_rows import edges_text
 
@@ -16,46 +20,27 @@ if TYPE_CHECKING:
     from rig.session.reading import Reader
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
-_UNITS = {
-    "_deg": "degrees",
-    "_m_s2": "m/s²",
-    "_m_s": "m/s",
-    "_m": "m",
-    "_ns": "ns, host clock",
-    "_s": "s",
-}
-_MEANINGS = {
-    "run": "number of the planned run",
-    "attempt": "which attempt at the run",
-    "superseded": "1 where a later attempt replaces this one",
-    "incline_deg": "inclination of the surface",
-    "impact_chain": "chain on the impact side",
-    "verdict": "accepted, marginal, void or rejected",
-    "reasons": "why, separated by semicolons",
-    "n": "number of runs",
-    "quantity": "what is uncertain; its unit stands at the end of its name",
-    "source": "what makes it uncertain",
-    "u": "standard uncertainty by that source; the squares add up",
-    "normalized_error": "difference from the prediction over its expanded uncertainty; within ±1 "
-    "they agree",
-    "channel": "gate",
-    "height_m": "of the gate's beam",
-    "gates.csv: speed_m_s": "of the object at the gate",
-    "interval_s": "since the object passed the gate before",
-    "time_s": "time since the release (imported edges: since a whole second)",
-    "state": "of the run; in edges.csv 1 is a blocked beam, 0 a clear one",
-    "tick": "device clock, 32 bits",
-}
+_ROWS_OF = {"states.csv": "run_state", "pings.csv": "ping", "edges.csv": "edge"}
+"""Whose raw records a file has, for the meaning of its columns."""
 
 
-def _meanings() -> dict[str, str]:
-    """What columns mean, those of the measurands too."""
-    meanings = dict(_MEANINGS)
+def _read_columns() -> tuple[dict[str, str], dict[str, str]]:
+    """Return the unit by each end of a name, and what columns mean, those of measurands too."""
+    lines = Path(__file__).with_name("columns.txt").read_text("utf-8").splitlines()
+    rows = dict(line.split(" | ") for line in lines if not line.startswith("#"))
+    meanings = {name: text for name, text in rows.items() if not name.startswith("_")}
     for row in MEASURANDS.values():
         meanings[row.name] = row.meaning
         meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
         meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
-    return meanings
+    raw = [(f"{file}: ", _ROWS_OF[file]) for file in _ROWS_OF]
+    for head, table in [*raw, ("", "run_state")]:
+        for column in TABLES[table].columns:
+            meanings.setdefault(head + column.name, column.meaning)
+    return {name: unit for name, unit in rows.items() if name.startswith("_")}, meanings
+
+
+_UNITS, _MEANINGS = _read_columns()
 
 
 def csv_files(
@@ -184,9 +169,56 @@ def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]
 
 
 def _describe(table: str, column: str) -> str:
-    if column.endswith(("_u", "_U95")):
-        return ""
-    unit, meanings = column_unit(column), _meanings()
-    meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
+    unit, meaning = describe_column(table, column)
     words = " ".join(filter(None, [unit and f"[{unit}]", meaning]))
     return words and f": {words}"
+
+
+def describe_column(table: str, column: str) -> tuple[str, str]:
+    """Return unit and meaning of a table's column; empty where its name says all."""
+    if column.endswith(("_u", "_U95")):
+        return "", ""
+    meaning = _MEANINGS.get(f"{table}: {column}", _MEANINGS.get(column, ""))
+    return column_unit(column), meaning
+
+
+def data_package(tables: Mapping[str, str]) -> dict[str, Any]:
+    """Describe CSV files for other programs (Frictionless): types, units, meanings, hashes.
+
+    Parameters
+    ----------
+    tables
+        Texts by file name.
+    """
+    resources = [_resource(name, text) for name, text in sorted(tables.items())]
+    return {"profile": "tabular-data-package", "name": "rig-tables", "resources": resources}
+
+
+def _resource(table: str, text: str) -> dict[str, Any]:
+    header, *rows = csv.reader(text.splitlines()) if text.strip() else [[]]
+    fields = []
+    for number, name in enumerate(header):
+        unit, meaning = describe_column(table, name)
+        kind = _type_of([row[number] for row in rows if row[number]])
+        field = {"name": name, "type": kind, "unit": unit, "description": meaning}
+        fields.append({key: value for key, value in field.items() if value})
+    return {
+        "name": table.removesuffix(".csv"),
+        "path": table,
+        "profile": "tabular-data-resource",
+        "format": "csv",
+        "encoding": "utf-8",
+        "bytes": len(text.encode()),
+        "hash": f"sha256:{hashlib.sha256(text.encode()).hexdigest()}",
+        "schema": {"fields": fields, "missingValues": [""]},
+    }
+
+
+def _type_of(cells: list[str]) -> str:
+    for kind, read in (("integer", int), ("number", float)):
+        try:
+            [read(cell) for cell in cells]
+        except ValueError:
+            continue
+        return kind if cells else "string"
+    return "string"

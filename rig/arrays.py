@@ -1,0 +1,11 @@
+"""Arrays of numbers, as types."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+"""Numbers of any shape."""

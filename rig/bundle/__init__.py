@@ -1,0 +1,1 @@
+"""A session for others: tables, and one file of which another person can check every number."""

@@ -1,0 +1,181 @@
+"""The ``.eln`` archive: stored files in fixed order, so that the same files give the same bytes.
+
+Nothing is compressed. Every byte of the archive follows from the files in it, and an altered byte
+shows wherever it is. The description is an RO-Crate as the ELN consortium wants it: ``crate.json``
+and a row a file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import mimetypes
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig import __version__
+from rig.errors import InputError
+from rig.files import read_input
+from rig.reasons import make_error
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+ROOT = "record/"
+"""The one folder of the archive."""
+SUMS = "SHA256SUMS"
+CRATE = "ro-crate-metadata.json"
+PUBLIC_KEY, SIGNATURE = f"{SUMS}.pub", f"{SUMS}.minisig"
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The first date that the format knows."""
+_LOCAL_HEADER = 30
+"""Bytes before a member's name (APPNOTE.TXT, 4.3.7)."""
+_LARGEST = 1 << 31
+
+
+def sha256(data: bytes) -> str:
+    """Return the SHA-256 of some bytes, in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def to_json(value: object) -> bytes:
+    """Write a JSON file."""
+    return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def seal(files: Mapping[str, bytes], about: Mapping[str, str]) -> dict[str, bytes]:
+    """Add the crate's description and the list of hashes to some files.
+
+    Parameters
+    ----------
+    files
+        Contents by name.
+    about
+        The crate's ``name``, ``description`` and ``datePublished``.
+    """
+    kinds = mimetypes.MimeTypes()  # Python's own list: the system's differs between systems
+    described = [
+        {
+            "@id": f"./{name}",
+            "@type": "File",
+            "name": name.rpartition("/")[2],
+            "encodingFormat": kinds.guess_type(name)[0] or "application/octet-stream",
+            "contentSize": str(len(content)),
+            "sha256": sha256(content),
+        }
+        for name, content in sorted(files.items())
+    ]
+    crate = json.loads(Path(__file__).with_name("crate.json").read_text("utf-8"))
+    _, root, program, *_ = crate["@graph"]
+    program["version"] = __version__
+    root |= {**about, "hasPart": [{"@id": file["@id"]} for file in described]}
+    crate["@graph"] += described
+    return list_hashes({**files, CRATE: to_json(crate)})
+
+
+def list_hashes(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Add the list of hashes to some files."""
+    sums = [f"{sha256(files[name])}  {name}\n" for name in sorted(files)]
+    return {**files, SUMS: "".join(sums).encode()}
+
+
+def pack(files: Mapping[str, bytes]) -> bytes:
+    """Return the archive of some files."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        for name in sorted(files):
+            member = zipfile.ZipInfo(ROOT + name, _EPOCH)
+            member.create_system = 3  # as on Unix, on every system
+            archive.writestr(member, files[name])
+    return packed.getvalue()
+
+
+def is_bundle(path: str | os.PathLike[str]) -> bool:
+    """Whether a bundle is meant: an archive, by its name or its end, or a folder."""
+    place = Path(path)
+    return place.suffix == ".eln" or place.is_dir() or zipfile.is_zipfile(place)
+
+
+def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[str]]:
+    """Read a bundle, or a folder that it was unpacked into.
+
+    Returns
+    -------
+    files, faults
+        Contents by name, and what was altered.
+
+    Raises
+    ------
+    InputError
+        It is something else, or too large.
+    """
+    place = Path(path)
+    if place.is_dir():
+        folder = place if (place / SUMS).exists() else place / ROOT
+        paths = [each for each in sorted(folder.rglob("*")) if each.is_file()]
+        files = {each.relative_to(folder).as_posix(): _read(each) for each in paths}
+    else:
+        data = _read(place)
+        files = _members(place, data)
+    if SUMS not in files:
+        raise _foreign(place, f"it has no {ROOT}{SUMS}")
+    # No hash can cover the list itself, and what signs it.
+    covered = {name: files[name] for name in files if name not in {SUMS, SIGNATURE}}
+    lists = (files[SUMS], list_hashes(covered)[SUMS])
+    rows, again = (text.decode("utf-8", "replace").splitlines() for text in lists)
+    names = sorted({row.partition("  ")[2] for row in {*rows} ^ {*again}})
+    faults = [f"{name} is not as {SUMS} has it" for name in names]
+    if not faults and rows != again:
+        faults = [f"{SUMS} is not as rig writes it"]
+    # The archive has a checksum of each file too: an altered file shows around it as well.
+    return files, faults if faults or place.is_dir() else _check_archive(files, data)
+
+
+def _members(place: Path, data: bytes) -> dict[str, bytes]:
+    """Return the files of an archive, as stored; checksums of their own are not looked at."""
+    files: dict[str, bytes] = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = archive.infolist()
+    except (zipfile.BadZipFile, ValueError, NotImplementedError, OverflowError) as error:
+        raise _foreign(place, f"its archive cannot be read ({error})") from error
+    for member in members:
+        name, size = member.filename, member.compress_size
+        begin = member.header_offset + _LOCAL_HEADER + len(name.encode())
+        is_stored = member.compress_type == zipfile.ZIP_STORED
+        if not (is_stored and name.startswith(ROOT) and ".." not in name.split("/")):
+            raise _foreign(place, f"{name!r:.60} is compressed, or outside of {ROOT}")
+        files[name.removeprefix(ROOT)] = data[begin : begin + size]
+    if sum(map(len, files.values())) > len(data):
+        raise _foreign(place, "its members overlap")
+    return files
+
+
+def _check_archive(files: Mapping[str, bytes], data: bytes) -> list[str]:
+    """Say where an archive differs from the one that its files give."""
+    again = pack(files)
+    if again == data:
+        return []
+    at = next((n for n, (a, b) in enumerate(zip(data, again, strict=False)) if a != b), len(again))
+    with zipfile.ZipFile(io.BytesIO(again)) as archive:
+        parts = {m.header_offset: f"the header of {m.filename}" for m in archive.infolist()}
+        parts[archive.start_dir] = "its directory"
+    where = parts[max(begin for begin in parts if begin <= at)]
+    return [f"the archive itself was altered at byte {at}, in {where}"]
+
+
+def _read(path: Path) -> bytes:
+    try:
+        data = read_input(path, _LARGEST + 1)
+    except OSError as error:
+        raise make_error(InputError, "bundle_unreadable", path=path, text=error) from error
+    if len(data) > _LARGEST:
+        raise _foreign(path, f"it has more than {_LARGEST} bytes")
+    return data
+
+
+def _foreign(path: Path, text: str) -> InputError:
+    return make_error(InputError, "bundle_foreign", path=path, text=text)

@@ -1,0 +1,51 @@
+"""Means with their degrees of freedom, and the covariance of means, as tables of a bundle."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.summary import good_cases
+from rig.text_table import csv_text
+
+if TYPE_CHECKING:
+    from rig.analysis.session import Analysis
+    from rig.protocol.protocol import Protocol
+
+
+def mean_tables(protocol: Protocol, analysis: Analysis) -> dict[str, str]:
+    """Make ``means.csv`` and ``covariances.csv``.
+
+    Covariances are those of means at two conditions, which share errors of the rig; of a joint fit
+    only they are known. In one drop, two quantities have more in common than what all drops share,
+    so there is no covariance of two means at one condition.
+    """
+    means: list[dict[str, object]] = []
+    shared = {}
+    cases = good_cases(protocol, analysis.runs) if analysis.summary else []  # none while blind
+    for line, drops in zip(analysis.summary, cases, strict=True):
+        at = line.condition.json() if protocol.surface is not None else {}
+        for name, mean in line.means.items():
+            degrees = mean.degrees if math.isfinite(mean.degrees) else "INF"
+            means.append({**at, "n": line.n, "quantity": name, **mean.json(), "degrees": degrees})
+            vectors = [drop.quantities[name].shared for drop in drops]
+            if all(vector is not None for vector in vectors):
+                shared[line.condition, name] = np.mean(np.array(vectors, float), axis=0)
+    covariances: list[dict[str, object]] = [
+        {
+            **first.json(),
+            "quantity": quantity,
+            **{f"{key}_2": value for key, value in second.json().items()},
+            "quantity_2": other_quantity,
+            "covariance": float(vector @ other_vector),
+        }
+        for (first, quantity), vector, (second, other_quantity), other_vector in (
+            (*one, *other) for one, other in combinations(shared.items(), 2)
+        )
+        if first != second
+    ]
+    tables = {"means.csv": means, "covariances.csv": covariances}
+    return {name: csv_text(list(rows[0]), rows) for name, rows in tables.items() if rows}

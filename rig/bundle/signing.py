@@ -1,0 +1,90 @@
+"""Signatures in the minisign format, by py-minisign (the extra ``sign``)."""
+
+from __future__ import annotations
+
+import sys
+from getpass import getpass
+from typing import TYPE_CHECKING, TypeVar
+
+from minisign import Error, PublicKey, SecretKey, Signature
+
+from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, SUMS, list_hashes
+from rig.bundle.contents import WRONG
+from rig.errors import InputError
+from rig.files import read_input
+from rig.reasons import make_error
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Mapping
+
+Key = TypeVar("Key")
+_COMMENT = "rig export --bundle"
+_LONGEST = 4096
+"""Bytes of a key file; minisign writes fewer than 300."""
+
+
+def read_secret(key: str | os.PathLike[str]) -> SecretKey:
+    """Read a secret key, and ask for its password if it has one.
+
+    Raises
+    ------
+    InputError
+        The key cannot be used; of one with a password, that there is no terminal to ask at.
+    """
+
+    def unlock(content: bytes) -> SecretKey:
+        secret = SecretKey.from_bytes(content)
+        if secret.is_encrypted():
+            if not sys.stdin.isatty():
+                raise make_error(InputError, "key_locked", path=key)
+            secret.decrypt(getpass(f"password of {key}: "))
+        return secret
+
+    return _read_key(key, unlock)
+
+
+def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
+    """Add the public key and a signature of the list of hashes to the files of a bundle.
+
+    The same files and key give the same bytes.
+    """
+    rest = {name: files[name] for name in files if name != SUMS}
+    signed = list_hashes({**rest, PUBLIC_KEY: _text(secret.get_public_key())})
+    signature = secret.sign(signed[SUMS], untrusted_comment=_COMMENT, trusted_comment=_COMMENT)
+    return {**signed, SIGNATURE: _text(signature)}
+
+
+def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | None) -> str:
+    """Check the signature of a bundle with a public key, or with the one that is in it.
+
+    Returns
+    -------
+    str
+        The finding; it begins with `WRONG` unless the signature is right.
+
+    Raises
+    ------
+    InputError
+        The key cannot be read, or is no public key of minisign.
+    """
+    stated = None if key is None else _read_key(key, PublicKey.from_bytes)
+    try:
+        public = stated or PublicKey.from_bytes(files.get(PUBLIC_KEY, b""))
+        public.verify(files[SUMS], Signature.from_bytes(files.get(SIGNATURE, b"")))
+    except Error as error:
+        return f"{WRONG}signature ({error})"
+    whose = "compare it with the signer's own" if key is None else f"of {key}"
+    return f"signature: right, by the key {public.to_base64().decode()} ({whose})"
+
+
+def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key:
+    """Read a key file; minisign's complaints about it become ours."""
+    try:
+        return read(read_input(path, _LONGEST))
+    except (OSError, Error) as error:
+        raise make_error(InputError, "key_unusable", path=path, text=error) from error
+
+
+def _text(part: object) -> bytes:
+    return bytes(part) + b"\n"  # type: ignore[call-overload, no-any-return]

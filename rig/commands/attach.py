@@ -1,0 +1,29 @@
+"""``rig attach``."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from rig.errors import InputError
+from rig.files import read_input
+from rig.reasons import make_error
+from rig.session.store import Session
+
+LARGEST = 1 << 25
+"""Bytes; half of what a value of a session file may have."""
+
+
+def main(arguments: Namespace) -> int:
+    """Add a file to a session, for its report."""
+    path = arguments.file
+    try:
+        data = read_input(path, LARGEST + 1)
+    except OSError as error:
+        raise make_error(InputError, "attachment_unreadable", path=path, text=error) from error
+    if not 0 < len(data) <= LARGEST:
+        raise make_error(InputError, "attachment_size", path=path)
+    with Session.open(arguments.session) as session:
+        session.attach(Path(path).name, data)
+    print(f"attached to {arguments.session}: {path}, {len(data)} bytes")
+    return 0

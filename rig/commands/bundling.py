@@ -1,0 +1,102 @@
+"""Making the files of a bundle from its session file, for ``rig export`` and ``rig verify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.bundle.archive import pack
+from rig.bundle.contents import SESSION, bundle_files, copy_session
+from rig.commands.output import progress, say, tell_damage
+from rig.commands.report import make_report
+from rig.files import check_place, replacing
+from rig.recover.examine import examine
+from rig.report.deviations import deviations
+from rig.report.files import figure_file
+from rig.results import protocol_of, results
+from rig.session.hashes import protocol_first
+from rig.session.store import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator
+
+    from rig.analysis.session import Analysis
+    from rig.recover.examine import ExaminedFile
+    from rig.session.reading import Reader
+
+_FIXED = {True: "yes", False: "no", None: "unknown"}
+
+
+class DerivedBundle(NamedTuple):
+    """All files that follow from a session file, its analysis, and the state of the file."""
+
+    files: dict[str, bytes]
+    analysis: Analysis
+    examined: ExaminedFile
+
+
+def write_bundle(arguments: Namespace) -> int:
+    """Write a session as a bundle; the same session gives the same bytes."""
+    check_place(arguments.bundle)
+    secret = None
+    if arguments.sign is not None:
+        from rig.bundle import signing  # noqa: PLC0415 - an extra that few need
+
+        secret = signing.read_secret(arguments.sign)
+    with Session.open(arguments.session, readonly=True) as session:
+        data = copy_session(session)
+    derived = derive_bundle(data)
+    files = signing.sign(derived.files, secret) if secret else derived.files
+    with replacing(arguments.bundle) as stream:
+        stream.write(pack(files))
+    say(f"bundle: {arguments.bundle}; rig verify {arguments.bundle} checks it")
+    return tell_damage(derived.analysis)
+
+
+def derive_bundle(data: bytes) -> DerivedBundle:
+    """Derive all files of a bundle from its session file.
+
+    Raises
+    ------
+    SessionError
+        It cannot be read.
+    """
+    with TemporaryDirectory(prefix="rig-bundle-") as folder:
+        copy = Path(folder) / SESSION
+        copy.write_bytes(data)
+        examined = examine(copy)
+        with Session.open(copy, readonly=True) as session:
+            # Every number from the raw edges: what is kept of earlier results proves nothing.
+            show = progress("analysing run")
+            outcome = results(session, show, fresh=True, with_joint_fit=True)
+            report = make_report(session, outcome, "U95", estimate=False, fresh=True)
+            drawn = {"report.html": report.html.encode()} | {
+                f"figures/figure-{number}.svg": figure_file(figure, "svg")
+                for number, figure in enumerate(report.figures, 1)
+            }
+            history = [*describe_history(session, examined, outcome.analysis)]
+            files = bundle_files(session, data, outcome, drawn, history)
+    return DerivedBundle(files, outcome.analysis, examined)
+
+
+def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis) -> Iterator[str]:
+    """List what was fixed beforehand, deviations from the plan, unblinding and attached files."""
+    protocol = protocol_of(session)
+    links = examined.rows.in_order("hash")
+    if next(session.byte_log(), None) is None:
+        first = "unknown, the edges were imported"
+    elif not links:
+        first = "unknown, an older program recorded the session, without a chain of hashes"
+    else:
+        broken = any("table protocol" in line or "table hash" in line for line in examined.damage)
+        first = "no" if broken else _FIXED[protocol_first(links)]
+    yield f"limits were fixed before the first run: {first}"
+    yield f"plan and limits: SHA-256 {session.meta['protocol_sha256']}, {session.meta['created']}"
+    yield from deviations(protocol, analysis, session.states())
+    if protocol.blind:
+        when = f"unblinded {session.unblinded}" if session.unblinded else "still blind"
+        yield f"blind session: {when}"
+    for file in session.attached_files():
+        yield f"attached {file.added}: {file.name}, {len(file.data)} bytes"

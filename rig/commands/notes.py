@@ -1,0 +1,24 @@
+"""``rig notes``."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from rig.errors import InputError
+from rig.reasons import make_error, plain_reason
+from rig.session.store import Session
+from rig.wordings import NOTE
+
+
+def main(arguments: Namespace) -> int:
+    """Add a note to a recorded run; its verdict stays."""
+    with Session.open(arguments.session) as session:
+        last = session.latest_state(arguments.run)
+        if last is None or session.drop(last.run, last.attempt) is None:
+            values = {"path": arguments.session, "run": arguments.run}
+            raise make_error(InputError, "run_unrecorded", **values)
+        reasons = (*last.reasons, plain_reason(arguments.text, NOTE))
+        # The host's clock may have begun anew since the drop: the entry keeps the drop's time.
+        session.add_state(last.run, last.attempt, last.state, last.host_ns, reasons)
+    print(f"noted to run {last.run}, attempt {last.attempt}: {arguments.text}")
+    return 0
