@@ -65,9 +65,12 @@ class Part:
 
 
 def table_parts(
-    name: str, records: Iterable[Any] = (), words: Iterable[str] = (),
-    row: Measurand | None = None, **derived: Callable[[Any], Any],
-) -> Iterator[Part]:  # fmt: skip
+    name: str,
+    records: Iterable[Any] = (),
+    words: Iterable[str] = (),
+    row: Measurand | None = None,
+    **derived: Callable[[Any], Any],
+) -> Iterator[Part]:
     """Yield a table of ``columns.txt``; nothing where there is nothing to say.
 
     Parameters
@@ -84,11 +87,14 @@ def table_parts(
     records, table = list(records), _TABLES[name]
     written = partial(str.format, row=row, first=records[0] if records else None)
     columns = [
-        Column(written(heading, row=kind).strip('"'),
-               partial(_cell, place, way, kind, derived), way.split()[0] not in _WORDS)
+        Column(
+            written(heading, row=kind).strip('"'),
+            partial(_cell, place, way, kind, derived),
+            way.split()[0] not in _WORDS,
+        )
         for heading, place, way, *each in table.rows
         for kind in (_kinds(each[0]) if each else [row])
-    ]  # fmt: skip
+    ]
     if records or words:
         sentences = [written(table.words), *words] if table.words else list(words)
         yield filled_part(raised(written(table.heading)), columns, records, sentences)
@@ -148,9 +154,12 @@ def _kinds(each: str) -> list[Measurand]:
 
 
 def _cell(
-    place: str, way: str, row: Measurand | None, derived: Mapping[str, Callable[[Any], Any]],
+    place: str,
+    way: str,
+    row: Measurand | None,
+    derived: Mapping[str, Callable[[Any], Any]],
     record: Any,
-) -> str:  # fmt: skip
+) -> str:
     row, value = row or _member(record, "row"), record
     for step in place.format(row=row).split("."):
         name, call, _ = step.partition("()")

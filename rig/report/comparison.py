@@ -63,8 +63,9 @@ def difference_lines(results: TogetherResults) -> Iterator[str]:
 
 def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
-    section = PageSection("results", "Results", _claims(results), [draw_comparison(results)],
-                          [*_tables(results)])  # fmt: skip
+    section = PageSection(
+        "results", "Results", _claims(results), [draw_comparison(results)], [*_tables(results)]
+    )
     title = f"Comparison with {results.fit.parts[0].name}"
     return page_html(ReportPage(title, [section], results.simulated))
 
@@ -106,9 +107,12 @@ def _differences(results: TogetherResults, row: Measurand) -> list[MeanDifferenc
 def _tables(results: TogetherResults) -> Iterator[Part]:
     """Yield the tables of each measurand."""
     for row in averaged():
-        means = ({"session": part.name, "line": line, "runs": _runs(line)}
-                 for part in results.fit.parts for line in part.analysis.summary
-                 if row.name in line.means)  # fmt: skip
+        means = (
+            {"session": part.name, "line": line, "runs": _runs(line)}
+            for part in results.fit.parts
+            for line in part.analysis.summary
+            if row.name in line.means
+        )
         yield from table_parts("sessions", means, row=row)
         yield from table_parts("differences", _differences(results, row), row=row, runs=_runs)
 

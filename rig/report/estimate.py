@@ -54,10 +54,14 @@ def _coefficients(found: SessionEstimate) -> Iterator[Part]:
     if coefficients is not None and parameters:
         words += _coefficient_words(coefficients)
     return table_parts(
-        "coefficients", parameters, words,
-        coefficient=lambda coefficient: symbol(coefficient.name), posterior=_posterior,
-        stated=_stated, source=lambda coefficient: "edges" if coefficient.identified else "held",
-    )  # fmt: skip
+        "coefficients",
+        parameters,
+        words,
+        coefficient=lambda coefficient: symbol(coefficient.name),
+        posterior=_posterior,
+        stated=_stated,
+        source=lambda coefficient: "edges" if coefficient.identified else "held",
+    )
 
 
 def _single_alphas(found: SessionEstimate) -> Iterator[Part]:
@@ -69,9 +73,11 @@ def _single_alphas(found: SessionEstimate) -> Iterator[Part]:
     contact = {point.incline_deg: _contact(point) for point in contacts}
     alphas = [{"of": alpha, "condition": alpha.condition} for alpha in found.alphas.inclines]
     return table_parts(
-        "alphas", alphas, words,
+        "alphas",
+        alphas,
+        words,
         contact=lambda alpha: contact.get(alpha["condition"].incline_deg, ""),
-    )  # fmt: skip
+    )
 
 
 def _end_correction(found: SessionEstimate) -> Iterator[Part]:
@@ -80,13 +86,15 @@ def _end_correction(found: SessionEstimate) -> Iterator[Part]:
 
 def _impulses(found: SessionEstimate) -> Iterator[Part]:
     words = [] if found.impulses is None else [resolution(found.impulses)]
-    return table_parts("impulses", found.impulses or (), words,
-                       worst=lambda impulses: _worst(impulses.gains))  # fmt: skip
+    return table_parts(
+        "impulses", found.impulses or (), words, worst=lambda impulses: _worst(impulses.gains)
+    )
 
 
 def _comparison(found: SessionEstimate) -> Iterator[Part]:
-    return table_parts("comparison", found.comparison or (),
-                       worst=lambda compared: _worst(compared.differences))  # fmt: skip
+    return table_parts(
+        "comparison", found.comparison or (), worst=lambda compared: _worst(compared.differences)
+    )
 
 
 def _failed(found: SessionEstimate) -> Iterator[Part]:
@@ -94,10 +102,14 @@ def _failed(found: SessionEstimate) -> Iterator[Part]:
 
 
 def _incline_by_incline(found: SessionEstimate) -> Iterator[Part]:
-    return table_parts("inclines", (
-        {"of": difference, "condition": difference.condition, "quantity": compared.quantity}
-        for compared in found.comparison or () for difference in compared.differences
-    ))  # fmt: skip
+    return table_parts(
+        "inclines",
+        (
+            {"of": difference, "condition": difference.condition, "quantity": compared.quantity}
+            for compared in found.comparison or ()
+            for difference in compared.differences
+        ),
+    )
 
 
 def _single_impulses(found: SessionEstimate) -> Iterator[Part]:
@@ -107,8 +119,13 @@ def _single_impulses(found: SessionEstimate) -> Iterator[Part]:
         for gain in rods.gains
     )
     # Count rods as people do, from 1.
-    return table_parts("rods", gains, rod=lambda rods: "–".join(
-        str(1 + rod) for rod in dict.fromkeys((rods["of"].first, rods["of"].last))))  # fmt: skip
+    return table_parts(
+        "rods",
+        gains,
+        rod=lambda rods: "–".join(
+            str(1 + rod) for rod in dict.fromkeys((rods["of"].first, rods["of"].last))
+        ),
+    )
 
 
 def _coefficient_words(coefficients: Coefficients) -> Iterator[str]:

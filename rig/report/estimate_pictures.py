@@ -57,15 +57,25 @@ def _alpha(found: SessionEstimate) -> Chart | None:
     axis, alphas = PlotAxis("incline of the surface (°)"), found.alphas
     fitted = [line for line in alphas.inclines if line.model is not None]
     inclines = ((line.condition.incline_deg, line.alpha) for line in alphas.inclines)
-    residuals = ((run.run.incline_deg, run.residual / 2.0) for run in alphas.runs
-                 if run.residual is not None)  # fmt: skip
+    residuals = (
+        (run.run.incline_deg, run.residual / 2.0) for run in alphas.runs if run.residual is not None
+    )
     traces = [
-        measured("single runs", ((run.run.incline_deg, run.alpha) for run in alphas.runs),
-                 "points", MUTED),
-        series("by fitted coefficients", [line.condition.incline_deg for line in fitted],
-               [line.model or 0.0 for line in fitted], "dash", MODEL),
+        measured(
+            "single runs",
+            ((run.run.incline_deg, run.alpha) for run in alphas.runs),
+            "points",
+            MUTED,
+        ),
+        series(
+            "by fitted coefficients",
+            [line.condition.incline_deg for line in fitted],
+            [line.model or 0.0 for line in fitted],
+            "dash",
+            MODEL,
+        ),
         measured("incline ± U", inclines, "mean"),
-    ]  # fmt: skip
+    ]
     return chart("alpha", [Panel(axis, PlotAxis("α"), traces), *residual_panels(axis, residuals)])
 
 
@@ -82,9 +92,12 @@ def _impulses(found: SessionEstimate) -> Chart | None:
             series("", rods, values, "line", color),
             measured(f"{line.condition.incline_deg:g}°", speeds, role, color),
         ]
-    errors = [(1 + (gain.first + gain.last) / 2, gain.normalized_error)
-              for line in found.impulses for gain in line.gains
-              if gain.normalized_error is not None]  # fmt: skip
+    errors = [
+        (1 + (gain.first + gain.last) / 2, gain.normalized_error)
+        for line in found.impulses
+        for gain in line.gains
+        if gain.normalized_error is not None
+    ]
     panel = Panel(axis, PlotAxis("speed gained ΔV (m/s)"), traces, 140.0)
     return chart("impulses", [panel, *residual_panels(axis, errors)])
 
@@ -95,11 +108,16 @@ def _curves(found: SessionEstimate) -> Chart | None:
     if not shown:
         return None
     falls = [
-        trace for drop, color in shown if drop.separation is not None
+        trace
+        for drop, color in shown
+        if drop.separation is not None
         for trace in _banded(drop, drop.time_s, drop.separation, color, SEPARATION.scale)
-    ]  # fmt: skip
-    squares = [trace for drop, color in shown
-               for trace in _banded(drop, drop.height_m, drop.squared_speed, color)]  # fmt: skip
+    ]
+    squares = [
+        trace
+        for drop, color in shown
+        for trace in _banded(drop, drop.height_m, drop.squared_speed, color)
+    ]
     time, height = PlotAxis("time since release (s)"), PlotAxis("height of the top rod z (m)")
     panels = [Panel(height, PlotAxis("V² (m²/s²)"), squares, 140.0)]
     title, words = "Squared speed against height", "V²(z)"

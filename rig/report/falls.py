@@ -167,13 +167,18 @@ def _object_panels(protocol: Protocol, seen: Passages, result: DropResult) -> li
             ("speed v (m/s)", -line.deriv(), slope, seen.speed, "width over shadow time", u_speed),
         )
         for panel in (
-            Panel(_FROM_FIRST, PlotAxis(label), [
-                series(name, at, motion(at), "line", MODEL),
-                series(points_name, time, points, "ring"),
-            ], 100.0),
+            Panel(
+                _FROM_FIRST,
+                PlotAxis(label),
+                [
+                    series(name, at, motion(at), "line", MODEL),
+                    series(points_name, time, points, "ring"),
+                ],
+                100.0,
+            ),
             *_residuals(_FROM_FIRST, time, points - motion(time), u),
         )
-    ]  # fmt: skip
+    ]
 
 
 def _residuals(axis: PlotAxis, times: Array, left: Array, u: Array | float) -> list[Panel]:

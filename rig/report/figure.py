@@ -27,9 +27,24 @@ if TYPE_CHECKING:
     Values = Sequence[float] | NDArray[np.float64]
 
 Role = Literal[
-    "line", "dash", "thick", "band", "level", "limit", "gap", "shade",
-    "points", "mean", "ring", "square", "cross", "bar", "words", "map", "levels",
-]  # fmt: skip
+    "line",
+    "dash",
+    "thick",
+    "band",
+    "level",
+    "limit",
+    "gap",
+    "shade",
+    "points",
+    "mean",
+    "ring",
+    "square",
+    "cross",
+    "bar",
+    "words",
+    "map",
+    "levels",
+]
 """How a series looks.
 
 A `line`, `dash` or `thick` line joins its points, with a gap where one is not a number; a `band`
@@ -141,18 +156,29 @@ def chart(name: str, panels: Sequence[Panel], **values: object) -> Chart:
 
 
 def series(
-    label: str, x: Values, y: Values, role: Role, color: int = INK, u: Values = (),
-    scale: float = 1.0, **options: Any,
-) -> Trace:  # fmt: skip
+    label: str,
+    x: Values,
+    y: Values,
+    role: Role,
+    color: int = INK,
+    u: Values = (),
+    scale: float = 1.0,
+    **options: Any,
+) -> Trace:
     """Return a `Trace` of any numbers, y and u times a factor."""
     x, y, u = [*map(float, x)], [scale * float(value) for value in y], [*map(float, u)]
     return Trace(label, x, y, role, color, [scale * value for value in u], **options)
 
 
 def measured(
-    label: str, points: Iterable[tuple[float, Measured]], role: Role, color: int = INK,
-    scale: float = 1.0, *, across: bool = False,
-) -> Trace:  # fmt: skip
+    label: str,
+    points: Iterable[tuple[float, Measured]],
+    role: Role,
+    color: int = INK,
+    scale: float = 1.0,
+    *,
+    across: bool = False,
+) -> Trace:
     """Return a `Trace` of measured values at their places, large points with bars of U."""
     rows = [(place, scale * value.value, scale * value.expanded) for place, value in points]
     places, values, widths = map(list, zip(*rows, strict=True)) if rows else ([], [], [])

@@ -120,8 +120,9 @@ def budget_figure(summary: Sequence[Incline]) -> Chart | None:
     colors = dict(zip(named, PARTS, strict=False))
     panels = []
     for row, parts in shares.items():
-        axis = PlotAxis("share of U² of the mean (%)" if row == [*shares][-1] else "",
-                        limits=(0.0, 100.0))  # fmt: skip
+        axis = PlotAxis(
+            "share of U² of the mean (%)" if row == [*shares][-1] else "", limits=(0.0, 100.0)
+        )
         names = PlotAxis("", {0.0: row.symbol}, (-2.0, 0.6))
         panels.append(Panel(axis, names, [*_stacked(parts, colors)], 64.0))
     return chart("budget", panels) if panels else None
@@ -172,9 +173,10 @@ def _incline_panels(
     traces = [
         *_model_series(curves, row),
         measured("", single, "points", MUTED, row.scale),
-        series("means", inclines, [mean.mean.value for mean in means], "mean", INK, widths,
-               row.scale),
-    ]  # fmt: skip
+        series(
+            "means", inclines, [mean.mean.value for mean in means], "mean", INK, widths, row.scale
+        ),
+    ]
     yield Panel(_INCLINE, PlotAxis(f"{row.title}\n{row.symbol} ({row.unit})"), traces, 110.0)
     errors = [(mean.line.incline_deg, mean.error) for mean in means if mean.error is not None]
     yield from residual_panels(_INCLINE, errors)

@@ -36,11 +36,14 @@ def film_figure(film: Film, pictures: int = PICTURES) -> Chart:
     names = {place: f"{1e3 * film.times_s[moment]:.0f} ms" for place, moment in places.items()}
     across = PlotAxis("time since release", names, (-0.1, [*places][-1] + 0.14))
     panels = [
-        Panel(across, PlotAxis(label, limits=_LIMITS_M),
-              [trace for place, moment in places.items() for trace in draw(film, moment, place)],
-              170.0)
+        Panel(
+            across,
+            PlotAxis(label, limits=_LIMITS_M),
+            [trace for place, moment in places.items() for trace in draw(film, moment, place)],
+            170.0,
+        )
         for label, draw in (("height (m)", _front), ("height (m), along the rods", _side))
-    ]  # fmt: skip
+    ]
     return chart("film", panels, incline=f"{film.incline_deg:g}")
 
 

@@ -49,14 +49,22 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
         lowest = f"close to the {protocol.zero}" if inclines else "lowest gates"
         panels = [
             # What lies below is named in the other view, where there is room.
-            _side_view(protocol, gates, 1.04 * max(highest, hanging), near,
-                       "posts and beams, from the side"),
+            _side_view(
+                protocol,
+                gates,
+                1.04 * max(highest, hanging),
+                near,
+                "posts and beams, from the side",
+            ),
             _side_view(protocol, gates, near, 0.0, lowest),
-        ]  # fmt: skip
+        ]
     words = render(
-        "mounting.txt", protocol=protocol, gates=gates, inclines=inclines,
+        "mounting.txt",
+        protocol=protocol,
+        gates=gates,
+        inclines=inclines,
         slots=_slots(protocol, gates),
-    )  # fmt: skip
+    )
     foot = str(words).split("\n")
     return Chart(protocol.title, protocol.title, panels, foot=foot, width=_WIDTH_PT)
 
@@ -132,7 +140,7 @@ def _side_view(
         *(series("", (x, x), (_LOW_M, top), "thick", scale=_MM) for x in (-_MM * post, _MM * post)),
         series("", [0.0] * len(rods), rods, "mean", scale=_MM),
         series("", (0.0,), (0.0,), "cross"),
-    ]  # fmt: skip
+    ]
     for place, incline in enumerate([] if named_above else inclines):
         away = top * (0.3 if place % 2 else 0.45)  # neighbours' names would meet
         slope, face = math.radians(incline), face_below(protocol, incline)
@@ -149,8 +157,10 @@ def _side_view(
     return Panel(
         PlotAxis(f"{title} ({unit})", limits=(-2.4 * _MM * post, 2.4 * _MM * post)),
         PlotAxis(f"mm {protocol.drop_from}" if inclines else "mm", {}, (_MM * _LOW_M, _MM * top)),
-        lines, _HEIGHT_PT, true=True,
-    )  # fmt: skip
+        lines,
+        _HEIGHT_PT,
+        true=True,
+    )
 
 
 def _board(protocol: Protocol, incline: float, post: float) -> Trace:

@@ -62,8 +62,16 @@ def _figure_3(columns: Columns, resolved: Columns) -> list[Panel]:
         traces = [*_inclines(columns, row.name, row.scale)]
         if resolved:
             words = f"{resolved['falls'][0]:g} resolved falls ± SD"
-            traces.append(series(words, resolved["incline_deg"], resolved[row.name], "square",
-                                 u=resolved[row.key("sd")], scale=row.scale))  # fmt: skip
+            traces.append(
+                series(
+                    words,
+                    resolved["incline_deg"],
+                    resolved[row.name],
+                    "square",
+                    u=resolved[row.key("sd")],
+                    scale=row.scale,
+                )
+            )
         panels.append(Panel(_INCLINE, PlotAxis(row.axis), traces, 150.0))
     speed = free_fall_speed(paper.UNIFORM, paper.DROP, paper.GRAVITY)
     in_text = paper.TEXT_FREE_FALL_SPEED
@@ -99,8 +107,9 @@ def _figure_4(columns: Columns, resolved: Columns) -> list[Panel]:
 
 def _falls(columns: Columns, struck: str, free: str, color: int) -> Iterator[Trace]:
     yield _centimetres(struck, columns["speed2"], columns["height_m"], "line", color)
-    yield _centimetres(free, columns["free_speed2"], columns["free_height_m"], "dash",
-                       INK if free else color)  # fmt: skip
+    yield _centimetres(
+        free, columns["free_speed2"], columns["free_height_m"], "dash", INK if free else color
+    )
 
 
 def _figure_6(columns: Columns, _: Columns) -> list[Panel]:
@@ -108,13 +117,25 @@ def _figure_6(columns: Columns, _: Columns) -> list[Panel]:
     axis = PlotAxis("rotational inertia of the rods, ξ (uniform rods: 1/3)")
     inertia = columns["inertia"]
     return [
-        Panel(axis, PlotAxis(row.axis), [
-            series("discrete model", inertia, columns[row.name], "line", MODEL, scale=row.scale),
-            series(f"Eq. {number}", inertia, columns[f"eq{number}_{row.name}"], "dash",
-                   scale=row.scale),
-        ], 130.0)
+        Panel(
+            axis,
+            PlotAxis(row.axis),
+            [
+                series(
+                    "discrete model", inertia, columns[row.name], "line", MODEL, scale=row.scale
+                ),
+                series(
+                    f"Eq. {number}",
+                    inertia,
+                    columns[f"eq{number}_{row.name}"],
+                    "dash",
+                    scale=row.scale,
+                ),
+            ],
+            130.0,
+        )
         for row, number in ((SEPARATION, 15), (SPEED, 14))
-    ]  # fmt: skip
+    ]
 
 
 _KINDS: dict[int, _Kind] = {

@@ -137,10 +137,12 @@ def run_parts(drops: Iterable[DropResult]) -> Iterator[Part]:
 def verdict_parts(drops: Iterable[DropResult]) -> Iterator[Part]:
     """Yield why drops are not accepted, and what to do about those that are void."""
     return table_parts(
-        "verdicts", (drop for drop in drops if drop.verdict != "accepted"), incline=_run_incline,
+        "verdicts",
+        (drop for drop in drops if drop.verdict != "accepted"),
+        incline=_run_incline,
         reasons=lambda drop: signed(sentences(drop.reasons)),
         remedies=lambda drop: "; ".join(remedies(drop.reasons)) if drop.verdict == "void" else "",
-    )  # fmt: skip
+    )
 
 
 def _run_incline(drop: DropResult) -> str:

@@ -83,11 +83,17 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
         typed = "\n".join(line.replace("  ", "\u00a0\u00a0") for line in foot)
         figure.text(0.005, 4.0 / height, typed, va="bottom", family="monospace")
         axes = figure.subplots(
-            len(panels), squeeze=False, height_ratios=heights,
-            gridspec_kw={"left": left / width, "right": 1.0 - _RIGHT_PT / width,
-                         "top": 1.0 - top / height, "bottom": bottom / height,
-                         "hspace": apart / fmean(heights)},
-        )[:, 0]  # fmt: skip
+            len(panels),
+            squeeze=False,
+            height_ratios=heights,
+            gridspec_kw={
+                "left": left / width,
+                "right": 1.0 - _RIGHT_PT / width,
+                "top": 1.0 - top / height,
+                "bottom": bottom / height,
+                "hspace": apart / fmean(heights),
+            },
+        )[:, 0]
         for number, (panel, here) in enumerate(zip(panels, axes, strict=True)):
             shared = [axes[other] for other in range(number) if panels[other].x == panel.x]
             if shared:
@@ -121,8 +127,9 @@ def _set_up(axes: Axes, panel: Panel, width: float, *, numbered: bool) -> None:
     rows, names = panel.height / _ROW_PT, panel.x.names.values()
     columns = width / max([_TICK_PT, *(len(name) * _LETTER + 6 for name in names)])
     for axis, about, most in ((axes.xaxis, panel.x, columns), (axes.yaxis, panel.y, rows)):
-        axis.set_major_locator(MaxNLocator(max(2, int(most)), steps=[1, 2, 5, 10],
-                                           integer=about.whole, min_n_ticks=1))  # fmt: skip
+        axis.set_major_locator(
+            MaxNLocator(max(2, int(most)), steps=[1, 2, 5, 10], integer=about.whole, min_n_ticks=1)
+        )
         if about.names:
             axis.set_ticks([*about.names], [*about.names.values()])
         if about.limits is not None:
@@ -164,8 +171,9 @@ def _draw(axes: Axes, trace: Trace) -> None:
             axes.plot(x, y, color=color, **look)
         case _ if u.size:
             across, up = (u, None) if trace.across else (None, u)
-            axes.errorbar(x, y, up, across, color=color, linestyle="none", elinewidth=0.9,
-                          capsize=0.0, **look)  # fmt: skip
+            axes.errorbar(
+                x, y, up, across, color=color, linestyle="none", elinewidth=0.9, capsize=0.0, **look
+            )
         case _:
             axes.plot(x, y, color=color, linestyle="none", **look)
 
@@ -206,8 +214,10 @@ def _name_series(axes: Axes, panel: Panel) -> None:
                 if box[0] < left or box[2] > right + 6.0 or box[3] > top + 4.0:
                     continue
                 hidden = (box[:2] - 1.0 < taken) & (taken < box[2:] + 1.0)
-                near = sum(bool((box[:2] < name[2:]).all() and (name[:2] < box[2:]).all())
-                           for name in names)  # fmt: skip
+                near = sum(
+                    bool((box[:2] < name[2:]).all() and (name[:2] < box[2:]).all())
+                    for name in names
+                )
                 cost = hidden.all(axis=1).sum() + _CROWDED * (near + (box[1] < bottom))
                 if best is None or cost < best[0]:
                     best = cost, box
@@ -233,7 +243,9 @@ def _shown(axes: Axes, trace: Trace) -> Points:
         places = np.arange(0.0, along[-1], _NEAR_PT)
         return np.column_stack([np.interp(places, along, column) for column in points.T])
     if u.size and trace.role != "band":
-        ends = [np.column_stack([x + way * u * trace.across, y + way * u * (not trace.across)])
-                for way in np.linspace(-1.0, 1.0, 9)]  # fmt: skip
+        ends = [
+            np.column_stack([x + way * u * trace.across, y + way * u * (not trace.across)])
+            for way in np.linspace(-1.0, 1.0, 9)
+        ]
         return np.vstack([points, axes.transData.transform(np.vstack(ends))])
     return points

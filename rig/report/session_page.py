@@ -102,8 +102,9 @@ def session_page(material: Material) -> ReportPage:
     falls = made("The figures of a fall", lambda: _falls(protocol, timed))
     curves = material.sections.make("The model's curve", lambda: model_curves(protocol)) or {}
     site = protocol.gravity.value if protocol.track is None else None
-    results = made("The figure of the result",
-                   lambda: [result_figure(analysis, curves, material.bars, site)])  # fmt: skip
+    results = made(
+        "The figure of the result", lambda: [result_figure(analysis, curves, material.bars, site)]
+    )
     many = len({line.incline_deg for line in summary}) >= FEWEST_INCLINES
     shown = [*results, *falls] if many or not falls else [falls[0], *results, *falls[1:]]
     judged = finding.verdict(summary)
@@ -112,37 +113,47 @@ def session_page(material: Material) -> ReportPage:
     drops = made("The table of drops", lambda: _drops(protocol, timed))
     sections = [
         PageSection(
-            "result", "Result",
+            "result",
+            "Result",
             finding.claims(summary),
             shown[1:2],
-            made("The table of results", lambda: [
-                *(parts.value_parts(summary) if len(summary) > 1 else ()),
-                *parts.gate_parts(summary)]),
+            made(
+                "The table of results",
+                lambda: [
+                    *(parts.value_parts(summary) if len(summary) > 1 else ()),
+                    *parts.gate_parts(summary),
+                ],
+            ),
             made("The paired differences", lambda: parts.effects_parts(analysis.effects)),
         ),
         PageSection(
-            "model", "Does it fit the model?",
+            "model",
+            "Does it fit the model?",
             [judged.sentence, *(found.sentence for found in likeness)],
             [*shown[2:], *made("The pictures of the simulation", lambda: _films(material))],
             (),
             made("The comparison with the model", lambda: _model_parts(material)),
         ),
         PageSection(
-            "limits", "What limits it",
+            "limits",
+            "What limits it",
             [*remarks.common_lines(summary), *(each.sentence for each in improvements(summary))],
             made("The figure of the budget", lambda: [budget_figure(summary)]),
             (),
             made("The uncertainty budget", lambda: parts.budget_parts(summary)),
         ),
         PageSection(
-            "drops", "Every drop",
+            "drops",
+            "Every drop",
             deviations(protocol, analysis, session.states()),
             made("The figure of the runs", lambda: [runs_figure(analysis, skew)]),
             made("The reasons for verdicts", lambda: _odd_parts(material)),
-            (), "drops.html" if drops else "", *drops,
+            (),
+            "drops.html" if drops else "",
+            *drops,
         ),
         _method(material),
-    ]  # fmt: skip
+    ]
     hidden = ("model", "limits") if outcome.blind else ()
     return ReportPage(
         protocol.title,
@@ -227,14 +238,21 @@ def _method(material: Material) -> PageSection:
     session, outcome = material.session, material.outcome
     analysis, rig = outcome.analysis, outcome.analysis.rig
     free = acceleration_in({name for drop in analysis.runs for name in drop.quantities})
-    said = [*remarks.alone_lines(analysis), *remarks.clock_lines(outcome.calibration),
-            *remarks.air_lines(None if rig is None else rig.drag)]  # fmt: skip
+    said = [
+        *remarks.alone_lines(analysis),
+        *remarks.clock_lines(outcome.calibration),
+        *remarks.air_lines(None if rig is None else rig.drag),
+    ]
     values = {
-        "session": session, "outcome": outcome, "runs": analysis.runs, "said": said,
+        "session": session,
+        "outcome": outcome,
+        "runs": analysis.runs,
+        "said": said,
         "pull": free.symbol if free else "g",
         "together": None if outcome.blind else rig is not None,
         "files": material.made("The files", lambda: attachments(session, outcome)),
-        "paper": PAPER, "software": SOFTWARE,
+        "paper": PAPER,
+        "software": SOFTWARE,
         "versions": {"rig": __version__} | {name: version(name) for name in _NUMERICS},
-    }  # fmt: skip
+    }
     return PageSection("method", "Method and files", template="method.html", values=values)

@@ -52,10 +52,14 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Char
     draw, height = (_map, 200.0) if up else (_curves, 150.0)
     panels = [
         # Each map has its own axis below, which says what its levels are.
-        Panel(replace(across, label=f"{row.axis} against {across.label}") if up else across,
-              up[0] if up else PlotAxis(row.axis), [*draw(row, layout, values, swept)], height)
+        Panel(
+            replace(across, label=f"{row.axis} against {across.label}") if up else across,
+            up[0] if up else PlotAxis(row.axis),
+            [*draw(row, layout, values, swept)],
+            height,
+        )
         for row, values in [*shown, (SPEED, swept.speed_m_s)]
-    ]  # fmt: skip
+    ]
     labels = {variable.column: variable.label for variable in VARIABLES.values()}
     held = "; ".join(_with_unit(labels[name], value) for name, value in facts["fixed"].items())
     foot = str(render("sweep.txt", facts=facts, held=held)).split("\n")

@@ -26,8 +26,9 @@ def wiring_drawing(protocol: Protocol, board: str) -> str:
         A key of `rig.ready.WIRED`.
     """
     gates = protocol.gates.gates if protocol.gates else ()
-    words = {f"gate-{gate.channel}": f"gate {gate.channel}: {gate.height * 1e3:.1f} mm"
-             for gate in gates}  # fmt: skip
+    words = {
+        f"gate-{gate.channel}": f"gate {gate.channel}: {gate.height * 1e3:.1f} mm" for gate in gates
+    }
     used = {*words, f"release-{protocol.release.channel}"}
     for prefix, uri in (("", _SVG), ("xlink", "http://www.w3.org/1999/xlink")):
         ElementTree.register_namespace(prefix, uri)
