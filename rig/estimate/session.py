@@ -157,11 +157,6 @@ class SessionEstimate:
     curves: tuple[DropCurves, ...] | None = None
     failed: tuple[str, ...] = ()
 
-    @property
-    def free_chain(self) -> bool:
-        """Whether a chain falls beside the one that strikes."""
-        return any(curve.separation is not None for curve in self.curves or ())
-
     def json(self) -> dict[str, Any]:
         """As `rig estimate --json` prints it."""
         record = attributes(self, "drops", "edges")
