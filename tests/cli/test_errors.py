@@ -135,7 +135,7 @@ def test_an_empty_port_is_refused(call, words):
     """As a variable of a shell is that nobody has set."""
     done = call(*words, "--port", "")
     assert done.code == 2
-    assert "no port is named" in done.err
+    assert "accepted: a device path, or a URL" in done.err
 
 
 def test_every_problem_of_a_protocol_has_its_line_and_column(call, tmp_path):

@@ -58,7 +58,7 @@ def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
     assert clock.startswith("Board clock: 13")
     told = [line for line in err.splitlines() if line.startswith("run ")]
     assert [line.split()[1] for line in told] == ["1/4", "2/4", "3/4", "4/4"]
-    assert err.splitlines()[-1].startswith("4 runs, 4 drops. Δz from ")
+    assert err.splitlines()[-1].startswith("4 runs, 4 drops: separation Δz at ")
     assert not re.search(r"(?m)^run ", out)
     assert_whole(finished.session, 4)
 
