@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from fractions import Fraction
 
+    from rig.measurands import Measurand
     from rig.session.reading import Reader
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
@@ -24,12 +26,13 @@ _ROWS_OF = {"states.csv": "run_state", "pings.csv": "ping", "edges.csv": "edge"}
 """Whose raw records a file has, for the meaning of its columns."""
 
 
-def _read_columns() -> tuple[dict[str, str], dict[str, str]]:
+@lru_cache(maxsize=1)
+def _read_columns(measurands: tuple[Measurand, ...]) -> tuple[dict[str, str], dict[str, str]]:
     """Return the unit by each end of a name, and what columns mean, those of measurands too."""
     lines = Path(__file__).with_name("columns.txt").read_text("utf-8").splitlines()
     rows = dict(line.split(" | ") for line in lines if not line.startswith("#"))
     meanings = {name: text for name, text in rows.items() if not name.startswith("_")}
-    for row in MEASURANDS.values():
+    for row in measurands:
         meanings[row.name] = row.meaning
         meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
         meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
@@ -38,9 +41,6 @@ def _read_columns() -> tuple[dict[str, str], dict[str, str]]:
         for column in TABLES[table].columns:
             meanings.setdefault(head + column.name, column.meaning)
     return {name: unit for name, unit in rows.items() if name.startswith("_")}, meanings
-
-
-_UNITS, _MEANINGS = _read_columns()
 
 
 def csv_files(
@@ -119,7 +119,8 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
 def column_unit(column: str) -> str:
     """Return the unit of a table's column, by the end of its name; empty where there is none."""
     name = column.removesuffix("_U95").removesuffix("_u")
-    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), "")
+    units, _ = _read_columns((*MEASURANDS.values(),))
+    return next((unit for end, unit in units.items() if name.endswith(end)), "")
 
 
 def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
@@ -178,7 +179,8 @@ def describe_column(table: str, column: str) -> tuple[str, str]:
     """Return unit and meaning of a table's column; empty where its name says all."""
     if column.endswith(("_u", "_U95")):
         return "", ""
-    meaning = _MEANINGS.get(f"{table}: {column}", _MEANINGS.get(column, ""))
+    _, meanings = _read_columns((*MEASURANDS.values(),))
+    meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
     return column_unit(column), meaning
 
 

@@ -160,7 +160,7 @@ def test_what_is_missing_is_named(bring, tmp_path):
 @pytest.mark.parametrize("u", ["nan", "-1 ppm", "50", "3 mm", ""])
 def test_an_absurd_clock_is_refused(bring, tmp_path, u):
     (line, *_) = refused(bring(f"--clock-uncertainty={u}"), tmp_path)
-    assert line.startswith("--clock-uncertainty: ")
+    assert "--clock-uncertainty: found '" in line
 
 
 def test_an_existing_session_is_never_imported_into(bring, tmp_path):
