@@ -58,9 +58,10 @@ def do_in_order(
     try:
         while batch := list(islice(remaining, _BATCH * processes)):
             with _ctrl_c_held():  # processes begin with the first tasks
-                results = executor.map(work, batch)
+                # Not a map, which cancels what is left as it is closed, and a dead pool says so.
+                results = [executor.submit(work, task) for task in batch]
             for task, result in zip(batch, results, strict=True):
-                take(task, result)
+                take(task, result.result())
     except BaseException:
         for process in multiprocessing.active_children():  # what they are at is not waited for
             process.kill()

@@ -27,7 +27,8 @@ from tests.report import fake_analysis
 def test_a_finding_counts_measures_and_compares():
     two = fake_analysis.two_chains()
     void = sum(drop.verdict == "void" for drop in two.runs)
-    counted, measured, *compared = finding(two).split(". ")
+    counted, _, rest = finding(two).partition(": ")
+    measured, *compared = rest.split(". ")
     assert counted == f"84 runs, 84 drops, {void} void"
     assert re.fullmatch(
         r"separation Δz at 30° = .* cm; .* at 80° = .* cm; .* V at 30° .*", measured
@@ -70,7 +71,7 @@ def test_a_finding_of_nothing_says_so():
     assert told == "1 run, 1 drop, 1 void. No mean can be given."
     told = finding(fake_analysis.gravity())
     assert told.endswith("g agrees with the protocol's gravity, within U.")
-    assert ". g = " in told  # G is another constant
+    assert ": g = " in told  # G is another constant
 
 
 def test_departures_from_the_plan_are_named():
