@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.records import Job
 from rig.session.schema import OLDER, TABLES, insert_statement
@@ -24,21 +24,45 @@ if TYPE_CHECKING:
 HASHED = [name for name in TABLES if name != "hash"]
 
 
-def extend_chain(connection: sqlite3.Connection) -> None:
-    """Hash all rows that no hash covers, in the open transaction."""
-    ends = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
-    last: dict[str, int] = dict(ends)
+class ChainEnd(NamedTuple):
+    """Where a chain ends: the last row of each table that it covers, and the last hash."""
+
+    last: Mapping[str, int]
+    digest: bytes
+
+
+def read_end(connection: sqlite3.Connection) -> ChainEnd:
+    """Read where the chain of a session ends, which takes time with its length."""
+    last = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
     tip = connection.execute("SELECT digest FROM hash ORDER BY id DESC LIMIT 1").fetchone()
-    digest = tip[0] if tip else b""
+    return ChainEnd(dict(last), tip[0] if tip else b"")
+
+
+def extend_chain(connection: sqlite3.Connection, end: ChainEnd | None = None) -> ChainEnd:
+    """Hash all rows that no hash covers, in the open transaction.
+
+    Parameters
+    ----------
+    end
+        Where the committed chain ends, if that is known.
+
+    Returns
+    -------
+    ChainEnd
+        Where it ends once the transaction is committed.
+    """
+    covered, digest = end or read_end(connection)
+    last = {**covered}
     for table in HASHED:
         # A table that is kept as an index has no number of its own; edges go by their drop's.
         key, then = ('"drop"', ", idx") if table == "edge" else ("rowid", "")
         sql = f'SELECT {key}, * FROM "{table}" WHERE {key} > ? ORDER BY {key}{then}'  # noqa: S608
         rows = connection.execute(sql, (last.get(table, 0),)).fetchall()
         if rows:
+            last[table] = rows[-1][0]
             digest = _digest(digest, table, (row[1:] for row in rows))
-            link = (None, table, rows[-1][0], digest)
-            connection.execute(insert_statement("hash"), link)
+            connection.execute(insert_statement("hash"), (None, table, last[table], digest))
+    return ChainEnd(last, digest)
 
 
 def check_chain(

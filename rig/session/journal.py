@@ -12,7 +12,7 @@ from typing import NamedTuple
 from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.session.faults import as_session_error
-from rig.session.hashes import extend_chain
+from rig.session.hashes import ChainEnd, extend_chain
 
 
 class Statement(NamedTuple):
@@ -55,6 +55,7 @@ class Journal:
         self._applied = 0  # how many of the pending the open transaction holds
         self._failed = False
         self._begun_s: float | None = None
+        self._chain_end: ChainEnd | None = None  # as committed, once that is known
 
     def __len__(self) -> int:
         """Count the records not yet on the disk."""
@@ -140,8 +141,9 @@ class Journal:
     def _commit(self) -> None:
         refusal = self._run()
         if self._connection.in_transaction:
-            extend_chain(self._connection)
+            end = extend_chain(self._connection, self._chain_end)
             self._connection.execute("COMMIT")
+            self._chain_end = end
         self._pending.clear()
         self._applied = 0
         self._report(refusal)
