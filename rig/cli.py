@@ -161,6 +161,7 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
         "a length above 0", lambda text: parse(text, Dimension.LENGTH).value, lambda m: m > 0.0
     ),
     "port": _accept("a device path, or a URL such as sim://", str, bool),
+    "text": _accept("words", str, lambda words: bool(words.strip())),
     "seconds": _accept("a time in seconds above 0", float, lambda s: 0.0 < s < math.inf),
     "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),
     "share": _accept(

@@ -84,12 +84,18 @@ def list_hashes(files: Mapping[str, bytes]) -> dict[str, bytes]:
 
 def pack(files: Mapping[str, bytes]) -> bytes:
     """Return the archive of some files."""
+    return zipped({ROOT + name: files[name] for name in sorted(files)}, zipfile.ZIP_STORED)
+
+
+def zipped(files: Mapping[str, bytes], compression: int = zipfile.ZIP_DEFLATED) -> bytes:
+    """Put files into an archive in their order; the same files give the same bytes."""
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
-        for name in sorted(files):
-            member = zipfile.ZipInfo(ROOT + name, _EPOCH)
+    with zipfile.ZipFile(packed, "w", compression, compresslevel=9) as archive:
+        for name, content in files.items():
+            member = zipfile.ZipInfo(name, _EPOCH)
             member.create_system = 3  # as on Unix, on every system
-            archive.writestr(member, files[name])
+            member.compress_type = compression
+            archive.writestr(member, content)
     return packed.getvalue()
 
 

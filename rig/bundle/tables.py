@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig.bundle.archive import sha256
 from rig.measurands import MEASURANDS
 from rig.reasons import sentences
 from rig.session.schema import TABLES
@@ -211,7 +211,7 @@ def _resource(table: str, text: str) -> dict[str, Any]:
         "format": "csv",
         "encoding": "utf-8",
         "bytes": len(text.encode()),
-        "hash": f"sha256:{hashlib.sha256(text.encode()).hexdigest()}",
+        "hash": f"sha256:{sha256(text.encode())}",
         "schema": {"fields": fields, "missingValues": [""]},
     }
 

@@ -1,6 +1,6 @@
 """A figure as plain data: what is drawn, and not how.
 
-Whoever draws it (`rig.report.layout` for pages and files) or writes it (`csv_table`) adds nothing
+Whoever draws it (`rig.report.plot` for pages and files) or writes it (`csv_table`) adds nothing
 to it.
 """
 

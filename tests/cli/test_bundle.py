@@ -305,6 +305,7 @@ def test_notes_and_files_are_appended_and_travel(fences, call, tmp_path):
     ("words", "said"),
     [
         (("notes", "--run", "99", "x"), "run 99 has no recorded drop"),
+        (("notes", "--run", "1", " "), "found ' '; accepted: words"),
         (("attach", "/dev/null"), "it is a device"),
         (("attach", "absent.jpg"), "No such file"),
     ],

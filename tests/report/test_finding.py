@@ -8,12 +8,12 @@ import zipfile
 from dataclasses import replace
 
 from rig.analysis.result import Audit, DropResult
+from rig.bundle.archive import zipped
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
 from rig.reasons import plain_reason
 from rig.records import Drop, Edge
-from rig.report.attachments import zipped
 from rig.report.deviations import NONE, deviations
 from rig.report.finding import finding, headline, verdict
 from rig.report.timeline import lanes, timeline
@@ -138,7 +138,7 @@ def test_a_drop_that_lasts_long_does_not_squeeze_the_others():
 
 
 def test_the_same_files_are_the_same_bytes():
-    files = {"a.csv": "run\n1\n", "b.txt": "Δz\n"}
+    files = {"a.csv": b"run\n1\n", "b.txt": "Δz\n".encode()}
     assert zipped(files) == zipped(files)
     with zipfile.ZipFile(io.BytesIO(zipped(files))) as archive:
-        assert {name: archive.read(name).decode() for name in archive.namelist()} == files
+        assert {name: archive.read(name) for name in archive.namelist()} == files
