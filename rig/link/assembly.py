@@ -57,16 +57,21 @@ class Assembly:
         self.certificate: DropCertificate | None = None
         self.reset = False
         self.first_kept = 0
-        self._events: dict[int, tuple[int, int]] = {}  # tick and state by number
+        self._raw = bytearray()  # the events' records, each at its number's place
+        self._mask = bytearray()  # 1 where there is one
 
     @property
     def begun(self) -> bool:
         """Whether anything of the drop itself was seen."""
-        return bool(self._events or self.certificate) or self.fire_tick is not None
+        return 1 in self._mask or self.fire_tick is not None or self.certificate is not None
 
     def add(self, frame: EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
-        self._events |= enumerate(frame.events, frame.first)
+        first, raw = frame.first, EVENTS.pack(frame.events)
+        end = first + len(frame.events)
+        self._reserve(end)
+        self._raw[first * EVENTS.size : end * EVENTS.size] = raw
+        self._mask[first:end] = b"\1" * (end - first)
 
     def missing(
         self, at_most: int = EVENTS_PER_FRAME, *, readable: bool = False
@@ -85,26 +90,23 @@ class Assembly:
         list of (first, count)
             Empty when nothing is missing, and while there is no certificate to say how many.
         """
-        gaps: list[tuple[int, int]] = []
         total = self.certificate.events if self.certificate else 0
-        for number in range(self.first_kept if readable else 0, total):
-            if number not in self._events:
-                first, count = gaps[-1] if gaps else (number, at_most)
-                if count < at_most and first + count == number:
-                    gaps[-1] = first, count + 1
-                else:
-                    gaps.append((number, 1))
-        return gaps
+        self._reserve(total)
+        return [
+            (at, min(at_most, end - at))
+            for first, end in self._stretches(0, self.first_kept if readable else 0, total)
+            for at in range(first, end, at_most)
+        ]
 
     def sound(self) -> bool:
         """Whether every event and the certificate are in and agree."""
-        seen = self.certificate
-        return seen is not None and not self.missing() and self._crc(seen.events) == seen.crc32
+        certificate = self.certificate
+        return certificate is not None and not self.missing() and self._crc() == certificate.crc32
 
     def forget_events(self, latest: int | None = None) -> None:
         """Drop the events, to read them again; only the latest so many, when said."""
-        first = max(0, len(self._events) - latest) if latest is not None else 0
-        self._events = {n: event for n, event in self._events.items() if n < first}
+        first = max(0, self._mask.count(1) - latest) if latest is not None else 0
+        del self._mask[first:], self._raw[first * EVENTS.size :]
 
     def drop(self, tick_hz: int) -> Drop:
         """Make the raw record of what is known now.
@@ -135,24 +137,42 @@ class Assembly:
             faults=tuple(self._faults(tick_hz)),
         )
 
-    def _crc(self, count: int) -> int:
-        """CRC-32 over so many events; none is missing."""
-        return zlib.crc32(EVENTS.pack([self._events[number] for number in range(count)]))
+    @property
+    def _end(self) -> int:
+        """One more than the last number an event can have."""
+        return self.certificate.events if self.certificate else len(self._mask)
 
-    def _edges(self, state: int, fire_tick: int | None) -> tuple[Edge, ...]:
+    def _reserve(self, end: int) -> None:
+        """Make room for the events before a number."""
+        lacking = max(0, end - len(self._mask))
+        self._mask += bytes(lacking)
+        self._raw += bytes(lacking * EVENTS.size)
+
+    def _stretches(self, value: int, first: int, end: int) -> Iterator[tuple[int, int]]:
+        """List from where to where events are there (1) or not (0)."""
+        first = self._mask.find(value, first, end)
+        while first >= 0:
+            stop = self._mask.find(1 - value, first, end)
+            yield first, end if stop < 0 else stop
+            first = self._mask.find(value, stop, end) if stop >= 0 else -1
+
+    def _crc(self) -> int:
+        """CRC-32 over all events; none is missing."""
+        return zlib.crc32(self._raw[: self._end * EVENTS.size])
+
+    def _edges(self, initial: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
             return ()
-        seen = self.certificate
+        gates = self.certificate.gates if self.certificate else self.gates
         rows: list[tuple[int, int, bool]] = []
-        due = 0
-        for number, event in sorted(self._events.items()):
-            if seen and number >= seen.events:
-                break
-            # Behind a gap it is not known when the gates changed: no edge is better than a
-            # wrong one.
-            before = state if number == due else event[1]
-            rows += edges([event], before, seen.gates if seen else self.gates, fire_tick)
-            state, due = event[1], number + 1
+        for first, end in self._stretches(1, 0, min(self._end, len(self._mask))):
+            raw = self._raw[first * EVENTS.size : end * EVENTS.size]
+            events, state = EVENTS.layout.iter_unpack(raw), initial
+            if first:
+                # Behind a gap it is not known when the gates changed: no edge is better than a
+                # wrong one.
+                _, state = next(events)
+            rows += edges(events, state, gates, fire_tick)
         return tuple(map(Edge._make, rows))
 
     def _faults(self, tick_hz: int) -> Iterator[Reason]:
@@ -170,7 +190,7 @@ class Assembly:
             code = "events_overwritten" if first < self.first_kept else "events_missing"
             missing = sum(count for _, count in gaps)
             yield make_reason(code, missing=missing, events=seen.events, first=first)
-        elif self._crc(seen.events) != seen.crc32:
+        elif self._crc() != seen.crc32:
             yield make_reason("crc_mismatch")
         if seen.overflows:
             yield make_reason("edges_lost", lost=seen.overflows)

@@ -39,7 +39,7 @@ from rig.link.wiretypes import (
     MessageError,
     Name,
     UniqueId,
-    read_payload,
+    payload_reader,
     wire_fields,
     write_field,
 )
@@ -389,6 +389,7 @@ class DropCertificate2(DropCertificate):
 
 CODES = {message: code for code, message in TABLE.items()}
 FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}
+_READERS = {kind: payload_reader(fields) for kind, fields in FIELDS.items()}
 
 
 def pack(message: Message) -> tuple[int, bytes]:
@@ -435,7 +436,7 @@ def unpack(code: int, payload: bytes) -> Message:
     kind: type[Any] | None = TABLE.get(code)
     if kind is None:
         raise MessageError(f"unknown message code 0x{code:02X}")
-    message: Message = kind(*read_payload(FIELDS[kind], payload))
+    message: Message = kind(*_READERS[kind](payload))
     return message
 
 

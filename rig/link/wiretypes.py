@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import struct
 import typing
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from itertools import takewhile
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias, overload
 
 from rig.errors import DeviceError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import SupportsIndex
 
 
 class MessageError(DeviceError, ValueError):
@@ -36,6 +41,11 @@ class Unsigned:
         return struct.unpack_from("<" + self.code, payload, at)[0], at + self.size
 
 
+def layout(scalars: Iterable[Unsigned]) -> struct.Struct:
+    """Put numbers behind each other, without padding."""
+    return struct.Struct("<" + "".join(scalar.code for scalar in scalars))
+
+
 class Event(NamedTuple):
     """One snapshot: the device's tick (u32) and the gates' state after the change (1 = blocked)."""
 
@@ -51,21 +61,82 @@ class Tail:
 
     @cached_property
     def layout(self) -> struct.Struct:
-        """One record as a `struct`, without padding."""
-        return struct.Struct("<" + "".join(scalar.code for scalar in self.scalars))
+        """One record as a `struct`."""
+        return layout(self.scalars)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Bytes of one record."""
         return self.layout.size
 
     def pack(self, events: Iterable[tuple[int, int]]) -> bytes:
-        """Write events."""
+        """Write events.
+
+        Raises
+        ------
+        struct.error
+            When a value does not fit.
+        """
+        if isinstance(events, Events):
+            return events.raw
         return b"".join([self.layout.pack(*event) for event in events])
 
-    def unpack(self, payload: bytes, at: int) -> tuple[tuple[Event, ...], int]:
+    def unpack(self, payload: bytes, at: int) -> tuple[Events, int]:
         """Read all that is left."""
-        return tuple(map(Event._make, self.layout.iter_unpack(payload[at:]))), len(payload)
+        return Events(self, payload[at:]), len(payload)
+
+    def rows(self, events: Sequence[Event]) -> Iterable[tuple[int, int]]:
+        """Give ticks and states, which is much faster than single `Event`."""
+        return self.layout.iter_unpack(events.raw) if isinstance(events, Events) else events
+
+
+class Events(Sequence[Event]):
+    """Events that are read when somebody looks at them; a record is made of many and needs none.
+
+    Parameters
+    ----------
+    tail
+        How they are on the wire.
+    raw
+        Whole records.
+
+    Raises
+    ------
+    ValueError
+        The last record is cut short.
+    """
+
+    __slots__ = ("_tail", "raw")
+
+    def __init__(self, tail: Tail, raw: bytes) -> None:
+        if len(raw) % tail.size:
+            raise ValueError(f"the last of the {tail.size}-byte records is cut short")
+        self._tail = tail
+        self.raw = raw
+
+    def __len__(self) -> int:
+        return len(self.raw) // self._tail.size
+
+    def __iter__(self) -> Iterator[Event]:
+        return map(Event._make, self._tail.layout.iter_unpack(self.raw))
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> Event: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Event, ...]: ...
+    def __getitem__(self, index: Any) -> Any:
+        return tuple(self)[index]
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Events):
+            return self.raw == other.raw
+        return tuple(self) == other
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,28 +250,70 @@ def write_field(field: Field, value: Any) -> bytes:
         raise MessageError(f"{field.name}={value!r} does not fit: {error}") from error
 
 
-def read_payload(fields: Iterable[Field], payload: bytes) -> list[Any]:
-    """Read the values of all fields of a message.
+def read_field(field: Field, payload: bytes, at: int) -> tuple[Any, int]:
+    """Read one value.
 
     Parameters
     ----------
-    fields
-        Of the message, in wire order.
+    field
+        Which field.
     payload
         The whole payload.
+    at
+        Where the field starts.
+
+    Returns
+    -------
+    value, int
+        The value, and where the next field starts.
 
     Raises
     ------
     MessageError
-        When the payload ends too soon or too late, or a value is not one of its field's.
+        When the payload ends too soon or the value is not one of the field's.
     """
-    values, at = list[Any](), 0
-    for field in fields:
+    try:
+        value, end = field.wire.unpack(payload, at)
+        return field.python(value) if isinstance(field.wire, Unsigned) else value, end
+    except (struct.error, IndexError, ValueError) as error:
+        raise MessageError(f"bad {field.name}: {error}") from error
+
+
+def payload_reader(fields: Sequence[Field]) -> Callable[[bytes], list[Any]]:
+    """Make what reads a whole payload: numbers at its beginning at once, the rest by `read_field`.
+
+    Parameters
+    ----------
+    fields
+        Of a message.
+
+    Returns
+    -------
+    callable
+        From a payload to the fields' values; raises `MessageError` where `read_field` does, and
+        when bytes are left over.
+    """
+    scalars = [f.wire for f in takewhile(lambda f: isinstance(f.wire, Unsigned), fields)]
+    head = layout([wire for wire in scalars if isinstance(wire, Unsigned)])
+    names = [(n, f.python) for n, f in enumerate(fields[: len(scalars)]) if f.python is not int]
+    rest = fields[len(scalars) :]
+
+    def read(payload: bytes) -> list[Any]:
         try:
-            value, at = field.wire.unpack(payload, at)
-            values.append(field.python(value) if isinstance(field.wire, Unsigned) else value)
-        except (struct.error, IndexError, ValueError) as error:
-            raise MessageError(f"bad {field.name}: {error}") from error
+            values: list[Any] = [*head.unpack_from(payload)]
+            for number, python in names:
+                values[number] = python(values[number])
+        except (struct.error, ValueError):
+            return _one_by_one(fields, payload, [], 0)  # it says which field is wrong
+        return _one_by_one(rest, payload, values, head.size)
+
+    return read
+
+
+def _one_by_one(fields: Sequence[Field], payload: bytes, values: list[Any], at: int) -> list[Any]:
+    for field in fields:
+        value, at = read_field(field, payload, at)
+        values.append(value)
     if at != len(payload):
         raise MessageError(f"{len(payload) - at} bytes too many")
     return values

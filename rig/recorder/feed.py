@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Received
+from rig.link.wiretypes import EVENTS
 from rig.reasons import published_reasons
 from rig.session.schema import RunState
 
@@ -117,7 +118,8 @@ class StateFeed:
     def _events(self, frame: wire.EventsFrame) -> None:
         if frame.first < self._next or self._fire_tick is None:
             return
-        events, state = frame.events, self._state
+        events = list(EVENTS.rows(frame.events))
+        state = self._state
         if frame.first > self._next and events:
             state = events[0][1]  # it is not known when the gates changed
         found = edges(events, state, ALL_GATES, self._fire_tick)
