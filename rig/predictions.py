@@ -6,7 +6,6 @@ Mechanics that a scene does not have are not loaded.
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
@@ -270,7 +269,7 @@ def air_shares(protocol: Protocol) -> dict[str, list[float]]:
         chains = protocol.chains.values()
         if any(min(rods.diameters, default=0.0) == 0.0 for rods in chains):
             return {name: [1.0] * rods.chain.rods for name, rods in protocol.chains.items()}
-        measured = not any(isnan(rods.rod_length) for rods in chains)
+        measured = all(rods.rod_length for rods in chains)
         weighed = measured and all(rods.weighed for rods in chains)
         shares = {
             name: _per_mass(rods, rods.rod_length if measured else 1.0, weighed=weighed)

@@ -26,7 +26,7 @@ def air(protocol: Protocol, drag: float) -> dict[str, list[float]]:
         kappa = protocol.gravity.value / stated.terminal_speed.value**2 + drag
         return {name: [kappa] * rods.chain.rods for name, rods in protocol.chains.items()}
     sizes_known = all(rods.diameters and min(rods.diameters) > 0.0 for rods in chains)
-    sized = sizes_known and not any(math.isnan(rods.rod_length) for rods in chains)
+    sized = sizes_known and all(rods.rod_length for rods in chains)
     weighed = sized and all(rods.weighed for rods in chains)
     per_mass = {
         name: _legs(rods, sizes_known=sizes_known, sized=sized, weighed=weighed)

@@ -225,7 +225,7 @@ class ResolvedLab(ChainLab):
 
     def _nominal(self, spec: RodChain) -> Rods:
         diameters = np.array(spec.diameters)
-        length = ROD_LENGTH if math.isnan(spec.rod_length) else spec.rod_length
+        length = spec.rod_length or ROD_LENGTH
         masses = np.array(spec.chain.masses)
         if not spec.weighed:
             masses = self.world.density * math.pi / 4.0 * diameters**2 * length

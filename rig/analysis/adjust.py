@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -93,11 +93,6 @@ class Estimate:
     def degrees(self) -> float:
         """Degrees of freedom: edges less the unknowns that they determine."""
         return self.edges - self.x.size + float(np.sum(self.inverse**2))
-
-    def kept(self) -> Estimate:
-        """Return the same in little memory."""
-        rows = {role: block.triangle() for role, block in self.rows.items()}
-        return replace(self, rows=rows)
 
 
 def adjust(

@@ -147,8 +147,9 @@ class Pairing:
 
     Attributes
     ----------
-    times, number
-        Of every observed edge, gate by gate, and its number in its train.
+    times, burst, number
+        Of every observed edge, gate by gate, see `rig.analysis.chain_records.EdgeTrain`; and its
+        number in its train.
     kind
         Of each: twice the number of its train, and one more where it darkens the beam.
     other
@@ -157,17 +158,19 @@ class Pairing:
         Of every expected edge.
     widths
         Of their rods, m.
-    ends
-        Number of expected edges after each train.
+    begins, ends
+        Number of observed edges before each train, and of expected ones after each.
     """
 
     times: Array
+    burst: Array
     number: Index
     kind: Index
     other: Index
     kinds: Index
     rods: Index
     widths: Array
+    begins: Index
     ends: Index
 
     @classmethod
@@ -191,14 +194,23 @@ class Pairing:
         partner[begins], partner[begins + 1] = begins + 1, begins
         return cls(
             np.concatenate([np.zeros(0), *(train.times for train in trains)]),
+            np.concatenate([np.zeros(0), *(train.burst for train in trains)]),
             np.concatenate([none, *(np.arange(train.times.size) for train in trains)]),
             kind,
             partner,
             kinds,
             rods,
             np.array(widths)[rods] if widths else np.full(rods.size, np.inf),
+            np.cumsum([0, *(train.times.size for train in trains)], dtype=np.intp)[:-1],
             np.cumsum([train.rods.size for train in trains], dtype=np.intp),
         )
+
+    def observed(self, matches: Sequence[Index]) -> tuple[Index, Index]:
+        """Expected edges that are matched, and the observed edge of each."""
+        match = np.concatenate(matches)
+        begins = np.repeat(self.begins, [match_of.size for match_of in matches])
+        pick = np.flatnonzero(match >= 0)
+        return pick, (match + begins)[pick]
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:

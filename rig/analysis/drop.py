@@ -16,7 +16,7 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise
-from rig.analysis.fit import timed
+from rig.analysis.fit import Matched, timed
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identified import identified
 from rig.analysis.joint_fit import by_itself
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
-    from rig.analysis.fit import Fit
+    from rig.analysis.fit import Begun, Fit
     from rig.analysis.identified import Identified
     from rig.analysis.result import Deviation
     from rig.clock.calibration import TimeScale
@@ -62,7 +62,7 @@ class DropSummary:
     identified
         Which rods its edges are, by the gates that are left out; nothing of a damaged record.
     aside
-        Which are; `None` where nothing was fitted.
+        Which are; `None` where no fit came to an end.
     x
         The unknowns, as they were adjusted; shape ``(unknowns,)``.
     deviations
@@ -132,19 +132,22 @@ class DropCase(NamedTuple):
         if fit is not None:
             if result.verdict in GOOD:
                 result = replace(result, gravity=free_gravity(fit))
-            records, x = fit.model.records.values(), fit.x
-            aside = tuple(train.gate for record in records for train in record.aside)
+            if fit.estimate.settled:
+                records, x = fit.model.records.values(), fit.x
+                aside = tuple(train.gate for record in records for train in record.aside)
         deviations = {name: value.deviation for name, value in result.quantities.items()}
         return DropSummary(self.scale, explain, result, readings, aside, x, deviations)
 
     @one_thread
-    def fit(self, summary: DropSummary) -> Fit | None:
-        """Make again the fit that a summary was made from; `None` where nothing was fitted."""
+    def adjusted(self, summary: DropSummary) -> Matched | None:
+        """Return where a summary left the drop; `None` where no fit of it came to an end."""
         aside = summary.aside
         if aside is None:
             return None
         case = self._at_contact()._replace(aside=aside)
-        return case._timed(case._records(), summary.identified[aside], summary.x)
+        begun = summary.identified[aside].begun
+        assert begun is not None
+        return Matched(case._model(case._records(), begun), begun.matches, summary.x)
 
     @one_thread
     def read(
@@ -185,16 +188,8 @@ class DropCase(NamedTuple):
     def _records(self) -> list[ChainRecord]:
         return chain_records(self.protocol, self.run, self.drop, self.scale.hz, self.aside)
 
-    def _timed(
-        self, records: Sequence[ChainRecord], identified: Identified, x: Array | None = None
-    ) -> Fit:
-        """Adjust at this time scale what was identified, or was adjusted before at this one."""
-        begun = identified.begun
-        assert begun is not None
-        model = DropModel(self.protocol, records, begun.guesses, self.scale.u, self.components)
-        if x is not None:
-            return timed(model, begun._replace(x=x), 1.0)
-        return timed(model, begun, self.scale.hz / identified.scale.hz)
+    def _model(self, records: Sequence[ChainRecord], begun: Begun) -> DropModel:
+        return DropModel.of(self.protocol, records, begun.guesses, self.scale.u, self.components)
 
     def _read(
         self, readings: dict[tuple[int, ...], Identified], *, explain: bool
@@ -219,7 +214,8 @@ class DropCase(NamedTuple):
                     readings[aside] = reading
                 reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, early.verdict, reasons, audit), None
-        fit = self._timed(records, reading)
+        begun = reading.begun
+        fit = timed(self._model(records, begun), begun, scale.hz / reading.scale.hz)
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.matched, count_unexplained(unmatched))
         joint = by_itself(fit)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import Pairing
+from rig.analysis.annealing import Guess, Pairing
 from rig.analysis.components import Components, stated
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.annealing import Guess
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.trajectory import Trajectory
     from rig.analysis.unknowns import Unknown
@@ -59,6 +59,8 @@ class DropModel:
         Relative standard uncertainty of the time scale.
     components
         How much everything scatters; as the protocol states it if not given.
+
+    See `DropModel.of`, which is quicker where many drops are alike.
 
     Attributes
     ----------
@@ -89,16 +91,38 @@ class DropModel:
         self.expected: dict[str, Expected] = {
             role: Expected.of(record, protocol) for role, record in self.records.items()
         }
-        self.pairings: dict[str, Pairing] = {
-            role: Pairing.of(record.trains, _widths(record))
-            for role, record in self.records.items()
-        }
+        self.pairings: dict[str, Pairing] = _pairings(records)
         if "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
             self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
         self._held: dict[tuple[str, str], tuple[object, Any]] = {}
         self.unknowns = Unknowns(self)
         self.slopes = {role: side_slopes(self, role) for role in self.records}
+
+    @classmethod
+    def of(
+        cls,
+        protocol: Protocol,
+        records: Sequence[ChainRecord],
+        guesses: Mapping[str, Guess] | None,
+        clock_u: float,
+        components: Components | None = None,
+    ) -> DropModel:
+        """Return a drop's model; what all drops of its condition have in common is made once.
+
+        Parameters
+        ----------
+        guesses
+            `None` for a drop that begins as stated.
+        """
+        content = tuple(map(_expectations, records))
+        return _model_of(_Condition(protocol, content, tuple(records))).changed(
+            records={record.role: record for record in records},
+            pairings=_pairings(records),
+            guesses=stated_guesses(protocol, records) if guesses is None else guesses,
+            clock_u=clock_u,
+            components=components or stated(protocol),
+        )
 
     def changed(self, **attributes: Any) -> DropModel:
         """Return the same drop with something else about it, and priors that follow."""
@@ -160,9 +184,9 @@ class DropModel:
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
         """Return the same drop with its edges moved in time, by so many seconds each."""
         return self.changed(
-            expected={
-                role: expected._replace(times=expected.times + shifts[role])
-                for role, expected in self.expected.items()
+            pairings={
+                role: replace(pairing, times=pairing.times + shifts[role])
+                for role, pairing in self.pairings.items()
             }
         )
 
@@ -256,7 +280,10 @@ class DropModel:
         """Collect the matched edges; a matching stays for many steps of an adjustment."""
 
         def seen() -> tuple[Sequence[Index], Seen]:
-            return matches, self.expected[role].seen(matches)  # held, so that no other is the same
+            pairing = self.pairings[role]
+            pick, edge = pairing.observed(matches)
+            seen = self.expected[role].seen(pick, pairing.times[edge], pairing.burst[edge])
+            return matches, seen  # held, so that no other is the same
 
         return self._last("matched", role, id(matches), seen)[1]
 
@@ -339,6 +366,40 @@ class DropModel:
         slopes[second] -= carried[second, None] * slopes[second - 1]
         residuals = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
         return Equations(residuals, carried, slopes, acts.columns)
+
+
+@dataclass(frozen=True)
+class _Condition:
+    """What a model depends on, but for the edges that came; `records` are of any such drop."""
+
+    protocol: Protocol
+    content: tuple[object, ...]
+    records: tuple[ChainRecord, ...] = field(compare=False)
+
+
+@lru_cache(maxsize=64)
+def _model_of(condition: _Condition) -> DropModel:
+    protocol, records = condition.protocol, condition.records
+    return DropModel(protocol, records, stated_guesses(protocol, records), 0.0)
+
+
+def _expectations(record: ChainRecord) -> tuple[object, ...]:
+    """Everything that a record has but its edges."""
+    arrays = [record.air, *(() if record.ratios is None else (record.ratios,))]
+    arrays += [part for train in record.trains for part in (train.rods, train.blocks, train.levels)]
+    gates = *(train.gate for train in record.trains), *(train.gate for train in record.aside)
+    fields = record.role, record.chain, record.alpha, record.condition, record.higher
+    return (*fields, gates, len(record.trains), *(array.tobytes() for array in arrays))
+
+
+def stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
+    """Let chains begin as stated."""
+    kappa, _ = prior_air(protocol)
+    return {record.role: Guess(0.0, protocol.drop.value, record.alpha, kappa) for record in records}
+
+
+def _pairings(records: Sequence[ChainRecord]) -> dict[str, Pairing]:
+    return {record.role: Pairing.of(record.trains, _widths(record)) for record in records}
 
 
 def _widths(record: ChainRecord) -> Sequence[float]:

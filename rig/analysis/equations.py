@@ -104,8 +104,6 @@ class Expected(NamedTuple):
 
     Attributes
     ----------
-    times, burst
-        Of every observed edge, see `rig.analysis.chain_records.EdgeTrain`.
     rods, gate, levels
         Of every expected edge.
     sign
@@ -118,12 +116,10 @@ class Expected(NamedTuple):
         Whether all rods below have struck: only the top rod falls.
     landed
         How much higher its rod may be there because it struck before, m; one standard deviation.
-    begins, ends
-        Number of observed edges before each gate, and of expected ones after each.
+    ends
+        Number of expected edges after each gate.
     """
 
-    times: Array
-    burst: Array
     rods: Index
     gate: Index
     levels: Array
@@ -132,14 +128,12 @@ class Expected(NamedTuple):
     drawn: Array
     alone: Flags
     landed: Array
-    begins: Index
     ends: Index
 
     @classmethod
     def of(cls, record: ChainRecord, protocol: Protocol) -> Expected:
         """Join the gates of a side."""
         trains, strikes = record.trains, record.strikes
-        observed = np.array([train.times.size for train in trains])
         expected = [train.rods.size for train in trains]
         rods = np.concatenate([train.rods for train in trains])
         levels = np.concatenate([train.levels for train in trains])
@@ -156,8 +150,6 @@ class Expected(NamedTuple):
         if record.ratios is not None:
             to_strike = levels + strikes[rods] - protocol.contact.strike.value
         return cls(
-            np.concatenate([train.times for train in trains]),
-            np.concatenate([train.burst for train in trains]),
             rods,
             np.repeat([train.gate for train in trains], expected),
             levels,
@@ -166,25 +158,16 @@ class Expected(NamedTuple):
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             last_falling,
             _landed(u, to_strike),
-            np.cumsum(observed) - observed,
             np.cumsum(expected),
         )
 
-    def chosen(self, matches: Sequence[Index]) -> tuple[Index, Index]:
-        """Expected edges that are matched, and the observed edge of each."""
-        match = np.concatenate(matches)
-        begins = np.repeat(self.begins, [match_of.size for match_of in matches])
-        pick = np.flatnonzero(match >= 0)
-        return pick, (match + begins)[pick]
-
-    def seen(self, matches: Sequence[Index]) -> Seen:
-        """Join the expected edges that are matched and the observed edge of each."""
-        pick, edge = self.chosen(matches)
+    def seen(self, pick: Index, times: Array, burst: Array) -> Seen:
+        """Join the expected edges that are matched and what was observed of each."""
         paired = np.zeros(pick.size, dtype=np.bool_)
         rods, gate = self.rods[pick], self.gate[pick]
         paired[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
         last_falling, landed = self.alone[pick], self.landed[pick]
-        return Seen(pick, self.times[edge], self.burst[edge], last_falling, landed, paired)
+        return Seen(pick, times, burst, last_falling, landed, paired)
 
 
 def _landed(u: Array, to_strike: Array) -> Array:

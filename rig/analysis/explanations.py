@@ -311,7 +311,7 @@ class Explainer:
             return None  # it is better read for another reason than that
         premise = fault.premise(self.setting, size + further)
         if not last and self._expects_others(premise, model):
-            moved = DropModel(
+            moved = DropModel.of(
                 premise.protocol,
                 self._records(premise),
                 model.guesses,

@@ -40,10 +40,17 @@ def count_matched(side: Sequence[Index]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Matched:
-    """A drop's unknowns, and which edge is which rod."""
+    """A drop's unknowns, and which edge is which rod.
+
+    Attributes
+    ----------
+    x
+        The unknowns, as they were adjusted; shape ``(unknowns,)``.
+    """
 
     model: DropModel
     matches: Matches
+    x: Array
 
     @property
     def matched(self) -> int:
@@ -68,11 +75,6 @@ class Fit(Matched):
     """A drop adjusted by itself."""
 
     estimate: Estimate
-
-    @property
-    def x(self) -> Array:
-        """Unknowns of that adjustment."""
-        return self.estimate.x
 
 
 def settle(model: DropModel, matches: Matches | None = None, x: Array | None = None) -> Fit:
@@ -99,7 +101,7 @@ def settle(model: DropModel, matches: Matches | None = None, x: Array | None = N
         estimate = adjust(model, matches, estimate.x, done=CLOSE)
         if alike:
             break
-    return Fit(model, matches, estimate)
+    return Fit(model, matches, estimate.x, estimate)
 
 
 class Begun(NamedTuple):
@@ -122,8 +124,13 @@ def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
     """
     x, clock = begun.x.copy(), model.unknowns["clock"]
     x[clock] = (1.0 + x[clock]) * rate - 1.0
-    estimate = adjust(model, begun.matches, x)
-    return Fit(model, begun.matches, estimate.kept())
+    return alone(Matched(model, begun.matches, x))
+
+
+def alone(drop: Matched) -> Fit:
+    """Adjust a drop by itself from where it is, each edge staying the rod it is."""
+    estimate = adjust(drop.model, drop.matches, drop.x.copy())
+    return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 
 def match(model: DropModel, x: Array) -> Matches:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, SideFall, log_density
-from rig.analysis.drop_model import DropModel, prior_air
+from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY, scaled
 from rig.analysis.fit import Fit, count_matched, settle
 from rig.protocol.gates import CLEARANCE_M
@@ -121,7 +121,7 @@ def identify(
     batches
         How many batches of starts are tried at most, the likeliest first.
     """
-    model = stated_model(protocol, records, clock_u, components)
+    model = DropModel.of(protocol, records, None, clock_u, components)
     readings = {role: _read(SideFall.of(model, role), window, batches) for role in model.records}
     # Likelier than that all edges are strays and every rod was missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
@@ -145,7 +145,7 @@ def most_votes(
     protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
 ) -> int:
     """Count the expected edges of a side that agree on one fall near the stated one, at most."""
-    model = stated_model(protocol, [record], clock_u, components)
+    model = DropModel.of(protocol, [record], None, clock_u, components)
     return SideFall.of(model, record.role).most_votes()
 
 
@@ -168,17 +168,6 @@ def possible(record: ChainRecord) -> int:
         for train in record.trains
         for dark in (True, False)
     )
-
-
-def stated_model(
-    protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
-) -> DropModel:
-    """Model a drop that begins as stated."""
-    kappa, _ = prior_air(protocol)
-    guesses: dict[str, Guess] = {
-        record.role: Guess(0.0, protocol.drop.value, record.alpha, kappa) for record in records
-    }
-    return DropModel(protocol, records, guesses, clock_u, components)
 
 
 def _read(fall: SideFall, window: Span, batches: int | None) -> list[Annealed]:

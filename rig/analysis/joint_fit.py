@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.analysis.equations import Residuals
-    from rig.analysis.fit import Fit
+    from rig.analysis.fit import Fit, Matched
     from rig.analysis.likeness import Likeness
 
     Array = NDArray[np.float64]
@@ -162,7 +162,7 @@ def by_itself(fit: Fit) -> JointFit:
 
 
 @one_thread
-def joint_fit(fits: Sequence[Fit | JointDrop]) -> JointFit:
+def joint_fit(fits: Sequence[Matched]) -> JointFit:
     """Adjust all drops of a session together.
 
     Parameters

@@ -9,14 +9,13 @@ import numpy as np
 
 from rig.analysis.equations import STRAY, linearize, scaled
 from rig.analysis.fit import Matched
-from rig.analysis.square_root import eliminate, square_root
+from rig.analysis.square_root import RowSum, eliminate, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rig.analysis.fit import Fit
     from rig.analysis.square_root import Root
     from rig.analysis.unknowns import SharedUnknowns
 
@@ -30,8 +29,6 @@ class JointDrop(Matched):
 
     Attributes
     ----------
-    x
-        Its unknowns, the common ones included.
     own, common, here
         Its own unknowns and the common ones in the drop's vector, and the latter in the session's.
     inverse, gain
@@ -42,7 +39,6 @@ class JointDrop(Matched):
         Prior means of its own unknowns, zero if not given.
     """
 
-    x: Array
     own: Index
     common: Index
     here: Index
@@ -52,7 +48,7 @@ class JointDrop(Matched):
     centre: Array | None = None
 
     @classmethod
-    def of(cls, fit: Fit | JointDrop, shared: SharedUnknowns) -> JointDrop:
+    def of(cls, fit: Matched, shared: SharedUnknowns) -> JointDrop:
         """Take a drop as it was adjusted by itself, or among others before."""
         common, places = shared.places(fit.model)
         own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
@@ -90,17 +86,17 @@ def joint_step(
     Root, list of JointDrop
         In units of `sd`; and the drops with their own unknowns eliminated.
     """
-    rows, reduced = [], []
+    rows, reduced = RowSum(x.size), []
     for drop in drops:
         own_sd, pull = drop.model.unknowns.sd, np.zeros(drop.x.size)
         off = drop.x[drop.own] if drop.centre is None else drop.x[drop.own] - drop.centre
         pull[drop.own] = scaled(off, own_sd[drop.own])
         blocks = [*linearize(drop.model, drop.matches, drop.x, cut=cut).rows.values()]
         inverse, gain, target, rest = eliminate(blocks, own_sd, pull, drop.own, drop.common)
-        rows.append(rest._replace(columns=drop.here))
+        rows.add(rest._replace(columns=drop.here))
         reduced.append(replace(drop, inverse=inverse, gain=gain, target=target))
     pull = scaled(x if centre is None else x - centre, sd)
-    return square_root(rows, np.ones(x.size), pull), reduced
+    return square_root([rows.rows()], np.ones(x.size), pull), reduced
 
 
 def take(

@@ -104,8 +104,9 @@ def _passages(fit: Fit, role: str, when: float | None = None) -> _Passages:
     """Collect a side's matched edges about some time, or at last, as passages of its top rod."""
     model = fit.model
     expected, nominal = model.expected[role], Adjusted(model, np.zeros(fit.x.size))
-    pick, edge = expected.chosen(fit.matches[role])
-    times = expected.times[edge] * model.rate(fit.x)
+    pairing = model.pairings[role]
+    pick, edge = pairing.observed(fit.matches[role])
+    times = pairing.times[edge] * model.rate(fit.x)
     chosen = expected.alone[pick] if when is None else np.abs(times - when) < _NEAR
     pick, times = pick[chosen], times[chosen]
     # The reference is at the level when the edge comes, and the top rod as much higher.

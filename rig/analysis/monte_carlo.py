@@ -302,9 +302,9 @@ def _shaker(drop: Fit | JointDrop, scale: float = 1.0) -> Callable[[Generator], 
     """Return what draws by how much every matched edge moves, with a scatter so much larger."""
     sides = []
     for role, matches in drop.matches.items():
-        rows, expected = drop.model.equations(role, drop.x, matches), drop.model.expected[role]
-        moved = expected.chosen(matches)[1], rows.residuals.speed, rows.residuals.sigma * scale
-        sides.append((role, expected.times.size, *moved, rows.told))
+        rows, pairing = drop.model.equations(role, drop.x, matches), drop.model.pairings[role]
+        moved = pairing.observed(matches)[1], rows.residuals.speed, rows.residuals.sigma * scale
+        sides.append((role, pairing.times.size, *moved, rows.told))
 
     def shake(rng: Generator) -> DropModel:
         times = {}

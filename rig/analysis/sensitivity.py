@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.adjust import adjust
 from rig.analysis.budgets import Budgets
-from rig.analysis.fit import Fit
+from rig.analysis.fit import alone
 from rig.analysis.joint_fit import by_itself, joint_fit
 from rig.analysis.summary import summarize
 from rig.protocol.protocol import Priors
@@ -63,10 +62,7 @@ def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
         for key, drop in analysis.adjusted.items()
     }
     if analysis.joint is None:
-        joints = [
-            by_itself(Fit(fit.model, fit.matches, adjust(fit.model, fit.matches, fit.x.copy())))
-            for fit in drops.values()
-        ]
+        joints = [by_itself(alone(drop)) for drop in drops.values()]
     else:
         joints = [joint_fit(list(drops.values()))]
         if not joints[0].settled:

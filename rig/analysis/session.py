@@ -10,7 +10,9 @@ from typing import Protocol as Interface
 from rig.analysis.budgets import Budgets
 from rig.analysis.drop import DropCase
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
+from rig.analysis.fit import alone
 from rig.analysis.joint_fit import FEWEST, joint_fit
+from rig.analysis.joint_step import JointDrop
 from rig.analysis.pairs import Effects, effects
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.processes import do_in_order
@@ -27,9 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.drop import DropSummary
-    from rig.analysis.fit import Fit
+    from rig.analysis.fit import Fit, Matched
     from rig.analysis.joint_fit import JointFit, RigEstimate
-    from rig.analysis.joint_step import JointDrop
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
@@ -160,7 +161,7 @@ def analyze(
     summaries, rejected = {} if summaries is None else summaries, rejected or {}
     total = length_hint(drops) if total is None else total
     results: list[DropResult] = []
-    fits: list[Fit | None] = []
+    drops_adjusted: list[Matched | None] = []
     unexplained = 0
 
     def take(task: tuple[DropCase, DropSummary | None], summary: DropSummary) -> None:
@@ -175,7 +176,7 @@ def analyze(
             summaries[case.drop] = summary
         result = overruled(summary.result, rejected.get((case.run.number, case.drop.attempt)))
         results.append(result)
-        fits.append(case.fit(summary) if joins(protocol, result) else None)
+        drops_adjusted.append(case.adjusted(summary) if joins(protocol, result) else None)
         if progress is not None:
             progress(len(results), total)
 
@@ -183,7 +184,7 @@ def analyze(
     do_in_order(
         _summarize, ((case, summaries.get(case.drop)) for case in cases), take, total, processes
     )
-    return gather(protocol, results, fits)
+    return gather(protocol, results, drops_adjusted)
 
 
 def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
@@ -226,7 +227,7 @@ def joins(protocol: Protocol, result: DropResult) -> bool:
 
 @one_thread
 def gather(
-    protocol: Protocol, results: Sequence[DropResult], fits: Sequence[Fit | None]
+    protocol: Protocol, results: Sequence[DropResult], drops: Sequence[Matched | None]
 ) -> Analysis:
     """Fit drops together that were analysed one by one, and sum up.
 
@@ -234,13 +235,13 @@ def gather(
     ----------
     protocol
         The scene and its plan.
-    results, fits
-        Of each drop by itself; `None` for the fit of one that does not join.
+    results, drops
+        Of each by itself; `None` for the unknowns of one that does not join.
     """
-    good = {n: fit for n, fit in enumerate(fits) if fit is not None and fit.estimate.settled}
+    good = {n: drop for n, drop in enumerate(drops) if drop is not None}
     together = fit_together(dict(enumerate(results)), good)
     adjusted = {
-        (result.run.number, result.attempt): drop
+        (result.run.number, result.attempt): drop if isinstance(drop, JointDrop) else alone(drop)
         for n, drop in together.drops.items()
         if (result := together.results[n]).verdict in GOOD
     }
@@ -294,13 +295,11 @@ class FittedTogether(NamedTuple, Generic[K]):
 
     joint: JointFit | None
     results: dict[K, DropResult]
-    drops: Mapping[K, Fit | JointDrop]
+    drops: Mapping[K, Matched]
     settled: bool = True
 
 
-def fit_together(
-    results: Mapping[K, DropResult], drops: Mapping[K, Fit | JointDrop]
-) -> FittedTogether[K]:
+def fit_together(results: Mapping[K, DropResult], drops: Mapping[K, Matched]) -> FittedTogether[K]:
     """Give good drops the numbers that they have in the light of all of them.
 
     A verdict is on a drop by itself, by limits fixed beforehand: what others say of the rig

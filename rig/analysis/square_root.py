@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     Index = NDArray[np.intp]
 
 
+_MANY = 16
+"""Rows an unknown that are reduced at once: as quick as all of them, and a few MB."""
+
+
 class EquationRows(NamedTuple):
     """Observations in standard deviations: for a step d they leave ``left + slopes @ d[columns]``.
 
@@ -73,6 +77,31 @@ class Root(NamedTuple):
         stack[size + np.arange(size), np.arange(size)] = np.sqrt(damping) * lengths
         stack = triangle(stack)
         return Root(stack[:size, :size], stack[:size, size])
+
+
+class RowSum:
+    """Rows of many blocks in few: more than some are reduced to a triangle as they come.
+
+    Parameters
+    ----------
+    size
+        Number of unknowns.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._columns = np.arange(size, dtype=np.intp)
+        self._blocks: list[EquationRows] = []
+
+    def add(self, block: EquationRows) -> None:
+        """Count a block's rows."""
+        self._blocks.append(block)
+        if sum(block.left.size for block in self._blocks) > _MANY * (self._columns.size + 1):
+            self._blocks = [self.rows()]
+
+    def rows(self) -> EquationRows:
+        """Return all of them, in no more rows than there are unknowns and one."""
+        reduced = _stacked(self._blocks, self._columns, np.zeros(0))
+        return EquationRows(reduced[:, :-1], reduced[:, -1], self._columns)
 
 
 class Eliminated(NamedTuple):

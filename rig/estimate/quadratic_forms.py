@@ -131,8 +131,8 @@ def _blocks(
     blocks, edges = [], 0
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)
-        expected = model.expected[role]
-        times = expected.times[expected.chosen(matches)[1]] * (1.0 + x[at["clock"]])
+        pairing = model.pairings[role]
+        times = pairing.times[pairing.observed(matches)[1]] * (1.0 + x[at["clock"]])
         extra = np.column_stack(_extra(model, role, model.trajectory(role, x), times))
         extra[1:] -= rows.told[1:, None] * extra[:-1]
         stays = ~np.isin(rows.columns, nothing)

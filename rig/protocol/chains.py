@@ -131,7 +131,7 @@ def _build_chain(
         return None
     tilt = math.radians(section["tilt"])
     widths = tuple(diameter / math.cos(tilt) for diameter in rods.diameters)
-    rod_length = math.nan if section["rod_length"] is None else section["rod_length"]
+    rod_length = section["rod_length"] or 0.0
     if not are_apart(section, heights, widths, rod_length * math.sin(tilt)):
         return None
     masses: tuple[float, ...] | None = rods.masses

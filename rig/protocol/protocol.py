@@ -7,7 +7,7 @@ empty, and every later stage leaves it out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, hypot, isnan, nan, radians, sin
+from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rig.protocol.keys import DEFAULTS
@@ -49,7 +49,7 @@ class RodChain:
     diameters
         Of the rods, m; 0 where unknown; bottom up.
     rod_length
-        Of every rod, m; NaN where unknown.
+        Of every rod, m; 0 where unknown.
     weighed
         Whether the masses are in kg; else only their ratios mean something.
     """
@@ -61,7 +61,7 @@ class RodChain:
     position_u: float = DEFAULTS["chains.*.position_uncertainty"]
     width_u: float = DEFAULTS["chains.*.width_uncertainty"]
     diameters: tuple[float, ...] = ()
-    rod_length: float = nan
+    rod_length: float = 0.0
     weighed: bool = False
 
     @property
@@ -70,7 +70,7 @@ class RodChain:
         stated_keys = {
             "mass": self.weighed,
             "diameter": min(self.diameters, default=0.0) > 0.0,
-            "rod_length": not isnan(self.rod_length),
+            "rod_length": self.rod_length > 0.0,
         }
         return tuple(key for key, stated in stated_keys.items() if not stated)
 
@@ -335,6 +335,9 @@ class Protocol:
     text: str = ""
     source: str = ""
     stated: Protocol | None = None
+
+    def __hash__(self) -> int:  # all of it is compared, and this tells most of them apart
+        return hash((self.text, self.drop, self.gates))
 
     @property
     def one_object(self) -> bool:

@@ -112,7 +112,7 @@ def are_apart(
     heights, widths
         Of the rods, m, bottom up; shape ``(rods,)``.
     rise
-        Of one end of a tilted rod over the other, m; NaN where unknown.
+        Of one end of a tilted rod over the other, m; 0 where unknown.
     """
     key = "length" if "length" in section else "spacing"
     for rod, ((low, high), (lower, upper)) in enumerate(
@@ -124,7 +124,7 @@ def are_apart(
             message = f"rods {rod} and {rod + 1} overlap: {apart} apart but {thick} thick"
             section.fault(key, message)
             return False
-        if rise >= pitch:  # never true of an unknown rod length, which is a NaN
+        if rise >= pitch:
             height = format_quantity(Quantity(rise), "mm")
             message = f"tilted ends rise {height}, so rods {rod} and {rod + 1} would touch"
             section.fault("rod_length", message)

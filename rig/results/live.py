@@ -241,12 +241,12 @@ class LiveAnalysis:
         view
             From `read`.
         """
-        fits = []
+        drops = []
         for job, result in view.results.items():
             summary, drop = self._summaries[job], view.drops[job]
             case = DropCase(view.protocol, view.plan[job.run], drop, summary.scale)
-            fits.append(case.fit(summary) if joins(view.protocol, result) else None)
-        analysis = gather(view.protocol, list(view.results.values()), fits)
+            drops.append(case.adjusted(summary) if joins(view.protocol, result) else None)
+        analysis = gather(view.protocol, list(view.results.values()), drops)
         self._joint_fit = _JointFit(self._members(view.results), analysis)
 
     def _look_for_kept(self, digest: str | None, members: object) -> None:

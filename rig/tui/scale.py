@@ -113,8 +113,7 @@ def drawing(
 
 
 def _rod_m(protocol: Protocol, name: str | None) -> float:
-    length = math.nan if name is None else protocol.chains[name].rod_length
-    return _WIDTH_M if math.isnan(length) else length
+    return _WIDTH_M if name is None else protocol.chains[name].rod_length or _WIDTH_M
 
 
 def _measured(fall: ChainFall, time_s: float) -> float:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.analysis.annealing import RELEASE, UNKNOWNS, SideFall
-from rig.analysis.identify import stated_model
+from rig.analysis.drop_model import DropModel
 from rig.analysis.verdict import SUPPORT
 from rig.model.impact import impact_on
 from rig.protocol.protocol import Protocol
@@ -31,7 +31,7 @@ def test_alpha_is_found_far_from_what_the_model_expects(restitution):
 def falls_of(one: Case, protocol: Protocol | None = None) -> list[SideFall]:
     """What annealing knows of each side."""
     protocol = protocol or one.protocol
-    model = stated_model(protocol, one.records, CLOCK_U, STATED)
+    model = DropModel.of(protocol, one.records, None, CLOCK_U, STATED)
     return [SideFall.of(model, role) for role in model.records]
 
 
