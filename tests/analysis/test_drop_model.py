@@ -59,8 +59,8 @@ def stamped_as_expected(model: DropModel, matches: dict, x: np.ndarray) -> DropM
         shifts = {}
         for role, match in matches.items():
             left = model.residuals(role, x, match)
-            _, edges = model.expected[role].chosen(match)
-            shifts[role] = np.zeros(model.expected[role].times.size)
+            _, edges = model.pairings[role].observed(match)
+            shifts[role] = np.zeros(model.pairings[role].times.size)
             shifts[role][edges] = left.values / left.speed
         model = model.shaken(shifts)
     return model
