@@ -71,11 +71,10 @@ def make_report(
             "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
         )
     stage("writing the page")
-    page = session_page(Material(session, outcome, bars, estimated, sections))
-    html = page_html(page)
+    html, figures = page_html(session_page(Material(session, outcome, bars, estimated, sections)))
     stage("")
     failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
-    return Report(html, tuple(page.figures), failed)
+    return Report(html, tuple(figures), failed)
 
 
 def _estimate(session: Session, outcome: SessionResults, *, fresh: bool) -> SessionEstimate | None:

@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rig.measurands import Measurand
 
 MINUS = "−"
 _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
@@ -75,6 +79,11 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
         return fixed(value * scale, default)
     decimals = decimals_for(uncertainty * scale, default)
     return f"{fixed(value * scale, decimals)} ± {fixed(uncertainty * scale, decimals)}"
+
+
+def with_unit(quantity: object, row: Measurand) -> str:
+    """Write a measurand ± U in its usual unit."""
+    return f"{plus_minus(quantity, row.scale, row.decimals)} {row.unit}"
 
 
 def ranges(noun: str, numbers: Iterable[int]) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any
 
 from rig.measurands import averaged, told
 from rig.reasons import remedies, summarize_reasons
-from rig.report.numbers import decimals_for, fixed, plus_minus, ranges, signed
+from rig.report.numbers import decimals_for, fixed
 from rig.report.templates import sentence
 from rig.results.improvements import improvements
 
@@ -56,12 +57,7 @@ def alone_lines(analysis: Analysis) -> list[str]:
     row = next((row for row in told() if runs and row.name in runs[-1].alone), None)
     if row is None:
         return []
-    last = runs[-1]
-    alone, among = (
-        f"{row.symbol} {plus_minus(where[row.name], row.scale, row.decimals)} {row.unit}"
-        for where in (last.alone, last.quantities)
-    )
-    return [sentence("alone", last.run.number, alone, len(runs), among)]
+    return [sentence("alone", runs[-1], row, len(runs))]
 
 
 def void_lines(analysis: Analysis) -> list[str]:
@@ -70,30 +66,16 @@ def void_lines(analysis: Analysis) -> list[str]:
         (*analysis.runs, *analysis.superseded), key=lambda drop: (drop.run.number, drop.attempt)
     )
     voids = [drop for drop in drops if drop.verdict == "void"]
-    if not voids:
-        return []
-    kinds: dict[tuple[object, ...], list[tuple[DropResult, Reason]]] = {}
+    kinds: dict[tuple[object, ...], list[tuple[DropResult, Reason]]] = defaultdict(list)
     for drop in voids:
         for reason in drop.reasons:
-            kinds.setdefault(reason.kind, []).append((drop, reason))
-    lines = ["void drops:"]
-    for members in kinds.values():
-        where = _runs([drop for drop, _ in members])
-        lines.append(f"  {where}: {signed(summarize_reasons([why for _, why in members]))}")
-    advice = remedies(reason for drop in voids for reason in drop.reasons)
-    return [*lines, "what to do:", *(f"  {remedy}" for remedy in advice)]
-
-
-def _runs(drops: Sequence[DropResult]) -> str:
-    """Name drops by run and, where it is not the first alone, by attempt."""
-    attempts: dict[int, list[int]] = {}
-    for drop in drops:
-        attempts.setdefault(drop.run.number, []).append(drop.attempt)
-    names = [
-        f"{run}" if numbers == [1] else f"{run} ({ranges('attempt', numbers)})"
-        for run, numbers in attempts.items()
+            kinds[reason.kind].append((drop, reason))
+    groups = [
+        ([drop for drop, _ in members], summarize_reasons([reason for _, reason in members]))
+        for members in kinds.values()
     ]
-    return f"run{'s' if len(names) > 1 else ''} {', '.join(names)}"
+    advice = remedies(reason for drop in voids for reason in drop.reasons)
+    return sentence("void", groups, advice).split("\n") if voids else []
 
 
 def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
@@ -112,4 +94,4 @@ def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
 def air_lines(drag: Measured | None) -> list[str]:
     """State the air drag that a fit finds, where it is significant: predictions ignore it."""
     significant = drag is not None and abs(drag.value) > _SIGNIFICANT * drag.u
-    return [sentence("air", plus_minus(drag))] if significant else []
+    return [sentence("air", drag)] if significant else []

@@ -102,7 +102,7 @@ def test_residuals_are_normalized_errors():
     figure = result_figure(TWO, CURVES)
     points = figure.panels[1].series[-1]
     assert list(points.y) == [line.normalized_error("separation_m") for line in TWO.summary]
-    assert figure.panels[1].series[0].y == (-1.0, 1.0)
+    assert figure.panels[1].series[0].y == [-1.0, 1.0]
 
 
 def test_without_any_uncertainty_there_are_no_residuals():
@@ -141,7 +141,7 @@ def test_shares_of_a_variance_add_up_to_the_whole():
     (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
     mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
     line = replace(line, means={"separation_m": mean}, causes={"separation_m": {"datum": 4e-3}})
-    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 0.36, "datum": 0.64})
+    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})
 
 
 def test_slack_strings_are_drawn_apart():

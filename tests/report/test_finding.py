@@ -118,14 +118,14 @@ def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
     assert [gate.channel for gate in shared.gates] == [0, 1, 8]  # from the top, impact first
     # 1280 steps for 500 ms: from 100 to 200 and what is not over; blocked from the start.
     bars = "M256 7.5h256m768 0h1M0 22.5h640M1024 37.5h256"
-    assert timeline(shared, drop, 1000, result) == (result, bars, "M1280 7.5m0-5v10", "")
-    assert timeline(shared, replace(drop, edges=()), 1000, result) == (result, "", "", "")
+    assert timeline(shared, drop, 1000, result) == (result, bars, "M1280 7.5m0-5v10")
+    assert timeline(shared, replace(drop, edges=()), 1000, result) == (result, "", "")
 
 
 def test_imported_edges_begin_where_they_begin():
     result = DropResult(Run(1, 40.0, "A", None), 1, "void", (), Audit(5, 0, 0, 5, 0))
     late = Drop(1, 1, 1000, tuple(edge._replace(tick=edge.tick + 10_000) for edge in EDGES))
-    _, bars, marks, _ = timeline(lanes(GATES, [(late, 1000, result)]), late, 1000, result)
+    _, bars, marks = timeline(lanes(GATES, [(late, 1000, result)]), late, 1000, result)
     assert bars.startswith("M0 7.5h320m")  # 100 of 400 ms
     assert not marks  # nothing was fitted, so nothing is odd
 

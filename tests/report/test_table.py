@@ -7,7 +7,7 @@ import pytest
 from rig.analysis.result import Measured
 from rig.analysis.summary import Incline
 from rig.report.numbers import decimals_for, fixed, plus_minus
-from rig.report.parts import run_parts, summary_table
+from rig.report.parts import summary_table, tables
 from rig.report.remarks import clock_lines
 from rig.units import Quantity
 from tests.report import fake_analysis
@@ -74,11 +74,11 @@ def test_where_nothing_is_struck_nothing_is_inclined() -> None:
     fence = fake_analysis.gravity()
     assert "incline" not in summary_table(fence.summary)
     void = replace(fence.runs[0], verdict="void", quantities={})
-    (part,) = run_parts([void, fence.runs[1]])
+    (part,) = tables("runs", [void, fence.runs[1]])
     heading = part.table[0]
     assert "incline" not in heading
     assert "impact" not in heading
-    (part,) = run_parts(fake_analysis.single_chain().runs)
+    (part,) = tables("runs", fake_analysis.single_chain().runs)
     assert "incline" in part.table[0]
 
 
