@@ -49,7 +49,7 @@ def main(arguments: Namespace) -> int:
             report = report if report.failed else entry.keep(report)
     write_atomic(arguments.output, report.html)
     if arguments.figures is not None:
-        from rig.report.files import write_figures  # noqa: PLC0415 - it needs matplotlib
+        from rig.report.canvas import write_figures  # noqa: PLC0415 - it needs matplotlib
 
         stage("drawing figures")
         write_figures(Path(arguments.figures), report.figures)

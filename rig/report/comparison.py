@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,23 +22,14 @@ if TYPE_CHECKING:
     from rig.report.figure import Chart
     from rig.results.together import MeanDifference, TogetherResults
 
-_OWNERS = {
-    "rig": "clock, gravity and air",
-    "posts": "post zeros",
-    "beams": "beam heights",
-    "start": "drop height",
-    "condition": "contact",
-}
-
 
 def shared_lines(results: TogetherResults) -> list[str]:
     """Say which errors the sessions have in common."""
-    owners: dict[tuple[str, ...], list[str]] = {}
+    owners = defaultdict[str, list[str]](list)
     for owner, groups in results.fit.shared.items():
         for group in groups:
-            if len(group) > 1:
-                owners.setdefault(tuple(group), []).append(_OWNERS.get(owner, owner))
-    return [sentence("common", words, names) for names, words in owners.items()] or [
+            owners[", ".join(group)] += [owner] * (len(group) > 1)
+    return [sentence("common", words, names) for names, words in owners.items() if words] or [
         sentence("nothing_common")
     ]
 

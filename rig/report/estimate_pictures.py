@@ -104,17 +104,14 @@ def _regions(mixture: Posterior) -> Trace | None:
     """Return what share the smallest region holds on whose edge a point lies, with two levels."""
     beta, mu = (mixture.names.index(name) for name in ("restitution", "friction"))
     kept = mixture.weights > 1e-6 * mixture.weights.max()
-    weights, means, sds = mixture.weights[kept], mixture.means[kept], mixture.sds[kept, beta]
-    middle = float(np.average(means[:, beta], weights=weights))
-    spread = np.sqrt(np.average(sds**2 + (means[:, beta] - middle) ** 2, weights=weights))
-    if np.ptp(means[:, mu]) <= 0.0 or spread <= 0.0:
+    logs, sds = np.log(mixture.weights[kept]), mixture.sds[kept, beta]
+    means, places = mixture.means[kept, beta], mixture.means[kept, mu]
+    low, high = (means - 4.5 * sds).min(), (means + 4.5 * sds).max()
+    if np.ptp(places) <= 0.0 or high <= low:
         return None
     # Smooth from node to node: more of them for the eye.
-    nodes = np.linspace(means[:, mu].min(), means[:, mu].max(), 161)
-    logs, centre, width = (
-        np.interp(nodes, means[:, mu], values) for values in (np.log(weights), means[:, beta], sds)
-    )
-    grid = np.linspace(middle - 4.5 * spread, middle + 4.5 * spread, 121)
+    nodes, grid = np.linspace(places.min(), places.max(), 161), np.linspace(low, high, 121)
+    logs, centre, width = (np.interp(nodes, places, values) for values in (logs, means, sds))
     density = np.exp(logs - 0.5 * ((grid[:, None] - centre) / width) ** 2) / width
     densest = np.argsort(density, axis=None)[::-1]
     held = np.empty(density.size)

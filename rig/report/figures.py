@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from dataclasses import replace
 from itertools import groupby, pairwise
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
@@ -17,7 +17,7 @@ from rig.report.numbers import fixed, value_of, with_unit
 from rig.report.parts import LABELS, means_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 FEWEST_INCLINES = 3
 """Below, a curve against incline says less than the runs themselves."""
 _GAP_DEG = 2.0  # the curve has a point each degree
+_SEGMENTS = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
 _HIDDEN = " Shaded inclines: the rods would not slide, the model has no answer."
 _SMALL = 4.0
 """Percent of U² below which a source is among the others."""
@@ -127,17 +128,11 @@ def budget_figure(summary: Sequence[Incline]) -> Chart | None:
         `None` where no mean has a budget.
     """
     budgets = {row: parts for row in averaged() if (parts := variance_shares(summary, row))}
-    most = defaultdict[str, float](float)
-    for parts in budgets.values():
-        for name, share in parts.items():
-            most[name] = max(most[name], share)
-    named = sorted((name for name in most if most[name] > _SMALL), key=most.__getitem__)
-    # The same source has the same colour for all quantities.
-    colors = dict(zip(reversed(named), PARTS, strict=False))
+    colors: dict[str, int] = {}  # the same of a source for all quantities
     panels = [
         {
             "name": "share of U² of the mean (%)" if row == [*budgets][-1] else "",
-            "parts": _stacked(parts, colors),
+            "parts": [*_stacked(parts, colors)],
             "x_axis": {"limits": (0.0, 100.0)},
             "y_axis": {"names": {0.0: row.symbol}, "limits": (-2.0, 0.6)},
         }
@@ -168,18 +163,21 @@ def unanswered(curves: Mapping[str, Any]) -> list[tuple[float, float]]:
     return [(low, high) for low, high in pairwise(inclines) if high - low > _GAP_DEG]
 
 
-def _stacked(parts: Mapping[str, float], colors: Mapping[str, int]) -> Groups:
-    """Lay one bar, source after source."""
-    shown = {name: parts[name] for name in colors if parts.get(name, 0.0) > _SMALL}
-    shown["others"] = 100.0 - sum(shown.values())
-    bars: Groups = []
+def _stacked(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dict[str, Any]]:
+    """Lay one bar, source after source, the largest first."""
     begin = 0.0
-    for name, share in shown.items():
-        end, label = begin + share, f"{name} {fixed(share, 0)} %"
-        bar = {"label": label, "color": colors.get(name, REST), "points": [(end, 0.0, begin)]}
-        bars += [bar] if name in colors or share > 0.5 else []
-        begin = end
-    return bars
+    for name in sorted(parts, key=lambda name: -parts[name]):
+        if parts[name] > _SMALL:
+            color, end = colors.setdefault(name, PARTS[len(colors)]), begin + parts[name]
+            yield _bar(name, color, begin, end)
+            begin = end
+    if begin < 99.5:
+        yield _bar("others", REST, begin, 100.0)
+
+
+def _bar(name: str, color: int, begin: float, end: float) -> dict[str, Any]:
+    label = f"{name} {fixed(end - begin, 0)} %"
+    return {"label": label, "color": color, "points": [(end, 0.0, begin)]}
 
 
 def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Groups:
@@ -188,19 +186,17 @@ def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Groups:
         return []
     names = curves.get("segments") or ["surface"] * len(curves["incline_deg"])
     columns = (curves[name] for name in ("incline_deg", row.name, row.key("U95")))
-    points = zip(names, *columns, strict=True)
     first = names[0].partition(", ")[2]
     parts = []
-    for name, part in groupby(points, key=lambda point: point[0]):
+    for name, points in groupby(zip(names, *columns, strict=True), key=itemgetter(0)):
         where, _, chain = name.partition(", ")  # unlike chains have curves of their own
-        pile = where == "pile"
-        words = "pile" if pile else "model ± U"
+        role, words = _SEGMENTS[where]
         parts.append(
             {
-                "role": "dash" if pile else "line",
+                "role": role,
                 "color": "model" if chain == first else "second",
                 "label": f"{words}, {chain}" if chain else words,
-                "points": [point[1:] for point in part],
+                "points": [*points],
             }
         )
     return parts

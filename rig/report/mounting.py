@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from rig.report.figure import chart
 from rig.report.templates import render
-from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol, Side
@@ -55,8 +54,9 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
             _side_view(protocol, gates, 1.04 * max(highest, hanging), near, whole),
             _side_view(protocol, gates, near, 0.0, lowest),
         ]
-    slots = _slots(protocol, gates)
-    words = render("mounting.txt", protocol=protocol, gates=gates, inclines=inclines, slots=slots)
+    words = render(
+        "mounting.txt", protocol=protocol, gates=gates, inclines=inclines, ends=beam_ends
+    )
     figure = chart("mounting", *views, title=protocol.title)
     return replace(figure, caption=figure.title, foot=str(words).split("\n"), width=_WIDTH_PT)
 
@@ -169,14 +169,3 @@ def _named(label: str, place: Point, color: str) -> dict[str, Any]:
 
 def _name(gate: Gate) -> str:
     return f"{gate.channel}: {_MM * gate.height:g}"
-
-
-def _slots(protocol: Protocol, gates: Gates) -> list[str]:
-    """Say where each beam of the side that strikes meets the board."""
-    inclines = [incline for incline in _inclines(protocol) if incline > 0]
-    rows = [["beam, mm", *(f"{incline:g}°" for incline in inclines)]]
-    for height in sorted(gate.height for gate in gates.on("impact")):
-        ends = [beam_ends(protocol, height, incline) for incline in inclines]
-        cells = (f"{_MM * uphill:.0f} | {_MM * along:.0f}" for uphill, along in ends)
-        rows.append([f"{_MM * height:g}", *cells])
-    return text_table(rows) if inclines and len(rows) > 1 else []

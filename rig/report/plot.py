@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _LETTER, _TYPED = 0.57 * SIZE, 0.61 * SIZE
 """Mean width of the digits and letters of the fonts in question, and those of a typewriter."""
 _LINE = 1.25 * SIZE
-_GAP_PT, _RIGHT_PT, _TICK_PT, _ROW_PT, _NEAR_PT = 8.0, 9.0, 42.0, 15.0, 4.0
+_GAP_PT, _RIGHT_PT, _NEAR_PT = 8.0, 9.0, 4.0
 _DIGITS = 6  # of numbers at an axis
 _PLACES = 16  # along a series, where its name may stand
 _CROWDED = 500  # points that a name may rather hide than touch another
@@ -43,6 +43,7 @@ _PAGE = (
 )
 """What a page has no use for: it has a style sheet of its own."""
 _AREAS = ("bar", "band", "map", "levels")
+_LINES = ("line", "dash", "level", "limit")
 _LOOKS: dict[str, dict[str, Any]] = {
     "line": {"linewidth": 1.4},
     "dash": {"linewidth": 1.2, "dashes": (3.5, 2.0)},
@@ -90,7 +91,7 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
                 if before.x == panel.x and other is not axes:
                     axes.sharex(other)
                     break
-            _set_up(axes, panel, width, numbered=not joined)
+            _set_up(axes, panel, numbered=not joined)
             for trace in panel.series:
                 _draw(axes, trace)
         for panel, axes in zip(panels, figure.axes, strict=True):
@@ -121,28 +122,19 @@ def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
     )
 
 
-def _set_up(axes: Axes, panel: Panel, width: float, *, numbered: bool) -> None:
+def _set_up(axes: Axes, panel: Panel, *, numbered: bool) -> None:
     """Set limits, ticks and labels of both axes."""
-    rows, names = panel.height / _ROW_PT, panel.x.names.values()
-    columns = width / max([_TICK_PT, *(len(name) * _LETTER + 6 for name in names)])
-    places = [place for trace in panel.series for place in trace.x]
-    for axis, about, most, whole in (
-        (axes.xaxis, panel.x, columns, all(place.is_integer() for place in places)),
-        (axes.yaxis, panel.y, rows, False),
-    ):
-        axis.set_major_locator(
-            MaxNLocator(max(2, int(most)), steps=[1, 2, 5, 10], integer=whole, min_n_ticks=1)
-        )
+    whole = all(place.is_integer() for trace in panel.series for place in trace.x)
+    for axis, about in ((axes.xaxis, panel.x), (axes.yaxis, panel.y)):
+        integer = whole and about is panel.x
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=integer))
         if about.names:
             axis.set_ticks([*about.names], [*about.names.values()])
         if about.limits is not None:
             axes.set(**{f"{axis.axis_name}lim": about.limits})
     axes.set(xlabel=panel.x.label if numbered else "", ylabel=panel.y.label)
     axes.tick_params(axis="x", labelbottom=numbered, bottom=numbered)
-    axes.tick_params(axis="y", length=0)
     axes.grid(visible=not panel.y.names, axis="y")
-    axes.spines["left"].set_visible(False)
-    axes.margins(0.03, 0.06)
     axes.set_aspect("equal" if panel.true else "auto")
 
 
@@ -164,21 +156,17 @@ def _draw(axes: Axes, trace: Trace) -> None:
         case "map" | "levels":
             _draw_map(axes, trace)
         case "words" | "cross":  # texts do not set the scale
-            side = "center" if trace.role == "cross" else "left" if x[0] > 0.0 else "right"
-            for place in zip(trace.x, trace.y, strict=True):
-                words = "×" if trace.role == "cross" else trace.label
-                axes.text(
-                    *place, words, ha=side, va="center", color=color, clip_on=side == "center"
-                )
-        case "line" | "dash" | "thick":
-            axes.plot(x, y, color=color, **look)
-        case _ if u.size:
-            across, up = (u, None) if trace.across else (None, u)
-            axes.errorbar(
-                x, y, up, across, color=color, linestyle="none", elinewidth=0.9, capsize=0.0, **look
+            cross = trace.role == "cross"
+            side, words = (
+                ("center", "×") if cross else ("left" if x[0] > 0 else "right", trace.label)
             )
+            for place in zip(x, y, strict=True):
+                axes.text(*place, words, ha=side, va="center", color=color, clip_on=cross)
         case _:
-            axes.plot(x, y, color=color, linestyle="none", **look)
+            options: dict[str, Any] = {"linestyle": "none"} if "marker" in look else {}
+            if u.size:
+                options |= {"xerr" if trace.across else "yerr": u, "elinewidth": 0.9}
+            axes.errorbar(x, y, color=color, **options, **look)
 
 
 def _draw_map(axes: Axes, trace: Trace) -> None:
@@ -231,21 +219,18 @@ def _meet(low: Points, high: Points, starts: Points, ends: Points) -> Any:
 def _shown(axes: Axes, trace: Trace) -> Points:
     """Return points on the drawing along what a series shows, none far from the next."""
     x, y, u = (np.array(values, float) for values in (trace.x, trace.y, trace.u))
-    (first, last), (low, high) = axes.get_xlim(), axes.get_ylim()
     if trace.role == "bar":
         x, y = (x + trace.base) / 2, y - 0.36
     elif not x.size:
-        x, y = np.linspace(first, last, 4 * _PLACES), np.full(4 * _PLACES, max(trace.y))
-    inside = (low <= y) & (y <= high) & np.isfinite(x)
-    points = axes.transData.transform(np.column_stack([x, y])[inside])
-    if trace.role in {"line", "dash", "level", "limit"} and len(points) > 1:
-        along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-        places = np.arange(0.0, along[-1], _NEAR_PT)
-        return np.column_stack([np.interp(places, along, column) for column in points.T])
+        x, y = np.array(axes.get_xlim()), np.full(2, y.max())
     if u.size and trace.role != "band":
-        ends = [
-            np.column_stack([x + way * u * trace.across, y + way * u * (not trace.across)])
-            for way in np.linspace(-1.0, 1.0, 9)
-        ]
-        return np.vstack([points, axes.transData.transform(np.vstack(ends))])
-    return points
+        ends = np.linspace(-1.0, 1.0, 9)[:, None] * u
+        x, y = np.ravel(x + ends * trace.across), np.ravel(y + ends * (not trace.across))
+    low, high = axes.get_ylim()
+    points: Points = axes.transData.transform(np.column_stack([x, y]))
+    points = points[(low <= y) & (y <= high) & np.isfinite(x)]
+    if trace.role not in _LINES or len(points) < 2:
+        return points
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    places = np.arange(0.0, along[-1], _NEAR_PT)
+    return np.column_stack([np.interp(places, along, column) for column in points.T])

@@ -13,17 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 from rig import __version__, measurands
 from rig.analysis import curves
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, Measured
 from rig.films import read_films
 from rig.protocol import plan
 from rig.report import (
     attachments,
-    deviations,
     estimate,
     figures,
     finding,
     parts,
-    remarks,
     timeline,
 )
 from rig.report.falls import fall_figures
@@ -37,6 +35,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.result import DropResult
     from rig.estimate.session import SessionEstimate
+    from rig.films import Film
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.report.figure import Chart
@@ -132,26 +131,26 @@ def _best_fall(
     protocol: Protocol, timed: Iterable[tuple[Drop, Any, DropResult]]
 ) -> Iterator[Chart]:
     """Draw the good run that shows most: where the separation is largest, else the first."""
-
-    def separation(drop: DropResult) -> float:
-        value = drop.quantities.get(measurands.SEPARATION.name)
-        return value.value if value else 0.0
-
-    good = [each for each in timed if each[-1].verdict in GOOD]
-    if good:
-        yield from fall_figures(protocol, *max(good, key=lambda each: separation(each[-1])))
+    none = Measured(0.0, 0.0)
+    best = max(
+        (drop for drop in timed if drop[-1].verdict in GOOD),
+        key=lambda drop: drop[-1].quantities.get(measurands.SEPARATION.name, none).value,
+        default=None,
+    )
+    return fall_figures(protocol, *best) if best else iter(())
 
 
 def _films(session: Reader, runs: Iterable[DropResult]) -> Iterator[Chart]:
     """Draw how simulated chains fell: the first that counts, and the first that does not."""
     films = read_films(session.path) if session.simulated else {}
-    fallen = [drop for drop in runs if (drop.run.number, drop.attempt) in films]
-    for good in (True, False):
-        for drop in [drop for drop in fallen if (drop.verdict in GOOD) == good][:1]:
-            yield film_figure(films[drop.run.number, drop.attempt])
+    shown: dict[bool, Film] = {}
+    for drop in runs:
+        if (film := films.get((drop.run.number, drop.attempt))) is not None:
+            shown.setdefault(drop.verdict not in GOOD, film)
+    return (film_figure(film) for _, film in sorted(shown.items()))
 
 
 _MODULES = (
-    *(attachments, curves, deviations, estimate, figures, finding, improvements),
-    *(measurands, parts, plan, remarks, timeline),
+    *(attachments, curves, estimate, figures, finding, improvements),
+    *(measurands, parts, plan, timeline),
 )

@@ -97,24 +97,21 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
     """
     end = _FINE * _WIDTH
     places = [round(ms * end / lanes.span_ms) for ms in _times_ms(drop, hz)]
-    seen = [edge for edge in enumerate(zip(drop.edges, places, strict=True)) if edge[1][1] <= end]
     bars = marks = ""
     for number, gate in enumerate(lanes.gates):
-        y, pen = f"{_LANE * (number + 0.5):g}", 0
-        own = [(n, edge, place) for n, (edge, place) in seen if edge.channel == gate.channel]
-        # From each change to the next; an edge like the one before changes nothing.
-        states = [
-            (bool(drop.initial_state >> gate.channel & 1), 0),
-            *((edge.blocked, place) for _, edge, place in own),
+        y = _LANE * (_FINE * number + 1)
+        own = [
+            (place, edge.blocked, n in result.matches)
+            for n, (edge, place) in enumerate(zip(drop.edges, places, strict=True))
+            if edge.channel == gate.channel and place <= end
         ]
-        changes = [next(same) for _, same in groupby(states, key=itemgetter(0))]
-        for (blocked, begin), (_, until) in pairwise([*changes, (False, end)]):
-            if blocked and places:
-                bars += f"m{begin - pen} 0h" if pen else f"M{begin} {y}h"
-                pen = max(until, begin + 1)
-                bars += f"{pen - begin}"
-        odd = [place for n, _, place in own if result.matches and n not in result.matches]
-        marks += "".join(f"M{place} {y}m0-5v10" for place in odd)
+        # From each change to the next; an edge like the one before changes nothing.
+        states = [(0, bool(drop.initial_state >> gate.channel & 1), True), *own, (end, None, True)]
+        changes = [next(same) for _, same in groupby(states, key=itemgetter(1))]
+        for (begin, blocked, _), (until, *_) in pairwise(changes if places else ()):
+            bars += f"M{begin} {y}h{max(until - begin, 1)}" if blocked else ""
+        for place, _, matched in own if result.matches else ():
+            marks += "" if matched else f"M{place} {y}m0-10v20"
     return Timeline(result, bars, marks)
 
 

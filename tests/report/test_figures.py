@@ -15,10 +15,9 @@ from rig.analysis.result import Audit, DropResult, Measured
 from rig.films import Film
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
-from rig.report.canvas import KINDS, canvas
+from rig.report.canvas import KINDS, canvas, figure_file, write_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
 from rig.report.figures import budget_figure, result_figure, runs_figure, variance_shares
-from rig.report.files import figure_file, write_figures
 from rig.report.film import film_figure
 from rig.report.looks import COLORS, SECOND
 from rig.report.plot import page_svg, plot
@@ -35,10 +34,9 @@ FILM = Film(
 
 def figures() -> list[Chart]:
     """One of each kind, of made-up results."""
-    budget = {"runs": 1e-3, "common": 2e-3}
-    means = {"separation_m": Measured(0.1, 5**0.5 * 1e-3, budget=budget)}
+    mean = Measured(0.1, 5**0.5 * 1e-3, budget={"runs": 1e-3, "common": 2e-3})
     causes = {"separation_m": {"datum": 4e-3, "beam heights": 3e-3, "width": 1e-5}}
-    line = replace(TWO.summary[0], means=means, causes=causes)
+    line = replace(TWO.summary[0], means={"separation_m": mean}, causes=causes)
     return [
         result_figure(TWO, CURVES),
         result_figure(fake_analysis.gravity(), {}, site_m_s2=9.82),
@@ -107,9 +105,9 @@ def test_residuals_are_normalized_errors():
 
 def test_without_any_uncertainty_there_are_no_residuals():
     """A protocol may state heights as exact."""
-    axis = PlotAxis("time (s)")
-    assert not residual_panels(axis, [(0.1, float("inf")), (0.2, float("nan"))])
-    assert residual_panels(axis, [(0.1, 0.5), (0.2, float("inf"))])
+    axis, none = PlotAxis("time (s)"), [(0.1, float("inf")), (0.2, float("nan"))]
+    assert not residual_panels(axis, none)
+    assert residual_panels(axis, [(0.1, 0.5), *none])
 
 
 def test_figures_follow_the_scene():

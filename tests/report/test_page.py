@@ -38,9 +38,7 @@ BAD = '<script>alert("x")</script>&\'</pre></style>'
 class Balance(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
-        self.open: list[str] = []
-        self.ids: list[str] = []
-        self.links: list[str] = []
+        self.open, self.ids, self.links = [], [], []
 
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)
@@ -49,19 +47,13 @@ class Balance(HTMLParser):
         if tag not in VOID_TAGS:
             self.open.append(tag)
 
-    def handle_startendtag(self, tag, attrs):
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID_TAGS:
-            self.open.pop()
-
     def handle_endtag(self, tag):
-        assert self.open.pop() == tag
+        assert tag in VOID_TAGS or self.open.pop() == tag
 
 
 def parse(page: str) -> Balance:
     parser = Balance()
     parser.feed(page)
-    parser.close()
     assert not parser.open
     return parser
 
@@ -72,25 +64,22 @@ def always(value: Any) -> Callable[..., Any]:
 
 def page_with(text: str) -> dict[str, Any]:
     """Return a session's page that says one text wherever a page says anything."""
-    panel = Panel(PlotAxis(text), PlotAxis(text), [Trace(text[:8], [0.0, 1.0], [0.0, 1.0], "line")])
+    axis, ends = PlotAxis(text), [0.0, 1.0]
+    panel = Panel(axis, axis, [Trace(text[:8], ends, ends, "line")])
     charts = always([Chart(text, text, [panel])])
     tables = always([Part(text, [text], [(text, False)], [[text]])])
     words = always([text])
     result = DropResult(Run(1, 40.0, text, text), 1, text, (), Audit())
-    session = Mock(
-        path=Simple(name=text),
-        meta=defaultdict(lambda: text),
-        protocol_text=text,
-        protocol_source=text,
-    )
-    session.identities.return_value = [(0, text)]
-    session.attached_files.return_value = [Simple(name=text, added=text)]
+    session = Simple(
+        path=Simple(name=text), meta=defaultdict(lambda: text), protocol_text=text,
+        protocol_source=text, states=words, identities=always([(0, text)]),
+        attached_files=always([Simple(name=text, added=text)]),
+    )  # fmt: skip
     analysis = Simple(
         runs=(result,), superseded=(), summary=(Simple(incline_deg=1.0, gates=()),), damage=[text],
         rig=Simple(likeness=Simple(sentence=text), drag=None),
     )  # fmt: skip
-    outcome = Mock(blind=False, analysis=analysis)
-    outcome.clock.details = {text: text}
+    outcome = Mock(blind=False, analysis=analysis, clock=Simple(details={text: text}))
     return {
         "template": "session.html", "title": text, "simulated": True, "session": session,
         "outcome": outcome, "timed": (), "good": GOOD, "created": datetime(2026, 6, 3),
@@ -100,22 +89,15 @@ def page_with(text: str) -> dict[str, Any]:
             estimated=True, sections=Simple(failed={"a": text}),
         ),
         "paper": text, "software": text, "versions": {"rig": text},
-        "curves": Simple(model_curves=always([{}])), "fall": charts, "fallen": charts,
-        "figures": Simple(
-            result_figure=charts, runs_figure=charts, budget_figure=charts, FEWEST_INCLINES=3
-        ),
-        "parts": Simple(tables=tables, means_parts=tables, budget_parts=tables),
-        "estimate": Simple(page_parts=tables), "deviations": Simple(deviations=words),
-        "timeline": Simple(timelines=always((Lanes((), 1.0), [Timeline(result, "", "M0 0")]))),
-        "attachments": Simple(attachments=always([Attachment(text, text, "1", text)])),
-        "finding": Simple(
-            claims=words, verdict=always(ModelCheck(text, False)),
-            headline=always([Number(text, text, text)]),
-        ),
-        "remarks": Simple(common_lines=words, alone_lines=words, clock_lines=words,
-                          air_lines=words),
-        "improvements": Simple(improvements=always([Simple(sentence=text)])),
-        "measurands": Simple(averaged=always([])), "plan": Simple(runs=always([])),
+        "curves": defaultdict(lambda: always([{}])), "fall": charts, "fallen": charts,
+        "figures": defaultdict(lambda: charts, FEWEST_INCLINES=3), "plan": {"runs": always([])},
+        "parts": defaultdict(lambda: tables), "estimate": {"page_parts": tables},
+        "timeline": {"timelines": always((Lanes((), 1.0), [Timeline(result, "", "M0 0")]))},
+        "attachments": {"attachments": always([Attachment(text, text, "1", text)])},
+        "finding": defaultdict(lambda: words, verdict=always(ModelCheck(text, False)),
+                               headline=always([Number(text, text, text)])),
+        "improvements": {"improvements": always([{"sentence": text}])},
+        "measurands": {"averaged": always([])},
     }  # fmt: skip
 
 
