@@ -108,8 +108,12 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
         # From each change to the next; an edge like the one before changes nothing.
         states = [(0, bool(drop.initial_state >> gate.channel & 1), True), *own, (end, None, True)]
         changes = [next(same) for _, same in groupby(states, key=itemgetter(1))]
+        pen, lane = 0, ""
         for (begin, blocked, _), (until, *_) in pairwise(changes if places else ()):
-            bars += f"M{begin} {y}h{max(until - begin, 1)}" if blocked else ""
+            if blocked:
+                lane += f"m{begin - pen} 0h{max(until - begin, 1)}"
+                pen = max(until, begin + 1)
+        bars += lane and f"M0 {y}{lane}"
         for place, _, matched in own if result.matches else ():
             marks += "" if matched else f"M{place} {y}m0-10v20"
     return Timeline(result, bars, marks)
