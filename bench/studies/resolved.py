@@ -16,7 +16,7 @@ from rig.errors import RigError
 from rig.films import Film
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned
-from rig.report.files import figure_file
+from rig.report.canvas import figure_file
 from rig.report.film import film_figure
 from rig.text_table import text_table
 

@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.measurands import acceleration_in
 from rig.reasons import make_error
 from rig.report.numbers import plus_minus
-from rig.report.parts import effects_parts, gate_parts, prior_parts, scatter_parts
+from rig.report.parts import prior_parts, scatter_parts, tables
 from rig.results import complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
@@ -53,7 +53,8 @@ def main(arguments: Namespace) -> int:
         summary = outcome.analysis.summary
         asked = [*scatter_parts(summary)] if arguments.scatter else []
         asked += prior_parts(members["prior_sensitivity"]) if arguments.priors else ()
-        asked += [*gate_parts(summary), *effects_parts(outcome.analysis.effects)]
+        asked += tables("gates", (gate for line in summary for gate in line.gates))
+        asked += tables("effects", outcome.analysis.effects)
         for part in asked:
             show(["", part.heading, *part.table])
         if video is not None and "video" in members:

@@ -12,8 +12,8 @@ from rig.commands.output import progress, say, tell_damage
 from rig.commands.report import make_report
 from rig.files import check_place, replacing
 from rig.recover.examine import examine
-from rig.report.deviations import deviations
-from rig.report.files import figure_file
+from rig.report.canvas import figure_file
+from rig.report.finding import deviations
 from rig.results import protocol_of, results
 from rig.session.hashes import protocol_first
 from rig.session.store import Session

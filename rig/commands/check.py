@@ -45,8 +45,7 @@ def _reference(*, as_schema: bool) -> int:
 
 def _draw(protocol: Protocol, path: Path) -> None:
     gates = check_gates(protocol)
-    from rig.report.canvas import kind_of  # noqa: PLC0415 - matplotlib, only here
-    from rig.report.files import write_figure  # noqa: PLC0415 - likewise
+    from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - matplotlib, only here
     from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
 
     kind_of(path)

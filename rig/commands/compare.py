@@ -10,13 +10,13 @@ from rig.commands.output import VOID, print_found, progress, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.reasons import make_error
+from rig.report.canvas import write_figure
 from rig.report.comparison import (
     comparison_page,
     difference_lines,
     draw_comparison,
     pooled_lines,
 )
-from rig.report.files import write_figure
 from rig.results.together import results_together
 from rig.session.store import Session
 

@@ -7,7 +7,6 @@ import os
 import sys
 from argparse import Namespace
 from datetime import UTC, datetime
-from operator import itemgetter
 from shlex import quote
 from typing import TYPE_CHECKING
 
@@ -22,12 +21,12 @@ from rig.ports import truth_file
 from rig.protocol.reader import parse
 from rig.ready import ready_protocol
 from rig.recorder.interrupts import Interrupts
-from rig.report.columns import Column, aligned
 from rig.report.estimate import symbol
 from rig.report.numbers import fixed, plus_minus
 from rig.results.estimated import session_estimate
 from rig.runner import run_protocol
 from rig.session.store import Session
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -126,9 +125,9 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
     if not rows:
         return ["no good drop to compare with the truth"]
     headings = max(rows, key=len)
-    columns = [Column(name, itemgetter(name)) for name in headings]
+    table = [[cells.get(heading, "") for heading in headings] for cells in rows]
     return [
-        *aligned(columns, [dict.fromkeys(headings, "") | cells for cells in rows]),
+        *text_table([[*headings], *table], rule=True),
         f"{held} of {of} results agree with the hidden truth within ± U (95 % expected)",
     ]
 

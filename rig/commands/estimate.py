@@ -35,8 +35,8 @@ def main(arguments: Namespace) -> int:
             print(likeness.sentence)
         print(estimate_text(estimate, sections, simulated=simulated))
     if folder is not None:
+        from rig.report.canvas import write_figure  # noqa: PLC0415 - likewise
         from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
-        from rig.report.files import write_figure  # noqa: PLC0415 - likewise
 
         entry = CacheEntry(dict, "estimate pictures", outcome.digest, fresh=fresh)
         drawn = entry.find()

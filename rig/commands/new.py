@@ -18,7 +18,7 @@ from rig.protocol.draft import SCENES, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.ready import WIRED
 from rig.recorder.interrupts import Interrupts
-from rig.report.files import write_figure
+from rig.report.canvas import write_figure
 from rig.report.mounting import mounting_figure
 from rig.report.wiring import wiring_drawing
 from rig.runner import Operator, run_protocol

@@ -148,8 +148,8 @@ def print_results(
             print("SIMULATED DATA")
         if outcome.blind:
             print("BLIND: results stay hidden until rig unblind SESSION")
+        from rig.report.finding import remarks, void_lines  # noqa: PLC0415
         from rig.report.parts import summary_table  # noqa: PLC0415 - few commands print one
-        from rig.report.remarks import remarks, void_lines  # noqa: PLC0415
 
         if not outcome.blind:
             show(summary_table(outcome.analysis.summary).splitlines())

@@ -86,8 +86,7 @@ def _written(value: float | None, u: float | None, row: Measurand) -> str:
 
 def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
     """Write a figure of the paper, and its numbers as CSV beside it."""
-    from rig.report.canvas import kind_of  # noqa: PLC0415 - it needs matplotlib
-    from rig.report.files import write_figure  # noqa: PLC0415 - likewise
+    from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - it needs matplotlib
     from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
 
     if output is None:

@@ -49,7 +49,7 @@ def main(arguments: Namespace) -> int:
             report = report if report.failed else entry.keep(report)
     write_atomic(arguments.output, report.html)
     if arguments.figures is not None:
-        from rig.report.files import write_figures  # noqa: PLC0415 - it needs matplotlib
+        from rig.report.canvas import write_figures  # noqa: PLC0415 - it needs matplotlib
 
         stage("drawing figures")
         write_figures(Path(arguments.figures), report.figures)
@@ -71,11 +71,10 @@ def make_report(
             "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
         )
     stage("writing the page")
-    page = session_page(Material(session, outcome, bars, estimated, sections))
-    html = page_html(page)
+    html, figures = page_html(session_page(Material(session, outcome, bars, estimated, sections)))
     stage("")
     failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
-    return Report(html, tuple(page.figures), failed)
+    return Report(html, tuple(figures), failed)
 
 
 def _estimate(session: Session, outcome: SessionResults, *, fresh: bool) -> SessionEstimate | None:

@@ -13,7 +13,7 @@ from rig.errors import InputError
 from rig.files import check_place, replacing
 from rig.protocol import reader
 from rig.reasons import make_error
-from rig.report.canvas import KINDS
+from rig.report.canvas import KINDS, write_figure
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
@@ -69,8 +69,7 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
     facts = provenance(protocol, layout)
     if _drawn(output):
-        from rig.report.files import write_figure  # noqa: PLC0415 - it needs matplotlib
-        from rig.report.sweep import sweep_figure  # noqa: PLC0415 - likewise
+        from rig.report.sweep import sweep_figure  # noqa: PLC0415 - it needs matplotlib
 
         write_figure(output, sweep_figure(facts, layout, swept))
         return

@@ -1,4 +1,4 @@
-"""What matplotlib draws, as files that never change by themselves."""
+"""Figures as files: the same figure gives the same bytes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rig.ctrl_c import ctrl_c_waits
 from rig.errors import InputError
+from rig.files import make_folder, replacing
 from rig.report import looks
+from rig.report.figure import csv_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from rig.report.figure import Chart
 
 INK, MODEL, SECOND, MUTED, PAPER = (
     looks.COLORS[number][0]
@@ -114,3 +118,34 @@ def canvas(
         if simulated:
             # In a strip of its own, where it hides nothing and nothing hides it.
             figure.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)
+
+
+def write_figure(path: Path, figure: Chart) -> None:
+    """Write a figure as its file's ending says, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it says nothing, or the file cannot be written.
+    """
+    content = figure_file(figure, kind_of(path))
+    with replacing(path) as stream:
+        stream.write(content)
+
+
+def write_figures(folder: Path, figures: Sequence[Chart]) -> None:
+    """Write each figure as ``figure-1.svg``, ``.pdf``, ``.png`` and its numbers as ``.csv``."""
+    make_folder(folder)
+    for number, figure in enumerate(figures, 1):
+        path = folder / f"figure-{number}.csv"
+        with replacing(path) as stream:
+            stream.write(csv_table(figure).encode())
+        for kind in KINDS:
+            write_figure(path.with_suffix(f".{kind}"), figure)
+
+
+def figure_file(figure: Chart, kind: Kind) -> bytes:
+    """Return a figure as a file of a kind."""
+    from rig.report.plot import plot  # noqa: PLC0415 - half a second, only for figures
+
+    return plot(figure).file(kind)

@@ -1,13 +1,13 @@
-"""Tables: their columns, for the terminal and the page alike, and as text."""
+"""Tables, for the terminal and the page alike, as `columns.txt` describes them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.analysis.result import Measured
 from rig.measurands import MEASURANDS
@@ -15,41 +15,27 @@ from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from rig.measurands import Measurand
 
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class Column(Generic[T]):
-    """A heading with its unit, and how a record fills the cell."""
-
-    heading: str
-    cell: Callable[[T], str]
-    numeric: bool = True
+_NOTHING: Mapping[str, Callable[[Any], Any]] = {}
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A heading, sentences or bullets, and perhaps a table.
+    """A heading, sentences, and perhaps a table.
 
     Attributes
     ----------
     head, rows
         Headings of columns and whether they are of numbers; the text of each row's cells.
-    off, links
-        Rows that do not count, and where the first cells of rows lead on the page.
     """
 
     heading: str
     sentences: Sequence[str] = ()
     head: Sequence[tuple[str, bool]] = ()
     rows: Sequence[Sequence[str]] = ()
-    bullets: bool = False
-    off: Container[int] = ()
-    links: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def table(self) -> list[str]:
@@ -87,50 +73,26 @@ def table_parts(
     records, table = list(records), _TABLES[name]
     written = partial(str.format, row=row, first=records[0] if records else None)
     columns = [
-        Column(
-            written(heading, row=kind).strip('"'),
-            partial(_cell, place, way, kind, derived),
-            way.split()[0] not in _WORDS,
+        (
+            (written(heading, row=kind).strip('"'), way.split()[0] not in _WORDS),
+            [_cell(place, way, kind, derived, record) for record in records],
         )
         for heading, place, way, *each in table.rows
         for kind in (_kinds(each[0]) if each else [row])
     ]
+    columns = [(head, cells) for head, cells in columns if any(cells)]
     if records or words:
         sentences = [written(table.words), *words] if table.words else list(words)
-        yield filled_part(raised(written(table.heading)), columns, records, sentences)
+        heading = written(table.heading)
+        # Not for what begins with a symbol, since g is not G.
+        heading = heading[:1].upper() + heading[1:]
+        rows = [*zip(*(cells for _, cells in columns), strict=True)]
+        yield Part(heading, sentences, [head for head, _ in columns], rows)
 
 
-def raised(text: str) -> str:
-    """Begin text with a capital; not for what begins with a symbol, since g is not G."""
-    return text[:1].upper() + text[1:]
-
-
-def filled_part(
-    heading: str, columns: Sequence[Column[T]], records: Sequence[T], sentences: Sequence[str] = ()
-) -> Part:
-    """Fill a table."""
-    columns, rows = filled(columns, records)
-    return Part(heading, sentences, [(each.heading, each.numeric) for each in columns], rows)
-
-
-def filled(
-    columns: Sequence[Column[T]], records: Sequence[T]
-) -> tuple[list[Column[T]], list[list[str]]]:
-    """Fill a table and leave out the columns in which no record has anything.
-
-    Returns
-    -------
-    columns, rows
-        The columns that stay, and the text of their cells for each record.
-    """
-    table = [[column.cell(record) for column in columns] for record in records]
-    kept = [index for index in range(len(columns)) if any(row[index] for row in table)]
-    return [columns[index] for index in kept], [[row[index] for index in kept] for row in table]
-
-
-def aligned(columns: Sequence[Column[T]], records: Sequence[T]) -> list[str]:
-    """Write records as lines of aligned text below their headings; empty columns are left out."""
-    return filled_part("", columns, records).table
+def heading_of(name: str) -> str:
+    """Return the heading of a table."""
+    return _TABLES[name].heading
 
 
 class _Table(NamedTuple):
@@ -160,16 +122,25 @@ def _cell(
     derived: Mapping[str, Callable[[Any], Any]],
     record: Any,
 ) -> str:
-    row, value = row or _member(record, "row"), record
-    for step in place.format(row=row).split("."):
-        name, call, _ = step.partition("()")
-        value = derived[name](value) if call else _member(value, name)
+    row = row or value_at(record, "row")
+    value = value_at(record, place.format(row=row), derived)
     way, *numbers = way.split()
     return _WAYS[way](value, row, *map(float, numbers))
 
 
-def _member(record: Any, name: str) -> Any:
-    return record.get(name) if isinstance(record, Mapping) else getattr(record, name, None)
+def value_at(
+    record: Any, place: str, derived: Mapping[str, Callable[[Any], Any]] = _NOTHING
+) -> Any:
+    """Follow a place such as ``run.incline_deg`` or ``0.edges()``; ``-`` is the record itself."""
+    for step in place.split("."):
+        name, call, _ = step.partition("()")
+        if call:
+            record = None if record is None else derived[name](record)
+        elif isinstance(record, Mapping):
+            record = record.get(name)
+        elif name != "-":
+            record = record[int(name)] if name.isdigit() else getattr(record, name, None)
+    return record
 
 
 def _text(value: object, *_: object) -> str:

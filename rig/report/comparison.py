@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
 from rig.report.columns import table_parts
-from rig.report.figure import Panel, PlotAxis, chart, measured, series
-from rig.report.looks import MODEL, MUTED
-from rig.report.page import PageSection, ReportPage, page_html
+from rig.report.figure import chart
+from rig.report.page import page_html
 from rig.report.parts import summary_table
 from rig.report.templates import sentence
 
@@ -22,23 +22,14 @@ if TYPE_CHECKING:
     from rig.report.figure import Chart
     from rig.results.together import MeanDifference, TogetherResults
 
-_OWNERS = {
-    "rig": "clock, gravity and air",
-    "posts": "post zeros",
-    "beams": "beam heights",
-    "start": "drop height",
-    "condition": "contact",
-}
-
 
 def shared_lines(results: TogetherResults) -> list[str]:
     """Say which errors the sessions have in common."""
-    owners: dict[tuple[str, ...], list[str]] = {}
+    owners = defaultdict[str, list[str]](list)
     for owner, groups in results.fit.shared.items():
         for group in groups:
-            if len(group) > 1:
-                owners.setdefault(tuple(group), []).append(_OWNERS.get(owner, owner))
-    return [sentence("common", words, names) for names, words in owners.items()] or [
+            owners[", ".join(group)] += [owner] * (len(group) > 1)
+    return [sentence("common", words, names) for names, words in owners.items() if words] or [
         sentence("nothing_common")
     ]
 
@@ -63,35 +54,38 @@ def difference_lines(results: TogetherResults) -> Iterator[str]:
 
 def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
-    section = PageSection(
-        "results", "Results", _claims(results), [draw_comparison(results)], [*_tables(results)]
-    )
-    title = f"Comparison with {results.fit.parts[0].name}"
-    return page_html(ReportPage(title, [section], results.simulated))
+    page = {
+        "template": "comparison.html",
+        "title": f"Comparison with {results.fit.parts[0].name}",
+        "simulated": results.simulated,
+        "figure_of_differences": draw_comparison(results),
+        "tables": [*_tables(results)],
+        "claims": _claims(results),
+        "results": results,
+    }
+    return page_html(page)[0]
 
 
 def draw_comparison(results: TogetherResults) -> Chart:
     """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
-    panels = [
-        _difference_panel(row, differences)
-        for row in averaged()
-        if (differences := _differences(results, row))
-    ]
-    return replace(chart("differences", panels), simulated=results.simulated)
+    panels = (_panel(row, differences) for row, differences in _differences(results) if differences)
+    return replace(chart("differences", *panels), simulated=results.simulated)
 
 
-def _difference_panel(row: Measurand, differences: Sequence[MeanDifference]) -> Panel:
-    places = [-float(number) for number in range(len(differences))]
+def _panel(row: Measurand, differences: Sequence[MeanDifference]) -> dict[str, Any]:
     names = [", ".join(filter(None, [each.session, _runs(each)])) for each in differences]
-    limits = places[-1] - 0.6, 0.6
-    values = zip(places, (each.value for each in differences), strict=True)
-    points = measured("", values, "mean", MODEL, row.fine_scale, across=True)
-    return Panel(
-        PlotAxis(f"difference of {row.title} {row.symbol} ± U ({row.fine})"),
-        PlotAxis("", dict(zip(places, names, strict=True)), limits),
-        [series("", (0.0, 0.0), limits, "line", MUTED), points],
-        16.0 * (len(differences) + 0.5),
-    )
+    rows = [(-float(place), each.value) for place, each in enumerate(differences)]
+    limits = rows[-1][0] - 0.6, 0.6
+    return {
+        "row": row,
+        "middle": [(0.0, limit) for limit in limits],
+        "differences": rows,
+        "height": 16.0 * (len(rows) + 0.5),
+        "y_axis": {
+            "names": {place: name for (place, _), name in zip(rows, names, strict=True)},
+            "limits": limits,
+        },
+    }
 
 
 def _runs(mean: MeanDifference | Incline) -> str:
@@ -100,13 +94,14 @@ def _runs(mean: MeanDifference | Incline) -> str:
     return "" if acceleration_in(names) else str(mean.condition)
 
 
-def _differences(results: TogetherResults, row: Measurand) -> list[MeanDifference]:
-    return [each for each in results.differences() if each.quantity == row.name]
+def _differences(results: TogetherResults) -> Iterator[tuple[Measurand, list[MeanDifference]]]:
+    for row in averaged():
+        yield row, [each for each in results.differences() if each.quantity == row.name]
 
 
 def _tables(results: TogetherResults) -> Iterator[Part]:
     """Yield the tables of each measurand."""
-    for row in averaged():
+    for row, differences in _differences(results):
         means = (
             {"session": part.name, "line": line, "runs": _runs(line)}
             for part in results.fit.parts
@@ -114,7 +109,7 @@ def _tables(results: TogetherResults) -> Iterator[Part]:
             if row.name in line.means
         )
         yield from table_parts("sessions", means, row=row)
-        yield from table_parts("differences", _differences(results, row), row=row, runs=_runs)
+        yield from table_parts("differences", differences, row=row, runs=_runs)
 
 
 def _claims(results: TogetherResults) -> list[str]:

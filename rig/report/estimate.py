@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.estimate.rods import resolution
-from rig.report.columns import table_parts
+from rig.report.columns import heading_of, table_parts
 from rig.report.numbers import MINUS, decimals_for, fixed, plus_minus
 from rig.report.templates import sentence
 
@@ -15,117 +14,56 @@ if TYPE_CHECKING:
 
     from rig.analysis.comparison import Difference
     from rig.estimate.rods import Gain
-    from rig.estimate.session import Coefficient, Coefficients, ContactPoint, SessionEstimate
+    from rig.estimate.session import Coefficient, Coefficients, SessionEstimate
     from rig.report.columns import Part
     from rig.sections import Sections
 
-    _Maker = Callable[[SessionEstimate], Iterator[Part]]
-
 SYMBOLS = {"alpha": "α", "restitution": "β", "friction": "μ", "pile_restitution": "β of the pile"}
+_TEXT = ("coefficients", "alphas", "end", "impulses", "comparison", "failed")
+"""In order; each is made by itself, and none where there is nothing to say."""
+_PAGE = (*_TEXT, "inclines", "rods")
+"""A page has a record for each rod too, or rods known by their sum."""
 
 
 def estimate_text(found: SessionEstimate, sections: Sections, *, simulated: bool) -> str:
     """Write everything for a terminal; what cannot be written is noted in `sections`."""
     lines = ["SIMULATED DATA"] if simulated else []
     lines.append(f"{found.drops} good drop{'s' * (found.drops > 1)}, {found.edges} edges")
-    for part in _parts(found, sections, _MAKERS):
+    for part in page_parts(found, sections, _TEXT):
         lines += part.lines
     return "\n".join(lines)
 
 
-def page_parts(found: SessionEstimate, sections: Sections) -> Iterator[Part]:
-    """Yield the same for a page, with a record for each rod too, or rods known by their sum."""
-    return _parts(found, sections, _MAKERS | _PAGE_MAKERS)
+def page_parts(
+    found: SessionEstimate, sections: Sections, names: Iterable[str] = _PAGE
+) -> Iterator[Part]:
+    """Yield tables of ``columns.txt``, each made alone."""
+
+    def make(name: str) -> list[Part]:
+        records, words = _TABLES[name](found)
+        return [*table_parts(name, records, words, None, **_CELLS)]
+
+    for name in names:
+        yield from sections.make(f'The section "{heading_of(name)}"', lambda: make(name)) or ()  # noqa: B023
 
 
-def _parts(found: SessionEstimate, sections: Sections, makers: dict[str, _Maker]) -> Iterator[Part]:
-    for words, make in makers.items():
-        yield from sections.make(f'The section "{words}"', partial(_made, make, found)) or ()
+def _coefficients(found: SessionEstimate) -> tuple[Iterable[Any], list[str]]:
+    words, coefficients = [f"{left}." for left in found.left_out or ()], found.coefficients
+    if coefficients is None or not coefficients.parameters:
+        return (), words
+    return coefficients.parameters, [*words, *_coefficient_words(coefficients)]
 
 
-def _made(make: _Maker, found: SessionEstimate) -> list[Part]:
-    return [*make(found)]
-
-
-def _coefficients(found: SessionEstimate) -> Iterator[Part]:
-    words = [f"{left}." for left in found.left_out or ()]
-    coefficients = found.coefficients
-    parameters = coefficients.parameters if coefficients else ()
-    if coefficients is not None and parameters:
-        words += _coefficient_words(coefficients)
-    return table_parts(
-        "coefficients",
-        parameters,
-        words,
-        coefficient=lambda coefficient: symbol(coefficient.name),
-        posterior=_posterior,
-        stated=_stated,
-        source=lambda coefficient: "edges" if coefficient.identified else "held",
-    )
-
-
-def _single_alphas(found: SessionEstimate) -> Iterator[Part]:
+def _alphas(found: SessionEstimate) -> tuple[Iterable[Any], list[str]]:
     if found.alphas is None:
-        return iter(())
+        return (), []
     tests = {"runs": found.alphas.runs_share_alpha, "model": found.alphas.by_model}
     words = [sentence("alphas", name, test) for name, test in tests.items() if test is not None]
     contacts = found.coefficients.contact if found.coefficients else ()
-    contact = {point.incline_deg: _contact(point) for point in contacts}
-    alphas = [{"of": alpha, "condition": alpha.condition} for alpha in found.alphas.inclines]
-    return table_parts(
-        "alphas",
-        alphas,
-        words,
-        contact=lambda alpha: contact.get(alpha["condition"].incline_deg, ""),
-    )
-
-
-def _end_correction(found: SessionEstimate) -> Iterator[Part]:
-    return table_parts("end", (), [found.end_correction.sentence] if found.end_correction else ())
-
-
-def _impulses(found: SessionEstimate) -> Iterator[Part]:
-    words = [] if found.impulses is None else [resolution(found.impulses)]
-    return table_parts(
-        "impulses", found.impulses or (), words, worst=lambda impulses: _worst(impulses.gains)
-    )
-
-
-def _comparison(found: SessionEstimate) -> Iterator[Part]:
-    return table_parts(
-        "comparison", found.comparison or (), worst=lambda compared: _worst(compared.differences)
-    )
-
-
-def _failed(found: SessionEstimate) -> Iterator[Part]:
-    return table_parts("failed", (), [f"{sentence}." for sentence in found.failed])
-
-
-def _incline_by_incline(found: SessionEstimate) -> Iterator[Part]:
-    return table_parts(
-        "inclines",
-        (
-            {"of": difference, "condition": difference.condition, "quantity": compared.quantity}
-            for compared in found.comparison or ()
-            for difference in compared.differences
-        ),
-    )
-
-
-def _single_impulses(found: SessionEstimate) -> Iterator[Part]:
-    gains = (
-        {"of": gain, "condition": rods.condition}
-        for rods in found.impulses or ()
-        for gain in rods.gains
-    )
-    # Count rods as people do, from 1.
-    return table_parts(
-        "rods",
-        gains,
-        rod=lambda rods: "–".join(
-            str(1 + rod) for rod in dict.fromkeys((rods["of"].first, rods["of"].last))
-        ),
-    )
+    contact = {point.incline_deg: point for point in contacts}
+    return [
+        (alpha, contact.get(alpha.condition.incline_deg)) for alpha in found.alphas.inclines
+    ], words
 
 
 def _coefficient_words(coefficients: Coefficients) -> Iterator[str]:
@@ -138,17 +76,13 @@ def _coefficient_words(coefficients: Coefficients) -> Iterator[str]:
     if pairs:
         yield f"Correlation: {', '.join(pairs)}."
     yield sentence("priors")
-    yield sentence("drag", coefficients.drag, plus_minus(coefficients.drag, 1e3))
+    yield sentence("drag", coefficients.drag)
 
 
 def symbol(name: str) -> str:
     """Write a coefficient as its symbol; of given α's each has its chain's name."""
     what, _, chain = name.partition(" ")
     return SYMBOLS[what] + (f" of {chain}" if chain else "")
-
-
-def _contact(contact: ContactPoint) -> str:
-    return plus_minus(contact.height, 1e3) if contact.identified else "not identified"
 
 
 def _posterior(coefficient: Coefficient) -> str:
@@ -166,16 +100,38 @@ def _worst(lines: Iterable[Gain | Difference]) -> float | None:
     return max((abs(error) for error in errors if error is not None), default=None)
 
 
-_MAKERS: dict[str, _Maker] = {
-    "Coefficients of the impacts": _coefficients,
-    "Best single α": _single_alphas,
-    "End correction": _end_correction,
-    "Speed gained from each rod, measured and by Eq. 9": _impulses,
-    "The protocol's model": _comparison,
-    "Not estimated": _failed,
+def _rod(gain: Gain) -> str:
+    """Count rods as people do, from 1."""
+    return "–".join(str(1 + rod) for rod in dict.fromkeys((gain.first, gain.last)))
+
+
+_TABLES: dict[str, Callable[[SessionEstimate], tuple[Iterable[Any], list[str]]]] = {
+    "coefficients": _coefficients,
+    "alphas": _alphas,
+    "end": lambda found: ((), [found.end_correction.sentence] if found.end_correction else []),
+    "impulses": lambda found: (
+        found.impulses or (),
+        [] if found.impulses is None else [resolution(found.impulses)],
+    ),
+    "comparison": lambda found: (found.comparison or (), []),
+    "failed": lambda found: ((), [f"{sentence}." for sentence in found.failed]),
+    "inclines": lambda found: (
+        [(test, line) for test in found.comparison or () for line in test.differences],
+        [],
+    ),
+    "rods": lambda found: (
+        [(rods, gain) for rods in found.impulses or () for gain in rods.gains],
+        [],
+    ),
 }
-"""In order; each is made by itself, and none where there is nothing to say."""
-_PAGE_MAKERS: dict[str, _Maker] = {
-    "The protocol's model, incline by incline": _incline_by_incline,
-    "Single impulses": _single_impulses,
+_CELLS: dict[str, Callable[[Any], Any]] = {
+    "symbol": symbol,
+    "posterior": _posterior,
+    "stated": _stated,
+    "source": lambda coefficient: "edges" if coefficient.identified else "held",
+    "contact": lambda point: (
+        plus_minus(point.height, 1e3) if point.identified else "not identified"
+    ),
+    "worst": _worst,
+    "rod": _rod,
 }

@@ -6,16 +6,15 @@ its duration. Release, acceleration and Δz are those of the session's results.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.result import GOOD
 from rig.estimate.curves import motion_by_model
 from rig.measurands import FALL_TIME, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in
-from rig.report.figure import Panel, PlotAxis, chart, measured, residual_panels, series
-from rig.report.looks import MODEL, MUTED
-from rig.report.numbers import plus_minus
+from rig.report.figure import chart
+from rig.report.numbers import with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,9 +31,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _MOMENTS = 200
-_TIME = PlotAxis("time since release (s)")
-_FROM_FIRST = PlotAxis("time since the first beam (s)")
-_TOP = PlotAxis("height of the top rod z (m)")
 
 
 class Passages(NamedTuple):
@@ -96,57 +92,51 @@ def fall_figures(
     head, values = f"Run {result.run.number}", result.quantities
     if result.run.impact is None:
         if free.time.size > 2:
-            yield chart("object", _object_panels(protocol, free, result), run=head)
+            yield chart("object", *_motions(protocol, free, result), run=head)
         return
     if struck.time.size < 3 or not {FALL_TIME.name, SPEED.name} <= values.keys():
         return
     head += f" at {result.run.incline_deg:g}°"
-    lasted = values[FALL_TIME.name].value
-    released = struck.time[-1] + struck.height[-1] / values[SPEED.name].value - lasted
+    end = values[FALL_TIME.name].value
+    released = struck.time[-1] + struck.height[-1] / values[SPEED.name].value - end
     struck = struck._replace(time=struck.time - released)
     motion = motion_by_model(protocol, result.run)
-    top = motion.at(0.0).height_m + motion.chain.length
     at = np.linspace(0.0, motion.end_s, _MOMENTS)
-    (falling, speeds, gaps), (heights, _, gaps_there) = (
-        np.transpose([_instant(motion, time) for time in times.tolist()])
-        for times in (at, struck.time)
-    )
+    heights, speeds, gaps = _model(motion, at)
     u = 2.0 * np.hypot(protocol.gates.height_u, protocol.gates.datum_u)
     if free.time.size > 2 and RELEASE_SKEW.name in values:
         half, skew = 0.5 * protocol.gravity.value, values[RELEASE_SKEW.name]
         # The free chain's way, from all its passages, at the moments of the striking one's.
         since = free.time - released - skew.value
         ahead = np.mean(free.height + half * since**2) - half * struck.time**2 - struck.height
-        level, u = values[SEPARATION.name], np.hypot(u, struck.speed * skew.expanded)
-        name, axis = "separation", PlotAxis("separation Δz (cm)")
-        curve = [
-            series("model", at, gaps, "line", MODEL, scale=100.0),
-            series("rods in beams", struck.time, ahead, "points", scale=100.0),
-            measured("Δz at level", [(lasted, level)], "mean", scale=100.0),
-        ]
-        left = ahead - gaps_there
+        name, curve, points, expected = "separation", gaps, ahead, _model(motion, struck.time)[2]
+        u = np.hypot(u, struck.speed * skew.expanded)
     else:
-        name, axis = "height", _TOP
-        curve = [
-            series("model", at, falling, "line", MODEL),
-            series("rods in beams", struck.time, struck.height, "points"),
-        ]
-        left, u = struck.height - heights, np.hypot(u, 2.0 * protocol.drop.u)
-    panels = [Panel(_TIME, axis, curve, 100.0), *_residuals(_TIME, struck.time, left, u)]
-    yield chart(name, panels, run=head)
-    fallen = np.array([0.0, top])
-    squares = [
-        series("free fall", 2.0 * motion.gravity * fallen, top - fallen, "dash", MUTED),
-        series("model", speeds**2, falling, "line", MODEL),
-        series("", free.speed**2, free.height, "points", MUTED),
-        series("rods in beams", struck.speed**2, struck.height, "points"),
-    ]
-    panels = [Panel(PlotAxis("squared speed V² (m²/s²)"), _TOP, squares, 150.0)]
-    yield chart("speed", panels, run=head)
+        name, curve, points, expected = (
+            "height",
+            heights,
+            struck.height,
+            _model(motion, struck.time)[0],
+        )
+        u = np.hypot(u, 2.0 * protocol.drop.u)
+    sources = {
+        "curve": np.column_stack((at, curve)),
+        "passages": _with_residuals(struck.time, points, expected, u),
+        "end": [(end, values.get(SEPARATION.name))],
+    }
+    yield chart(name, sources, run=head)
+    fallen = heights[0] * np.arange(2)
+    squares = {
+        "free_fall": np.column_stack((2.0 * motion.gravity * fallen, heights[0] - fallen)),
+        "curve": np.column_stack((speeds**2, heights)),
+        "free": np.column_stack((free.speed**2, free.height)),
+        "struck": np.column_stack((struck.speed**2, struck.height)),
+    }
+    yield chart("speed", squares, run=head)
 
 
-def _object_panels(protocol: Protocol, seen: Passages, result: DropResult) -> list[Panel]:
-    """Draw z(t) and v(t) of an object, with the acceleration as the slope, and what is left."""
+def _motions(protocol: Protocol, seen: Passages, result: DropResult) -> Iterator[dict[str, Any]]:
+    """Yield z(t) and v(t) of an object, with the acceleration as the slope, and what is left."""
     row = acceleration_in(result.quantities)
     assert row is not None
     assert protocol.gates is not None
@@ -156,38 +146,35 @@ def _object_panels(protocol: Protocol, seen: Passages, result: DropResult) -> li
     # Height and speed at the first beam are as they fit best; the acceleration is the result.
     start = np.polyfit(time, seen.height + 0.5 * pull.value * time**2, 1)
     line = np.poly1d([-0.5 * pull.value, *start])
-    slope = f"slope {row.symbol} = {plus_minus(pull, row.scale, row.decimals)} {row.unit}"
+    slope = f"slope {row.symbol} = {with_unit(pull, row)}"
     where = "height z (m)" if protocol.track is None else "place on the track z (m)"
     u_speed = 2.0 * seen.speed * rods.width_u / rods.widths[0]
     at = np.linspace(0.0, time[-1], _MOMENTS)
-    return [
-        panel
-        for label, motion, name, points, points_name, u in (
-            (where, line, "", seen.height, "beams", 2.0 * protocol.gates.height_u),
-            ("speed v (m/s)", -line.deriv(), slope, seen.speed, "width over shadow time", u_speed),
-        )
-        for panel in (
-            Panel(
-                _FROM_FIRST,
-                PlotAxis(label),
-                [
-                    series(name, at, motion(at), "line", MODEL),
-                    series(points_name, time, points, "ring"),
-                ],
-                100.0,
-            ),
-            *_residuals(_FROM_FIRST, time, points - motion(time), u),
-        )
-    ]
+    for name, words, points_name, motion, points, u in (
+        (where, "", "beams", line, seen.height, 2.0 * protocol.gates.height_u),
+        ("speed v (m/s)", slope, "width over shadow time", -line.deriv(), seen.speed, u_speed),
+    ):
+        yield {
+            "name": name,
+            "slope": words,
+            "points": points_name,
+            "curve": np.column_stack((at, motion(at))),
+            "passages": _with_residuals(time, points, motion(time), u),
+        }
 
 
-def _residuals(axis: PlotAxis, times: Array, left: Array, u: Array | float) -> list[Panel]:
-    """Return none where heights and sizes are stated without an uncertainty."""
+def _with_residuals(times: Array, values: Array, expected: Array, u: Array | float) -> Array:
+    """Return a row a passage, with what is left over: nothing finite where nothing has a U."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return residual_panels(axis, zip(times, left / u, strict=True))
+        return np.column_stack((times, values, (values - expected) / u))
 
 
-def _instant(motion: Motion, time: float) -> tuple[float, float, float]:
-    """Return where the model has the top rod, m, its speed, m/s, and Δz, m."""
-    instant = motion.at(min(max(time, 0.0), motion.end_s))
-    return instant.height_m + motion.chain.length, instant.speed_m_s, instant.separation_m
+def _model(motion: Motion, times: Array) -> Array:
+    """Return where the model has the top rod, m, its speed, m/s, and Δz, m; a row each."""
+    instants = [motion.at(min(max(time, 0.0), motion.end_s)) for time in times.tolist()]
+    return np.transpose(
+        [
+            (instant.height_m + motion.chain.length, instant.speed_m_s, instant.separation_m)
+            for instant in instants
+        ]
+    )

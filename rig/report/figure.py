@@ -7,59 +7,25 @@ to it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from rig.report.columns import read_tables
-from rig.report.looks import INK, MODEL
+from rig.analysis.result import Measured
+from rig.report import looks
+from rig.report.columns import read_tables, value_at
 from rig.text_table import csv_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from rig.analysis.result import Measured
-
-    Values = Sequence[float] | NDArray[np.float64]
-
-Role = Literal[
-    "line",
-    "dash",
-    "thick",
-    "band",
-    "level",
-    "limit",
-    "gap",
-    "shade",
-    "points",
-    "mean",
-    "ring",
-    "square",
-    "cross",
-    "bar",
-    "words",
-    "map",
-    "levels",
-]
-"""How a series looks.
-
-A `line`, `dash` or `thick` line joins its points, with a gap where one is not a number; a `band`
-fills y ± u; a `level` or `limit` is a line across the panel at
-each y; a `shade` fills the panel between two y, a `gap` between two x; `points` are small, `mean`,
-`ring` and `square` large, with bars of u; a `cross` does not set the scale; a `bar` lies from
-`base` to x; `words` are only the label, outwards from the point; a `map` shades the grid of x
-and y by z, in steps at the levels u, and `levels` are numbered lines there.
-"""
-
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 COLUMN_PT, WIDE_PT = 244.0, 400.0
 """A journal's column of 86 mm, which is a telephone's width too, and the width of a page."""
-_WORDS = dict(read_tables(Path(__file__).with_name("figures.txt").read_text("utf-8")))
+_FIGURES = dict(read_tables(Path(__file__).with_name("figures.txt").read_text("utf-8")))
 _FEW = 40  # points that are drawn large
+_LINES = {"zero": (0.0,), "unity": (-1.0, 1.0)}
+_BARE = ("points", "cross")  # roles without bars
 _COLUMNS = ("panel", "x_axis", "y_axis", "series", "x", "y", "U95", "begins")
 
 
@@ -74,7 +40,12 @@ class Trace:
     x, y
         In units of the axes.
     role
-        See `Role`.
+        How it looks. A `line`, `dash` or `thick` line joins its points, with a gap where one is not
+        a number; a `band` fills y ± u; a `level` or `limit` is a line across the panel at each y; a
+        `shade` fills the panel between two y, a `gap` between two x; `points` are small, `mean`,
+        `ring` and `square` large, with bars of u; a `cross` does not set the scale; a `bar` lies
+        from `base` to x; `words` are only the label, outwards from the point; a `map` shades the
+        grid of x and y by z, in steps at the levels u, and `levels` are numbered lines there.
     u
         Half-widths along y, or along x where `across`.
     base
@@ -88,7 +59,7 @@ class Trace:
     label: str
     x: Sequence[float]
     y: Sequence[float]
-    role: Role
+    role: str
     color: int = 0
     u: Sequence[float] = ()
     base: Sequence[float] = ()
@@ -115,7 +86,7 @@ class Panel:
 
     x: PlotAxis
     y: PlotAxis
-    series: Sequence[Trace]
+    series: list[Trace]
     height: float = 120.0
     true: bool = False
 
@@ -149,47 +120,88 @@ class Chart:
     facts: str = ""
 
 
-def chart(name: str, panels: Sequence[Panel], **values: object) -> Chart:
-    """Return a figure with its title and caption in ``figures.txt``."""
-    heading, caption, _ = _WORDS[name]
-    return Chart(heading.format(**values), caption.format(**values), panels)
+def chart(name: str, *panels: Mapping[str, Any], **values: object) -> Chart:
+    """Draw a figure as ``figures.txt`` describes it.
+
+    Parameters
+    ----------
+    panels
+        All its panels are drawn for each: the records of their series, by name, what their labels
+        ask for, and options of both axes.
+    values
+        What title and caption ask for.
+    """
+    title, caption, rows = _FIGURES[name]
+    drawn = [panel for sources in panels for panel in _panels(rows, {**_LINES, **sources})]
+    return Chart(title.format(**values), caption.format(**values), drawn)
 
 
-def series(
-    label: str,
-    x: Values,
-    y: Values,
-    role: Role,
-    color: int = INK,
-    u: Values = (),
-    scale: float = 1.0,
-    **options: Any,
-) -> Trace:
-    """Return a `Trace` of any numbers, y and u times a factor."""
-    x, y, u = [*map(float, x)], [scale * float(value) for value in y], [*map(float, u)]
-    return Trace(label, x, y, role, color, [scale * value for value in u], **options)
+def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[Panel]:
+    """Draw panels from their rows, without those that stay empty."""
+    panels: list[Panel] = []
+    scale = 1.0
+    for kind, *cells in rows:
+        if kind == "panel":
+            x, y, height, *factor = (_written(cell, sources) for cell in cells)
+            x_axis, y_axis = (sources.get(axis, {}) for axis in ("x_axis", "y_axis"))
+            scale = float(*factor or (1.0,))
+            traces, true = [*sources.get("traces", ())], sources.get("true", False)
+            panels.append(
+                Panel(PlotAxis(x, **x_axis), PlotAxis(y, **y_axis), traces, float(height), true)
+            )
+        elif kind == "residuals":
+            panels += residual_panels(panels[-1].x, _points(cells, sources))
+        else:
+            panels[-1].series.extend(_traces(kind, cells, sources, scale))
+    return [panel for panel in panels if panel.series]
 
 
-def measured(
-    label: str,
-    points: Iterable[tuple[float, Measured]],
-    role: Role,
-    color: int = INK,
-    scale: float = 1.0,
-    *,
-    across: bool = False,
-) -> Trace:
-    """Return a `Trace` of measured values at their places, large points with bars of U."""
-    rows = [(place, scale * value.value, scale * value.expanded) for place, value in points]
-    places, values, widths = map(list, zip(*rows, strict=True)) if rows else ([], [], [])
-    x, y = (values, places) if across else (places, values)
-    return Trace(
-        label, x, y, role, color, () if role in {"points", "cross"} else widths, (), across
-    )
+def _traces(
+    role: str, cells: Sequence[str], sources: Mapping[str, Any], scale: float
+) -> Iterator[Trace]:
+    """Draw records as one series, or each group of records as a series of its own."""
+    paint, label, source, *places = cells
+    name, grouped, key = source.partition("*")
+    for group in sources.get(name, ()) if grouped else [sources]:
+        known = {**sources, **group}
+        columns = [*zip(*_points([key or name, *places], known), strict=True)]
+        if not columns:
+            continue
+        if len(places) == 1:
+            columns.insert(role == "gap", ())
+        x, y, *more = columns
+        across = any(isinstance(value, Measured) for value in x)
+        expanded = (value.expanded for value in (x if across else y) if isinstance(value, Measured))
+        kind, color = _written(role, known), _written(paint, known)
+        widths = [scale * (width or 0.0) for width in (more[0] if more else expanded)]
+        yield Trace(
+            _written(label, known),
+            _floats(x, scale if across else 1.0),
+            _floats(y, 1.0 if across else scale),
+            kind,
+            int(color) if color.isdigit() else getattr(looks, color.upper()),
+            **{"base" if role == "bar" else "u": [] if kind in _BARE else widths},
+            across=across,
+        )
 
 
-def residual_panels(x: PlotAxis, ratios: Iterable[tuple[float, float]]) -> list[Panel]:
-    """Return the panel below a curve: what is left over in units of U, ±1 shaded.
+def _points(cells: Sequence[str], sources: Mapping[str, Any]) -> list[list[Any]]:
+    """Find the coordinates of all records that have both."""
+    name, *places = (_written(cell, sources) for cell in cells)
+    rows = ([value_at(record, place) for place in places] for record in sources.get(name, ()))
+    return [row for row in rows if None not in row[:2]]
+
+
+def _floats(values: Iterable[Any], scale: float) -> list[float]:
+    return [scale * float(getattr(value, "value", value)) for value in values]
+
+
+def _written(cell: str, values: Mapping[str, Any]) -> str:
+    return cell.strip('"').replace("\\n", "\n").format(**values)
+
+
+def residual_panels(x: PlotAxis, ratios: Iterable[Sequence[float]]) -> list[Panel]:
+    """Draw the panel below a curve: what is left over in units of U, ±1 shaded.
 
     Parameters
     ----------
@@ -201,17 +213,12 @@ def residual_panels(x: PlotAxis, ratios: Iterable[tuple[float, float]]) -> list[
     list of Panel
         None where there is nothing to show.
     """
-    rows = [(float(place), float(ratio)) for place, ratio in ratios if math.isfinite(ratio)]
-    if not rows:
-        return []
-    places, values = zip(*rows, strict=True)
-    most = 1.1 * max(2.0, *map(abs, values))
-    lines = [
-        Trace("", (), (-1.0, 1.0), "shade", MODEL),
-        Trace("", (), (0.0,), "level", MODEL),
-        series("", places, values, "mean" if len(rows) <= _FEW else "points"),
-    ]
-    return [Panel(x, PlotAxis("residual\n/ U", limits=(-most, most)), lines, 42.0)]
+    points = [point for point in ratios if math.isfinite(point[1])]
+    most = 1.1 * max([2.0, *(abs(ratio) for _, ratio in points)])
+    sources = {"ratios": points, "y_axis": {"limits": (-most, most)}, "x": x.label}
+    sources["role"] = "mean" if len(points) <= _FEW else "points"
+    (panel,) = chart("residuals", sources).panels
+    return [replace(panel, x=x)] if points else []
 
 
 def csv_table(figure: Chart) -> str:

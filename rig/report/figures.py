@@ -1,41 +1,39 @@
-"""Figures of a session's results: pure functions of the result, as plain data."""
+"""Figures of a session's results: what `figures.txt` draws, from the results alone."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
 from itertools import groupby, pairwise
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
 from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
 from rig.protocol.protocol import Condition
-from rig.report.figure import Panel, PlotAxis, Trace, chart, measured, residual_panels, series
-from rig.report.looks import INK, MODEL, MUTED, PARTS, REST, RULE, SECOND
-from rig.report.numbers import fixed, plus_minus, value_of
+from rig.report.figure import chart
+from rig.report.looks import PARTS, REST
+from rig.report.numbers import fixed, value_of, with_unit
 from rig.report.parts import LABELS, means_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from rig.analysis.result import Measured
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
-    from rig.report.figure import Chart, Role
+    from rig.report.figure import Chart
     from rig.report.parts import Bars
+
+    Groups = list[dict[str, Any]]
 
 FEWEST_INCLINES = 3
 """Below, a curve against incline says less than the runs themselves."""
 _GAP_DEG = 2.0  # the curve has a point each degree
-_INCLINE = PlotAxis("incline of the surface (°)")
-_RUN = PlotAxis("run", whole=True)
-_SEGMENTS: dict[str, tuple[Any, str]] = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
-_REFERENCES = {"predicted": "model", "means": "mean"}
+_SEGMENTS = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
 _HIDDEN = " Shaded inclines: the rods would not slide, the model has no answer."
-_SMALL = 0.04
-"""Share of U² below which a source is among the others."""
+_SMALL = 4.0
+"""Percent of U² below which a source is among the others."""
 
 
 def result_figure(
@@ -62,11 +60,22 @@ def result_figure(
     title = " and ".join(f"{row.title} {row.symbol}" for row in rows)
     inclines = {run.run.incline_deg for run in analysis.runs}
     if len(inclines) < FEWEST_INCLINES or acceleration_in(measured):
-        panels = [_runs_panel(analysis, row, site_m_s2) for row in rows]
-        return chart("runs", panels, title=title)
-    panels = [panel for row in rows for panel in _incline_panels(analysis, curves, row, bars)]
-    hidden = _HIDDEN if unanswered(curves) else ""
-    return chart("incline", panels, title=title, bars=LABELS[bars], hidden=hidden)
+        return chart("runs", *(_by_run(analysis, row, site_m_s2) for row in rows), title=title)
+    gaps = unanswered(curves)
+    sources = (
+        {
+            "row": row,
+            "gaps": [{"ends": gap} for gap in gaps],
+            "model": _model_parts(curves, row),
+            "free_fall": [curves.get("free_fall_speed_m_s")] * (row == SPEED),
+            "runs": [run for run in analysis.runs if run.verdict in GOOD],
+            "means": means_of(analysis.summary, row),
+            "bars": bars,
+        }
+        for row in rows
+    )
+    hidden = _HIDDEN if gaps else ""
+    return chart("incline", *sources, title=title, bars=LABELS[bars], hidden=hidden)
 
 
 def runs_figure(analysis: Analysis, skew_limit_s: float | None = None) -> Chart | None:
@@ -83,24 +92,31 @@ def runs_figure(analysis: Analysis, skew_limit_s: float | None = None) -> Chart 
         `None` where there are no two chains.
     """
     # Runs are compared with the model, or with their mean where it has no answer.
-    words = "predicted" if any(line.predicted for line in analysis.summary) else "means"
+    predicted = any(line.predicted for line in analysis.summary)
     references = {
         line.condition: reference.value
         for line in analysis.summary
-        if (reference := getattr(line, words).get(SEPARATION.name)) is not None
+        if (reference := (line.predicted if predicted else line.means).get(SEPARATION.name))
     }
-    panels = []
-    if any(SEPARATION.name in run.quantities for run in analysis.runs):
-        points = _run_series(analysis, SEPARATION, SEPARATION.fine_scale, references)
-        axis = PlotAxis(f"Δz − {_REFERENCES[words]}\n({SEPARATION.fine})")
-        panels.append(Panel(_RUN, axis, [Trace("", (), (0.0,), "level", MODEL), *points], 90.0))
-    if any(RELEASE_SKEW.name in run.quantities for run in analysis.runs):
-        row, limits = RELEASE_SKEW, (skew_limit_s or 0.0, -(skew_limit_s or 0.0))
-        ends = [series("limit", (), limits, "limit", SECOND, scale=row.scale)]
-        points = _run_series(analysis, row, row.scale)
-        axis = PlotAxis(f"{row.label}\n({row.unit})")
-        panels.append(Panel(_RUN, axis, [*(ends if skew_limit_s else ()), *points], 70.0))
-    return chart("order", panels) if panels else None
+    separation = {
+        "name": f"{SEPARATION.symbol} − {'model' if predicted else 'mean'}",
+        "unit": SEPARATION.fine,
+        "height": 90,
+        "scale": SEPARATION.fine_scale,
+        "middle": "zero",
+        "runs": _runs_by_chain(analysis, SEPARATION, references),
+    }
+    skew = {
+        "name": RELEASE_SKEW.label,
+        "unit": RELEASE_SKEW.unit,
+        "height": 70,
+        "scale": RELEASE_SKEW.scale,
+        "middle": "",
+        "limits": [skew_limit_s, -skew_limit_s] if skew_limit_s else (),
+        "runs": _runs_by_chain(analysis, RELEASE_SKEW),
+    }
+    panels = [panel for panel in (separation, skew) if panel["runs"]]
+    return chart("order", *panels) if panels else None
 
 
 def budget_figure(summary: Sequence[Incline]) -> Chart | None:
@@ -111,25 +127,22 @@ def budget_figure(summary: Sequence[Incline]) -> Chart | None:
     Chart or None
         `None` where no mean has a budget.
     """
-    shares = {row: parts for row in averaged() if (parts := variance_shares(summary, row))}
-    most: dict[str, float] = {}
-    for parts in shares.values():
-        most |= {name: max(share, most.get(name, 0.0)) for name, share in parts.items()}
-    named = sorted((name for name in most if most[name] > _SMALL), key=lambda name: -most[name])
-    # The same source has the same colour for all quantities.
-    colors = dict(zip(named, PARTS, strict=False))
-    panels = []
-    for row, parts in shares.items():
-        axis = PlotAxis(
-            "share of U² of the mean (%)" if row == [*shares][-1] else "", limits=(0.0, 100.0)
-        )
-        names = PlotAxis("", {0.0: row.symbol}, (-2.0, 0.6))
-        panels.append(Panel(axis, names, [*_stacked(parts, colors)], 64.0))
-    return chart("budget", panels) if panels else None
+    budgets = {row: parts for row in averaged() if (parts := variance_shares(summary, row))}
+    colors: dict[str, int] = {}  # the same of a source for all quantities
+    panels = [
+        {
+            "name": "share of U² of the mean (%)" if row == [*budgets][-1] else "",
+            "parts": [*_stacked(parts, colors)],
+            "x_axis": {"limits": (0.0, 100.0)},
+            "y_axis": {"names": {0.0: row.symbol}, "limits": (-2.0, 0.6)},
+        }
+        for row, parts in budgets.items()
+    ]
+    return chart("budget", *panels) if panels else None
 
 
 def variance_shares(summary: Sequence[Incline], row: Measurand) -> dict[str, float]:
-    """Return which share of the variance of the means each source makes, the runs' scatter too."""
+    """Return how many percent of the variance of the means each source makes, scatter too."""
     squares = defaultdict[str, float](float)
     for line in summary:
         mean = line.means.get(row.name)
@@ -141,7 +154,7 @@ def variance_shares(summary: Sequence[Incline], row: Measurand) -> dict[str, flo
             for cause, u in causes.items():
                 squares[cause] += part * u**2
     total = sum(squares.values())
-    return {name: square / total for name, square in squares.items()} if total else {}
+    return {name: 100.0 * square / total for name, square in squares.items() if total}
 
 
 def unanswered(curves: Mapping[str, Any]) -> list[tuple[float, float]]:
@@ -150,100 +163,86 @@ def unanswered(curves: Mapping[str, Any]) -> list[tuple[float, float]]:
     return [(low, high) for low, high in pairwise(inclines) if high - low > _GAP_DEG]
 
 
-def _stacked(parts: Mapping[str, float], colors: Mapping[str, int]) -> Iterator[Trace]:
-    """Yield one bar, source after source."""
+def _stacked(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dict[str, Any]]:
+    """Lay one bar, source after source, the largest first."""
     begin = 0.0
-    shown = {name: 100.0 * parts[name] for name in colors if parts.get(name, 0.0) > _SMALL}
-    rest = 100.0 - sum(shown.values())
-    for name, share in [*shown.items(), *([("others", rest)] if rest > 0.5 else [])]:
-        words = f"{name} {fixed(share, 0)} %"
-        yield Trace(words, (begin + share,), (0.0,), "bar", colors.get(name, REST), base=(begin,))
-        begin += share
+    for name in sorted(parts, key=lambda name: -parts[name]):
+        if parts[name] > _SMALL:
+            color, end = colors.setdefault(name, PARTS[len(colors)]), begin + parts[name]
+            yield _bar(name, color, begin, end)
+            begin = end
+    if begin < 99.5:
+        yield _bar("others", REST, begin, 100.0)
 
 
-def _incline_panels(
-    analysis: Analysis, curves: Mapping[str, Any], row: Measurand, bars: Bars
-) -> Iterator[Panel]:
-    """Yield a measurand against incline, and below it what it is off by."""
-    means = means_of(analysis.summary, row)
-    inclines = [mean.line.incline_deg for mean in means]
-    widths = [mean.bars[bars] or 0.0 for mean in means]
-    good = (run for run in analysis.runs if run.verdict in GOOD and row.name in run.quantities)
-    single = ((run.run.incline_deg, run.quantities[row.name]) for run in good)
-    traces = [
-        *_model_series(curves, row),
-        measured("", single, "points", MUTED, row.scale),
-        series(
-            "means", inclines, [mean.mean.value for mean in means], "mean", INK, widths, row.scale
-        ),
-    ]
-    yield Panel(_INCLINE, PlotAxis(f"{row.title}\n{row.symbol} ({row.unit})"), traces, 110.0)
-    errors = [(mean.line.incline_deg, mean.error) for mean in means if mean.error is not None]
-    yield from residual_panels(_INCLINE, errors)
+def _bar(name: str, color: int, begin: float, end: float) -> dict[str, Any]:
+    label = f"{name} {fixed(end - begin, 0)} %"
+    return {"label": label, "color": color, "points": [(end, 0.0, begin)]}
 
 
-def _model_series(curves: Mapping[str, Any], row: Measurand) -> Iterator[Trace]:
-    """Yield the model's curve part by part, with its bands and the inclines it cannot answer."""
+def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Groups:
+    """Part the model's curve: on the surface, on the pile, and of unlike chains."""
     if row.name not in curves:
-        return
-    for gap in unanswered(curves):
-        yield Trace("", gap, (), "gap", RULE)
-    inclines = curves["incline_deg"]
-    names = curves.get("segments") or ["surface"] * len(inclines)
-    points = zip(names, inclines, curves[row.name], curves[row.key("U95")], strict=True)
+        return []
+    names = curves.get("segments") or ["surface"] * len(curves["incline_deg"])
+    columns = (curves[name] for name in ("incline_deg", row.name, row.key("U95")))
     first = names[0].partition(", ")[2]
-    for name, part in groupby(points, key=lambda point: point[0]):
+    parts = []
+    for name, points in groupby(zip(names, *columns, strict=True), key=itemgetter(0)):
         where, _, chain = name.partition(", ")  # unlike chains have curves of their own
-        color = MODEL if chain == first else SECOND
-        role, label = _SEGMENTS[where]
-        _, at, values, widths = zip(*part, strict=True)
-        yield series("", at, values, "band", color, widths, row.scale)
-        words = f"{label}, {chain}" if chain else label
-        yield series(words, at, values, role, color, scale=row.scale)
-    speed = value_of(curves.get("free_fall_speed_m_s"))
-    if row == SPEED and speed is not None:
-        yield Trace("free fall", (), (speed,), "limit", MUTED)
+        role, words = _SEGMENTS[where]
+        parts.append(
+            {
+                "role": role,
+                "color": "model" if chain == first else "second",
+                "label": f"{words}, {chain}" if chain else words,
+                "points": [*points],
+            }
+        )
+    return parts
 
 
-def _runs_panel(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> Panel:
-    """Draw a measurand of each run, its mean with U as a band, and what is expected."""
-    traces = []
-    expected = site_m_s2 if acceleration_in([row.name]) else None
-    for line, _ in means_of(analysis.summary, row):
-        mean = line.means[row.name]
-        words = f"mean {plus_minus(mean, row.scale, row.decimals)} {row.unit}"
-        ends = mean.value - mean.expanded, mean.value + mean.expanded
-        traces += [
-            series("", (), ends, "shade", MODEL, scale=row.scale),
-            series(words, (), (mean.value,), "level", MODEL, scale=row.scale),
-        ]
-        expected = expected or value_of(line.predicted.get(row.name))
-    if expected is not None:
-        words = f"expected {fixed(expected * row.scale, row.decimals)}"
-        traces.append(series(words, (), (expected,), "limit", SECOND, scale=row.scale))
-    traces += _run_series(analysis, row, row.scale)
-    return Panel(_RUN, PlotAxis(f"{row.title}\n{row.symbol} ({row.unit})"), traces, 110.0)
+def _by_run(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> dict[str, Any]:
+    """Say what a measurand is in each run, its mean with U as a strip, and what is expected."""
+    lines = [mean.line for mean in means_of(analysis.summary, row)]
+    means = [line.means[row.name] for line in lines]
+    expected = [site_m_s2] if acceleration_in([row.name]) else []
+    expected += [value_of(line.predicted.get(row.name)) for line in lines]
+    stated = [value for value in expected if value is not None][:1]
+    return {
+        "row": row,
+        "means": [
+            {
+                "words": with_unit(mean, row),
+                "middle": [mean.value],
+                "ends": [mean.value - mean.expanded, mean.value + mean.expanded],
+            }
+            for mean in means
+        ],
+        "expectations": stated,
+        "expected": "".join(fixed(value * row.scale, row.decimals) for value in stated),
+        "runs": _runs_by_chain(analysis, row),
+    }
 
 
-def _run_series(
-    analysis: Analysis,
-    row: Measurand,
-    scale: float,
-    references: Mapping[Condition, float] | None = None,
-) -> Iterator[Trace]:
-    """Yield a quantity of every run: a series for each chain that strikes, void runs as crosses."""
-    groups: dict[str | None, list[tuple[float, Measured]]] = {}
+def _runs_by_chain(
+    analysis: Analysis, row: Measurand, references: Mapping[Condition, float] | None = None
+) -> Groups:
+    """Part a quantity of every run: a series for each chain that strikes, crosses for void runs."""
+    points = defaultdict[str, list[Any]](list)
     for run in sorted(analysis.runs, key=attrgetter("run.number")):
         like = Condition(run.run.incline_deg)  # where it makes no difference which one strikes
         own = like._replace(impact_chain=run.run.impact)
         reference = references.get(own, references.get(like)) if references is not None else 0.0
-        if row.name in run.quantities and reference is not None:
-            value = run.quantities[row.name]
+        value = run.quantities.get(row.name)
+        if value is not None and reference is not None:
             point = run.run.number, replace(value, value=value.value - reference)
-            group = (run.run.impact or "") if run.verdict in GOOD else None
-            groups.setdefault(group, []).append(point)
-    if None in groups:
-        yield measured("not counted", groups.pop(None), "cross", MUTED, scale)
-    looks: tuple[tuple[Role, int], ...] = (("mean", INK), ("ring", SECOND))
-    for (chain, points), (role, color) in zip(sorted(groups.items()), looks, strict=False):
-        yield measured(f"{chain} strikes" if chain else "", points, role, color, scale)
+            strikes = f"{run.run.impact} strikes" if run.run.impact else ""
+            points[strikes if run.verdict in GOOD else "not counted"].append(point)
+    groups = [("not counted", points.pop("not counted", [])), *sorted(points.items())]
+    looks = (("cross", "muted"), ("mean", "ink"), ("ring", "second"))
+    return [
+        {"label": label, "role": role, "color": color, "points": group}
+        for (label, group), (role, color) in zip(groups, looks, strict=False)
+        if group
+    ]

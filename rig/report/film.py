@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rig.report.figure import Panel, PlotAxis, chart, series
-from rig.report.looks import INK, MODEL, MUTED, SECOND
+from rig.report.figure import chart
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from rig.films import Film, Point
-    from rig.report.figure import Chart, Trace
+    from rig.report.figure import Chart
 
 PICTURES = 6
 _APART_M = 0.26
 _BOARD_M = (-0.08, 0.12)
 _LIMITS_M = (-0.25, 0.55)
+_GAP = (math.nan,) * 3
 
 
 def film_figure(film: Film, pictures: int = PICTURES) -> Chart:
@@ -34,39 +34,35 @@ def film_figure(film: Film, pictures: int = PICTURES) -> Chart:
     step = (film.times_s[-1] - begin) / (pictures - 1)
     places = {_APART_M * n: film.nearest(begin + n * step) for n in range(pictures)}
     names = {place: f"{1e3 * film.times_s[moment]:.0f} ms" for place, moment in places.items()}
-    across = PlotAxis("time since release", names, (-0.1, [*places][-1] + 0.14))
-    panels = [
-        Panel(
-            across,
-            PlotAxis(label, limits=_LIMITS_M),
-            [trace for place, moment in places.items() for trace in draw(film, moment, place)],
-            170.0,
-        )
-        for label, draw in (("height (m)", _front), ("height (m), along the rods", _side))
+    slope = math.tan(math.radians(film.incline_deg))
+    middles = [
+        (place + y, z) for place, moment in places.items() for _, y, z in film.middles(moment)
     ]
-    return chart("film", panels, incline=f"{film.incline_deg:g}")
+    boards = [
+        {"color": "model", "points": [(place + y, film.board_m - y * slope) for y in _BOARD_M]}
+        for place in places
+    ]
+    axes = {
+        "x_axis": {"names": names, "limits": (-0.1, [*places][-1] + 0.14)},
+        "y_axis": {"limits": _LIMITS_M},
+    }
+    front = [lines for place, moment in places.items() for lines in _front(film, moment, place)]
+    return chart(
+        "film",
+        {"name": "height (m)", "lines": front, **axes},
+        {"name": "height (m), along the rods", "lines": boards, "rods": middles, **axes},
+        incline=f"{film.incline_deg:g}",
+    )
 
 
-def _front(film: Film, moment: int, place: float) -> Iterator[Trace]:
+def _front(film: Film, moment: int, place: float) -> Iterator[dict[str, Any]]:
+    """Yield strings that are tight, those that are slack, and rods, with gaps between them."""
     ends = film.left[moment], film.right[moment]
-    strings = [
-        (low, high, loose)
-        for side, slack in zip(ends, film.slack(moment), strict=True)
-        for low, high, loose in zip(side, side[1:], slack, strict=False)
-    ]
-    for color, slack in ((MUTED, False), (SECOND, True)):
-        yield _lines(((low, high) for low, high, loose in strings if loose == slack), place, color)
-    yield _lines(zip(*ends, strict=True), place, INK)
-
-
-def _side(film: Film, moment: int, place: float) -> Iterator[Trace]:
-    slope, middles = math.tan(math.radians(film.incline_deg)), film.middles(moment)
-    heights = [film.board_m - y * slope for y in _BOARD_M]
-    yield series("", [place + y for y in _BOARD_M], heights, "line", MODEL)
-    yield series("", [place + y for _, y, _ in middles], [z for _, _, z in middles], "ring")
-
-
-def _lines(pairs: Iterable[tuple[Point, Point]], place: float, color: int) -> Trace:
-    """Lines between points, with gaps between one line and the next."""
-    points = [point for pair in pairs for point in (*pair, (math.nan,) * 3)]
-    return series("", [place + x for x, _, _ in points], [z for _, _, z in points], "line", color)
+    lines: dict[str, list[Point]] = {"muted": [], "second": [], "ink": []}
+    for side, slack in zip(ends, film.slack(moment), strict=True):
+        for low, high, loose in zip(side, side[1:], slack, strict=False):
+            lines["second" if loose else "muted"] += [low, high, _GAP]
+    for rod in zip(*ends, strict=True):
+        lines["ink"] += [*rod, _GAP]
+    for color, points in lines.items():
+        yield {"color": color, "points": [(place + x, z) for x, _, z in points]}

@@ -7,20 +7,21 @@ the slope and into the board, unless there is a slot, or its uphill part stands 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from rig.report.figure import Chart, Panel, PlotAxis, series
-from rig.report.looks import INK, MODEL, MUTED, SECOND
+from rig.report.figure import chart
 from rig.report.templates import render
-from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol, Side
-    from rig.report.figure import Role, Trace
+    from rig.report.figure import Chart
 
-_SIDES: dict[Side, tuple[int, Role, int]] = {
-    "impact": (-1, "line", SECOND),
-    "free": (1, "dash", MODEL),
+    Point = tuple[float, float]
+
+_SIDES: dict[Side, tuple[int, str, str]] = {
+    "impact": (-1, "line", "second"),
+    "free": (1, "dash", "model"),
 }
 _WIDTH_PT, _HEIGHT_PT = 530.0, 330.0
 _NEAR_M = 0.16  # what is drawn larger once more
@@ -41,32 +42,23 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
     """
     inclines = _inclines(protocol)
     if protocol.track is not None:
-        panels = [_track(protocol, protocol.track, gates)]
+        views = [_track(protocol, protocol.track, gates)]
     else:
         highest = max(gate.height for gate in gates.gates)
         hanging = protocol.drop.value + max(c.chain.length for c in protocol.chains.values())
         near = max(_NEAR_M, 1.5 * min(gate.height for gate in gates.gates))
         lowest = f"close to the {protocol.zero}" if inclines else "lowest gates"
-        panels = [
+        whole = "posts and beams, from the side"
+        views = [
             # What lies below is named in the other view, where there is room.
-            _side_view(
-                protocol,
-                gates,
-                1.04 * max(highest, hanging),
-                near,
-                "posts and beams, from the side",
-            ),
+            _side_view(protocol, gates, 1.04 * max(highest, hanging), near, whole),
             _side_view(protocol, gates, near, 0.0, lowest),
         ]
     words = render(
-        "mounting.txt",
-        protocol=protocol,
-        gates=gates,
-        inclines=inclines,
-        slots=_slots(protocol, gates),
+        "mounting.txt", protocol=protocol, gates=gates, inclines=inclines, ends=beam_ends
     )
-    foot = str(words).split("\n")
-    return Chart(protocol.title, protocol.title, panels, foot=foot, width=_WIDTH_PT)
+    figure = chart("mounting", *views, title=protocol.title)
+    return replace(figure, caption=figure.title, foot=str(words).split("\n"), width=_WIDTH_PT)
 
 
 def face_below(protocol: Protocol, incline_deg: float) -> float:
@@ -104,90 +96,76 @@ def _inclines(protocol: Protocol) -> list[float]:
     return sorted(set(protocol.plan.inclines)) if protocol.surface is not None else []
 
 
-def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> Panel:
+def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, Any]:
     """Draw a track from the side, with beams across it; all lengths are along it, from one mark."""
     slope, start = math.radians(track.incline_deg.value), protocol.drop.value
 
-    def at(along: float, above: float = 0.0) -> tuple[float, float]:
+    def at(along: float, above: float = 0.0) -> Point:
         return (
-            _MM * ((start - along) * math.cos(slope) + above * math.sin(slope)),
-            _MM * (along * math.sin(slope) + above * math.cos(slope)),
+            (start - along) * math.cos(slope) + above * math.sin(slope),
+            along * math.sin(slope) + above * math.cos(slope),
         )
 
     ends = {gate: (at(gate.height), at(gate.height, _POST_M)) for gate in gates.gates}
-    lines = [
-        _path("thick", at(1.05 * start), at(0.0)),
-        _path("cross", at(0.0)),
-        _path("mean", at(start)),
-        *(_path("line", *pair, color=MODEL) for pair in ends.values()),
-        *(_words(_name(gate), *end, MODEL) for gate, (_, end) in ends.items()),
-    ]
-    title = f"the track at {track.incline_deg.value:g}°, from the side (mm)"
-    return Panel(PlotAxis(title), PlotAxis("mm"), lines, 0.6 * _HEIGHT_PT, true=True)
+    return {
+        "x": f"the track at {track.incline_deg.value:g}°, from the side (mm)",
+        "y": "mm",
+        "height": 0.6 * _HEIGHT_PT,
+        "true": True,
+        "posts": [{"ends": _mm(at(1.05 * start), at(0.0))}],
+        "rods": _mm(at(start)),
+        "mark": _mm(at(0.0)),
+        "beams": [{"role": "line", "color": "model", "ends": _mm(*pair)} for pair in ends.values()],
+        "names": [_named(_name(gate), end, "model") for gate, (_, end) in ends.items()],
+    }
 
 
 def _side_view(
     protocol: Protocol, gates: Gates, top: float, named_above: float, title: str
-) -> Panel:
+) -> dict[str, Any]:
     """Draw what is below a height, to scale, and name gates; uphill is to the right."""
     inclines = _inclines(protocol)
     post = _POST_M if top > 2 * _POST_M else top / 2
     chain = next(iter(protocol.chains.values()))
-    rods = [protocol.drop.value + height for height in chain.chain.heights]
-    lines = [
-        series("", (), (0.0,), "limit"),
-        *(_board(protocol, incline, post) for incline in inclines),
-        *(series("", (x, x), (_LOW_M, top), "thick", scale=_MM) for x in (-_MM * post, _MM * post)),
-        series("", [0.0] * len(rods), rods, "mean", scale=_MM),
-        series("", (0.0,), (0.0,), "cross"),
-    ]
-    for place, incline in enumerate([] if named_above else inclines):
+    names, beams, boards = [], [], []
+    for place, incline in enumerate(inclines):
         away = top * (0.3 if place % 2 else 0.45)  # neighbours' names would meet
         slope, face = math.radians(incline), face_below(protocol, incline)
-        at = away * math.cos(slope), away * math.sin(slope) - face
-        lines.append(_words(f"{incline:g}°", _MM * at[0], _MM * at[1]))
+        boards.append(_mm(*((y, y * math.tan(slope) - face) for y in (-0.5 * post, 1.2 * post))))
+        if not named_above:
+            at = away * math.cos(slope), away * math.sin(slope) - face
+            names.append(_named(f"{incline:g}°", at, "ink"))
     for gate in gates.gates:
+        side, role, color = _SIDES[gate.side]
         if gate.height <= top:
-            side, role, color = _SIDES[gate.side]
-            height = _MM * gate.height
-            lines.append(series("", (-_MM * post, _MM * post), (height, height), role, color))
+            ends = _mm((-post, gate.height), (post, gate.height))
+            beams.append({"role": role, "color": color, "ends": ends})
             if gate.height >= named_above:
-                lines.append(_words(_name(gate), 1.05 * side * _MM * post, height, color))
-    unit = "mm, uphill to the right" if inclines else "mm"
-    return Panel(
-        PlotAxis(f"{title} ({unit})", limits=(-2.4 * _MM * post, 2.4 * _MM * post)),
-        PlotAxis(f"mm {protocol.drop_from}" if inclines else "mm", {}, (_MM * _LOW_M, _MM * top)),
-        lines,
-        _HEIGHT_PT,
-        true=True,
-    )
+                names.append(_named(_name(gate), (1.05 * side * post, gate.height), color))
+    return {
+        "x": f"{title} ({'mm, uphill to the right' if inclines else 'mm'})",
+        "y": f"mm {protocol.drop_from}" if inclines else "mm",
+        "x_axis": {"limits": (-2.4 * _MM * post, 2.4 * _MM * post)},
+        "y_axis": {"limits": (_MM * _LOW_M, _MM * top)},
+        "height": _HEIGHT_PT,
+        "true": True,
+        "ground": [0.0],
+        "boards": [{"ends": ends} for ends in boards],
+        "posts": [{"ends": _mm((x, _LOW_M), (x, top))} for x in (-post, post)],
+        "rods": _mm(*((0.0, protocol.drop.value + height) for height in chain.chain.heights)),
+        "mark": [(0.0, 0.0)],
+        "beams": beams,
+        "names": names,
+    }
 
 
-def _board(protocol: Protocol, incline: float, post: float) -> Trace:
-    """Draw the board at an incline."""
-    face = -face_below(protocol, incline)
-    ends = [(y, face + y * math.tan(math.radians(incline))) for y in (-0.5 * post, 1.2 * post)]
-    return _path("line", *((_MM * y, _MM * z) for y, z in ends), color=MUTED)
+def _mm(*points: Point) -> list[Point]:
+    return [(_MM * x, _MM * y) for x, y in points]
 
 
-def _path(role: Role, *points: tuple[float, float], color: int = INK) -> Trace:
-    return series("", [x for x, _ in points], [y for _, y in points], role, color)
-
-
-def _words(words: str, x: float, y: float, color: int = INK) -> Trace:
-    return series(words, [x], [y], "words", color)
+def _named(label: str, place: Point, color: str) -> dict[str, Any]:
+    return {"label": label, "place": _mm(place), "color": color}
 
 
 def _name(gate: Gate) -> str:
     return f"{gate.channel}: {_MM * gate.height:g}"
-
-
-def _slots(protocol: Protocol, gates: Gates) -> list[str]:
-    """Say where each beam of the side that strikes meets the board."""
-    inclines = [incline for incline in _inclines(protocol) if incline > 0]
-    rows = [["beam, mm", *(f"{incline:g}°" for incline in inclines)]]
-    for height in sorted(gate.height for gate in gates.on("impact")):
-        ends = [beam_ends(protocol, height, incline) for incline in inclines]
-        cells = (f"{_MM * uphill:.0f} | {_MM * along:.0f}" for uphill, along in ends)
-        rows.append([f"{_MM * height:g}", *cells])
-    return text_table(rows) if inclines and len(rows) > 1 else []

@@ -5,6 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rig.measurands import Measurand
 
 MINUS = "−"
 _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
@@ -48,10 +53,8 @@ def decimals_for(uncertainty: float | None, default: int = 3) -> int:
     """Decimals that show two significant digits of an uncertainty (GUM 7.2.6)."""
     if uncertainty is None or uncertainty <= 0:
         return default
-    digits = 1 - math.floor(math.log10(uncertainty))
-    if round(uncertainty, digits) >= 10 ** (2 - digits):  # 0.0996 is written 0.10
-        digits -= 1
-    return min(max(digits, 0), 9)
+    exponent = f"{uncertainty:.1e}".partition("e")[2]  # of 0.0996 that of 0.10
+    return min(max(1 - int(exponent), 0), 9)
 
 
 def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
@@ -77,13 +80,18 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
     return f"{fixed(value * scale, decimals)} ± {fixed(uncertainty * scale, decimals)}"
 
 
+def with_unit(quantity: object, row: Measurand) -> str:
+    """Write a measurand ± U in its usual unit."""
+    return f"{plus_minus(quantity, row.scale, row.decimals)} {row.unit}"
+
+
 def ranges(noun: str, numbers: Iterable[int]) -> str:
     """Write numbers, neighbours together: runs 3, 5–8."""
-    spans: list[tuple[int, int]] = []
-    for number in sorted(set(numbers)):
-        if spans and spans[-1][1] == number - 1:
-            spans[-1] = spans[-1][0], number
-        else:
-            spans.append((number, number))
-    names = [f"{low}" if low == high else f"{low}–{high}" for low, high in spans]
+    spans = [
+        [number for _, number in neighbours]
+        for _, neighbours in groupby(
+            enumerate(sorted(set(numbers))), lambda pair: pair[1] - pair[0]
+        )
+    ]
+    names = [f"{span[0]}–{span[-1]}" if span[1:] else f"{span[0]}" for span in spans]
     return f"{noun}{'s' if len(names) > 1 or '–' in names[0] else ''} {', '.join(names)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.result import COUNTS
@@ -14,7 +15,6 @@ from rig.report.numbers import degrees, signed
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from rig.analysis.pairs import Effects
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
@@ -39,11 +39,6 @@ class Mean(NamedTuple):
 
     line: Incline
     row: Measurand
-
-    @property
-    def incline(self) -> str:
-        """The inclination of the line."""
-        return summary_incline(self.line)
 
     @property
     def mean(self) -> Measured:
@@ -90,25 +85,25 @@ def main_error(line: Incline) -> float | None:
 
 def means_parts(summary: Sequence[Incline]) -> list[Part]:
     """Return the means of each measurand beside the model; unlike chains have a line each."""
-    return [
-        part for row in averaged() for part in table_parts("model", means_of(summary, row), row=row)
-    ]
+    return [part for row in averaged() for part in tables("model", means_of(summary, row), row=row)]
 
 
-def value_parts(summary: Sequence[Incline]) -> Iterator[Part]:
-    """Yield the means without the model."""
-    return table_parts("means", summary, incline=summary_incline)
+def tables(
+    name: str, records: Iterable[Any], words: Iterable[str] = (), row: Measurand | None = None
+) -> Iterator[Part]:
+    """Yield a table of ``columns.txt`` of means, of drops, or of what both have."""
+    return table_parts(name, records, words, row, **_CELLS)
 
 
 def budget_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the table of what makes the uncertainty of the means, where anything is known of it."""
     means = [mean for row in averaged() for mean in means_of(summary, row)]
-    return table_parts("budget", (mean for mean in means if mean.mean.budget))
+    return tables("budget", (mean for mean in means if mean.mean.budget))
 
 
 def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the table of scatter."""
-    return table_parts(
+    return tables(
         "scatter",
         (mean for line in summary for row in averaged() for mean in means_of([line], row)),
     )
@@ -116,41 +111,21 @@ def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
 
 def prior_parts(moves: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
     """Yield the table of what means move by with each prior, see `rig analyze --priors`."""
-    return table_parts("priors", ({**move, "row": MEASURANDS[move["quantity"]]} for move in moves))
-
-
-def gate_parts(summary: Sequence[Incline]) -> Iterator[Part]:
-    """Yield the section on what each gate saw of one object, where there is one."""
-    return table_parts("gates", (gate for line in summary for gate in line.gates))
-
-
-def effects_parts(effects: Sequence[Effects]) -> Iterator[Part]:
-    """Yield the section on effects of chains and sides where there are any."""
-    return table_parts("effects", effects)
-
-
-def run_parts(drops: Iterable[DropResult]) -> Iterator[Part]:
-    """Yield the table of drops; raw Δz is as it happened, not corrected to simultaneous release."""
-    return table_parts("runs", drops, incline=_run_incline, edges=_edges)
-
-
-def verdict_parts(drops: Iterable[DropResult]) -> Iterator[Part]:
-    """Yield why drops are not accepted, and what to do about those that are void."""
-    return table_parts(
-        "verdicts",
-        (drop for drop in drops if drop.verdict != "accepted"),
-        incline=_run_incline,
-        reasons=lambda drop: signed(sentences(drop.reasons)),
-        remedies=lambda drop: "; ".join(remedies(drop.reasons)) if drop.verdict == "void" else "",
-    )
-
-
-def _run_incline(drop: DropResult) -> str:
-    return "" if drop.run.impact is None else degrees(drop.run.incline_deg)
+    rows = ({**move, "row": MEASURANDS[move["quantity"]]} for move in moves)
+    return tables("priors", rows)
 
 
 def _edges(drop: DropResult) -> str:
     return " / ".join(str(getattr(drop.audit, name)) for name in COUNTS)
+
+
+_CELLS: dict[str, Callable[[Any], str]] = {
+    "incline": summary_incline,
+    "run_incline": lambda drop: "" if drop.run.impact is None else degrees(drop.run.incline_deg),
+    "edges": _edges,
+    "reasons": lambda drop: signed(sentences(drop.reasons)),
+    "remedies": lambda drop: "; ".join(remedies(drop.reasons)) if drop.verdict == "void" else "",
+}
 
 
 def summary_table(summary: Sequence[Incline]) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import textwrap
+from functools import partial
 from html import escape
 from itertools import pairwise
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _LETTER, _TYPED = 0.57 * SIZE, 0.61 * SIZE
 """Mean width of the digits and letters of the fonts in question, and those of a typewriter."""
 _LINE = 1.25 * SIZE
-_GAP_PT, _RIGHT_PT, _TICK_PT, _ROW_PT, _NEAR_PT = 8.0, 9.0, 42.0, 15.0, 4.0
+_GAP_PT, _RIGHT_PT, _NEAR_PT = 8.0, 9.0, 4.0
 _DIGITS = 6  # of numbers at an axis
 _PLACES = 16  # along a series, where its name may stand
 _CROWDED = 500  # points that a name may rather hide than touch another
@@ -43,6 +43,7 @@ _PAGE = (
 )
 """What a page has no use for: it has a style sheet of its own."""
 _AREAS = ("bar", "band", "map", "levels")
+_LINES = ("line", "dash", "level", "limit")
 _LOOKS: dict[str, dict[str, Any]] = {
     "line": {"linewidth": 1.4},
     "dash": {"linewidth": 1.2, "dashes": (3.5, 2.0)},
@@ -61,16 +62,15 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
     width = width or chart.width
     letters = int(width / _TYPED)
     foot = [
-        line
+        line.replace("  ", "\u00a0\u00a0")
         for words in chart.foot
         for line in textwrap.wrap(words, letters, drop_whitespace=len(words) > letters) or [""]
     ]
     panels = chart.panels
-    last = [panel.x != follower.x for panel, follower in pairwise(panels)] + [True]
-    apart = _GAP_PT + 2.6 * _LINE * any(last[:-1])
-    top, bottom = (1 + chart.simulated) * _LINE, (3 + len(foot)) * _LINE
-    heights = [panel.height for panel in panels]
-    height = top + sum(heights) + apart * (len(panels) - 1) + bottom
+    shared = [panel.x == follower.x for panel, follower in pairwise(panels)]
+    below = [_GAP_PT if joined else _GAP_PT + 2.6 * _LINE for joined in shared]
+    below.append((3 + len(foot)) * _LINE)
+    top = height = (1 + chart.simulated) * _LINE + sum(below) + sum(each.height for each in panels)
     left = max(
         _LINE * (1.5 + panel.y.label.count("\n"))
         + _LETTER * max([_DIGITS, *map(len, panel.y.names.values())])
@@ -80,41 +80,41 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
         figure = Figure(figsize=(width / 72.0, height / 72.0), dpi=72.0)
         stamp = "SIMULATED DATA" if chart.simulated else ""
         figure.text(0.995, 1.0, stamp, ha="right", va="top", color=COLORS[SECOND][0])
-        typed = "\n".join(line.replace("  ", "\u00a0\u00a0") for line in foot)
-        figure.text(0.005, 4.0 / height, typed, va="bottom", family="monospace")
-        axes = figure.subplots(
-            len(panels),
-            squeeze=False,
-            height_ratios=heights,
-            gridspec_kw={
-                "left": left / width,
-                "right": 1.0 - _RIGHT_PT / width,
-                "top": 1.0 - top / height,
-                "bottom": bottom / height,
-                "hspace": apart / fmean(heights),
-            },
-        )[:, 0]
-        for number, (panel, here) in enumerate(zip(panels, axes, strict=True)):
-            shared = [axes[other] for other in range(number) if panels[other].x == panel.x]
-            if shared:
-                here.sharex(shared[0])
-            _set_up(here, panel, width, numbered=last[number])
+        figure.text(0.005, 4.0 / height, "\n".join(foot), va="bottom", family="monospace")
+        top -= (1 + chart.simulated) * _LINE
+        for panel, gap, joined in zip(panels, below, [*shared, False], strict=True):
+            top -= panel.height
+            box = left, top, width - left - _RIGHT_PT, panel.height
+            axes = figure.add_axes(tuple(np.array(box) / (width, height, width, height)))
+            top -= gap
+            for other, before in zip(figure.axes, panels, strict=False):
+                if before.x == panel.x and other is not axes:
+                    axes.sharex(other)
+                    break
+            _set_up(axes, panel, numbered=not joined)
             for trace in panel.series:
-                _draw(here, trace)
-        for panel, here in zip(panels, axes, strict=True):
-            _name_series(here, panel)
-    return Canvas(figure, list(axes), chart.facts or chart.title)
+                _draw(axes, trace)
+        for panel, axes in zip(panels, figure.axes, strict=True):
+            _name_series(axes, panel)
+    return Canvas(figure, figure.axes, chart.facts or chart.title)
 
 
-def page_svg(chart: Chart, width: float, kind: str, mark: str = "") -> str:
+def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
     """Return SVG for a page, of a class and with names of its own, in the page's colours."""
     svg = plot(chart, width).svg
     svg = svg[svg.index("<svg") :]
     for pattern, words in _PAGE:
         svg = re.sub(pattern, words, svg, flags=re.DOTALL)
-    svg = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d)\d+", r"\1", tag[0]), svg)
+    # One decimal, and no space where a letter parts numbers.
+    terse = partial(re.sub, r"(\.\d)\d+| +(?=[A-Zz])|(?<=[A-Z]) +", r"\1")
+    svg = re.sub(r"<[^>]*>", lambda tag: terse(tag[0]), svg)
     # Two figures have the same marks, and one of them may be hidden.
     svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{mark}-", svg)
+    rules = ""
+    for number, style in enumerate(sorted(set(re.findall(r' style="([^"]*)"', svg)))):
+        svg = svg.replace(f' style="{style}"', f' class="{mark}-{number}"')
+        rules += f".{mark}-{number}{{{style}}}"
+    svg = svg.replace(">", f"><style>{rules}</style>", 1)
     for number, (light, _) in enumerate(COLORS):
         svg = svg.replace(light, f"var(--c{number})")
     return svg.replace(
@@ -122,24 +122,19 @@ def page_svg(chart: Chart, width: float, kind: str, mark: str = "") -> str:
     )
 
 
-def _set_up(axes: Axes, panel: Panel, width: float, *, numbered: bool) -> None:
+def _set_up(axes: Axes, panel: Panel, *, numbered: bool) -> None:
     """Set limits, ticks and labels of both axes."""
-    rows, names = panel.height / _ROW_PT, panel.x.names.values()
-    columns = width / max([_TICK_PT, *(len(name) * _LETTER + 6 for name in names)])
-    for axis, about, most in ((axes.xaxis, panel.x, columns), (axes.yaxis, panel.y, rows)):
-        axis.set_major_locator(
-            MaxNLocator(max(2, int(most)), steps=[1, 2, 5, 10], integer=about.whole, min_n_ticks=1)
-        )
+    whole = all(place.is_integer() for trace in panel.series for place in trace.x)
+    for axis, about in ((axes.xaxis, panel.x), (axes.yaxis, panel.y)):
+        integer = whole and about is panel.x
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=integer))
         if about.names:
             axis.set_ticks([*about.names], [*about.names.values()])
         if about.limits is not None:
             axes.set(**{f"{axis.axis_name}lim": about.limits})
     axes.set(xlabel=panel.x.label if numbered else "", ylabel=panel.y.label)
     axes.tick_params(axis="x", labelbottom=numbered, bottom=numbered)
-    axes.tick_params(axis="y", length=0)
     axes.grid(visible=not panel.y.names, axis="y")
-    axes.spines["left"].set_visible(False)
-    axes.margins(0.03, 0.06)
     axes.set_aspect("equal" if panel.true else "auto")
 
 
@@ -161,21 +156,17 @@ def _draw(axes: Axes, trace: Trace) -> None:
         case "map" | "levels":
             _draw_map(axes, trace)
         case "words" | "cross":  # texts do not set the scale
-            side = "center" if trace.role == "cross" else "left" if x[0] > 0.0 else "right"
-            for place in zip(trace.x, trace.y, strict=True):
-                words = "×" if trace.role == "cross" else trace.label
-                axes.text(
-                    *place, words, ha=side, va="center", color=color, clip_on=side == "center"
-                )
-        case "line" | "dash" | "thick":
-            axes.plot(x, y, color=color, **look)
-        case _ if u.size:
-            across, up = (u, None) if trace.across else (None, u)
-            axes.errorbar(
-                x, y, up, across, color=color, linestyle="none", elinewidth=0.9, capsize=0.0, **look
+            cross = trace.role == "cross"
+            side, words = (
+                ("center", "×") if cross else ("left" if x[0] > 0 else "right", trace.label)
             )
+            for place in zip(x, y, strict=True):
+                axes.text(*place, words, ha=side, va="center", color=color, clip_on=cross)
         case _:
-            axes.plot(x, y, color=color, linestyle="none", **look)
+            options: dict[str, Any] = {"linestyle": "none"} if "marker" in look else {}
+            if u.size:
+                options |= {"xerr" if trace.across else "yerr": u, "elinewidth": 0.9}
+            axes.errorbar(x, y, color=color, **options, **look)
 
 
 def _draw_map(axes: Axes, trace: Trace) -> None:
@@ -198,54 +189,48 @@ def _name_series(axes: Axes, panel: Panel) -> None:
     lines = (trace for trace in panel.series if trace.y and trace.role not in _AREAS)
     taken = np.vstack([np.empty((0, 2)), *(_shown(axes, trace) for trace in lines)])
     left, bottom, right, top = axes.bbox.extents
-    names: list[Points] = []
+    names = np.empty((0, 4))
     for trace in panel.series:
         if not trace.label or not trace.y or trace.role == "words":
             continue
-        wide, best = len(trace.label) * _LETTER, None
-        rows = [3.0, -SIZE - 2.0, -3.0]
-        if trace.role == "bar":
-            rows = [-4.0 - row * _LINE for row in range(1, 5)]
+        bar, places = trace.role == "bar", _shown(axes, trace)
+        wide = len(trace.label) * _LETTER
+        rows = [-4.0 - row * _LINE for row in range(1, 5)] if bar else [3.0, -SIZE - 2.0, -3.0]
         offsets = [(dx, dy) for dy in rows for dx in (-wide / 2, 5.0, -wide - 5.0)]
-        places = _shown(axes, trace)
-        for x, y in places[:: max(1, len(places) // _PLACES)]:
-            for dx, dy in offsets:
-                box = np.array([x + dx, y + dy - 2.0, x + dx + wide, y + dy + SIZE])
-                if box[0] < left or box[2] > right + 6.0 or box[3] > top + 4.0:
-                    continue
-                hidden = (box[:2] - 1.0 < taken) & (taken < box[2:] + 1.0)
-                near = sum(
-                    bool((box[:2] < name[2:]).all() and (name[:2] < box[2:]).all())
-                    for name in names
-                )
-                cost = hidden.all(axis=1).sum() + _CROWDED * (near + (box[1] < bottom))
-                if best is None or cost < best[0]:
-                    best = cost, box
-        if best is not None:
-            names.append(best[1])
-            place = tuple(axes.transData.inverted().transform(best[1][:2] + np.array((0.0, 2.0))))
-            color = COLORS[INK if trace.role == "bar" else trace.color][0]
-            axes.annotate(trace.label, place, color=color, annotation_clip=False)
+        corners = (places[:: max(1, len(places) // _PLACES), None] + offsets).reshape(-1, 2)
+        low, high = np.subtract(corners, (0.0, 2.0)), np.add(corners, (wide, SIZE))
+        inside = (low[:, 0] >= left) & (high[:, 0] <= right + 6.0) & (high[:, 1] <= top + 4.0)
+        if not inside.any():
+            continue
+        hidden = _meet(low - 1.0, high + 1.0, taken, taken)
+        crowded = _meet(low, high, names[:, :2], names[:, 2:]) + (low[:, 1] < bottom)
+        best = np.argmin(np.where(inside, hidden + _CROWDED * crowded, np.inf))
+        names = np.vstack((names, [*low[best], *high[best]]))
+        place = axes.transData.inverted().transform(corners[best])
+        color = COLORS[INK if bar else trace.color][0]
+        axes.annotate(trace.label, tuple(place), color=color, annotation_clip=False)
+
+
+def _meet(low: Points, high: Points, starts: Points, ends: Points) -> Any:
+    """Count for each box how many others it meets."""
+    return ((low[:, None] < ends) & (starts < high[:, None])).all(axis=2).sum(axis=1)
 
 
 def _shown(axes: Axes, trace: Trace) -> Points:
     """Return points on the drawing along what a series shows, none far from the next."""
     x, y, u = (np.array(values, float) for values in (trace.x, trace.y, trace.u))
-    (first, last), (low, high) = axes.get_xlim(), axes.get_ylim()
     if trace.role == "bar":
         x, y = (x + trace.base) / 2, y - 0.36
     elif not x.size:
-        x, y = np.linspace(first, last, 4 * _PLACES), np.full(4 * _PLACES, max(trace.y))
-    inside = (low <= y) & (y <= high) & np.isfinite(x)
-    points = axes.transData.transform(np.column_stack([x, y])[inside])
-    if trace.role in {"line", "dash", "level", "limit"} and len(points) > 1:
-        along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-        places = np.arange(0.0, along[-1], _NEAR_PT)
-        return np.column_stack([np.interp(places, along, column) for column in points.T])
+        x, y = np.array(axes.get_xlim()), np.full(2, y.max())
     if u.size and trace.role != "band":
-        ends = [
-            np.column_stack([x + way * u * trace.across, y + way * u * (not trace.across)])
-            for way in np.linspace(-1.0, 1.0, 9)
-        ]
-        return np.vstack([points, axes.transData.transform(np.vstack(ends))])
-    return points
+        ends = np.linspace(-1.0, 1.0, 9)[:, None] * u
+        x, y = np.ravel(x + ends * trace.across), np.ravel(y + ends * (not trace.across))
+    low, high = axes.get_ylim()
+    points: Points = axes.transData.transform(np.column_stack([x, y]))
+    points = points[(low <= y) & (y <= high) & np.isfinite(x)]
+    if trace.role not in _LINES or len(points) < 2:
+        return points
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    places = np.arange(0.0, along[-1], _NEAR_PT)
+    return np.column_stack([np.interp(places, along, column) for column in points.T])

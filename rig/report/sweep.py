@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.measurands import SEPARATION, SPEED
-from rig.report.figure import WIDE_PT, Chart, Panel, PlotAxis, Trace, series
-from rig.report.looks import INK, MODEL, MUTED
+from rig.report.figure import WIDE_PT, Trace, chart
+from rig.report.looks import INK, MUTED
 from rig.report.templates import render
 from rig.sweep.compute import PILE
 from rig.sweep.variables import VARIABLES
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from rig.measurands import Measurand
     from rig.model.batch import Floats
+    from rig.report.figure import Chart
     from rig.sweep.compute import Swept
     from rig.sweep.layout import Layout
 
@@ -44,27 +45,16 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Char
         Where the model has no answer the picture is empty; where the point lies beyond its domain,
         lines are dashed. Levels span what is found inside the domain.
     """
-    across, *up = (
-        PlotAxis(VARIABLES[axis.name].label, limits=(axis.values[0], axis.values[-1]))
-        for axis in layout.grid.axes
-    )
     shown = [(SEPARATION, swept.separation_m)] if layout.two_chains else []
-    draw, height = (_map, 200.0) if up else (_curves, 150.0)
-    panels = [
-        # Each map has its own axis below, which says what its levels are.
-        Panel(
-            replace(across, label=f"{row.axis} against {across.label}") if up else across,
-            up[0] if up else PlotAxis(row.axis),
-            [*draw(row, layout, values, swept)],
-            height,
-        )
-        for row, values in [*shown, (SPEED, swept.speed_m_s)]
-    ]
+    panels = (
+        _panel(row, layout, values, swept) for row, values in [*shown, (SPEED, swept.speed_m_s)]
+    )
     labels = {variable.column: variable.label for variable in VARIABLES.values()}
     held = "; ".join(_with_unit(labels[name], value) for name, value in facts["fixed"].items())
     foot = str(render("sweep.txt", facts=facts, held=held)).split("\n")
+    figure = chart("sweep", *panels, title=facts["title"])
     record = json.dumps(facts, ensure_ascii=False)
-    return Chart(facts["title"], foot[-1], panels, foot=foot, width=WIDE_PT, facts=record)
+    return replace(figure, caption=foot[-1], foot=foot, width=WIDE_PT, facts=record)
 
 
 def _with_unit(label: str, value: float) -> str:
@@ -73,14 +63,26 @@ def _with_unit(label: str, value: float) -> str:
     return f"{name} = {value:g} {unit.removesuffix(')')}".rstrip().replace(" °", "°")
 
 
-def _curves(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:
-    (axis,) = layout.grid.axes
+def _panel(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> dict[str, Any]:
+    """Draw one quantity: along an axis, or as a map, whose own axis says what its levels are."""
+    (x, across), *second = (
+        (VARIABLES[axis.name].label, {"limits": (axis.values[0], axis.values[-1])})
+        for axis in layout.grid.axes
+    )
+    for y, up in second:
+        traces = _map(row, layout, values, swept)
+        axes = {"x": f"{row.axis} against {x}", "y": y, "x_axis": across, "y_axis": up}
+        return {"height": 200, "scale": 1, "traces": traces, **axes}
+    (places,) = (axis.values for axis in layout.grid.axes)
+    parts = []
     for piled in (False, True):
         # The step from the pile to the surface is no part of either curve.
         part = np.where(((swept.notes & PILE) > 0) == piled, values, np.nan)
-        yield series("", axis.values, part, "dash", MUTED, scale=row.scale)
         inside = np.where(swept.in_domain, part, np.nan)
-        yield series("", axis.values, inside, "line", MODEL, scale=row.scale)
+        rows = {"points": part, "inside": inside}
+        parts.append({name: np.column_stack((places, row)) for name, row in rows.items()})
+    axes = {"x": x, "y": row.axis, "x_axis": across}
+    return {"height": 150, "scale": row.scale, "parts": parts, **axes}
 
 
 def _map(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import accumulate, groupby, pairwise
+from operator import itemgetter
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.measurands import averaged
-from rig.report.numbers import plus_minus
-
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
     from fractions import Fraction
 
     from rig.analysis.result import DropResult
@@ -41,22 +40,16 @@ class Lanes(NamedTuple):
 
 
 class Timeline(NamedTuple):
-    """A drop's shadows and unexplained edges, as SVG path data, and what is said beside them."""
+    """A drop's shadows and unexplained edges, as SVG path data."""
 
     result: DropResult
     bars: str
     odd: str
-    numbers: str
-
-    @property
-    def anchor(self) -> str:
-        """Its place on the page."""
-        return f"drop-{self.result.run.number}-{self.result.attempt}"
 
 
 def timelines(
     gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
-) -> tuple[Lanes, dict[int, Timeline]]:
+) -> tuple[Lanes, list[Timeline]]:
     """Draw when each beam was blocked, as far as there is room.
 
     Parameters
@@ -66,17 +59,17 @@ def timelines(
 
     Returns
     -------
-    Lanes, dict of int to Timeline
-        What all have in common; those drawn, by number.
+    Lanes, list of Timeline
+        What all have in common; the drops that are drawn.
     """
-    shared, shown, left = lanes(gates, timed), {}, _ROOM
+    shared = lanes(gates, timed)
+    drawn = [timeline(shared, *drop) for drop in timed]
     # Those that do not count come first where not all have room.
-    for number in sorted(range(len(timed)), key=lambda n: (timed[n][-1].verdict == "accepted", n)):
-        drawn = timeline(shared, *timed[number])
-        left -= len(drawn.bars) + len(drawn.odd) + _AROUND
-        if drawn.bars and left > 0:
-            shown[number] = drawn
-    return shared, dict(sorted(shown.items()))
+    drawn.sort(key=lambda drop: drop.result.verdict == "accepted")
+    sizes = accumulate(len(drop.bars) + len(drop.odd) + _AROUND for drop in drawn)
+    return shared, [
+        drop for drop, size in zip(drawn, sizes, strict=True) if drop.bars and size < _ROOM
+    ]
 
 
 def lanes(
@@ -102,29 +95,28 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
     result
         Which of its edges were matched; where none was, none is unexplained.
     """
-    places = [round(ms * _FINE * _WIDTH / lanes.span_ms) for ms in _times_ms(drop, hz)]
+    end = _FINE * _WIDTH
+    places = [round(ms * end / lanes.span_ms) for ms in _times_ms(drop, hz)]
     bars = marks = ""
     for number, gate in enumerate(lanes.gates):
-        y = f"{_LANE * (number + 0.5):g}"
-        at = {
-            n: place
+        y = _LANE * (_FINE * number + 1)
+        own = [
+            (place, edge.blocked, n in result.matches)
             for n, (edge, place) in enumerate(zip(drop.edges, places, strict=True))
-            if edge.channel == gate.channel and place <= _FINE * _WIDTH
-        }
-        pen = 0
-        blocked = bool(drop.initial_state >> gate.channel & 1)
-        for begin, end in _spans(drop, at, blocked=blocked) if places else ():
-            bars += f"m{begin - pen} 0h{end - begin}" if pen else f"M{begin} {y}h{end - begin}"
-            pen = end
-        if result.matches:
-            odd = [place for n, place in at.items() if n not in result.matches]
-            marks += "".join(f"M{place} {y}m0-5v10" for place in odd)
-    values = [
-        f", {row.symbol} {plus_minus(value, row.scale, row.decimals)} {row.unit}"
-        for row in averaged()
-        if (value := result.quantities.get(row.name)) is not None
-    ]
-    return Timeline(result, bars, marks, "".join(values))
+            if edge.channel == gate.channel and place <= end
+        ]
+        # From each change to the next; an edge like the one before changes nothing.
+        states = [(0, bool(drop.initial_state >> gate.channel & 1), True), *own, (end, None, True)]
+        changes = [next(same) for _, same in groupby(states, key=itemgetter(1))]
+        pen, lane = 0, ""
+        for (begin, blocked, _), (until, *_) in pairwise(changes if places else ()):
+            if blocked:
+                lane += f"m{begin - pen} 0h{max(until - begin, 1)}"
+                pen = max(until, begin + 1)
+        bars += lane and f"M0 {y}{lane}"
+        for place, _, matched in own if result.matches else ():
+            marks += "" if matched else f"M{place} {y}m0-10v20"
+    return Timeline(result, bars, marks)
 
 
 def _times_ms(drop: Drop, hz: float | Fraction) -> list[float]:
@@ -133,16 +125,3 @@ def _times_ms(drop: Drop, hz: float | Fraction) -> list[float]:
     # Imported edges are counted from a whole second, not from the release.
     begin = 0.0 if drop.fire_tick is not None and times[:1] >= [0.0] else min(times, default=0.0)
     return [time - begin for time in times]
-
-
-def _spans(drop: Drop, at: dict[int, int], *, blocked: bool) -> Iterator[tuple[int, int]]:
-    """Yield from where to where a beam was blocked, from the first edge or from the start."""
-    since = 0 if blocked else None
-    for number, place in at.items():
-        if drop.edges[number].blocked:
-            since = place if since is None else since
-        elif since is not None:
-            yield since, max(place, since + 1)
-            since = None
-    if since is not None:
-        yield since, max(_FINE * _WIDTH, since + 1)

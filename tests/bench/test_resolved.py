@@ -9,7 +9,7 @@ from bench.studies import resolved as bench_resolved
 from rig import cli
 from rig.bench import resolved_paper
 from rig.bench.resolved_paper import Ensemble
-from rig.report.files import figure_file
+from rig.report.canvas import figure_file
 from rig.report.film import film_figure
 from tests.report.test_figures import FILM
 

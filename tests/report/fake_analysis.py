@@ -79,12 +79,6 @@ def two_chains(seed: int = 1, repeats: int = 12) -> Analysis:
             )
         )
     summary.sort(key=lambda line: line.incline_deg)
-    budgets = {
-        "separation_m": {"release skew": 0.00098, "beam heights": 0.0003},
-        "speed_m_s": {"clock": 0.0004},
-    }
-    for name, budget in budgets.items():
-        runs[5] = measured(runs[5], **{name: replace(runs[5].quantities[name], budget=budget)})
     return analysis(runs, summary)
 
 

@@ -15,10 +15,9 @@ from rig.analysis.result import Audit, DropResult, Measured
 from rig.films import Film
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
-from rig.report.canvas import KINDS, canvas
+from rig.report.canvas import KINDS, canvas, figure_file, write_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
 from rig.report.figures import budget_figure, result_figure, runs_figure, variance_shares
-from rig.report.files import figure_file, write_figures
 from rig.report.film import film_figure
 from rig.report.looks import COLORS, SECOND
 from rig.report.plot import page_svg, plot
@@ -35,10 +34,9 @@ FILM = Film(
 
 def figures() -> list[Chart]:
     """One of each kind, of made-up results."""
-    budget = {"runs": 1e-3, "common": 2e-3}
-    means = {"separation_m": Measured(0.1, 5**0.5 * 1e-3, budget=budget)}
+    mean = Measured(0.1, 5**0.5 * 1e-3, budget={"runs": 1e-3, "common": 2e-3})
     causes = {"separation_m": {"datum": 4e-3, "beam heights": 3e-3, "width": 1e-5}}
-    line = replace(TWO.summary[0], means=means, causes=causes)
+    line = replace(TWO.summary[0], means={"separation_m": mean}, causes=causes)
     return [
         result_figure(TWO, CURVES),
         result_figure(fake_analysis.gravity(), {}, site_m_s2=9.82),
@@ -102,14 +100,14 @@ def test_residuals_are_normalized_errors():
     figure = result_figure(TWO, CURVES)
     points = figure.panels[1].series[-1]
     assert list(points.y) == [line.normalized_error("separation_m") for line in TWO.summary]
-    assert figure.panels[1].series[0].y == (-1.0, 1.0)
+    assert figure.panels[1].series[0].y == [-1.0, 1.0]
 
 
 def test_without_any_uncertainty_there_are_no_residuals():
     """A protocol may state heights as exact."""
-    axis = PlotAxis("time (s)")
-    assert not residual_panels(axis, [(0.1, float("inf")), (0.2, float("nan"))])
-    assert residual_panels(axis, [(0.1, 0.5), (0.2, float("inf"))])
+    axis, none = PlotAxis("time (s)"), [(0.1, float("inf")), (0.2, float("nan"))]
+    assert not residual_panels(axis, none)
+    assert residual_panels(axis, [(0.1, 0.5), *none])
 
 
 def test_figures_follow_the_scene():
@@ -141,7 +139,7 @@ def test_shares_of_a_variance_add_up_to_the_whole():
     (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
     mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
     line = replace(line, means={"separation_m": mean}, causes={"separation_m": {"datum": 4e-3}})
-    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 0.36, "datum": 0.64})
+    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})
 
 
 def test_slack_strings_are_drawn_apart():

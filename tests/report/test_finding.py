@@ -14,8 +14,7 @@ from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
 from rig.reasons import plain_reason
 from rig.records import Drop, Edge
-from rig.report.deviations import NONE, deviations
-from rig.report.finding import finding, headline, verdict
+from rig.report.finding import NONE, deviations, finding, headline, verdict
 from rig.report.timeline import lanes, timeline
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
@@ -117,17 +116,18 @@ def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
     shared = lanes(GATES, [(drop, 1000, result)])
     assert [gate.channel for gate in shared.gates] == [0, 1, 8]  # from the top, impact first
     # 1280 steps for 500 ms: from 100 to 200 and what is not over; blocked from the start.
-    bars = "M256 7.5h256m768 0h1M0 22.5h640M1024 37.5h256"
-    assert timeline(shared, drop, 1000, result) == (result, bars, "M1280 7.5m0-5v10", "")
-    assert timeline(shared, replace(drop, edges=()), 1000, result) == (result, "", "", "")
+    bars = "M0 15m256 0h256m768 0h1M0 45m0 0h640M0 75m1024 0h256"
+    assert timeline(shared, drop, 1000, result)[1:] == (bars, "M1280 15m0-10v20")
+    assert timeline(shared, replace(drop, edges=()), 1000, result)[1:] == ("", "")
 
 
 def test_imported_edges_begin_where_they_begin():
     result = DropResult(Run(1, 40.0, "A", None), 1, "void", (), Audit(5, 0, 0, 5, 0))
     late = Drop(1, 1, 1000, tuple(edge._replace(tick=edge.tick + 10_000) for edge in EDGES))
-    _, bars, marks, _ = timeline(lanes(GATES, [(late, 1000, result)]), late, 1000, result)
-    assert bars.startswith("M0 7.5h320m")  # 100 of 400 ms
-    assert not marks  # nothing was fitted, so nothing is odd
+    drop = late, 1000, result
+    drawn = timeline(lanes(GATES, [drop]), *drop)
+    assert drawn.bars.startswith("M0 15m0 0h320m")  # 100 of 400 ms
+    assert not drawn.odd  # nothing was fitted, so nothing is odd
 
 
 def test_a_drop_that_lasts_long_does_not_squeeze_the_others():

@@ -10,7 +10,7 @@ import pytest
 
 from rig.cli import main
 from rig.protocol.reader import parse, read
-from rig.report.files import figure_file
+from rig.report.canvas import figure_file
 from rig.report.mounting import beam_ends, mounting_figure
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"

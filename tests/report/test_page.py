@@ -7,22 +7,26 @@ import re
 import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Callable
+from datetime import datetime
 from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
-from types import SimpleNamespace
+from types import SimpleNamespace as Simple
+from typing import Any
 from unittest.mock import Mock
 
 import yaml
 
 from rig import __version__
-from rig.analysis.result import Audit, DropResult
+from rig.analysis.result import GOOD, Audit, DropResult
 from rig.protocol.protocol import Run
+from rig.records import Job
 from rig.report.attachments import METHOD, Attachment, method_page
 from rig.report.columns import Part
 from rig.report.figure import Chart, Panel, PlotAxis, Trace
-from rig.report.finding import Number
-from rig.report.page import PageSection, ReportPage, page_html
+from rig.report.finding import ModelCheck, Number
+from rig.report.page import page_html
 from rig.report.session_page import PAPER, SOFTWARE
 from rig.report.timeline import Lanes, Timeline
 
@@ -34,9 +38,7 @@ BAD = '<script>alert("x")</script>&\'</pre></style>'
 class Balance(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
-        self.open: list[str] = []
-        self.ids: list[str] = []
-        self.links: list[str] = []
+        self.open, self.ids, self.links = [], [], []
 
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)
@@ -45,65 +47,75 @@ class Balance(HTMLParser):
         if tag not in VOID_TAGS:
             self.open.append(tag)
 
-    def handle_startendtag(self, tag, attrs):
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID_TAGS:
-            self.open.pop()
-
     def handle_endtag(self, tag):
-        assert self.open.pop() == tag
+        assert tag in VOID_TAGS or self.open.pop() == tag
 
 
 def parse(page: str) -> Balance:
     parser = Balance()
     parser.feed(page)
-    parser.close()
     assert not parser.open
     return parser
 
 
-def page_with(text: str) -> ReportPage:
-    """Return a page that says one text wherever a page says anything."""
-    panel = Panel(PlotAxis(text), PlotAxis(text), [Trace(text[:8], [0.0, 1.0], [0.0, 1.0], "line")])
-    figure = Chart(text, text, [panel])
-    part = Part(text, [text], [(text, False)], [[text]], off={0}, links={0: "drop-1-1"})
+def always(value: Any) -> Callable[..., Any]:
+    return lambda *_: value
+
+
+def page_with(text: str) -> dict[str, Any]:
+    """Return a session's page that says one text wherever a page says anything."""
+    axis, ends = PlotAxis(text), [0.0, 1.0]
+    panel = Panel(axis, axis, [Trace(text[:8], ends, ends, "line")])
+    charts = always([Chart(text, text, [panel])])
+    tables = always([Part(text, [text], [(text, False)], [[text]])])
+    words = always([text])
     result = DropResult(Run(1, 40.0, text, text), 1, text, (), Audit())
-    drop = Timeline(result, "", "M0 0", text)
-    drops = {"table": part, "timelines": {0: drop}, "lanes": Lanes((), 1.0), "results": [result]}
-    session = Mock(
-        path=SimpleNamespace(name=text),
-        meta=defaultdict(lambda: text),
-        protocol_text=text,
-        protocol_source=text,
-    )
-    session.identities.return_value = [(0, text)]
-    method = defaultdict(lambda: text, session=session, outcome=Mock(), runs=[result],
-                         files=[Attachment(text, text, "1", text)], said=[text])  # fmt: skip
-    method["outcome"].clock.details = {text: text}
-    sections = [
-        PageSection("result", text, [text], [figure], [part], [part], "drops.html", drops),
-        PageSection("method", text, template="method.html", values=method),
-    ]
-    return ReportPage(
-        text, sections, True, [figure], [Number(text, text, text)], text, True, text, [text], text
-    )
+    session = Simple(
+        path=Simple(name=text), meta=defaultdict(lambda: text), protocol_text=text,
+        protocol_source=text, states=words, identities=always([(0, text)]),
+        attached_files=always([Simple(name=text, added=text)]),
+    )  # fmt: skip
+    analysis = Simple(
+        runs=(result,), superseded=(), summary=(Simple(incline_deg=1.0, gates=()),), damage=[text],
+        rig=Simple(likeness=Simple(sentence=text), drag=None),
+    )  # fmt: skip
+    outcome = Mock(blind=False, analysis=analysis, clock=Simple(details={text: text}))
+    return {
+        "template": "session.html", "title": text, "simulated": True, "session": session,
+        "outcome": outcome, "timed": (), "good": GOOD, "created": datetime(2026, 6, 3),
+        "protocol": Mock(notes=text, track=None), "free": None, "notes": {Job(1, 1): text},
+        "material": Simple(
+            make=lambda _, make, *arguments: make(*arguments), drops=[result], bars="U95",
+            estimated=True, sections=Simple(failed={"a": text}),
+        ),
+        "paper": text, "software": text, "versions": {"rig": text},
+        "curves": defaultdict(lambda: always([{}])), "fall": charts, "fallen": charts,
+        "figures": defaultdict(lambda: charts, FEWEST_INCLINES=3), "plan": {"runs": always([])},
+        "parts": defaultdict(lambda: tables), "estimate": {"page_parts": tables},
+        "timeline": {"timelines": always((Lanes((), 1.0), [Timeline(result, "", "M0 0")]))},
+        "attachments": {"attachments": always([Attachment(text, text, "1", text)])},
+        "finding": defaultdict(lambda: words, verdict=always(ModelCheck(text, False)),
+                               headline=always([Number(text, text, text)])),
+        "improvements": {"improvements": always([{"sentence": text}])},
+        "measurands": {"averaged": always([])},
+    }  # fmt: skip
 
 
 def test_the_page_is_whole_and_needs_nothing_else():
-    page = page_html(page_with("Text"))
+    page = page_html(page_with("Text"))[0]
     parser = parse(page)
     assert len(parser.ids) == len(set(parser.ids))
     places = [link[1:] for link in parser.links if not link.startswith("data:")]
     assert set(places) <= set(parser.ids)
     assert "SIMULATED DATA" in page
-    assert page == page_html(page_with("Text"))
+    assert page == page_html(page_with("Text"))[0]
     (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
     assert f"script-src 'sha256-{digest}'" in page
 
 
 def test_text_is_escaped():
-    plain, bad = page_html(page_with("Text")), page_html(page_with(BAD))
+    plain, bad = page_html(page_with("Text"))[0], page_html(page_with(BAD))[0]
     parse(bad)
     for tag in ("<script", "</style>", "</pre>"):
         assert bad.count(tag) == plain.count(tag)

@@ -9,8 +9,7 @@ import pytest
 
 from rig import cli
 from rig.report import paper as figures
-from rig.report.canvas import KINDS
-from rig.report.files import figure_file
+from rig.report.canvas import KINDS, figure_file
 
 
 @pytest.mark.parametrize("number", [3, 4, 6])

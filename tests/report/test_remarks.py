@@ -11,7 +11,7 @@ from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason, remedies
-from rig.report.remarks import air_lines, void_lines
+from rig.report.finding import air_lines, void_lines
 from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
 from tests.cli.lab import rig, short
 

@@ -110,11 +110,11 @@ def test_a_page_says_what_it_lacks(single, monkeypatch):
     def fail(*_, **__):
         raise TypeError("must be real number, not str")
 
-    for name in ("budget_figure", "result_figure", "fall_figures"):
-        monkeypatch.setattr(f"rig.report.session_page.{name}", fail)
+    for name in ("figures.budget_figure", "figures.result_figure", "session_page.fall_figures"):
+        monkeypatch.setattr(f"rig.report.{name}", fail)
     with Session.open(single, readonly=True) as session:
         material = Material(session, results(session))
-        page = page_html(session_page(material))
+        page, _ = page_html(session_page(material))
     assert len(material.sections.failed) == 3
     for sentence in material.sections.failed.values():
         assert sentence in page

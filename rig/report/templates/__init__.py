@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.report import numbers
+
 if TYPE_CHECKING:
     from jinja2 import Environment
 
@@ -19,9 +21,15 @@ def environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - pages only
 
     loader = FileSystemLoader(Path(__file__).parent)
-    filled = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
-    filled.filters["prose"] = _prose
-    return filled
+    templates = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+    templates.filters |= {
+        "prose": _prose,
+        "plus_minus": numbers.plus_minus,
+        "with_unit": numbers.with_unit,
+        "signed": numbers.signed,
+    }
+    templates.globals["ranges"] = numbers.ranges
+    return templates
 
 
 def render(name: str, **values: object) -> str:
