@@ -8,21 +8,17 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig import __version__
 from rig.boards import GATES
-from rig.command_help import build_parser, runnable
+from rig.command_help import Parser, build_parser, runnable
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
 from rig.units import Dimension, parse
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from rig.command_help import Parser
 
 BAD_INPUT = 2
 INTERRUPTED = 130

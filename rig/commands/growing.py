@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from rig.analysis.curves import model_curves
 from rig.analysis.session import Analysis
@@ -16,8 +16,6 @@ from rig.tui.plots import inclined
 from rig.tui.plotting import plotted
 
 if TYPE_CHECKING:
-    from typing import TextIO
-
     from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol
     from rig.tui.braille import Span
