@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.campaign import events
-from rig.campaign.events import Stage
+from rig.campaign.events import Effect, Event, Stage
 from rig.campaign.machine import Flow, step
 from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
 from rig.campaign.voids import voids_of
-from rig.daemon.connecting import connect
+from rig.daemon.connecting import Rig, connect
 from rig.errors import DeviceError
 from rig.link.refusals import DeviceRefusedError
 from rig.measurands import told
@@ -21,9 +21,9 @@ from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.recorder.interrupts import Interrupts
-from rig.records import Job
+from rig.records import Drop, Job
 from rig.report.numbers import plus_minus, signed
-from rig.results import results
+from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -33,11 +33,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.result import DropResult
-    from rig.campaign.events import Effect, Event
-    from rig.daemon.connecting import Rig
     from rig.protocol.protocol import Protocol
-    from rig.records import Drop
-    from rig.results import SessionResults
 
 
 _FALL = (events.FireRelease, events.Collect, events.Stop)

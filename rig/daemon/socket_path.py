@@ -19,11 +19,11 @@ _AGAIN_S = 0.02
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 
 
-def default_socket() -> Path:
-    """Name the socket of this user's daemon."""
+def default_socket(name: str = "") -> Path:
+    """Name the socket of this user's daemon, or of the one of several rigs that has a name."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     folder = Path(runtime) if runtime else Path.home() / ".cache"
-    return folder / "chainrig" / "rig.sock"
+    return folder / "chainrig" / ("-".join(filter(None, ["rig", name])) + ".sock")
 
 
 def token_file(path: Path) -> Path:

@@ -64,7 +64,7 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     try:
         data = read_input(path, MAX_BYTES + 1)
     except FileNotFoundError:
-        hint = "rig new FILE.yaml writes a protocol; ready protocols are in protocols/"
+        hint = "rig new FILE.yaml writes a protocol; rig ready lists ready protocols"
         raise InputError(f"{source}: there is no such file", hint) from None
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         reason = getattr(error, "strerror", None) or error
