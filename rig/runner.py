@@ -12,7 +12,7 @@ from rig.campaign.events import Effect, Event, Stage
 from rig.campaign.machine import Flow, step
 from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
 from rig.campaign.voids import voids_of
-from rig.daemon.connecting import Rig, connect
+from rig.daemon.connecting import connect
 from rig.errors import DeviceError
 from rig.link.refusals import DeviceRefusedError
 from rig.measurands import told
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.result import DropResult
+    from rig.daemon.connecting import Rig
     from rig.protocol.protocol import Protocol
 
 

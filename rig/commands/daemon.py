@@ -14,7 +14,7 @@ from pathlib import Path
 from rig.commands.output import say
 from rig.daemon.listener import notify_systemd
 from rig.daemon.server import serve
-from rig.daemon.socket_path import default_socket
+from rig.daemon.socket_path import default_socket, require_sockets
 from rig.link.port import check_url
 from rig.printable import printable
 
@@ -69,6 +69,7 @@ def logged_to_stderr() -> Iterator[None]:
 
 def main(arguments: Namespace) -> int:
     """Own a port and serve clients, in the foreground, until a signal or the idle time ends it."""
+    require_sockets()
     check_url(arguments.port)
     path = Path(arguments.socket).absolute() if arguments.socket else default_socket()
 

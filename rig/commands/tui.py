@@ -11,6 +11,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rig.daemon.socket_path import require_sockets
 from rig.errors import InputError
 from rig.ports import check_name
 from rig.ready import ready_protocols
@@ -62,6 +63,8 @@ def _options(arguments: Namespace) -> Options:
     offline = bool(arguments.session) and not (
         arguments.port or arguments.protocol or arguments.socket
     )
+    if not offline:
+        require_sockets()
     check_name(arguments.port or "")  # before a daemon is started for it
     fresh = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session"
     return Options(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import resource
 import secrets
 import signal
 import sys
@@ -268,6 +267,8 @@ def _kept_log() -> Iterator[None]:
 
 
 def _allow_descriptors() -> None:
+    import resource  # noqa: PLC0415 - Windows has none, nor a daemon
+
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     limit = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
     if soft != resource.RLIM_INFINITY and soft < limit:

@@ -46,6 +46,18 @@ def prepare_folder(folder: Path) -> None:
         raise make_error(InputError, "place_unusable", path=folder, text=error) from error
 
 
+def require_sockets() -> None:
+    """Refuse to do what needs a daemon where none can be.
+
+    Raises
+    ------
+    InputError
+        Python has no Unix sockets here, as on Windows, so nobody knows who a client is.
+    """
+    if not hasattr(socket, "AF_UNIX"):
+        raise make_error(InputError, "no_unix_sockets")
+
+
 def check_folder(folder: Path) -> None:
     """Refuse a folder that others may write to.
 
@@ -54,6 +66,7 @@ def check_folder(folder: Path) -> None:
     InputError
         As for `prepare_folder`.
     """
+    require_sockets()
     about = folder.stat()
     if about.st_uid != os.getuid():
         raise make_error(InputError, "folder_foreign", folder=folder)
