@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
@@ -14,25 +13,23 @@ from rig.files import make_folder, write_atomic
 from rig.ready import shipped
 from rig.usb.listing import sole_port
 
-_PORT = "RIG_PORT="
-
 
 def main(arguments: Namespace) -> int:
-    """Write the user's systemd unit that keeps a daemon running, and the board's port for it."""
-    rig, config = arguments.name, platformdirs.user_config_path()
-    port = _lasting(arguments.port or sole_port())
-    unit = "chainrig@.service" if rig else "chainrig.service"
-    settings = make_folder(config / "chainrig") / f"{rig or 'daemon'}.env"
-    options: list[str] = []
-    with suppress(FileNotFoundError):
-        options = settings.read_text("utf-8").splitlines(keepends=True)
-    options = [line for line in options if not line.startswith(_PORT)]
-    write_atomic(settings, "".join([f"{_PORT}{port}\n", *options]))
-    programs = str(Path(sys.executable).parent).replace("%", "%%")
-    text = shipped(f"packaging/{unit}").read_text("utf-8").replace("%h/.local/bin", programs)
-    write_atomic(make_folder(config / "systemd/user") / unit, text)
+    """Write the user's systemd unit that keeps a daemon running at the board's port."""
+    rig, port = arguments.name, _lasting(arguments.port or sole_port())
+    template = "chainrig@.service" if rig else "chainrig.service"
+    text = shipped(f"packaging/{template}").read_text("utf-8")
+    values = {
+        "%h/.local/bin": str(Path(sys.executable).parent).replace("%", "%%"),
+        "${RIG_PORT}": port.replace("%", "%%"),
+        "EnvironmentFile=": "EnvironmentFile=-",  # there may be RIG_OPTIONS in it
+    }
+    for placeholder, value in values.items():
+        text = text.replace(placeholder, value)
     service = f"chainrig@{rig}" if rig else "chainrig"
-    say(f"{service}: {port}, by {settings}")
+    folder = make_folder(platformdirs.user_config_path() / "systemd/user")
+    write_atomic(folder / f"{service}.service", text)
+    say(f"{folder / service}.service: {port}")
     say(f"start it: systemctl --user daemon-reload && systemctl --user enable --now {service}")
     return 0
 
