@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
-from rig.commands.output import print_findings, say
+from rig.commands.output import print_json, say
 from rig.doctor.board import BOARD_CHECKS, look_at_board
 from rig.doctor.computer import (
     PORT_CHECKS,
@@ -30,10 +30,13 @@ def main(arguments: Namespace) -> int:
     """Say what is well, and of what is not, what to do."""
     if arguments.clear_cache:
         CacheFile().clear()
-    checks = _findings(arguments.port, arguments.session)
-    findings = print_findings(
-        checks, "findings", lambda finding: runnable(str(finding)), as_json=arguments.json
-    )
+    findings = []
+    for finding in _findings(arguments.port, arguments.session):
+        findings.append(finding)
+        if not arguments.json:
+            print(runnable(str(finding)), flush=True)
+    if arguments.json:
+        print_json({"findings": [finding.json() for finding in findings]})
     troubles = sum(bool(finding.advice) for finding in findings)
     if troubles:
         say(f"{troubles} thing{'s' * (troubles > 1)} to do")

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.results import SessionResults
-    from rig.selftest.findings import Finding
 
 VOID = 3
 
@@ -136,20 +135,6 @@ def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bo
 def print_json(data: Mapping[str, Any]) -> None:
     """Print one JSON object."""
     print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def print_findings(
-    findings: Iterable[Finding], key: str, write: Callable[[Finding], str], *, as_json: bool
-) -> list[Finding]:
-    """Print each finding as soon as it is there, or all as JSON, and return them."""
-    collected = []
-    for finding in findings:
-        collected.append(finding)
-        if not as_json:
-            print(write(finding), flush=True)
-    if as_json:
-        print_json({key: [finding.json() for finding in collected]})
-    return collected
 
 
 def print_results(

@@ -5,13 +5,13 @@ from __future__ import annotations
 from argparse import Namespace
 from contextlib import closing
 
-from rig.commands.output import print_findings, say
+from rig.commands.output import print_json, say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
 from rig.protocol import reader
 from rig.reasons import remedies
 from rig.selftest.board import SelftestOptions
-from rig.selftest.findings import Finding, Verdict
+from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
 
 
@@ -24,16 +24,18 @@ def main(arguments: Namespace) -> int:
     options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release, gates)
     if options.release:
         say("release 0 will be driven once: keep clear of it")
+    findings = []
     with closing(open_port(arguments.port)) as port:
-        checks = selftest(port, port_clock(port), options)
-        findings = print_findings(checks, "checks", _line, as_json=arguments.json)
+        for finding in selftest(port, port_clock(port), options):
+            findings.append(finding)
+            if not arguments.json:
+                words = finding.name, finding.verdict, finding.what
+                print(": ".join(filter(None, words)), flush=True)
+    if arguments.json:
+        print_json({"checks": [finding.json() for finding in findings]})
     failures = sum(finding.verdict is Verdict.FAILED for finding in findings)
     for advice in remedies(finding.reason for finding in findings if finding.reason):
         say(f"do: {advice}")
     if failures:
         say(f"{failures} checks failed" if failures > 1 else "1 check failed")
     return DeviceError.exit_code if failures else 0
-
-
-def _line(finding: Finding) -> str:
-    return ": ".join(filter(None, [finding.name, finding.verdict, finding.what]))

@@ -8,8 +8,6 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from filelock import FileLock, Timeout, has_fcntl, lock_descriptor
-
 from rig.errors import SessionError
 from rig.reasons import make_error
 
@@ -31,6 +29,8 @@ class WriterLock:
     """
 
     def __init__(self, session: Path) -> None:
+        from filelock import FileLock, Timeout, has_fcntl  # noqa: PLC0415 - not for who only reads
+
         self.path = _place(session)
         self._lock = FileLock(
             self.path, _LOOK_S, thread_local=False, poll_interval=_LOOK_S / 4,
@@ -80,6 +80,8 @@ def writer_of(session: Path) -> str:
     """Name the process that has a session open for writing; empty without one."""
     lock = _place(session)
     with suppress(OSError), lock.open("rb") as file:
+        from filelock import lock_descriptor  # noqa: PLC0415 - only where somebody may write
+
         for pause_s in (_LOOK_S, 0.0):
             if lock_descriptor(file.fileno(), blocking=False):
                 return ""
