@@ -54,10 +54,10 @@ def show(lines: Iterable[str]) -> None:
     width = get_terminal_size().columns
     for line in lines:
         for part in _broken(line, width):
-            print(_tint(part))
+            print(tint(part))
 
 
-def _tint(text: str) -> str:
+def tint(text: str) -> str:
     """Colour what is not as it should be, unless the reader wants none (no-color.org)."""
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return text if plain else _ODD.sub("\x1b[33m\\1\x1b[0m", text)
