@@ -5,24 +5,23 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 import signal
 import sys
 import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig import __version__
 from rig.boards import GATES
-from rig.command_help import build_parser, runnable
+from rig.command_help import Parser, build_parser, runnable
 from rig.errors import RigError
+from rig.ready import find_protocol
 from rig.streams import open_streams, say, settle_streams
 from rig.units import Dimension, parse
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from rig.command_help import Parser
+from rig.usb.listing import sole_port
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -62,7 +61,9 @@ def _run(argv: Sequence[str] | None) -> int:
     try:
         parser = _parser()
         try:
-            arguments = parser.parse(argv)
+            words = sys.argv[1:] if argv is None else argv
+            seen = sys.stdin.isatty() and sys.stdout.isatty()
+            arguments = parser.parse(words or ["tui"] * seen)
         finally:
             sys.stdout.flush()  # of --help, here, where a closed pipe is understood
         if "module" not in arguments:
@@ -149,6 +150,18 @@ def _place(name: str) -> Callable[[str], str]:
     return place
 
 
+def _is_name(text: str) -> bool:
+    """Whether a rig may be called so: the name becomes a part of a file's."""
+    return re.fullmatch(r"[\w-]{1,40}", text, re.ASCII) is not None
+
+
+def _socket(name: str) -> str:
+    """Return the socket of the daemon of a rig, by the rig's name."""
+    if not _is_name(name):
+        raise ValueError(name)
+    return str(import_module("rig.daemon.socket_path").default_socket(name))
+
+
 _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     "int": lambda _: {"type": int},
     "count": _accept("a whole number, 1 or more", int, lambda n: n >= 1),
@@ -160,7 +173,14 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     "length": _accept(
         "a length above 0", lambda text: parse(text, Dimension.LENGTH).value, lambda m: m > 0.0
     ),
-    "port": _accept("a device path, or a URL such as sim://", str, bool),
+    "name": _accept("letters, digits, - and _", str, _is_name),
+    "rig": lambda _: {"dest": "socket"} | _accept("letters, digits, - and _", _socket, bool)(""),
+    "port": _accept(
+        "a device path, or a URL such as sim://, or auto",
+        lambda text: sole_port() if text == "auto" else text,
+        bool,
+    ),
+    "protocol": lambda _: {"type": find_protocol},
     "text": _accept("words", str, lambda words: bool(words.strip())),
     "seconds": _accept("a time in seconds above 0", float, lambda s: 0.0 < s < math.inf),
     "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),

@@ -93,9 +93,9 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
         self.commands: dict[str, Parser] = {}
 
-    def parse(self, args: Sequence[str] | None) -> argparse.Namespace:
+    def parse(self, args: Sequence[str]) -> argparse.Namespace:
         """Parse; what is left over is the mistake of the sub-command that was named."""
-        words = _join_pairs(sys.argv[1:] if args is None else args)
+        words = _join_pairs(args)
         arguments, rest = self.parse_known_args(words)
         if rest:
             name = next((word for word in words if word in self.commands), "")

@@ -14,16 +14,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
-from rig.analysis.result import GOOD, optional_package
+from rig.analysis.result import GOOD, DropResult, Measured, optional_package
 from rig.bundle.tables import column_unit, result_tables
 from rig.errors import InputError, SessionError
 from rig.measurands import MEASURANDS
 from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
+from rig.ready import find_protocol
 from rig.report.numbers import plus_minus
 from rig.report.page import parts_html
 from rig.report.parts import means_parts, summary_table
-from rig.results import calibration, protocol_of, results
+from rig.results import SessionResults, calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
 from rig.session.store import Session
 
@@ -34,10 +35,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rig.analysis.result import DropResult, Measured
     from rig.analysis.summary import Incline
     from rig.protocol.protocol import Protocol
-    from rig.results import SessionResults
 
 __all__ = [
     "Edges",
@@ -78,7 +77,7 @@ def read_protocol(path: str | os.PathLike[str]) -> Protocol:
     InputError
         With every problem at its line and column.
     """
-    return reader.read(str(path))
+    return reader.read(find_protocol(str(path)))
 
 
 def predict(protocol: Protocol) -> list[PredictedIncline]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from rig.errors import InputError
@@ -10,20 +11,35 @@ WIRED = {"pico": "rp2040", "mega": "atmega2560", "uno": "atmega328p"}
 """Boards of whose circuits there is a picture, and its folder in `firmware`."""
 
 
-def ready_protocol(name: str) -> Path:
-    """Find a ready protocol.
+def ready_protocols() -> dict[str, Path]:
+    """Return the ready protocols by their names, which have no ending."""
+    return {path.stem: path for path in sorted(shipped("protocols").glob("*.yaml"))}
 
-    Parameters
-    ----------
-    name
-        Without its ending, such as ``inclined-uniform``.
+
+def ready_protocol(name: str) -> Path:
+    """Return the file of a ready protocol.
 
     Raises
     ------
     InputError
-        Where this installation lacks it.
+        There is none of that name.
     """
-    return _found(f"protocols/{name}.yaml")
+    ready = ready_protocols()
+    if name not in ready:
+        raise InputError(f"{name} is no ready protocol", f"accepted: {', '.join(ready)}")
+    return ready[name]
+
+
+def find_protocol(name: str) -> str:
+    """Return the file that a name means: one in this folder, or else a ready protocol.
+
+    Parameters
+    ----------
+    name
+        A file's, with or without ``.yaml``, or a ready protocol's; any other is returned as it is.
+    """
+    places = (name, f"{name}.yaml", str(ready_protocols().get(name, "")))
+    return next(filter(os.path.isfile, places), name)
 
 
 def wiring_picture(board: str) -> Path:
@@ -34,12 +50,19 @@ def wiring_picture(board: str) -> Path:
     InputError
         Where this installation lacks it.
     """
-    return _found(f"firmware/{WIRED[board]}/wiring.svg")
+    return shipped(f"firmware/{WIRED[board]}/wiring.svg")
 
 
-def _found(name: str) -> Path:
+def shipped(name: str) -> Path:
+    """Find a file or a folder that comes with this program.
+
+    Raises
+    ------
+    InputError
+        Where this installation lacks it.
+    """
     here = Path(__file__).parent
-    path = next((path for folder in (here, here.parent) if (path := folder / name).is_file()), None)
+    path = next((path for folder in (here, here.parent) if (path := folder / name).exists()), None)
     if path is None:
         raise InputError(f"this installation has no {name}", "install chainrig again")
     return path

@@ -7,20 +7,15 @@ it is, what it is called, how it reads and what to do about it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rig.errors import RigError
 from rig.units import Quantity, format_quantity
-from rig.vocabulary import ANY_SCENE, VOCABULARIES
-from rig.wordings import LOOK, NOTE, SENTENCE, WORDINGS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from rig.vocabulary import Vocabulary
-    from rig.wordings import Severity
+from rig.vocabulary import ANY_SCENE, VOCABULARIES, Vocabulary
+from rig.wordings import LOOK, NOTE, SENTENCE, WORDINGS, Severity
 
 Failure = TypeVar("Failure", bound=RigError)
 

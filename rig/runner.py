@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.campaign import events
-from rig.campaign.events import Stage
+from rig.campaign.events import Effect, Event, Stage
 from rig.campaign.machine import Flow, step
 from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
 from rig.campaign.voids import voids_of
@@ -21,9 +21,9 @@ from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.recorder.interrupts import Interrupts
-from rig.records import Job
+from rig.records import Drop, Job
 from rig.report.numbers import plus_minus, signed
-from rig.results import results
+from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -33,11 +33,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.result import DropResult
-    from rig.campaign.events import Effect, Event
     from rig.daemon.connecting import Rig
     from rig.protocol.protocol import Protocol
-    from rig.records import Drop
-    from rig.results import SessionResults
 
 
 _FALL = (events.FireRelease, events.Collect, events.Stop)
@@ -54,13 +51,10 @@ class Operator:
         Shows one line of narration.
     ask
         Shows a request and returns when it is done; `None` when nobody is there (``--yes``).
-    judged
-        Shows what came of a drop of so many that are planned; `None` says it in a line.
     """
 
     say: Callable[[str], None]
     ask: Callable[[str], None] | None = None
-    judged: Callable[[DropResult, int], None] | None = None
 
 
 def run_protocol(
@@ -275,10 +269,7 @@ class Campaign:
                 case events.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
-                    if self.operator.judged is None:
-                        self.operator.say(narration(self._result, len(self.plan)))
-                    else:
-                        self.operator.judged(self._result, len(self.plan))
+                    self.operator.say(narration(self._result, len(self.plan)))
         except DeviceRefusedError as refusal:
             self._failed = refusal
             self._take(events.effect_failed(self.flow.ticket, refusal))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from rig.bench.precision_reference import GATE_M
+from rig.bench.precision_reference import GATE_M, Model, PrecisionScene
 from rig.errors import RigError
 from rig.model import continuum
 from rig.model.chain import Chain
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
-
-    from rig.bench.precision_reference import Model, PrecisionScene
 
     Stage = tuple[float, ...]
     Slope = Callable[[Stage], Stage]

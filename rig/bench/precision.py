@@ -11,17 +11,22 @@ import time
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from rig.bench.methods import absent, methods
-from rig.bench.precision_reference import contact_truth, continuum_truth, discrete_truth, scenes
+from rig.bench.methods import Answer, Method, Setting, absent, methods
+from rig.bench.precision_reference import (
+    ExactAnswer,
+    Model,
+    PrecisionScene,
+    contact_truth,
+    continuum_truth,
+    discrete_truth,
+    scenes,
+)
 from rig.bench.stability import relative_error
 from rig.errors import RigError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from decimal import Decimal
-
-    from rig.bench.methods import Answer, Method, Setting
-    from rig.bench.precision_reference import ExactAnswer, Model, PrecisionScene
 
     Truths = dict[float | None, ExactAnswer]
 

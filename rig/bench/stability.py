@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import TYPE_CHECKING
 
-from rig.bench.extremes import PITCH, extremes
-from rig.bench.reference import exact_coefficients, exact_fall
+from rig.bench.extremes import PITCH, Extreme, extremes
+from rig.bench.reference import Exact, exact_coefficients, exact_fall
 from rig.errors import DomainError
 from rig.model.chain import Chain
 from rig.model.drag import drag_fall
-from rig.model.fall import fall, kicks
-from rig.model.impact import impact_on
+from rig.model.fall import Fall, fall, kicks
+from rig.model.impact import Impact, impact_on
 from rig.model.surface import Surface
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from rig.bench.extremes import Extreme
-    from rig.bench.reference import Exact
-    from rig.model.fall import Fall
-    from rig.model.impact import Impact
 
 SOUND = 343.0
 """Speed of sound in air at 20 °C, m/s."""

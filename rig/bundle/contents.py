@@ -18,13 +18,12 @@ from rig import __version__
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
 from rig.bundle.means import mean_tables
 from rig.bundle.tables import csv_files, data_package
-from rig.results import protocol_of, tick_rates
+from rig.results import SessionResults, protocol_of, tick_rates
 from rig.session.faults import translate_errors
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from rig.results import SessionResults
     from rig.session.reading import Reader
 
 SESSION, RESULTS, ENVIRONMENT = "record.session", "results.json", "environment.json"

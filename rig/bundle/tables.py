@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.bundle.archive import sha256
-from rig.measurands import MEASURANDS
+from rig.measurands import MEASURANDS, Measurand
 from rig.reasons import sentences
 from rig.session.schema import TABLES
 from rig.text_table import csv_text
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from fractions import Fraction
 
-    from rig.measurands import Measurand
     from rig.session.reading import Reader
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room

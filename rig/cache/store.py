@@ -117,4 +117,4 @@ def _is_private(folder: Path) -> bool:
     about = folder.stat()
     if not folder.is_absolute() or not stat.S_ISDIR(about.st_mode):
         return False
-    return os.name != "posix" or (about.st_uid == os.getuid() and not about.st_mode & 0o022)
+    return not hasattr(os, "getuid") or (about.st_uid == os.getuid() and not about.st_mode & 0o022)

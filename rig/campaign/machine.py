@@ -8,20 +8,15 @@ has an old ticket and changes nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from rig.campaign import events
-from rig.campaign.events import Stage
-from rig.campaign.voids import after, why_halted
+from rig.campaign.events import Effect, Event, Stage
+from rig.campaign.voids import VoidRow, after, why_halted
 from rig.link.messages import RefusalReason
-from rig.reasons import plain_reason
+from rig.reasons import Reason, plain_reason
 from rig.records import Job
 from rig.wordings import NOTE, OPERATOR
-
-if TYPE_CHECKING:
-    from rig.campaign.events import Effect, Event
-    from rig.campaign.voids import VoidRow
-    from rig.reasons import Reason
 
 COUNTDOWN_S = 3.0
 """From armed to fired: time to take a hand away, or to press a key."""

@@ -6,14 +6,13 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.reasons import summarize_reasons
+from rig.reasons import Reason, summarize_reasons
 from rig.records import Job
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from rig.campaign.plan import RunLine
-    from rig.reasons import Reason
     from rig.session.reading import StateEntry
 
 MANY = 3

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
-from rig.clock.rate import ping_rate, pulse_rate
-from rig.clock.samples import HostTime, one_axis, samples
+from rig.clock.rate import TickRate, ping_rate, pulse_rate
+from rig.clock.samples import HostTime, Samples, one_axis, samples
 from rig.threads import one_thread
 from rig.units import significant
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rig.clock.rate import TickRate
-    from rig.clock.samples import Samples
     from rig.records import ClockSample, Drop, HostBreak, Pulse
 
 HOST_U = 50e-6 / sqrt(3)

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.clock.samples import RECV, SEND, TICK, middles_ns, samples
+from rig.clock.samples import RECV, SEND, TICK, Samples, middles_ns, samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from rig.clock.samples import Samples
     from rig.records import ClockSample
 
 RESONATOR_TOLERANCE = 0.005

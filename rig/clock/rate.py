@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.clock.epochs import RESONATOR_TOLERANCE, epochs
-from rig.clock.samples import RECV, SEND, TICK
+from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
+from rig.clock.samples import RECV, SEND, TICK, Samples
 from rig.clock.wander import Readings, Track
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rig.arrays import Array
-    from rig.clock.epochs import Epochs
-    from rig.clock.samples import Samples
     from rig.records import ClockSample, Pulse
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance

@@ -13,7 +13,7 @@ from rig.measurands import acceleration_in
 from rig.reasons import make_error
 from rig.report.numbers import plus_minus
 from rig.report.parts import prior_parts, scatter_parts, tables
-from rig.results import complete_analysis, results
+from rig.results import SessionResults, complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.analysis.result import Measured
-    from rig.results import SessionResults
 
 
 def main(arguments: Namespace) -> int:

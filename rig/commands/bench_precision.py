@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from dataclasses import asdict, fields
 from functools import partial
 from itertools import groupby
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.bench.figures import precision_figure
-from rig.bench.precision import Point, as_json, precision
+from rig.bench.precision import Cheapest, Gap, Point, Precision, as_json, precision
 from rig.commands.output import print_found, say, write_study
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from pathlib import Path
-
-    from rig.bench.precision import Cheapest, Gap, Precision
 
 _HEAD = """\
 # Cheapest way to compute the model

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
+from collections.abc import Sequence
 from dataclasses import astuple
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from rig.bench.scenes import as_json, scenes
+from rig.bench.scenes import Cost, Quartiles, as_json, scenes
 from rig.commands.output import print_found, say, write_study
 from rig.files import make_folder
 from rig.text_table import csv_text, text_table
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Sequence
-
-    from rig.bench.scenes import Cost, Quartiles
 
 _HEAD = """\
 # What each scene costs

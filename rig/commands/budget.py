@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
-from rig.analysis.session import planned_run
+from rig.analysis.session import Analysis, planned_run
 from rig.cache.entry import recall
 from rig.commands.output import print_found, tell_damage
 from rig.errors import InputError
-from rig.measurands import MEASURANDS
+from rig.measurands import MEASURANDS, Measurand
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.report.numbers import decimals_for, fixed, plus_minus
-from rig.results import calibration, check_open, protocol_of, results
+from rig.results import SessionResults, calibration, check_open, protocol_of, results
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
     from rig.analysis.monte_carlo import Propagated
     from rig.analysis.result import Measured
-    from rig.analysis.session import Analysis
-    from rig.measurands import Measurand
-    from rig.results import SessionResults
     from rig.session.reading import Reader
 
 SEED = 1

@@ -11,7 +11,7 @@ from rig.bundle.contents import SESSION, bundle_files, copy_session
 from rig.commands.output import progress, say, tell_damage
 from rig.commands.report import make_report
 from rig.files import check_place, replacing
-from rig.recover.examine import examine
+from rig.recover.examine import ExaminedFile, examine
 from rig.report.canvas import figure_file
 from rig.report.finding import deviations
 from rig.results import protocol_of, results
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.analysis.session import Analysis
-    from rig.recover.examine import ExaminedFile
     from rig.session.reading import Reader
 
 _FIXED = {True: "yes", False: "no", None: "unknown"}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.commands.output import VOID, print_found, progress, say
 from rig.errors import InputError
@@ -17,13 +17,8 @@ from rig.report.comparison import (
     draw_comparison,
     pooled_lines,
 )
-from rig.results.together import results_together
+from rig.results.together import TogetherResults, results_together
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.results.together import TogetherResults
 
 
 def main(arguments: Namespace) -> int:

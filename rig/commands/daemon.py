@@ -7,14 +7,13 @@ import os
 import queue
 import threading
 from argparse import Namespace
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 from rig.commands.output import say
 from rig.daemon.listener import notify_systemd
-from rig.daemon.server import serve
-from rig.daemon.socket_path import default_socket
+from rig.daemon.server import logging_to, serve
+from rig.daemon.socket_path import default_socket, require_sockets
 from rig.link.port import check_url
 from rig.printable import printable
 
@@ -52,23 +51,9 @@ class StderrHandler(logging.Handler):
                 os.write(2, f"{line}\n".encode())  # past Python's buffer and its lock
 
 
-@contextmanager
-def logged_to_stderr() -> Iterator[None]:
-    """Show what this program logs for the time of a block."""
-    root, ours, handler = logging.getLogger(), logging.getLogger("rig"), StderrHandler()
-    before = ours.level
-    ours.setLevel(logging.INFO)
-    root.addHandler(handler)
-    try:
-        yield
-    finally:
-        root.removeHandler(handler)
-        ours.setLevel(before)
-        handler.close()
-
-
 def main(arguments: Namespace) -> int:
     """Own a port and serve clients, in the foreground, until a signal or the idle time ends it."""
+    require_sockets()
     check_url(arguments.port)
     path = Path(arguments.socket).absolute() if arguments.socket else default_socket()
 
@@ -76,7 +61,7 @@ def main(arguments: Namespace) -> int:
         say(f"rig daemon: {arguments.port} at {path}")
         notify_systemd()
 
-    with logged_to_stderr():
+    with logging_to(StderrHandler()):
         serve(arguments.port, path, tcp=arguments.tcp, idle_s=arguments.idle_timeout, ready=ready)
     say("rig daemon: ended")
     return 0

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.components import stated
+from rig.analysis.components import Components, stated
 from rig.commands.output import print_found, say
 from rig.design.cases import beams_of, cases, with_beams
-from rig.design.forecast import GateLayout, forecast
+from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.rewriting import with_heights
 from rig.design.search import better, readable, room
 from rig.design.trials import trials, trials_text
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Mapping, Sequence
 
-    from rig.analysis.components import Components
-    from rig.design.forecast import Forecast
     from rig.protocol.protocol import Protocol, Side
 
 SPACING_M = 0.01

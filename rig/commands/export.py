@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 from rig.bundle.tables import csv_files
 from rig.commands.output import progress, say, tell_damage
@@ -11,9 +11,6 @@ from rig.files import make_folder, write_atomic
 from rig.reasons import make_error
 from rig.results import results, tick_rates
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 def main(arguments: Namespace) -> int:

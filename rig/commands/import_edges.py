@@ -22,7 +22,7 @@ from rig.protocol.plan import runs
 from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.timers.importing import FallMatch, import_drops
+from rig.timers.importing import FallMatch, Import, import_drops
 from rig.timers.lines import check_is_file
 from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
-    from rig.timers.importing import Import
 
 _COMPARED = 3
 """Drops that are compared with falls: as many as tell a way of reading from another."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS, GATES
 from rig.commands.output import print_results
@@ -14,7 +15,7 @@ from rig.files import write_atomic
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
-from rig.protocol.draft import SCENES, Draft, draft_text
+from rig.protocol.draft import SCENES, Draft, Scene, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.ready import WIRED
 from rig.recorder.interrupts import Interrupts
@@ -23,12 +24,6 @@ from rig.report.mounting import mounting_figure
 from rig.report.wiring import wiring_drawing
 from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Sequence
-
-    from rig.protocol.draft import Scene
 
 _COEFFICIENTS = "coefficients"
 _MANY_INCLINES = "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"

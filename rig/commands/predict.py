@@ -9,8 +9,8 @@ from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import print_found, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
-from rig.measurands import SEPARATION, SPEED
-from rig.predictions import group_notes, predictions
+from rig.measurands import SEPARATION, SPEED, Measurand
+from rig.predictions import PredictedIncline, group_notes, predictions
 from rig.protocol import reader
 from rig.reasons import make_error
 from rig.report.numbers import degrees, fixed, plus_minus
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Mapping
 
-    from rig.measurands import Measurand
-    from rig.predictions import PredictedIncline
     from rig.protocol.protocol import Protocol
 
 

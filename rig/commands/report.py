@@ -12,7 +12,7 @@ from rig.files import check_place, write_atomic
 from rig.films import film_digest
 from rig.report.page import page_html
 from rig.report.session_page import Material, session_page
-from rig.results import protocol_of, results
+from rig.results import SessionResults, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections
 from rig.session.store import Session
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rig.estimate.session import SessionEstimate
     from rig.report.figure import Chart
     from rig.report.parts import Bars
-    from rig.results import SessionResults
 
 
 class Report(NamedTuple):

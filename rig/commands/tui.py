@@ -11,8 +11,10 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rig.daemon.socket_path import require_sockets
 from rig.errors import InputError
 from rig.ports import check_name
+from rig.ready import ready_protocols
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
@@ -57,9 +59,12 @@ def _options(arguments: Namespace) -> Options:
     else:
         folders = (Path("protocols"), Path())
         files = tuple(path for folder in folders for path in sorted(folder.glob("[!.]*.yaml")))
+        files = files or tuple(ready_protocols().values())
     offline = bool(arguments.session) and not (
         arguments.port or arguments.protocol or arguments.socket
     )
+    if not offline:
+        require_sockets()
     check_name(arguments.port or "")  # before a daemon is started for it
     fresh = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session"
     return Options(

@@ -18,14 +18,13 @@ from rig.daemon import rpc
 from rig.daemon.lease import LEASE_S, ControlError
 from rig.daemon.socket_path import reach
 from rig.errors import DeviceError, DeviceTimeoutError, RigError
-from rig.reasons import make_error
+from rig.reasons import Reason, make_error
 from rig.recorder.interrupts import Interrupts
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.reading import Reader
     from rig.session.schema import RunState

@@ -9,8 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from rig.daemon import rpc
-from rig.daemon.socket_path import prepare_folder, token_file
-from rig.errors import InputError
+from rig.daemon.rpc import BusyError
+from rig.daemon.socket_path import prepare_folder, reach, token_file
+from rig.errors import DeviceError, InputError
 from rig.files import identity_of, write_atomic
 from rig.reasons import make_error
 
@@ -39,7 +40,7 @@ def listen(path: Path, token: str) -> socket.socket:
         Another daemon is there, or the folder cannot be trusted.
     """
     prepare_folder(path.parent)
-    if _answers_at_socket(path) or _answers_at_port(token_file(path)):
+    if _answers(path):
         raise make_error(InputError, "daemon_there", path=path)
     for left_by_a_killed_one in (path, token_file(path)):
         left_by_a_killed_one.unlink(missing_ok=True)
@@ -82,30 +83,24 @@ class Door:
                 self.path.unlink()
 
 
-def _answers_at_socket(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-        probe.settimeout(_PROBE_S)
-        try:
-            probe.connect(str(path))
-        except (FileNotFoundError, ConnectionRefusedError):
-            return False
-        except (BlockingIOError, TimeoutError):
-            return True  # so many wait that it does not come to us
-        except OSError as error:
-            raise make_error(InputError, "place_unusable", path=path, text=error) from error
-    return True
-
-
-def _answers_at_port(file: Path) -> bool:
+def _answers(path: Path) -> bool:
     """Whether a daemon answers: any program may have the port of one that was killed."""
     try:
-        address = json.loads(file.read_text("ascii"))
-        hello = {"api": rpc.API, "client": "a daemon that starts", "token": address["token"]}
-        with socket.create_connection(("127.0.0.1", address["port"]), _PROBE_S) as probe:
-            probe.sendall(rpc.request("hello", hello, 1))
-            return b'"jsonrpc"' in probe.recv(1 << 12)
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
+        line, token = reach(path)
+    except BusyError:
+        return True  # so many wait that it does not come to us
+    except DeviceError as error:
+        if isinstance(error.__cause__, FileNotFoundError | ConnectionRefusedError | ValueError):
+            return False
+        raise make_error(InputError, "place_unusable", path=path, text=error.__cause__) from error
+    with line:
+        line.settimeout(_PROBE_S)
+        hello = {"api": rpc.API, "client": "a daemon that starts", "token": token}
+        try:
+            line.sendall(rpc.request("hello", hello, 1))
+            return not token or b'"jsonrpc"' in line.recv(1 << 12)
+        except OSError:
+            return not token
 
 
 def notify_systemd() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import resource
 import secrets
 import signal
 import sys
@@ -229,7 +228,10 @@ class Server:
             await asyncio.sleep(_DOOR_S)
         folder = state_folder()
         self._failed = make_error(InputError, "socket_lost", path=door.path, folder=folder)
-        with _kept_log():
+        # Where stderr went may be deleted with the socket.
+        handler = logging.FileHandler(make_folder(folder) / "daemon.log")
+        handler.setFormatter(logging.Formatter("%(asctime)s %(process)d: %(message)s"))
+        with logging_to(handler):
             log.error("%s", self._failed)
             self.end()
             await asyncio.Event().wait()  # until this is cancelled, when all has ended
@@ -254,20 +256,23 @@ class Server:
 
 
 @contextmanager
-def _kept_log() -> Iterator[None]:
-    """Log into the state folder too: where stderr went may be deleted with the socket."""
-    handler = logging.FileHandler(make_folder(state_folder()) / "daemon.log")
-    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d: %(message)s"))
-    root = logging.getLogger()
+def logging_to(handler: logging.Handler) -> Iterator[None]:
+    """Have a handler take what this program logs in a block, and close it."""
+    root, ours = logging.getLogger(), logging.getLogger("rig")
+    before = ours.level
+    ours.setLevel(logging.INFO)
     root.addHandler(handler)
     try:
         yield
     finally:
         root.removeHandler(handler)
+        ours.setLevel(before)
         handler.close()
 
 
 def _allow_descriptors() -> None:
+    import resource  # noqa: PLC0415 - Windows has none, nor a daemon
+
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     limit = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
     if soft != resource.RLIM_INFINITY and soft < limit:

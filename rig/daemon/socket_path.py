@@ -6,7 +6,6 @@ import json
 import os
 import socket
 import struct
-import time
 from pathlib import Path
 
 from rig.daemon.rpc import BusyError
@@ -15,15 +14,15 @@ from rig.reasons import make_error
 
 _SECRET = 0o077  # what the group and others may not have
 _REACH_S = 5.0
-_AGAIN_S = 0.02
+_PATIENCE = struct.pack("@2l", round(_REACH_S), 0)
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 
 
-def default_socket() -> Path:
-    """Name the socket of this user's daemon."""
+def default_socket(name: str = "") -> Path:
+    """Name the socket of this user's daemon, or of the one of several rigs that has a name."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     folder = Path(runtime) if runtime else Path.home() / ".cache"
-    return folder / "chainrig" / "rig.sock"
+    return folder / "chainrig" / (f"rig-{name}.sock" if name else "rig.sock")
 
 
 def token_file(path: Path) -> Path:
@@ -46,6 +45,18 @@ def prepare_folder(folder: Path) -> None:
         raise make_error(InputError, "place_unusable", path=folder, text=error) from error
 
 
+def require_sockets() -> None:
+    """Refuse to do what needs a daemon where none can be.
+
+    Raises
+    ------
+    InputError
+        Python has no Unix sockets here, as on Windows, so nobody knows who a client is.
+    """
+    if not hasattr(socket, "AF_UNIX"):
+        raise make_error(InputError, "no_unix_sockets")
+
+
 def check_folder(folder: Path) -> None:
     """Refuse a folder that others may write to.
 
@@ -54,6 +65,7 @@ def check_folder(folder: Path) -> None:
     InputError
         As for `prepare_folder`.
     """
+    require_sockets()
     about = folder.stat()
     if about.st_uid != os.getuid():
         raise make_error(InputError, "folder_foreign", folder=folder)
@@ -101,8 +113,9 @@ def reach(path: Path) -> tuple[socket.socket, str]:
             line, token = socket.create_connection(address, _REACH_S), told["token"]
         else:
             line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            line.settimeout(_REACH_S)
-            _connect(line, path)
+            # More may want to be let in than the kernel keeps waiting.
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _PATIENCE)
+            line.connect(str(path))
     except (BlockingIOError, TimeoutError) as error:
         if line is not None:
             line.close()
@@ -115,17 +128,3 @@ def reach(path: Path) -> tuple[socket.socket, str]:
         line.close()
         raise make_error(DeviceError, "daemon_foreign", path=path)
     return line, token
-
-
-def _connect(line: socket.socket, path: Path) -> None:
-    """Connect, and try again while more want to be let in than the kernel keeps waiting."""
-    until = time.monotonic() + _REACH_S
-    while True:
-        try:
-            line.connect(str(path))
-        except BlockingIOError:
-            if time.monotonic() > until:
-                raise
-            time.sleep(_AGAIN_S)
-        else:
-            return

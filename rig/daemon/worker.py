@@ -13,28 +13,22 @@ import queue
 import random
 import threading
 import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from rig.daemon.lease import ControlError
+from rig.daemon.lease import ControlError, Lease
 from rig.daemon.rpc import error_to_data, in_words
 from rig.daemon.stopper import Stopper
 from rig.errors import InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
-from rig.reasons import make_error, make_reason, remedies
+from rig.reasons import Reason, make_error, make_reason, remedies
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
-from rig.recorder.published import link_state
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from rig.daemon.lease import Lease
-    from rig.reasons import Reason
-    from rig.recorder.published import PublishedState
+from rig.recorder.published import PublishedState, link_state
 
 log = logging.getLogger(__name__)
 _ARMED_S = 0.08  # between two requests while armed: the device gives the host 250 ms

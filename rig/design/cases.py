@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.annealing import Guess
-from rig.analysis.chain_records import chain_records
+from rig.analysis.chain_records import ChainRecord, EdgeTrain, chain_records
 from rig.analysis.drop_model import DropModel, prior_air
 from rig.analysis.quantities import measurands
-from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
 from rig.analysis.unknowns import SharedUnknowns
 from rig.model.rods import rod_impacts
 from rig.protocol.contact import at_contact
 from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
-from rig.protocol.protocol import Gate, Run
+from rig.protocol.protocol import Gate, Protocol, Run
+from rig.protocol.protocol import Side as Role
 from rig.records import Drop
 from rig.threads import one_thread
 
@@ -27,12 +28,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.components import Components
-    from rig.analysis.trajectory import Trajectory
     from rig.arrays import Array
-    from rig.protocol.protocol import Protocol
-    from rig.protocol.protocol import Side as Role
 
     Index = NDArray[np.intp]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.analysis.square_root import triangle
 from rig.analysis.summary import by_case
-from rig.design.cases import BEAM
+from rig.design.cases import BEAM, Block, Case, Cases
 from rig.estimate.coefficients import KNOWN, described, given_alphas, held_back
 from rig.estimate.hypotheses import alphas
 from rig.threads import one_thread
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.arrays import Array
-    from rig.design.cases import Block, Case, Cases
     from rig.model.chain import Chain
     from rig.protocol.protocol import Condition, Protocol
     from rig.units import Quantity

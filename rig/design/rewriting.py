@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from rig.errors import InputError
-from rig.protocol.protocol import SIDES
+from rig.protocol.protocol import SIDES, Protocol, Side
 from rig.protocol.reader import parse
 from rig.protocol.yamltree import load, place_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.protocol.protocol import Protocol, Side
 
 _VALUE = re.compile(r"\"[^\"]*\"|'[^']*'|[^,}\]\n#]*[^,}\]\n#\s]")
 _ROUNDED = 0.05e-3 + 1e-9  # heights are written to 0.1 mm

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import stated
+from rig.analysis.components import Components, stated
 from rig.analysis.identify import identify
 from rig.analysis.verdict import LEAD
 from rig.design.cases import CLOCK_U, cases, perfect, with_beams
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rig.analysis.components import Components
     from rig.protocol.protocol import Protocol, Side
 
     Index = NDArray[np.intp]

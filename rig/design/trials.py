@@ -16,7 +16,7 @@ import numpy as np
 
 from rig.analysis.annealing import MISSED
 from rig.analysis.components import above, stated
-from rig.analysis.identify import deciding_gate, identify
+from rig.analysis.identify import Identification, deciding_gate, identify
 from rig.analysis.verdict import pattern_faults
 from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, observed, records_of, trajectory
 from rig.protocol.contact import at_contact
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.identify import Identification
     from rig.analysis.trajectory import Trajectory
     from rig.arrays import Array
     from rig.protocol.protocol import Protocol, Run

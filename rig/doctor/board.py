@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING
 
 from rig.flash.image import shipped_firmware
 from rig.link.client import Device
-from rig.link.gatewatch import listed, watch_gates
+from rig.link.gatewatch import GateStates, listed, watch_gates
 from rig.link.messages import (
     HOST_SILENCE_MS,
     TEST_RUN,
+    Identity,
     Phase,
     RefusalReason,
     pack_label,
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rig.clock.host import Clock
-    from rig.link.gatewatch import GateStates
-    from rig.link.messages import Identity
     from rig.link.port import Port
     from rig.records import ClockSample, Edge
 

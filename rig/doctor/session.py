@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator
 
 from rig.link.messages import unpack_label
 from rig.link.restarts import Restart, causes
 from rig.records import Drop, Job
-from rig.recover.examine import examine
-from rig.selftest.findings import CheckFailedError, make_check
+from rig.recover.examine import ExaminedFile, examine
+from rig.selftest.findings import CheckFailedError, Finding, make_check
 from rig.session.drop_check import ByteReplay
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from rig.recover.examine import ExaminedFile
-    from rig.selftest.findings import Finding
 
 
 def check_session(path: str) -> Iterator[Finding]:

@@ -10,14 +10,13 @@ from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.estimate import coefficients as of
 from rig.estimate.hypotheses import one_alpha
-from rig.estimate.hypothesis_fit import fit
+from rig.estimate.hypothesis_fit import HypothesisFit, fit
 from rig.estimate.likelihood_ratio import LikelihoodRatio
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.estimate.coefficients import CoefficientProblem
-    from rig.estimate.hypothesis_fit import HypothesisFit
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Condition, Protocol, Run
 

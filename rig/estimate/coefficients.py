@@ -9,14 +9,13 @@ import numpy as np
 
 from rig.analysis.drop_model import prior_air
 from rig.estimate.hypotheses import ALPHA, BETA, MU, PILE, coefficients, with_contact, with_drag
-from rig.estimate.hypothesis_fit import Parameter, fit
+from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit, Parameter, fit
 from rig.model.impact import impact_on
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rig.arrays import Array
-    from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol

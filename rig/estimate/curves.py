@@ -11,7 +11,7 @@ from rig.analysis.budgets import Budgets
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.dual import Dual
 from rig.analysis.fit import Fit
-from rig.analysis.joint_fit import by_itself
+from rig.analysis.joint_fit import JointFit, by_itself
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import Adjusted
 from rig.measurands import SEPARATION
@@ -21,7 +21,6 @@ from rig.model.rods import rod_impacts
 from rig.protocol.contact import as_struck, at_contact
 
 if TYPE_CHECKING:
-    from rig.analysis.joint_fit import JointFit
     from rig.analysis.joint_step import JointDrop
     from rig.arrays import Array
     from rig.protocol.protocol import Protocol, Run

@@ -10,7 +10,7 @@ import numpy as np
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
-from rig.estimate.coefficients import nuisances
+from rig.estimate.coefficients import CoefficientProblem, nuisances
 from rig.estimate.hypotheses import END, one_alpha, with_end_correction
 from rig.estimate.hypothesis_fit import fit
 from rig.model.rods import rod_impacts
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.arrays import Array
-    from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
-from rig.estimate.quadratic_forms import EXTRA
+from rig.estimate.quadratic_forms import EXTRA, QuadraticForm
 from rig.model.rods import rod_impacts
 from rig.units import Quantity
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.arrays import Array
-    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.model.surface import Surface
 

@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.plain_data import attributes
-from rig.estimate.coefficients import model, nuisances
+from rig.estimate.coefficients import CoefficientProblem, model, nuisances
 from rig.estimate.hypotheses import MU
-from rig.estimate.hypothesis_fit import Parameter, fit
+from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
 
 if TYPE_CHECKING:
     from rig.arrays import Array
-    from rig.estimate.coefficients import CoefficientProblem
-    from rig.estimate.hypothesis_fit import HypothesisFit
     from rig.protocol.protocol import Protocol
 
 NODES = 41

@@ -18,7 +18,7 @@ import numpy as np
 from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
 from rig.analysis.square_root import EquationRows, eliminate
-from rig.analysis.trajectory import COMMON, DRAG
+from rig.analysis.trajectory import COMMON, DRAG, Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from rig.analysis.drop_model import DropModel
     from rig.analysis.joint_step import JointDrop
-    from rig.analysis.trajectory import Trajectory
     from rig.analysis.unknowns import SharedUnknowns
     from rig.arrays import Array
     from rig.model.chain import Chain

@@ -12,14 +12,13 @@ from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
 from rig.estimate.coefficients import CONTACT_U
 from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
-from rig.estimate.hypothesis_fit import fit
+from rig.estimate.hypothesis_fit import Hypothesis, fit
 from rig.estimate.likelihood_ratio import LikelihoodRatio
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.arrays import Array
-    from rig.estimate.hypothesis_fit import Hypothesis
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Condition, Protocol
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.comparison import compare
+from rig.analysis.comparison import Comparison, compare
 from rig.analysis.drop_model import prior_air
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured
@@ -13,29 +13,23 @@ from rig.analysis.summary import good_cases
 from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.estimate import coefficients as of
-from rig.estimate.alphas import single_alphas
-from rig.estimate.curves import drop_curves
-from rig.estimate.end_correction import end_correction
+from rig.estimate.alphas import SingleAlphas, single_alphas
+from rig.estimate.curves import DropCurves, drop_curves
+from rig.estimate.end_correction import EndCorrection, end_correction
 from rig.estimate.hypotheses import AIR
-from rig.estimate.posterior import posterior
+from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merged, quadratic_form
-from rig.estimate.rods import impulses, resolution
+from rig.estimate.rods import Impulses, impulses, resolution
 from rig.sections import Sections
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from rig.analysis.comparison import Comparison
     from rig.analysis.session import Analysis
     from rig.arrays import Array
-    from rig.estimate.alphas import SingleAlphas
     from rig.estimate.coefficients import CoefficientProblem
-    from rig.estimate.curves import DropCurves
-    from rig.estimate.end_correction import EndCorrection
     from rig.estimate.hypothesis_fit import HypothesisFit
-    from rig.estimate.posterior import Posterior
-    from rig.estimate.rods import Impulses
     from rig.protocol.protocol import Condition, Protocol
     from rig.units import Quantity
 

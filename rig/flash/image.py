@@ -8,18 +8,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.errors import InputError, Problem
 from rig.files import read_input
-from rig.flash.boards import DRIVE, FIRMWARE, TARGETS
+from rig.flash.boards import DRIVE, FIRMWARE, TARGETS, Target
 from rig.flash.uf2 import read_blocks
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rig.flash.boards import Target
 
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START = range(6)
 _ERASED = b"\xff"

@@ -9,19 +9,17 @@ from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.avrdude import find_avrdude, write_flash
-from rig.flash.boards import DRIVE, TARGETS
+from rig.flash.boards import DRIVE, TARGETS, Target
 from rig.flash.drive import choose_drive, copy_to, new_port, pico_ports
 from rig.flash.image import read_image
 from rig.link.client import Device
-from rig.link.port import open_port, port_clock
+from rig.link.port import Port, open_port, port_clock
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.flash.boards import Target
     from rig.link.messages import Identity
-    from rig.link.port import Port
 
 _UDEV_S = 2.0
 """For which a port that has just appeared may be forbidden: udev gives permission after it."""

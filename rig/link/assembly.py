@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterable, Iterator
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.boards import GATES
-from rig.link.messages import EVENTS_PER_FRAME, DropCertificate2, PulseEnd, unpack_label
+from rig.link.messages import (
+    EVENTS_PER_FRAME,
+    DropCertificate,
+    DropCertificate2,
+    EventsFrame,
+    PulseEnd,
+    unpack_label,
+)
 from rig.link.wiretypes import EVENTS
-from rig.reasons import make_reason
+from rig.reasons import Reason, make_reason
 from rig.records import Certificate, Drop, Edge
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from rig.link.messages import DropCertificate, EventsFrame
-    from rig.reasons import Reason
 
 ALL_GATES = (1 << GATES) - 1
 _WRAP = 1 << 32

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 
 from rig.link import frames
 from rig.link import messages as wire
-from rig.link.wiretypes import Chars, Raw, Tail, Unsigned
+from rig.link.wiretypes import Chars, Field, Raw, Tail, Unsigned
 
 if TYPE_CHECKING:
     from enum import IntEnum
 
-    from rig.link.wiretypes import Field
 
 _TOP = """\
 /* Written by rig/link/cheader.py from rig/link/messages.py: change that file, not this one.

@@ -10,16 +10,14 @@ from rig.link import messages as wire
 from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Received
+from rig.link.transcript import Received, Record
 from rig.reasons import make_error
-from rig.records import ClockSample
+from rig.records import ClockSample, Drop
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rig.link.assembly import Assembly
-    from rig.link.transcript import Record
-    from rig.records import Drop
 
 BOOT_WAIT_S = 2.0
 """The Mega's boot loader listens this long before it starts the firmware."""

@@ -12,7 +12,7 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.refusals import DeviceRefusedError
 from rig.link.restarts import Restart
-from rig.link.transcript import Received, Record, Transcript
+from rig.link.transcript import Direction, Received, Record, Transcript
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from rig.clock.host import Clock
     from rig.link.port import Port
-    from rig.link.transcript import Direction
 
     Tap: TypeAlias = Callable[[Direction, int, bytes], None]
     OnRecord: TypeAlias = Callable[[Record], None]

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import array
 import errno
-import fcntl
 import os
 import socket
-import termios
 import warnings
 from typing import Any, Protocol
 
@@ -30,6 +27,7 @@ _CODES = {
     errno.EAGAIN: "port_taken",
 }
 _PLAIN = {errno.ENOTTY: "it is no serial port", errno.EISDIR: "it is a folder"}
+_PEEK = 1 << 16  # bytes; more than a session reads at once
 _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
 
 
@@ -173,9 +171,7 @@ class NetworkPort:
         """Bytes that can be read at once."""
         if not self._port.in_waiting:  # also says when the port is closed
             return 0
-        count = array.array("i", [0])
-        fcntl.ioctl(self._port.fileno(), termios.FIONREAD, count)
-        return count[0]
+        return len(self._socket.recv(_PEEK, socket.MSG_PEEK))
 
 
 def _why_unreachable(error: OSError) -> str:

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import struct
 import typing
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import takewhile
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias, overload
+from typing import Annotated, Any, NamedTuple, SupportsIndex, TypeAlias, overload
 
 from rig.errors import DeviceError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from typing import SupportsIndex
 
 
 class MessageError(DeviceError, ValueError):

@@ -12,13 +12,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rig.model.chain import UNIFORM_ROD_INERTIA
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from rig.model.surface import Pile
 
 Floats: TypeAlias = NDArray[np.float64]

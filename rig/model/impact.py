@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
-from rig.model.chain import UNIFORM_ROD_INERTIA
+from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 
 if TYPE_CHECKING:
-    from rig.model.chain import Chain
     from rig.model.surface import Surface
 
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
-from rig.model.fall import hits
+from rig.model.fall import Hit, hits
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.model.chain import Chain
-    from rig.model.fall import Hit
 
 
 @dataclass(frozen=True, slots=True)

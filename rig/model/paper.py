@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.model.chain import Chain
 from rig.model.continuum import UniformChain, end, separation_fast, separation_leading_order, speed
-from rig.model.fall import fall, free_fall_speed, kicks
+from rig.model.fall import Fall, fall, free_fall_speed, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_liftoff, impact_on
 from rig.model.motion import Motion
 from rig.model.surface import Pile, Surface
@@ -16,8 +16,6 @@ from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from rig.model.fall import Fall
 
     Columns = dict[str, list[float]]
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
-from rig.model.impact import gamma_finite, impact_on
+from rig.model.impact import Impact, gamma_finite, impact_on
 
 if TYPE_CHECKING:
     from rig.model.chain import Chain
-    from rig.model.impact import Impact
     from rig.model.surface import Surface
 
 

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Collection
 
 from rig.model.chain import XI, Chain
-from rig.protocol.fields import Section, did_you_mean, join, read_value, unique_entries
+from rig.protocol.fields import FieldFaults, Section, did_you_mean, join, read_value, unique_entries
 from rig.protocol.keys import Mapped
 from rig.protocol.protocol import RodChain
 from rig.protocol.rods import are_apart, list_rods, place_rods
-from rig.protocol.yamltree import Mapping, ScalarNode, Sequence
+from rig.protocol.yamltree import Mapping, Node, ScalarNode, Sequence
 from rig.units import quoted
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from rig.protocol.fields import FieldFaults
-    from rig.protocol.yamltree import Node
 
 _LONGEST_NAME = 32
 

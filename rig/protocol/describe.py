@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
 from rig.model.chain import XI
@@ -20,13 +20,8 @@ from rig.protocol.measurable import (
     unmeasurable,
 )
 from rig.protocol.plan import PATTERNS, runs
-from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY
+from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY, Protocol, RodChain
 from rig.units import Quantity, format_quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from rig.protocol.protocol import Protocol, RodChain
 
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
 

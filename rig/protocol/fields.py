@@ -7,18 +7,14 @@ follows checks only what keys have to do with each other.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.errors import Problem
 from rig.protocol import keys
-from rig.protocol.yamltree import Mapping, ScalarNode, Sequence
+from rig.protocol.yamltree import Mapping, Node, Place, ScalarNode, Sequence
 from rig.units import UnitError, parse, quoted
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rig.protocol.yamltree import Node, Place
 
 
 @dataclass(slots=True)

@@ -7,20 +7,14 @@ inputs and outputs.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from rig.boards import BOARDS, LONGEST_RECORD_MS
+from rig.boards import BOARDS, LONGEST_RECORD_MS, Capabilities
 from rig.errors import InputError, Problem
-from rig.protocol.protocol import AT_REST, SIDES
+from rig.protocol.protocol import AT_REST, SIDES, Gate, Gates, Protocol
 from rig.protocol.yamltree import load, place_of
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from rig.boards import Capabilities
-    from rig.protocol.protocol import Gate, Gates, Protocol
 
 LEAST_RECORD_MS = 1500
 """Long enough for the drops of most labs, and then the same for all."""

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-from rig.protocol.protocol import Run
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Order, Protocol
+from rig.protocol.protocol import Order, Protocol, Run
 
 T = TypeVar("T")
 

@@ -7,13 +7,13 @@ other. What a file does not name is not loaded either: what builds its parts is 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import InputError
 from rig.files import read_input
 from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
-from rig.protocol.fields import FieldFaults, read_value, unique_entries
+from rig.protocol.fields import FieldFaults, Section, read_value, unique_entries
 from rig.protocol.keys import Mapped
 from rig.protocol.protocol import (
     SIDES,
@@ -28,16 +28,13 @@ from rig.protocol.protocol import (
     Protocol,
     ReleasePulse,
 )
-from rig.protocol.yamltree import load, place_at
+from rig.protocol.yamltree import Node, load, place_at
 from rig.units import Quantity
 
 if TYPE_CHECKING:
     import os
-    from typing import Any
 
     from rig.model.surface import Surface
-    from rig.protocol.fields import Section
-    from rig.protocol.yamltree import Node
 
 MAX_BYTES = 1_000_000
 
@@ -64,7 +61,7 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     try:
         data = read_input(path, MAX_BYTES + 1)
     except FileNotFoundError:
-        hint = "rig new FILE.yaml writes a protocol; ready protocols are in protocols/"
+        hint = "rig new FILE.yaml writes a protocol; rig ready lists ready protocols"
         raise InputError(f"{source}: there is no such file", hint) from None
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         reason = getattr(error, "strerror", None) or error

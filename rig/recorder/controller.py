@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError, InputError, RigError, SessionError
-from rig.link.messages import TEST_RUN, RefusalReason
+from rig.link.messages import TEST_RUN, Identity, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import completed, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
-from rig.reasons import error_of, make_error, make_reason, plain_reason
+from rig.reasons import Reason, error_of, make_error, make_reason, plain_reason
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
@@ -30,10 +30,8 @@ from rig.session.schema import RunState
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.link.messages import Identity
     from rig.link.port import Port
     from rig.protocol.protocol import Protocol
-    from rig.reasons import Reason
     from rig.records import Drop
     from rig.session.store import Session
 

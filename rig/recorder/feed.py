@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
-from rig.link.transcript import Received
+from rig.link.transcript import Received, Record
 from rig.link.wiretypes import EVENTS
-from rig.reasons import published_reasons
+from rig.reasons import Reason, published_reasons
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.link.transcript import Record
-    from rig.reasons import Reason
     from rig.recorder.published import PublishedState
     from rig.records import Drop, Edge
 

@@ -10,28 +10,23 @@ from typing import TYPE_CHECKING, Self
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.messages import Disarmed, Phase, pack_label, unpack_label
-from rig.link.port import open_port, port_clock
+from rig.link.messages import Disarmed, DisarmReason, Identity, Phase, pack_label, unpack_label
+from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Received
+from rig.link.transcript import Direction, Received, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
-from rig.reasons import make_error, sentences
+from rig.reasons import Reason, make_error, sentences
 from rig.recorder.interrupts import Interrupts, StoppedError
-from rig.records import ClockSample, Pulse
+from rig.records import ClockSample, Drop, Pulse
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rig.link.messages import DisarmReason, Identity
-    from rig.link.port import Port
-    from rig.link.transcript import Direction, Record
     from rig.protocol.protocol import Protocol
-    from rig.reasons import Reason
     from rig.recorder.feed import StateFeed
     from rig.recorder.sink import NullSink
-    from rig.records import Drop
     from rig.session.store import Session
 
 log = logging.getLogger(__name__)

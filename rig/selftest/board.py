@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from rig.link import messages as wire
 from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER, Frame, encode
-from rig.link.gatewatch import watch_gates
+from rig.link.gatewatch import GateStates, watch_gates
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
 from rig.link.transcript import Received
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rig.clock.host import Clock
-    from rig.link.gatewatch import GateStates
     from rig.link.port import Port
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)

@@ -7,16 +7,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from statistics import fmean, stdev
-from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.assembly import ticks_since
 from rig.link.messages import TEST_RUN, Phase, RefusalReason
-from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US
+from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US, BoardUnderTest
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
-
-if TYPE_CHECKING:
-    from rig.selftest.board import BoardUnderTest
 
 _BUSY_MS = 400
 

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
-from rig.reasons import make_reason, remedies
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.reasons import Reason
+from rig.reasons import Reason, make_reason, remedies
 
 _ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from statistics import median
-from typing import TYPE_CHECKING
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.rate import tick_rate
@@ -12,13 +12,8 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
 from rig.records import ClockSample
-from rig.selftest.board import LABEL
+from rig.selftest.board import LABEL, BoardUnderTest
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.selftest.board import BoardUnderTest
 
 _PINGS = 60
 _LATE = 6  # of them, above which it is not the computer that was busy

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from rig.boards import GATES, RELEASES
 from rig.link import messages as wire
@@ -11,13 +11,8 @@ from rig.link.client import BOOT_WAIT_S
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import listed
 from rig.link.messages import PROTOCOL_VERSION, Phase, RefusalReason
-from rig.selftest.board import LABEL, RawRequest
+from rig.selftest.board import LABEL, BoardUnderTest, RawRequest
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.selftest.board import BoardUnderTest
 
 BAD_ORDERS: tuple[dict[str, int], ...] = (
     {"label": 0},

@@ -7,9 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DeviceError
-from rig.reasons import make_reason
+from rig.reasons import Reason, make_reason
 from rig.selftest import drops, line_checks, requests
-from rig.selftest.board import BoardUnderTest
+from rig.selftest.board import BoardUnderTest, SelftestOptions
 from rig.selftest.findings import (
     CheckEndedError,
     Finding,
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from rig.clock.host import Clock
     from rig.link.port import Port
-    from rig.reasons import Reason
-    from rig.selftest.board import SelftestOptions
 
 
 class Check(NamedTuple):

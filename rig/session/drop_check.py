@@ -9,20 +9,17 @@ import zlib
 from dataclasses import fields, replace
 from enum import StrEnum
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rig.link.messages import TEST_RUN
-from rig.link.transcript import Received, Transcript
+from rig.link.transcript import Received, Record, Transcript
 from rig.link.wiretypes import EVENTS
-from rig.records import Certificate, Drop, Job
+from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
-    from typing import Literal
 
     from rig.link.restarts import Restart
-    from rig.link.transcript import Record
-    from rig.records import ClockSample, Edge, Pulse
 
 _U32 = (1 << 32) - 1
 _LATER = [field.name for field in fields(Certificate) if field.default is None]

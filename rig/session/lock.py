@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
+import time
 from contextlib import suppress
 from pathlib import Path
 
 from rig.errors import SessionError
 from rig.reasons import make_error
 
+_LOOK_S = 0.01  # whoever looks for a writer has the lock for microseconds
+_NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
+
 
 class WriterLock:
-    """An exclusive ``flock`` on ``FILE.lock`` beside the session.
+    """An exclusive lock on ``FILE.lock`` beside the session.
 
     The kernel drops the lock when its process ends, however it ends, so a killed writer blocks
     nobody. The lock has a file of its own because closing any second handle on the database
@@ -26,68 +29,64 @@ class WriterLock:
     """
 
     def __init__(self, session: Path) -> None:
-        self.path = session.with_name(session.name + ".lock")
-        self._handle: int | None = None
+        from filelock import FileLock, Timeout, has_fcntl  # noqa: PLC0415 - not for who only reads
+
+        self.path = _place(session)
+        self._lock = FileLock(
+            self.path, _LOOK_S, thread_local=False, poll_interval=_LOOK_S / 4,
+            fallback_to_soft=False,
+        )  # fmt: skip
         try:
-            self._handle = self._acquire(session)
+            _refuse_second_name(session)
+            session.parent.stat()  # filelock would make it
+            self._lock.acquire()
+            if has_fcntl:  # elsewhere the lock's file cannot be written, or says who has it
+                self.path.write_text(f"{os.getpid()}\n", "ascii")
+        except Timeout:
+            holder = _holder(self.path)
+            raise make_error(SessionError, "session_in_use", path=session, holder=holder) from None
         except OSError as error:
+            self._lock.release()
             if isinstance(error, SessionError):
                 raise
-            if error.errno in {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}:
+            if error.errno in _NO_LOCKS:
                 raise make_error(SessionError, "disk_knows_no_locks", path=session) from error
             # The lock is the first file that a session makes: without its folder there is neither.
             code = "session_unmade" if isinstance(error, FileNotFoundError) else "cannot_lock"
             raise make_error(SessionError, code, path=session, text=error) from error
 
-    def _acquire(self, session: Path) -> int:
-        while True:
-            _refuse_second_name(session)
-            handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if self._is_current(handle):
-                    os.ftruncate(handle, 0)
-                    os.write(handle, f"{os.getpid()}\n".encode())
-                    return handle
-            except BlockingIOError:
-                holder = _holder(handle)
-                os.close(handle)
-                used = make_error(SessionError, "session_in_use", path=session, holder=holder)
-                raise used from None
-            except BaseException:
-                os.close(handle)
-                raise
-            os.close(handle)
-
-    def _is_current(self, handle: int) -> bool:
-        # The holder before us may have removed the file between our open and our lock; what we
-        # hold would then be a lock on a name nobody else can see.
-        with suppress(FileNotFoundError):
-            return os.path.samestat(os.fstat(handle), self.path.stat())
-        return False
-
     def release(self) -> None:
         """Give the lock up and take its file away; further calls do nothing."""
-        if self._handle is None:
-            return
-        with suppress(OSError):  # a folder made read-only meanwhile: a stale *file* blocks nobody
-            self.path.unlink(missing_ok=True)  # while still locked, see _is_current
-        os.close(self._handle)
-        self._handle = None
+        if self._lock.is_locked:
+            # A folder made read-only meanwhile: a stale *file* blocks nobody. While it is locked,
+            # for then nobody else locks a name that is gone.
+            with suppress(OSError):
+                self.path.unlink(missing_ok=True)
+            self._lock.release()
 
 
-def _holder(handle: int) -> str:
-    owner = os.pread(handle, 32, 0).decode("ascii", "replace").strip()
+def _place(session: Path) -> Path:
+    return session.with_name(session.name + ".lock")
+
+
+def _holder(lock: Path) -> str:
+    owner = ""
+    with suppress(OSError):
+        owner = lock.read_text("ascii", "replace").partition("\n")[0]
     return f"process {owner}" if owner else "another process"
 
 
 def writer_of(session: Path) -> str:
     """Name the process that has a session open for writing; empty without one."""
-    with suppress(OSError), session.with_name(session.name + ".lock").open("rb") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return _holder(lock.fileno())
+    lock = _place(session)
+    with suppress(OSError), lock.open("rb") as file:
+        from filelock import lock_descriptor  # noqa: PLC0415 - only where somebody may write
+
+        for pause_s in (_LOOK_S, 0.0):
+            if lock_descriptor(file.fileno(), blocking=False):
+                return ""
+            time.sleep(pause_s)
+        return _holder(lock)
     return ""
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 from rig.boards import GATES
 from rig.errors import SessionError
-from rig.reasons import make_error
-from rig.records import ClockSample, Drop, HostBreak, Pulse
+from rig.reasons import Reason, make_error
+from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
-    from rig.reasons import Reason
-    from rig.records import Job
 
 T = TypeVar("T")
 Direction = Literal["rx", "tx"]

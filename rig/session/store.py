@@ -19,7 +19,7 @@ from rig import __version__
 from rig.errors import InputError, SessionError
 from rig.files import make_folder, state_folder
 from rig.printable import encodable
-from rig.reasons import make_error
+from rig.reasons import Reason, make_error
 from rig.session.database import build, check_place, connect
 from rig.session.faults import translate_errors
 from rig.session.journal import Journal, Statement
@@ -28,14 +28,12 @@ from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
 from rig.session.reason_rows import write_reasons
 from rig.session.rows import edge_rows, row_of
-from rig.session.schema import TABLES, insert_statement
+from rig.session.schema import TABLES, RunState, insert_statement
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from rig.reasons import Reason
     from rig.records import ClockSample, Drop, HostBreak, Pulse
-    from rig.session.schema import RunState
 
 
 log = logging.getLogger(__name__)

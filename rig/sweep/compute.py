@@ -8,22 +8,20 @@ grid is cut nor who computes a piece can be seen in the results.
 
 from __future__ import annotations
 
-from concurrent.futures import FIRST_COMPLETED, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from rig.model.batch import Impacts, falls, given_impacts, surface_impacts
+from rig.model.batch import Flags, Floats, Impacts, falls, given_impacts, surface_impacts
 from rig.model.chain import XI
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from concurrent.futures import Executor, Future
 
     from numpy.typing import NDArray
 
-    from rig.model.batch import Flags, Floats
     from rig.sweep.layout import Layout
 
     _Numbers: TypeAlias = float | Floats

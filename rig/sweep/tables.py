@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from rig import __version__
-from rig.sweep.compute import NOTES
+from rig.sweep.compute import NOTES, Swept
 from rig.sweep.variables import VARIABLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from rig.protocol.protocol import Protocol
-    from rig.sweep.compute import Swept
     from rig.sweep.layout import Layout
 
 _ROWS = 20_000  # made into text together; a whole sweep's would not fit

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.model.chain import XI
-from rig.protocol.keys import range_of
+from rig.protocol.keys import Range, range_of
 
 if TYPE_CHECKING:
-    from rig.protocol.keys import Range
     from rig.protocol.protocol import Protocol
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.boards import MEGA, PICO, UNO
 from rig.errors import DeviceError
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -121,6 +122,21 @@ def _describe(info: ListPortInfo) -> SerialPort:
         kinds=tuple(kind.name for kind in kinds),
         skipped=skipped,
     )
+
+
+def sole_port() -> str:
+    """Return the path of the only board there is.
+
+    Raises
+    ------
+    DeviceError
+        There is none, or there are several.
+    """
+    paths = [port.path for port in serial_ports() if port.candidate]
+    if len(paths) != 1:
+        code = "many_boards" if paths else "no_board"
+        raise make_error(DeviceError, code, ports=" and ".join(paths))
+    return paths[0]
 
 
 def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> str | None:

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
-from rig.usb.listing import KNOWN
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rig.usb.listing import Known
+from rig.usb.listing import KNOWN, Known
 
 _HEAD = """\
 # Boards of a chain rig. Put this into /etc/udev/rules.d/, then

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.studies.layout_catalogue import KINDS, STANDARD, Kind, under
-from rig.analysis import unknowns
+from rig.analysis import drop_model, unknowns
 from rig.analysis.drop_model import DropModel
 from rig.analysis.joint_fit import joint_fit
 from rig.analysis.unknowns import TABLE, Unknown, Unknowns

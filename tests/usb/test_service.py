@@ -1,7 +1,6 @@
-"""The unit that is shipped for systemd."""
+"""The units that are shipped for systemd."""
 
 import configparser
-import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -9,45 +8,34 @@ from pathlib import Path
 import pytest
 
 from rig.cli import _parser
-from rig.usb.listing import KNOWN
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
-UNIT = ROOT / "packaging" / "chainrig.service"
+UNITS = pytest.mark.parametrize(
+    "unit", [*(ROOT / "packaging").glob("*.service")], ids=lambda unit: unit.stem
+)
 
 
-def test_it_starts_a_command_that_there_is():
-    unit = configparser.ConfigParser(interpolation=None)
-    unit.optionxform = str
-    unit.read(UNIT)
-    words = unit["Service"]["ExecStart"].split()
+@UNITS
+def test_it_starts_a_command_that_there_is(unit):
+    settings = configparser.ConfigParser(interpolation=None)
+    settings.optionxform = str
+    settings.read(unit)
+    words = settings["Service"]["ExecStart"].split()
     rig = words.index("rig")
-    arguments = [word for word in words[rig + 1 :] if word != "$RIG_OPTIONS"]
+    arguments = [word.replace("%i", "left") for word in words[rig + 1 :] if word != "$RIG_OPTIONS"]
     assert _parser().parse_args(arguments).module == "daemon"
 
 
-@pytest.mark.parametrize("name", sorted({kind.name for kind in KNOWN if kind.board}))
-def test_the_port_that_the_page_writes_into_its_settings_is_that_of_any_board(name, tmp_path):
-    (line,) = re.findall(
-        r'^echo "(RIG_PORT=.*)" >', (ROOT / "docs/daemon.md").read_text(), re.MULTILINE
-    )
-    for device in (name.replace(" ", "_"), "Generic_Modem"):
-        (tmp_path / f"usb-{device}_0042-if00").touch()
-    said = line.replace("/dev/serial/by-id", str(tmp_path))
-    done = subprocess.run(
-        ["sh", "-c", f'echo "{said}"'], capture_output=True, text=True, check=True
-    )
-    assert done.stdout == f"RIG_PORT={tmp_path}/usb-{name.replace(' ', '_')}_0042-if00\n"
-
-
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="needs systemd-analyze")
-def test_systemd_understands_it():
+@UNITS
+def test_systemd_understands_it(unit):
     done = subprocess.run(
-        ["systemd-analyze", "verify", UNIT],
+        ["systemd-analyze", "verify", unit],
         capture_output=True,
         text=True,
         check=False,
         timeout=PATIENCE_S,
     )
-    complaints = [line for line in done.stderr.splitlines() if UNIT.name in line]
+    complaints = [line for line in done.stderr.splitlines() if unit.name in line]
     assert complaints == []

@@ -1,0 +1,29 @@
+"""``rig ready``."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from rig.commands.output import say
+from rig.errors import InputError
+from rig.files import write_atomic
+from rig.protocol import reader
+from rig.ready import ready_protocol, ready_protocols
+from rig.text_table import text_table
+
+
+def main(arguments: Namespace) -> int:
+    """List the ready protocols, or copy one into this folder."""
+    if arguments.name is None:
+        rows = [[name, reader.read(path).title] for name, path in ready_protocols().items()]
+        print("\n".join(text_table(rows, left={0, 1})))
+        say("try one: rig run NAME --port sim:// --session my.session; copy one: rig ready NAME")
+        return 0
+    copy = Path(f"{arguments.name}.yaml")
+    text = ready_protocol(arguments.name).read_text("utf-8")
+    if copy.exists():
+        raise InputError(f"{copy} already exists", "move this file away")
+    write_atomic(copy, text)
+    say(f"protocol: {copy}")
+    return 0

@@ -1,0 +1,40 @@
+"""``rig service install``."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import platformdirs
+
+from rig.commands.output import say
+from rig.files import make_folder, write_atomic
+from rig.ready import shipped
+from rig.usb.listing import sole_port
+
+
+def main(arguments: Namespace) -> int:
+    """Write the user's systemd unit that keeps a daemon running at the board's port."""
+    rig, port = arguments.name, _lasting(arguments.port or sole_port())
+    template = "chainrig@.service" if rig else "chainrig.service"
+    text = shipped(f"packaging/{template}").read_text("utf-8")
+    values = {
+        "%h/.local/bin": str(Path(sys.executable).parent).replace("%", "%%"),
+        "${RIG_PORT}": port.replace("%", "%%"),
+        "EnvironmentFile=": "EnvironmentFile=-",  # there may be RIG_OPTIONS in it
+    }
+    for placeholder, value in values.items():
+        text = text.replace(placeholder, value)
+    service = f"chainrig@{rig}" if rig else "chainrig"
+    folder = make_folder(platformdirs.user_config_path() / "systemd/user")
+    write_atomic(folder / f"{service}.service", text)
+    say(f"{folder / service}.service: {port}")
+    say(f"start it: systemctl --user daemon-reload && systemctl --user enable --now {service}")
+    return 0
+
+
+def _lasting(port: str) -> str:
+    """Return the name of a port that it has again after its board was plugged in elsewhere."""
+    links = Path("/dev/serial/by-id").glob("*")
+    return next((str(link) for link in links if link.resolve() == Path(port).resolve()), port)

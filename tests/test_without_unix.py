@@ -1,0 +1,138 @@
+"""Where Python has no fcntl, termios, pwd, resource or Unix sockets, as on Windows.
+
+Pyserial, platformdirs and Textual are loaded before: they have branches of their own for Windows.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.waiting import PATIENCE_S
+
+ROOT = Path(__file__).parents[1]
+BARE = """
+import asyncio, concurrent.futures.process, multiprocessing.popen_spawn_posix, multiprocessing.util
+import os, signal, socket, subprocess, sys, tempfile, warnings
+import platformdirs.unix, serial, serial.tools.list_ports, textual.app
+import textual.drivers.linux_driver
+
+for name in ("fcntl", "termios", "pwd", "grp", "resource", "tty", "pty"):
+    sys.modules[name] = None
+for module, names in {
+    socket: ("AF_UNIX", "SO_PEERCRED", "socketpair", "send_fds"),
+    os: ("fork", "forkpty", "getuid", "geteuid", "getgid", "pread", "pwrite", "O_CLOEXEC",
+         "O_NONBLOCK", "set_blocking", "sched_getaffinity", "sched_setaffinity", "mkfifo"),
+    signal: ("pthread_sigmask", "SIGALRM", "SIGUSR1", "SIGHUP"),
+}.items():
+    for name in names:
+        vars(module).pop(name, None)
+warnings.filterwarnings("ignore", "only soft file lock")
+import rig.cli
+sys.exit(rig.cli.main(sys.argv[1:]))
+"""
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory):
+    """Run a command in a folder of its own, in a Python that lacks what Windows lacks."""
+    folder = tmp_path_factory.mktemp("bare")
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache")}
+
+    def call(line, code=0):
+        done = subprocess.run(
+            [sys.executable, "-c", BARE, *line.split()],
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=PATIENCE_S,
+        )
+        assert "Traceback" not in done.stderr
+        assert "internal error" not in done.stderr
+        assert done.returncode == code, done.stderr
+        return done
+
+    call.folder = folder
+    text = (ROOT / "protocols/single-chain.yaml").read_text("utf-8")
+    (folder / "chains.yaml").write_text(re.sub(r"repeats: \d+", "repeats: 2", text), "utf-8")
+    call("run chains --port sim:// --seed 3 --session chains.session --yes")
+    return call
+
+
+def test_results_are_the_same_as_anywhere(bare):
+    bare("run chains --port sim:// --seed 2 --session my.session --yes")
+    assert not (bare.folder / "my.session.lock").exists()
+    here = json.loads(bare("analyze my.session --json --fresh").stdout)
+    rig = [sys.executable, "-m", "rig", "analyze", "my.session", "--json", "--fresh"]
+    done = subprocess.run(rig, cwd=bare.folder, capture_output=True, check=True)
+    assert here == json.loads(done.stdout)
+    bare("compare chains.session my.session")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "ready",
+        "check falling-ball -o mounting.svg",
+        "predict inclined-uniform --json",
+        "new my.yaml --scene object --yes",
+        "analyze chains.session",
+        "report chains.session -o report.html --figures figures",
+        "export chains.session --csv csv",
+        "export chains.session --bundle chains.eln",
+        "replay chains.session",
+        "recover chains.session -o saved.session",
+        "estimate chains.session",
+        "design single-chain --no-search",
+        "notes chains.session --run 1 windy",
+        "verify chains.session",
+        "ports",
+    ],
+)
+def test_a_command_works(bare, line):
+    bare(line)
+
+
+def test_edges_of_another_timer_become_a_session(bare):
+    bare("export chains.session --csv edges")
+    edges = bare.folder / "edges" / "edges.csv"
+    line = f"import {edges} --protocol chains --session {{}} --simulated"
+    bare(line.format("imported.session"))
+    bare("analyze imported.session --json")
+
+
+def test_the_doctor_looks(bare):
+    bare("doctor --port sim://?protocol=chains.yaml --session chains.session")
+
+
+def test_one_writer_at_a_time(bare):
+    lock = bare.folder / "chains.session.lock"
+    program = f"from filelock import SoftFileLock as Lock; lock = Lock({str(lock)!r}); "
+    program += "lock.acquire(); print(flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as holder:
+        holder.stdout.readline()
+        done = bare("notes chains.session --run 1 calm", 2)
+        holder.communicate(b"\n")
+    assert f"is being written by process {holder.pid}" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "daemon --port sim://",
+        "daemon --port sim:// --tcp",
+        "tui falling-ball --port sim://",
+        "run falling-ball --port sim:// --session x.session --name left",
+    ],
+)
+def test_what_cannot_work_says_so(bare, line):
+    done = bare(line, 2)
+    assert done.stderr.startswith("this computer has no Unix sockets, so no daemon runs here\n")

@@ -1,0 +1,67 @@
+"""The service that `rig service install` writes."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from rig.cli import main
+from rig.usb.listing import SerialPort
+from tests.waiting import PATIENCE_S
+
+
+@pytest.fixture
+def units(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    boards = [SerialPort("/dev/ttyACM0"), SerialPort("/dev/ttyS0", skipped="no USB device")]
+    monkeypatch.setattr("rig.usb.listing.serial_ports", lambda: boards)
+    return tmp_path / "systemd/user"
+
+
+@pytest.mark.parametrize(
+    ("words", "service", "command"),
+    [
+        ([], "chainrig", "rig daemon --port /dev/ttyACM0"),
+        (["--name", "left"], "chainrig@left", "rig daemon --name %i --port /dev/ttyACM0"),
+        (["--port", "/dev/ttyACM9"], "chainrig", "rig daemon --port /dev/ttyACM9"),
+    ],
+)
+def test_the_unit_starts_a_daemon_at_the_board(units, capsys, words, service, command):
+    assert main(["service", "install", *words]) == 0
+    (unit,) = units.iterdir()
+    assert unit.name == f"{service}.service"
+    text = unit.read_text()
+    (line,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
+    assert f" {command} $RIG_OPTIONS" in line
+    assert "EnvironmentFile=-" in text
+    assert f"enable --now {service}\n" in capsys.readouterr().err
+    if shutil.which("systemd-analyze"):
+        done = subprocess.run(
+            ["systemd-analyze", "verify", unit],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=PATIENCE_S,
+        )
+        assert unit.name not in done.stderr
+
+
+def test_a_port_is_named_so_that_it_stays(tmp_path, monkeypatch):
+    from rig.commands import service_install
+
+    link, device = tmp_path / "usb-Pico", tmp_path / "ttyACM0"
+    device.touch()
+    link.symlink_to(device)
+    monkeypatch.setattr(
+        service_install, "Path", lambda path: tmp_path if "by-id" in path else Path(path)
+    )
+    assert service_install._lasting(str(device)) == str(link)
+    assert service_install._lasting("/dev/ttyS9") == "/dev/ttyS9"
+
+
+def test_without_a_board_there_is_no_unit(units, monkeypatch, capsys):
+    monkeypatch.setattr("rig.usb.listing.serial_ports", list)
+    assert main(["service", "install"]) == 4
+    assert "no board found" in capsys.readouterr().err
+    assert not units.exists()
