@@ -51,10 +51,13 @@ class Operator:
         Shows one line of narration.
     ask
         Shows a request and returns when it is done; `None` when nobody is there (``--yes``).
+    judged
+        Shows what came of a drop of so many that are planned; `None` says it in a line.
     """
 
     say: Callable[[str], None]
     ask: Callable[[str], None] | None = None
+    judged: Callable[[DropResult, int], None] | None = None
 
 
 def run_protocol(
@@ -269,7 +272,10 @@ class Campaign:
                 case events.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
-                    self.operator.say(narration(self._result, len(self.plan)))
+                    if self.operator.judged is None:
+                        self.operator.say(narration(self._result, len(self.plan)))
+                    else:
+                        self.operator.judged(self._result, len(self.plan))
         except DeviceRefusedError as refusal:
             self._failed = refusal
             self._take(events.effect_failed(self.flow.ticket, refusal))

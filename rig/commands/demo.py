@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from rig.analysis.result import GOOD
 from rig.commands import report
+from rig.commands.narration import narrator
 from rig.commands.output import VOID, goes_on, say, show
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
@@ -23,7 +24,7 @@ from rig.recorder.interrupts import Interrupts
 from rig.report.estimate import symbol
 from rig.report.numbers import fixed, plus_minus
 from rig.results.estimated import session_estimate
-from rig.runner import Operator, run_protocol
+from rig.runner import run_protocol
 from rig.session.store import Session
 from rig.text_table import text_table
 
@@ -58,8 +59,9 @@ def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
     """Let chains fall, or those that have not fallen yet, and show what was found."""
     interrupts = Interrupts()
     with interrupts.caught():
+        operator = narrator(str(protocol), None)
         outcome = run_protocol(
-            str(protocol), "sim://", str(session), Operator(say), arguments.seed, interrupts
+            str(protocol), "sim://", str(session), operator, arguments.seed, interrupts
         )
     print("SIMULATED DATA")
     print("\n".join(beside_truth(outcome.analysis, session)))

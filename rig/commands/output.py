@@ -59,8 +59,12 @@ def show(lines: Iterable[str]) -> None:
 
 def tint(text: str) -> str:
     """Colour what is not as it should be, unless the reader wants none (no-color.org)."""
-    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
-    return text if plain else _ODD.sub("\x1b[33m\\1\x1b[0m", text)
+    return _ODD.sub("\x1b[33m\\1\x1b[0m", text) if has_colours() else text
+
+
+def has_colours() -> bool:
+    """Whether a terminal may be given colours."""
+    return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
 def _broken(line: str, width: int) -> list[str]:

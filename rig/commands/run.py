@@ -6,18 +6,19 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from rig.commands.output import goes_on, print_results, say
+from rig.commands.narration import narrator
+from rig.commands.output import goes_on, print_results
 from rig.recorder.interrupts import Interrupts
 from rig.report.finding import finding
 from rig.report.templates import sentence
-from rig.runner import Operator, run_protocol
-from rig.streams import ask
+from rig.runner import run_protocol
+from rig.streams import ask, say
 
 
 def main(arguments: Namespace) -> int:
     """Carry out a protocol."""
     attended = not arguments.yes and sys.stdin.isatty()
-    operator = Operator(say, _ask if attended else None)
+    operator = narrator(arguments.protocol, _ask if attended else None)
     interrupts = Interrupts()
     with goes_on("the same command continues the session"), interrupts.caught():
         outcome = run_protocol(

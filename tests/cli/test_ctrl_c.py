@@ -1,6 +1,7 @@
 """Ctrl-C while a command loads and as it ends: 130, and no traceback."""
 
 import asyncio
+import io
 import os
 import re
 import shlex
@@ -17,6 +18,7 @@ from textual.app import App
 from bench.mutants import CSV, make_session
 from rig import cli
 from rig.commands import demo, tui
+from rig.commands.growing import Growing
 
 STRUCK = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
 LOADING = f"""
@@ -93,6 +95,29 @@ def test_a_demo_that_was_interrupted_says_what_goes_on_with_it(call, tmp_path, m
     words = re.search(r"rig: interrupted; \S*rig (demo .*) continues it", said.err)
     assert said.code == call(*shlex.split(words[1])).code == 130
     assert asked[0] == asked[1]
+
+
+def test_a_demo_draws_fig_3_as_it_grows_where_somebody_looks(call, tmp_path, monkeypatch):
+    """As `rig run` does, which tests/cli/test_growing.py looks at."""
+    told = []
+
+    def interrupted(_protocol, _url, _session, operator, _seed, _interrupts):
+        told.append(operator.judged)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(demo, "run_protocol", interrupted)
+    call("demo", "-o", tmp_path / "lines")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    call("demo", "-o", tmp_path / "picture")
+    assert told[0] is None
+    assert isinstance(told[1].__self__, Growing)
+
+
+class Terminal(io.StringIO):
+    encoding = "utf-8"
+
+    def isatty(self):
+        return True
 
 
 MOMENTS = 40
