@@ -16,8 +16,7 @@ _MS = PICO.clock_hz // 1000
 _HEAD = """\
 # A Pico whose USB controller hangs
 
-`./run bench usb`, in emulated time: erratum RP2040-E15 at random moments, at rest and amid answers,
-while a drop is held. Coming back includes the 100 ms that a host waits after a plug.
+`./run bench usb`, in emulated time: erratum RP2040-E15 while a drop is held. 100 ms are the host's.
 
 | | |
 |---|---|
