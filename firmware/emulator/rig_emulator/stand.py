@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rig_emulator.controller import Change
     from rig_emulator.wiring import Wiring
 
-_BOOT_CYCLES = 1_600_000
+_BOOT_CYCLES, _SLOW_BOOT_CYCLES = 500_000, 1_600_000  # the Pico waits for its crystal
 _ANSWER_CYCLES = 800_000
 _TRIES = 5
 _LABEL = wire.pack_label(1, 1)
@@ -180,7 +180,8 @@ class Stand:
         self.fire_sent = self.fired = self.certified = self.heard = self._latest = 0
         for pin in (*wiring.gates, wiring.stop):
             self.avr.edge(0, pin, False)
-        self.hear(self._scaled(_BOOT_CYCLES) + waits)
+        slow = wiring.clock_hz > 16_000_000
+        self.hear(self._scaled(_SLOW_BOOT_CYCLES if slow else _BOOT_CYCLES) + waits)
         identity = self.ask(wire.Identify())
         if not isinstance(identity, wire.Identity):
             raise DeviceError(f"the board answers IDENTIFY with {identity}")
