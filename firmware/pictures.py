@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run as a script, it does not see its parent
 
 import schemdraw
-from schemdraw import drawing_stack, logic
+from schemdraw import drawing_stack
 from schemdraw import elements as elm
 
 from firmware.pins import Pins, read_pins
@@ -155,7 +155,7 @@ def _board(page: _Sheet, pins: Pins, x: float, y: float) -> None:
     }
     rows += [(pins.others[key][0], word) for key, word in words.items() if key in pins.others]
     if pins.volts != "+5 V":
-        rows += [("3V3", "out: inverters, pull-ups")]
+        rows += [("3V3", "out: pull-ups")]
     rows += [("GND", "all grounds")]
     parts = {words[key]: key.lower() for key in ("SYNC", "SENSE", "REFERENCE")}
     step = 0.5
@@ -171,22 +171,23 @@ def _board(page: _Sheet, pins: Pins, x: float, y: float) -> None:
 def _gate(pins: Pins, x: float, y: float) -> None:
     _title(x - 0.8, y + 4.9, "Photogate, the same for each gate: high while its beam is blocked")
     _supply(x + 0.6, y + 3.6)
-    _down(elm.Resistor(), x + 0.6, y + 3.6, y + 1.8, "150 Ω")
+    _down(elm.ResistorVar(), x + 0.6, y + 3.6, y + 1.8, "68 Ω +\ntrimmer\n2 kΩ", "top")
     _down(elm.LED(), x + 0.6, y + 1.8, y, "IR LED\n940 nm", "top")
     _ground(x + 0.6, y)
-    beam = elm.Line(arrow="->").at((x + 2.1, y + 0.9)).to((x + 3.2, y + 0.9))
+    beam = elm.Line(arrow="->").at((x + 2.1, y + 2.6)).to((x + 3.2, y + 2.6))
     beam.color(_LIGHT).linestyle("--")
-    _text(x + 2.65, y + 1.25, "beam", align="center", color=_LIGHT)
+    _text(x + 2.65, y + 2.95, "beam", align="center", color=_LIGHT)
 
-    eye = elm.NpnPhoto().at((x + 4.0, y + 0.9)).anchor("base")
+    eye = elm.NpnPhoto().at((x + 4.0, y + 2.6)).anchor("base")
     node_x, node_y = eye.collector.x, y + 1.8
     _supply(node_x, y + 3.6)
-    _down(elm.Resistor(), node_x, y + 3.6, node_y, "2.2 kΩ", "top")
-    _wire((node_x, node_y), (node_x, eye.collector.y))
-    _wire((node_x, eye.emitter.y), (node_x, y))
+    _wire((node_x, y + 3.6), (node_x, eye.collector.y))
+    _wire((node_x, eye.emitter.y), (node_x, node_y))
+    _down(elm.Resistor(), node_x, node_y, y, "4.7 kΩ", "top")
     _ground(node_x, y)
     elm.Dot().at((node_x, node_y))
-    _note(node_x + 0.4, y + 1.1, "slit 0.5 mm", "in front")
+    _note(node_x + 0.4, y + 2.9, "slit 0.5 mm", "in front")
+    _note(node_x + 0.4, y + 1.4, "trim to 2.44 V")
 
     chip = elm.Opamp(leads=True).right().at((node_x + 4.8, node_y)).anchor("in1")
     _text(chip.center.x - 0.05, chip.center.y, "½ LM393", _SMALL - 1.5, align="center")
@@ -195,7 +196,7 @@ def _gate(pins: Pins, x: float, y: float) -> None:
     _wire((ref_x, ref_y), (chip.in2.x, ref_y))
     elm.Dot().at((ref_x, ref_y))
     # Its upper resistor crosses the signal's wire without touching it.
-    _down(elm.Resistor(), ref_x, y + 3.6, y + 2.0, "10 kΩ", "top")
+    _down(elm.Resistor(), ref_x, y + 3.6, y + 2.0, "33 kΩ", "top")
     _wire((ref_x, y + 2.0), (ref_x, ref_y))
     _supply(ref_x, y + 3.6)
     _down(elm.Resistor(), ref_x, ref_y, ref_y - 1.7, "10 kΩ", "top")
@@ -210,22 +211,18 @@ def _gate(pins: Pins, x: float, y: float) -> None:
     back_y = ref_y - 1.1
     _wire((out_x, out_y), (out_x, back_y))
     elm.Resistor().at((chip.in2.x - 0.4, back_y)).to((out_x, back_y)).label(
-        "100 kΩ", loc="top", fontsize=_SMALL
+        "220 kΩ", loc="top", fontsize=_SMALL
     )
     _wire((chip.in2.x - 0.4, back_y), (chip.in2.x - 0.4, ref_y))
     elm.Dot().at((chip.in2.x - 0.4, ref_y))
 
-    inverter = logic.SchmittNot().at((out_x + 0.9, out_y)).anchor("in1").right()
-    at_3v3 = "" if pins.volts == "+5 V" else ",\nat 3.3 V"
-    _text(inverter.center.x, out_y + (1.0 if at_3v3 else 0.8), f"⅙ 74HC14{at_3v3}", align="center")
-    end = inverter.out.x + 0.3
-    _wire((inverter.out.x, out_y), (end, out_y))
+    end = out_x + 0.9
     elm.Resistor().at((end, out_y)).to((end + 1.7, out_y)).label("1 kΩ", fontsize=_SMALL)
     _pin(end + 1.7, out_y, pins.gates[0])
     _note(
         x + 10.6,
         y - 1.35,
-        "100 nF at each chip, between its supply and ground.",
+        "2.2 kΩ and 1 kΩ beside the pin; 100 nF at each chip.",
         f"{pins.gates[0]} is gate 0; the list has the pins of the other gates.",
         "Leave a pin without a gate open.",
     )

@@ -49,7 +49,7 @@ GIVEN = {
         "80 and 150 mm": "a place for a gate", "4 ms": "sim/dials.py", "3 %": "sim/dials.py",
     },
     "firmware/emulator/README.md": {
-        "3.4 ms": "data sheet", "1 ms": "USB's frames",
+        "3.4 ms": "data sheet",
         "50 µs": "firmware/emulator/rig_emulator/pico/run.mjs",
     },
     "docs/resolved-world.md": dict.fromkeys(("1 nm", "1.4 %", "2 %"), "tests/sim/test_resolved.py")

@@ -5,7 +5,9 @@
 
 #define CRYSTAL_MHZ 12u
 #define XOSC_ON (0xFABu << 12 | 0xAA0u) /* 1 to 15 MHz */
-#define XOSC_WAIT 47u                   /* 1 ms, in 256 of its clocks */
+/* In 256 of its clocks: 64 ms. The Pico's own crystal needs 1 ms; those of other boards with this
+ * chip have needed up to 64 times as long (PICO_XOSC_STARTUP_DELAY_MULTIPLIER of their SDK). */
+#define XOSC_WAIT (64u * 47u)
 #define STABLE (1u << 31)
 #define LOCKED (1u << 31)
 

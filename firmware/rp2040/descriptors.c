@@ -13,7 +13,7 @@
 
 static const uint8_t device[] = {
     18, DEVICE, 0x00, 0x02,  /* USB 2.0 */
-    2, 0, 0,                 /* communications */
+    2, 2, 0,                 /* communications, ACM: Windows chooses its driver by both */
     PACKET,
     LOW(VENDOR), HIGH(VENDOR), LOW(PRODUCT), HIGH(PRODUCT), 0x00, 0x01,
     1, 2, 3,                 /* texts: maker, product, serial number */
@@ -31,7 +31,7 @@ static const uint8_t configuration[ALL] = {
     5, 0x24, 6, 0, 1,
     7, 5, 0x80 | NOTICES, 3, 8, 0, 255,
     /* its bytes */
-    9, 4, 1, 0, 2, 10, 0, 0, 0,
+    9, 4, BYTES_INTERFACE, 0, 2, 10, 0, 0, 0,
     7, 5, BYTES, 2, PACKET, 0, 0,
     7, 5, 0x80 | BYTES, 2, PACKET, 0, 0,
 };

@@ -6,6 +6,7 @@
 
 #define PACKET 64
 #define NOTICES 1 /* endpoint on which a modem would tell of its lines; nothing ever comes */
+#define BYTES_INTERFACE 1
 #define BYTES 2   /* endpoint of the line itself, in and out */
 
 /* The descriptor of a type and index, its size at `size`; 0: there is none. `number` is the board's

@@ -50,8 +50,11 @@ uint16_t board_supply_mv(uint16_t measured)
     return measured ? (uint16_t)((ADC_FULL - measured) * ADC_FULL_MV * DIVIDER / ADC_FULL) : 0;
 }
 
+/* It flickers where an old chip waits for a host that may never see it. */
 void board_led(bool on)
 {
+    if (usb_unseen())
+        on = REGISTER(TIMER_RAW_LOW) >> 16 & 1;
     REGISTER(on ? SIO_OUT_SET : SIO_OUT_CLEAR) = 1u << LED;
 }
 

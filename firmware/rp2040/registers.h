@@ -24,6 +24,10 @@
 #define RESET_USB (1u << 24)
 #define PSM_WDSEL 0x40010008u
 
+/* 2.20.2 which chip it is */
+#define CHIP_ID 0x40000000u
+#define CHIP_REVISION(id) ((id) >> 28) /* 1: B0 and B1, 2: B2 */
+
 /* 2.12.7 why the chip started */
 #define CHIP_RESET 0x40064008u
 #define CHIP_RESET_POWER (1u << 8)
@@ -120,9 +124,12 @@
 #define USB_OUT_CTRL(endpoint) (USB_MEMORY + 4u + 8u * (endpoint))
 #define USB_ADDRESS 0x50110000u
 #define USB_MAIN_CTRL 0x50110040u
+#define USB_FRAME 0x50110048u
 #define USB_SIE_CTRL 0x5011004Cu
 #define USB_SIE_STATUS 0x50110050u
 #define USB_BUFFERS 0x50110058u
+#define USB_ABORT 0x50110060u
+#define USB_ABORT_DONE 0x50110064u
 #define USB_STALL_ARM 0x50110068u
 #define USB_MUXING 0x50110074u
 #define USB_POWER 0x50110078u

@@ -5,6 +5,7 @@
 #include "board.h"
 #include "clocks.h"
 #include "descriptors.h"
+#include "frames.h"
 #include "registers.h"
 
 /* Where the packets are in the controller's memory. */
@@ -33,6 +34,9 @@
 #define SIE_INTERRUPT_EACH (1u << 29)
 #define SIE_PULL_UP (1u << 16)
 
+#define UNPLUGGED_US 20000u /* for so long that every hub and host sees it */
+#define OLDER_THAN_B2 (CHIP_REVISION(REGISTER(CHIP_ID)) < 2)
+
 /* Requests: type and code. */
 #define GET_STATUS 0x8000
 #define GET_STATUS_INTERFACE 0x8100
@@ -52,6 +56,8 @@
 
 static const uint8_t *number;
 static uint8_t address, configured;
+static bool unplugged; /* the controller is being restarted */
+static uint32_t unplugged_since;
 static bool address_waits; /* until its request is answered */
 static bool listening;
 static uint8_t coding[LINE_CODING] = {0x20, 0xA1, 0x07, 0, 0, 0, 8}; /* 500,000 baud; any will do */
@@ -63,7 +69,6 @@ static struct {
     uint16_t left;
     bool data1;
     bool short_end; /* a packet that is not full must tell the host that there is no more */
-    bool thanks;    /* the host says when it has it all */
 } control;
 
 static bool out_data1, in_data1, in_flight;
@@ -85,6 +90,26 @@ static void hand_over(uint32_t buffer, uint32_t what)
     REGISTER(buffer) = what;
     __asm__ volatile("nop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop\n\tnop");
     REGISTER(buffer) = what | BUFFER_AVAILABLE;
+}
+
+/* Take a buffer back, and tell whether the host was quicker. The oldest chips would keep the order
+ * for ever (erratum RP2040-E2). */
+static bool withdraw(uint32_t buffer, uint32_t done)
+{
+    uint8_t patience = 255;
+    bool was_done;
+    if (!OLDER_THAN_B2) {
+        REGISTER(USB_ABORT) = done;
+        while (!(REGISTER(USB_ABORT_DONE) & done) && --patience)
+            ;
+    }
+    was_done = REGISTER(USB_BUFFERS) & done;
+    if (!was_done)
+        REGISTER(buffer) = 0;
+    REGISTER(USB_ABORT) = 0;
+    REGISTER(USB_ABORT_DONE) = done;
+    REGISTER(USB_BUFFERS) = done;
+    return was_done;
 }
 
 static uint32_t toggled(bool *data1)
@@ -118,7 +143,8 @@ static void control_answer(const uint8_t *data, uint16_t size, uint16_t asked)
     control.next = data;
     control.left = size < asked ? size : asked;
     control.short_end = size < asked;
-    control.thanks = asked != 0;
+    if (asked) /* from now on: a host that has it all says so, and we may not know it yet */
+        control_expect(0);
     control_send();
 }
 
@@ -132,6 +158,17 @@ static void control_stall(void)
     REGISTER(USB_STALL_ARM) = 3;
     REGISTER(USB_IN(0)) = BUFFER_STALL;
     REGISTER(USB_OUT(0)) = BUFFER_STALL;
+}
+
+/* The host may have given up the request before. */
+static void control_begin(void)
+{
+    withdraw(USB_IN(0), DONE_IN(0));
+    withdraw(USB_OUT(0), DONE_OUT(0));
+    control.left = 0;
+    control.data1 = true;
+    control.short_end = false;
+    address_waits = coding_comes = false;
 }
 
 static void bytes_expect(void)
@@ -165,6 +202,42 @@ static void packet_sent(void)
     packets.closed--;
     if (!packets.room)
         packet_open();
+}
+
+static void packet_send(void)
+{
+    REGISTER(USB_IN_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_IN(packets.first);
+    hand_over(USB_IN(BYTES), BUFFER_FULL | toggled(&in_data1) | packets.size[packets.first]);
+    in_flight = true;
+}
+
+static void bytes_received(void)
+{
+    out_at = 0;
+    out_size = (uint8_t)(REGISTER(USB_OUT(BYTES)) & BUFFER_SIZE);
+    if (!out_size)
+        bytes_expect();
+}
+
+/* From now on both sides count packets from DATA0, also the one that is offered already. */
+static void out_restart(void)
+{
+    bool waits = configured && out_at == out_size;
+    if (waits && withdraw(USB_OUT(BYTES), DONE_OUT(BYTES))) {
+        bytes_received();
+        waits = out_at == out_size;
+    }
+    out_data1 = false;
+    if (waits)
+        bytes_expect();
+}
+
+static void in_restart(void)
+{
+    if (in_flight && withdraw(USB_IN(BYTES), DONE_IN(BYTES)))
+        packet_sent();
+    in_flight = false; /* it is offered anew */
+    in_data1 = false;
 }
 
 /* The host's end of the line is open or not. What nobody has read is lost when it closes; what was
@@ -202,8 +275,6 @@ static void setup(void)
     uint16_t value = (uint16_t)(packet[2] | packet[3] << 8);
     uint16_t asked = (uint16_t)(packet[6] | packet[7] << 8), size;
     const uint8_t *found;
-    control.data1 = true;
-    coding_comes = false;
     switch (request) {
     case GET_DESCRIPTOR:
         found = descriptor((uint8_t)(value >> 8), (uint8_t)value, number, &size);
@@ -243,12 +314,18 @@ static void setup(void)
         break;
     case CLEAR_FEATURE_ENDPOINT:
         if (packet[4] == BYTES)
-            out_data1 = false;
+            out_restart();
         else if (packet[4] == (0x80 | BYTES))
-            in_data1 = false;
+            in_restart();
         control_accept();
         break;
     case SET_INTERFACE:
+        if (packet[4] == BYTES_INTERFACE) {
+            out_restart();
+            in_restart();
+        }
+        control_accept();
+        break;
     case SEND_BREAK:
         control_accept();
         break;
@@ -263,12 +340,8 @@ static void control_sent(void)
         REGISTER(USB_ADDRESS) = address;
         address_waits = false;
     }
-    if (control.left || control.short_end) {
+    if (control.left || control.short_end)
         control_send();
-    } else if (control.thanks) {
-        control.thanks = false;
-        control_expect(0);
-    }
 }
 
 static void control_received(void)
@@ -298,7 +371,7 @@ bool board_receive(uint8_t *byte)
 uint8_t board_send(const uint8_t *bytes, uint8_t count)
 {
     const uint8_t *end = bytes + count, *next = bytes;
-    while (next != end && packets.room) {
+    while (next != end && packets.room && !unplugged) {
         uint8_t left = (uint8_t)(end - next), n = left < packets.room ? left : packets.room;
         volatile uint8_t *at = packets.at;
         packets.room = (uint8_t)(packets.room - n);
@@ -311,13 +384,6 @@ uint8_t board_send(const uint8_t *bytes, uint8_t count)
     return listening ? (uint8_t)(next - bytes) : count;
 }
 
-static void packet_send(void)
-{
-    REGISTER(USB_IN_CTRL(BYTES)) = ENDPOINT_ON | ENDPOINT_BULK | AT_IN(packets.first);
-    hand_over(USB_IN(BYTES), BUFFER_FULL | toggled(&in_data1) | packets.size[packets.first]);
-    in_flight = true;
-}
-
 /* -- the bus */
 
 static void bus_reset(void)
@@ -326,11 +392,69 @@ static void bus_reset(void)
     address_waits = false;
     configure(0);
     listen(false);
+    frames_forget();
+}
+
+static void controller_start(void)
+{
+    uint32_t at;
+    for (at = 0; at < 0x180; at += 4)
+        REGISTER(USB_MEMORY + at) = 0;
+    REGISTER(USB_MUXING) = 1u << 0 | 1u << 3; /* to the chip's own transceiver */
+    REGISTER(USB_POWER) = 1u << 2 | 1u << 3;  /* plugged in: it has no other supply */
+    REGISTER(USB_MAIN_CTRL) = 1;
+    REGISTER(USB_SIE_CTRL) = SIE_INTERRUPT_EACH;
+    REGISTER(USB_INTE) = 1u << 4 | 1u << 12 | 1u << 16; /* packets, bus reset, requests */
+    TO_SET(USB_SIE_CTRL) = SIE_PULL_UP;
+    frames_forget();
+}
+
+/* The controller hangs: start it anew, and nothing else. To the host somebody has pulled the plug
+ * and put it back; a drop goes on, and a held one stays. */
+static void unplug(void)
+{
+    TO_SET(RESETS_RESET) = RESET_USB;
+    unplugged = true;
+    unplugged_since = REGISTER(TIMER_RAW_LOW);
+    configured = address_waits = false;
+    listen(false);
+    if (in_flight)
+        packet_sent();
+    out_at = out_size = 0;
+}
+
+/* It may take its time: nothing waits for it. */
+static void plug_in(void)
+{
+    if (REGISTER(TIMER_RAW_LOW) - unplugged_since < UNPLUGGED_US)
+        return;
+    TO_CLEAR(RESETS_RESET) = RESET_USB;
+    if (!(REGISTER(RESETS_DONE) & RESET_USB))
+        return;
+    unplugged = false;
+    controller_start();
+}
+
+bool usb_unseen(void)
+{
+    return OLDER_THAN_B2 && !configured;
 }
 
 void usb_pass(uint8_t whole)
 {
-    uint32_t status = REGISTER(USB_SIE_STATUS), done = REGISTER(USB_BUFFERS);
+    uint32_t status, done;
+    if (unplugged) {
+        plug_in();
+        return;
+    }
+    frames_pass();
+    if (frames_ended()) {
+        unplug();
+        return;
+    }
+    /* In this order: what was done before a request is known when we see that. */
+    status = REGISTER(USB_SIE_STATUS);
+    done = REGISTER(USB_BUFFERS);
     if (done)
         REGISTER(USB_BUFFERS) = done;
     if (status & STATUS_BUS_RESET) {
@@ -341,38 +465,28 @@ void usb_pass(uint8_t whole)
         control_sent();
     if (done & DONE_OUT(0))
         control_received();
-    if (status & STATUS_SETUP) {
-        REGISTER(USB_SIE_STATUS) = STATUS_SETUP;
-        setup();
-    }
     if (done & DONE_IN(BYTES))
         packet_sent();
-    if (done & DONE_OUT(BYTES)) {
-        out_at = 0;
-        out_size = (uint8_t)(REGISTER(USB_OUT(BYTES)) & BUFFER_SIZE);
-        if (!out_size)
-            bytes_expect();
+    if (done & DONE_OUT(BYTES))
+        bytes_received();
+    if (status & STATUS_SETUP) {
+        control_begin(); /* first: the host is put off until its request is taken */
+        REGISTER(USB_SIE_STATUS) = STATUS_SETUP;
+        setup();
     }
     if (!configured || !listening || in_flight)
         return;
     if (whole && !packets.closed && packets.room < FULL)
         packet_close();
-    if (packets.closed)
+    /* At a frame's end a hub may cut a packet off, and the controller would hang for ever (RP2040-E15). */
+    if (packets.closed && frames_early())
         packet_send();
 }
 
 void usb_start(const uint8_t own[8])
 {
-    uint32_t at;
     number = own;
     packet_open();
     blocks_start(RESET_USB);
-    for (at = 0; at < 0x180; at += 4)
-        REGISTER(USB_MEMORY + at) = 0;
-    REGISTER(USB_MUXING) = 1u << 0 | 1u << 3; /* to the chip's own transceiver */
-    REGISTER(USB_POWER) = 1u << 2 | 1u << 3;  /* plugged in: it has no other supply */
-    REGISTER(USB_MAIN_CTRL) = 1;
-    REGISTER(USB_SIE_CTRL) = SIE_INTERRUPT_EACH;
-    REGISTER(USB_INTE) = 1u << 4 | 1u << 12 | 1u << 16; /* packets, bus reset, requests */
-    TO_SET(USB_SIE_CTRL) = SIE_PULL_UP;
+    controller_start();
 }

@@ -10,14 +10,8 @@ from pathlib import Path
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
 from rig.commands.output import print_json, say
+from rig.doctor import computer
 from rig.doctor.board import BOARD_CHECKS, look_at_board
-from rig.doctor.computer import (
-    PORT_CHECKS,
-    PortPlace,
-    check_packages,
-    check_room,
-    describe_cache,
-)
 from rig.doctor.session import check_session
 from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
@@ -50,7 +44,7 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     paths = [url] if url and "://" not in url else []
     free = True
     for path in paths or [port.path for port in serial_ports() if port.candidate and not url]:
-        permission, owners, modem = _check_all(PORT_CHECKS, PortPlace(path), path)
+        permission, owners, modem = _check_all(computer.PORT_CHECKS, computer.PortPlace(path), path)
         free = not (permission.reason or owners.reason)
         yield from (permission, owners, modem)
     if url and free:
@@ -58,9 +52,9 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
     folder = Path(session).parent if session else Path()
-    yield make_check("packages called rig", check_packages, "chainrig")
-    yield make_check("kept results", describe_cache, CacheFile())
-    yield make_check("disk", check_room, folder)
+    yield make_check("packages called rig", computer.check_packages, "chainrig")
+    yield make_check("kept results", computer.describe_cache, CacheFile())
+    yield make_check("disk", computer.check_room, folder)
     if session and not Path(session).exists():
         yield explain(f"session {session}", make_reason("session_missing"))
     elif session:

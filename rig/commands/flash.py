@@ -11,13 +11,9 @@ from rig.flash.steps import flash, flash_drive
 from rig.reasons import make_error
 
 
+@goes_on("the firmware may be incomplete; run the same command again")
 def main(arguments: Namespace) -> int:
     """Flash a board and say what it is now."""
-    with goes_on("the firmware may be incomplete; run the same command again"):
-        return _flash(arguments)
-
-
-def _flash(arguments: Namespace) -> int:
     board, port = arguments.board, arguments.port
     if board not in TARGETS:
         if arguments.avrdude is not None:

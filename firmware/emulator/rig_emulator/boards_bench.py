@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import random
 import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -199,19 +198,17 @@ def page() -> str:
     return _HEAD + "\n".join(lines) + "\n"
 
 
-def main() -> int:
-    """Print the page, or write it into a folder."""
-    parser = argparse.ArgumentParser(prog="rig_emulator.boards_bench")
-    parser.add_argument("-o", "--output", metavar="DIR")
+def show_page(name: str, text: str) -> None:
+    """Print a page, or write it into the folder that the command line names."""
+    parser = argparse.ArgumentParser(prog=f"rig_emulator.{name}_bench")
+    parser.add_argument("-o", "--output", metavar="DIR", type=Path)
     folder = parser.parse_args().output
-    text = page()
     if folder is None:
         print(text, end="")
     else:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        write_atomic(Path(folder) / "boards.md", text)
-    return 0
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / f"{name}.md", text)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    show_page("boards", page())

@@ -49,6 +49,8 @@ class PicoChip:
         Of its flash chip: eight bytes.
     quick
         Take a state machine's loops at one go, which changes nothing but how long it takes.
+    revision
+        Of the chip: 2 is B2, 1 is B0 or B1.
 
     Attributes
     ----------
@@ -58,18 +60,25 @@ class PicoChip:
         How often the watchdog has bitten.
     texts
         What its USB port calls itself: maker, product and serial number.
+    usb
+        Whether the port is `ready`; how many packets were offered `late` in a frame, how many
+        acknowledgements were `lost`, how often the host `gaveUp` a request, and how often the
+        device came to the bus (`plugs`).
     """
 
-    def __init__(self, program: Path, number: bytes, *, quick: bool = True) -> None:
+    def __init__(
+        self, program: Path, number: bytes, *, quick: bool = True, revision: int = 2
+    ) -> None:
         need_pico()
         self.cycle = self.watchdog_resets = self._outputs = self._watched = 0
         self.texts: list[str] = []
+        self.usb: dict[str, int] = {}
         self._edges: list[tuple[int, int, int]] = []
         self._bytes: list[tuple[int, str]] = []
         self._changes: list[Change] = []
         self._sent: list[Sent] = []
         self._node = subprocess.Popen(
-            ["node", HERE / "run.mjs", program, number.hex()],  # noqa: S607 - wherever node is
+            ["node", HERE / "run.mjs", program, number.hex(), str(revision)],  # noqa: S607 - wherever node is
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -152,6 +161,26 @@ class PicoChip:
         """Let the bus go, as a hub may, and ask it anew who it is."""
         self._order(resetBus=True)
 
+    def hostile(self, *, loses: int = 0, gives_up: int = 0) -> None:
+        """Lose each so many-th acknowledgement, give up each so many-th control transfer midway."""
+        self._order(hostile={"loses": loses, "givesUp": gives_up})
+
+    def hang_usb(self, *, dead_s: float = 0.0) -> None:
+        """Let the controller hang (RP2040-E15), and take so long to come out of reset."""
+        self._order(hang=True, deadNs=dead_s * 1e9)
+
+    def sleep_bus(self, sleeps: bool) -> None:
+        """Suspend the bus, or let it go on."""
+        self._order(sleeps=sleeps)
+
+    def clear_halts(self) -> None:
+        """Clear the halts of both endpoints of the line: packets are counted from DATA0."""
+        self._order(clearHalts=True)
+
+    def set_interface(self) -> None:
+        """Choose the line's interface anew, with the same effect."""
+        self._order(setInterface=True)
+
     # -- DMA, for tests
 
     def dma_late(self, cycle: int) -> None:
@@ -197,7 +226,7 @@ class PicoChip:
             raise EmulatorError(f"the Pico's emulator ended (node: {self._node.poll()})")
         answer: dict[str, Any] = json.loads(line)
         self.cycle, self.watchdog_resets = answer["cycle"], answer["watchdogs"]
-        self._outputs, self.texts = answer["outputs"], answer["texts"]
+        self._outputs, self.texts, self.usb = answer["outputs"], answer["texts"], answer["usb"]
         self._changes += [Change(at, f"GP{pin}", bool(high)) for at, pin, high in answer["changes"]]
         for at, data in answer["sent"]:
             self._sent += [Sent(at, value) for value in bytes.fromhex(data)]

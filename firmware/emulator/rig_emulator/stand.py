@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rig_emulator.controller import Change
     from rig_emulator.wiring import Wiring
 
-_BOOT_CYCLES = 500_000
+_BOOT_CYCLES, _SLOW_BOOT_CYCLES = 500_000, 1_600_000  # the Pico waits for its crystal
 _ANSWER_CYCLES = 800_000
 _TRIES = 5
 _LABEL = wire.pack_label(1, 1)
@@ -180,7 +180,8 @@ class Stand:
         self.fire_sent = self.fired = self.certified = self.heard = self._latest = 0
         for pin in (*wiring.gates, wiring.stop):
             self.avr.edge(0, pin, False)
-        self.hear(self._scaled(_BOOT_CYCLES) + waits)
+        slow = wiring.clock_hz > 16_000_000
+        self.hear(self._scaled(_SLOW_BOOT_CYCLES if slow else _BOOT_CYCLES) + waits)
         identity = self.ask(wire.Identify())
         if not isinstance(identity, wire.Identity):
             raise DeviceError(f"the board answers IDENTIFY with {identity}")
@@ -201,14 +202,21 @@ class Stand:
         data = bytes(one.value for one in sent)
         return [wire.unpack(frame.type, frame.payload) for frame in self._decoder.feed(data)]
 
-    def ask(self, request: wire.HostMessage, cycles: int = _ANSWER_CYCLES) -> wire.Message:
-        """Send a request, again if need be, and take the first answer; wait as at 16 MHz."""
+    def send(self, request: wire.HostMessage) -> bytes:
+        """Send a request, and wait for nothing; return what was sent."""
         self._seq = self._seq % 255 + 1
         code, payload = wire.pack(request)
+        frame = b"\0" + encode(Frame(code, self._seq, 0, payload))
+        self.avr.receive(frame)
+        return frame
+
+    def ask(self, request: wire.HostMessage, cycles: int = _ANSWER_CYCLES) -> wire.Message:
+        """Send a request, again if need be, and take the first answer; wait as at 16 MHz."""
+        frame = self.send(request)
         for _ in range(_TRIES):
-            self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
             if heard := self.hear(self._scaled(cycles)):
                 return heard[0]
+            self.avr.receive(frame)
         raise DeviceError(f"the board does not answer {request}")
 
     def tick_at(self, cycle: int) -> int:
@@ -279,13 +287,14 @@ class Stand:
             raise DeviceError(f"the board answers ARM with {armed}")
         self.avr.watch(self.wiring.sync)
         self.avr.take_changes()
-        self._seq = self._seq % 255 + 1
-        code, payload = wire.pack(wire.Fire(armed.token))
         changes: list[Change] = []
         self.fire_sent = self.avr.cycle
-        while not (begun := [c.cycle for c in changes if c.pin == self.wiring.sync]):
-            self.avr.receive(b"\0" + encode(Frame(code, self._seq, 0, payload)))
+        frame = self.send(wire.Fire(armed.token))
+        while True:
             self.avr.run(self.avr.cycle + self._scaled(100_000))
             changes += self.avr.take_changes()
+            if begun := [c.cycle for c in changes if c.pin == self.wiring.sync]:
+                break
+            self.avr.receive(frame)
         self.fired = begun[0] + self.wiring.sync_lead
         return self.fired, changes

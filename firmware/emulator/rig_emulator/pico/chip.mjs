@@ -19,6 +19,8 @@ const PIO0 = 6;
 const LED = 25;
 const DREQ_RX = 4;
 const DMA_ABORT = 0x444;
+const XOSC_STATUS = 4, XOSC_STARTUP = 12, STABLE = 2 ** 31, CRYSTAL_KHZ = 12000;
+const CHIP_ID = 0x0002927; // behind the revision: 1 is B0 or B1, 2 is B2
 
 // A block of registers that only keeps what is written.
 class Registers {
@@ -76,7 +78,7 @@ export function readUf2(path) {
 }
 
 export class Chip {
-  constructor(flash, number) {
+  constructor(flash, number, revision = 2) {
     this.flash = flash;
     this.number = number;
     this.cycle = 0;
@@ -89,7 +91,9 @@ export class Chip {
     this.stop = null;
     this.restart = null;
     this.supply = 5000;
+    this.revision = revision;
     this.pio = null;
+    this.hostile = {}; // what the host does wrong
     this.dmaFrom = 0; // the cycle before which DMA takes nothing
     this.power({ chip: 0x100, watchdog: 0 }, null);
   }
@@ -111,6 +115,8 @@ export class Chip {
     peripherals[0x40030] = new Registers(); // the bus has no queue here
     peripherals[0x40064] = new Registers({ 0x08: reasons.chip });
     const watchdog = peripherals[0x40058];
+    peripherals[0x40000] = new Registers({ 0x00: this.revision * 2 ** 28 + CHIP_ID });
+    this.connectCrystal(peripherals[0x40024]);
     watchdog.reason = reasons.watchdog;
     watchdog.onWatchdogTrigger = () => {
       this.restart = { chip: reasons.chip, watchdog: 1 };
@@ -122,12 +128,27 @@ export class Chip {
     this.connectPins();
     this.host = new Host(rp2040, (data) => this.heard(data), (why) => this.fail(why));
     this.host.open = this.open ?? true;
+    Object.assign(this.host, this.hostile);
     // The chip's own boot program: it calls the first 256 bytes from the end of RAM.
     rp2040.sram.set(rp2040.flash.subarray(0, BOOT_SIZE), BOOT_AT - RAM);
     rp2040.core.PC = BOOT_AT;
     rp2040.core.SP = 0x20042000;
     rp2040.core.LR = 0;
     this.restart = null;
+  }
+
+  // It takes as long as the program says, and what waits for it waits at one go.
+  connectCrystal(crystal) {
+    const read = crystal.readUint32.bind(crystal);
+    let stable = null;
+    crystal.readUint32 = (offset) => {
+      const value = read(offset);
+      if (offset !== XOSC_STATUS || !(value & STABLE)) return value;
+      stable ??= this.cycle + Math.round((read(XOSC_STARTUP) * 256 * CLOCK_MHZ * 1000) / CRYSTAL_KHZ);
+      if (this.cycle >= stable) return value;
+      this.cycle = Math.max(this.cycle, Math.min(stable, this.until));
+      return (value & ~STABLE) >>> 0;
+    };
   }
 
   connectPio(old) {
@@ -261,6 +282,7 @@ export class Chip {
   // Let it work up to a cycle; it comes back earlier for a watched pin, or for bytes.
   run(until) {
     this.stop = null;
+    this.until = until;
     while (this.cycle < until && !this.stop && !this.fault) {
       if (this.restart) this.power(this.restart, this.rp2040.sram);
       const { core } = this.rp2040;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A Pico at the other end of a pipe: an order a line, an answer a line, both JSON. Started as
-// `node run.mjs FIRMWARE.uf2 NUMBER`; it ends with its input.
+// `node run.mjs FIRMWARE.uf2 NUMBER REVISION`; it ends with its input.
 
 import { createInterface } from 'node:readline';
 
@@ -8,8 +8,8 @@ import { Chip, NS, RAM, readUf2 } from './chip.mjs';
 
 const OUTPUTS = [16, 17, 18, 25];
 
-const [, , path, number] = process.argv;
-const chip = new Chip(readUf2(path), Buffer.from(number, 'hex'));
+const [, , path, number, revision] = process.argv;
+const chip = new Chip(readUf2(path), Buffer.from(number, 'hex'), Number(revision));
 
 function obey(order) {
   if (order.quick !== undefined) chip.pio.quick = order.quick;
@@ -18,6 +18,12 @@ function obey(order) {
   if (order.reads !== undefined) chip.host.setReads(order.reads);
   if (order.rate !== undefined) chip.host.setRate(order.rate);
   if (order.resetBus) chip.host.resetBus();
+  if (order.sleeps !== undefined) chip.host.setSleeps(order.sleeps);
+  if (order.hang) chip.host.controller.hang();
+  if (order.deadNs !== undefined) chip.host.controller.deadNs = order.deadNs;
+  if (order.hostile) Object.assign(chip.host, (chip.hostile = order.hostile));
+  if (order.clearHalts) chip.host.clearHalts();
+  if (order.setInterface) chip.host.setInterface();
   if (order.dmaLate !== undefined) chip.dmaFrom = order.dmaLate;
   if (order.wear) chip.wear(...order.wear);
   for (const pin of order.clear ?? []) chip.pio.clearEdges(pin);
@@ -40,11 +46,12 @@ function obey(order) {
 // What has come of it since the last answer.
 function state() {
   const { cycle, changes, sent, watchdogs, fault } = chip;
+  const { texts, ready, late, lost, gaveUp, plugs } = chip.host;
   const outputs = OUTPUTS.reduce((mask, pin) => mask | (chip.output(pin) << pin), 0);
   chip.changes = [];
   chip.sent = [];
   chip.fault = null;
-  return { cycle, changes, sent, watchdogs, fault, outputs, texts: chip.host.texts, why: null };
+  return { cycle, changes, sent, watchdogs, fault, outputs, texts, usb: { ready, late, lost, gaveUp, plugs }, why: null };
 }
 
 for await (const line of createInterface({ input: process.stdin })) {

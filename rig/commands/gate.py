@@ -1,0 +1,13 @@
+"""``rig gate``."""
+
+from argparse import Namespace
+
+from rig.model.photogate import design_photogate
+
+
+def main(arguments: Namespace) -> int:
+    """Print a photogate's resistors, and what follows from them."""
+    how = arguments.distance, arguments.slit, arguments.led, arguments.detector
+    for name, value in design_photogate(*how).items():
+        print(f"{name:50}{value:8.4g}")
+    return 0

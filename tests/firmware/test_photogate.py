@@ -1,0 +1,88 @@
+"""The photogate as drawn: `rig gate` against ngspice, and its resistors against the pages."""
+
+import subprocess
+
+import pytest
+
+from rig.cli import main
+from rig.errors import InputError
+from rig.model import photogate
+from tests.firmware.toolchain import FIRMWARE, need
+
+NAMED = {"distance_m": 0.06, "slit_m": 0.5e-3, "led": "TSAL6100", "detector": "BPW85C"}
+DECK = """\
+a photogate whose light goes and comes back
+VCC vcc 0 5
+VPULL pull 0 {pull}
+R1 vcc ref 33k
+R2 ref 0 10k
+RH ref out 220k
+RP pull out 2.2k
+ILIT 0 sig PWL(0 {lit} 1m {lit} 11m 0 12m 0 22m {lit} 23m {lit})
+RL sig 0 {load}
+* an open output: it pulls down while the signal is above the reference
+SOUT out 0 sig ref comparator
+.model comparator SW(VT=0 VH=0 RON=50 ROFF=100Meg)
+.tran 10u 23m
+.meas tran goes WHEN v(out)={half} RISE=1
+.meas tran back WHEN v(out)={half} FALL=LAST
+.meas tran lit FIND v(sig) AT=0.5m
+.end
+"""
+
+
+def spice(deck, tmp_path):
+    need("ngspice")
+    (path := tmp_path / "deck.cir").write_text(deck)
+    done = subprocess.run(["ngspice", "-b", path], capture_output=True, text=True, check=False)
+    found = {}
+    for line in done.stdout.splitlines():
+        name, equals, value = line.partition("=")
+        if equals and name.strip() in {"goes", "back", "lit"}:
+            found[name.strip()] = float(value.split()[0])
+    assert len(found) == 3, done.stdout + done.stderr
+    return found
+
+
+@pytest.mark.parametrize("pull", [5.0, 3.3])
+def test_the_threshold_is_at_half_light_whatever_the_supply_of_the_board(tmp_path, pull):
+    gate = photogate.design_photogate(**NAMED)
+    lit = gate["lit, V (twice the threshold)"] / gate["load resistor, Ω"]
+    deck = DECK.format(pull=pull, lit=lit, load=gate["load resistor, Ω"], half=pull / 2)
+    found = spice(deck, tmp_path)
+    assert found["lit"] == pytest.approx(2.44, rel=0.01)
+    dark, light = 1 - (found["goes"] - 1e-3) / 10e-3, (found["back"] - 12e-3) / 10e-3
+    assert (dark + light) / 2 == pytest.approx(0.5, abs=0.03)
+    assert light > dark
+    told = gate["hysteresis, % of the light"] / 100
+    assert 0.6 * told < light - dark < 1.4 * told
+
+
+def test_a_gate_of_every_pair_is_lit_at_half_of_what_its_led_bears():
+    gate = photogate.design_photogate(**NAMED)
+    assert gate["load resistor, Ω"] == 4700
+    assert gate["LED current, weakest parts, mA"] <= 50
+    series = gate["LED resistor, Ω"] + gate["LED trimmer, Ω, at least"]
+    assert (5 - photogate.LED_V) / series * 1e3 <= gate["LED current, strongest parts, mA"]
+    assert (5 - photogate.LED_V) / gate["LED resistor, Ω"] * 1e3 >= 50
+    twice = photogate.design_photogate(**{**NAMED, "distance_m": 0.085})
+    assert twice["load resistor, Ω"] == 10_000
+
+
+def test_too_little_light_is_said():
+    with pytest.raises(InputError, match="too little light"):
+        photogate.design_photogate(**{**NAMED, "detector": "BPW85", "led": "TSAL6400"})
+
+
+@pytest.mark.parametrize("board", ["rp2040", "atmega2560", "atmega328p"])
+def test_the_drawing_has_the_resistors_that_were_computed(board):
+    gate = photogate.design_photogate(**NAMED)
+    drawing = (FIRMWARE / board / "wiring.svg").read_text("utf-8")
+    assert f"{gate['load resistor, Ω'] / 1e3:g} kΩ" in drawing
+    assert f"{gate['LED resistor, Ω']:g} Ω" in drawing
+    assert "74HC14" not in drawing
+
+
+def test_it_prints_them(capsys):
+    assert main(["gate", "--distance", "60 mm"]) == 0
+    assert "4700" in capsys.readouterr().out
