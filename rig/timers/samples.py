@@ -6,8 +6,9 @@ straight line between two samples crosses that middle.
 
 from __future__ import annotations
 
+import itertools
 from array import array
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from rig.arrays import Array
     from rig.timers.columns import TimerColumn
-    from rig.timers.table import Row
+    from rig.timers.table import Row, RowBlock, Table
 
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
@@ -30,6 +31,9 @@ _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
 _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
+_EXACT = 2.0**53
+_CHUNK = 4096
+"""Rows that are read one by one where some cannot be read at once."""
 _LEVELS = {"zero": 0.0, "low": 0.0, "one": 1.0, "high": 1.0}
 
 
@@ -40,45 +44,103 @@ class Threshold(NamedTuple):
     half: float
 
 
-def read_samples(reader: RowReader, rows: Iterable[Row], base: tuple[float, float]) -> list[Reason]:
-    """Read rows of samples; give the changes to a reader, and say how many volts there are.
+class _Samples:
+    """Samples as they are read: those at which nothing changes are left out of levels."""
 
-    Parameters
-    ----------
-    base
-        Of samples without times: when the first was taken, and the time between them, s.
-    """
-    clocks = list(dict.fromkeys(signal.clock for signal in reader.signals))
-    values = list(dict.fromkeys(signal.value for signal in reader.signals))
-    stamps, levels, lines, origin = array("d"), array("f"), array("L"), 0
-    last, last_texts, is_digital = (
-        list[float](),
-        list[str](),
-        all(c and c.role == "level" for c in values),
-    )
-    for reader.rows, row in enumerate(rows, 1):
-        texts = [row.cell(column.at) for column in values if column]
-        is_over = [len(clocks) > 1 and clock and not row.cell(clock.at) for clock in clocks]
-        ticks = [
-            None if over else _read_tick(reader, row, clock, base)
-            for clock, over in zip(clocks, is_over, strict=True)
-        ]
-        origin = origin if stamps else int(ticks[0] or 0)
-        now = [np.nan if tick is None else float(tick - origin) for tick in ticks]
-        if clocks[0] and last and now[0] < last[0]:
-            place, text = row.column(clocks[0].at), row.cell(clocks[0].at)
+    def __init__(self, reader: RowReader, base: tuple[float, float]) -> None:
+        self.reader, self.base = reader, base
+        self.clocks = list(dict.fromkeys(signal.clock for signal in reader.signals))
+        self.values = [v for v in dict.fromkeys(s.value for s in reader.signals) if v]
+        self.columns = [*filter(None, self.clocks), *self.values]
+        self.is_digital = all(value.role == "level" for value in self.values)
+        self.stamps, self.levels, self.lines = array("d"), array("f"), array("L")
+        self.origin: int | None = None
+        self._last, self._last_texts = list[float](), list[str]()
+
+    def add(self, row: Row) -> None:
+        """Add a row of any form."""
+        reader, first = self.reader, self.clocks[0]
+        reader.rows += 1
+        texts = [row.cell(column.at) for column in self.values]
+        ticks = [self._read_tick(row, clock) for clock in self.clocks]
+        self.origin = ticks[0] if self.origin is None else self.origin
+        now = [np.nan if tick is None else float(tick - (self.origin or 0)) for tick in ticks]
+        if first and self._last and now[0] < self._last[0]:
+            place, text = row.column(first.at), row.cell(first.at)
             reader.problems.add(row.line, place, "time", "backwards", text=text)
-        last = now
-        if is_digital and texts == last_texts:
-            continue  # most samples of an input that changes now and then
-        last_texts = texts
+        self._last = now
+        if self.is_digital and texts == self._last_texts:
+            return
+        self._last_texts = texts
         try:
-            levels.extend(list(map(float, texts)))
+            self.levels.extend(list(map(float, texts)))
         except ValueError:
-            cells = [reader.read_cell(row, column, _level_of, np.nan) for column in values]
-            levels.extend([np.nan if level is None else level for level in cells])
-        stamps.extend(now)
-        lines.append(row.line)
+            cells = [reader.read_cell(row, column, _level_of, np.nan) for column in self.values]
+            self.levels.extend([np.nan if level is None else level for level in cells])
+        self.stamps.extend(now)
+        self.lines.append(row.line)
+
+    def add_numbers(self, lines: Sequence[int], numbers: Array) -> bool:
+        """Add rows of numbers at once; false where these are to be read row by row."""
+        count, width = len(lines), sum(clock is not None for clock in self.clocks)
+        if self.origin is None or (
+            self.is_digital and not np.isin(numbers[:, width:], (0, 1)).all()
+        ):
+            return False
+        start, step = self.base
+        ticks = np.empty((count, len(self.clocks)))
+        for n, clock in enumerate(self.clocks):
+            number = numbers[:, n] if clock else self.reader.rows + np.arange(count)
+            is_time = clock is not None and clock.role == "time"
+            seconds = (
+                number * 10.0 ** -(clock.power or 0) if clock and is_time else start + step * number
+            )
+            ticks[:, n] = seconds * TICK_HZ - self.origin
+        # Beyond that, a float is not exact to the picosecond.
+        if np.abs(ticks + self.origin).max() > _EXACT or np.any(
+            np.diff(ticks[:, 0], prepend=self._last[0]) < 0
+        ):
+            return False
+        values = numbers[:, width:].astype(np.float32)
+        is_kept = np.ones(count, dtype=bool)
+        if self.is_digital:
+            is_kept[1:] = np.any(values[1:] != values[:-1], axis=1)
+        self.reader.rows += count
+        self._last, self._last_texts = list(ticks[-1]), []
+        self.stamps.frombytes(np.round(ticks[is_kept]).tobytes())
+        self.levels.frombytes(values[is_kept].tobytes())
+        self.lines.extend(np.asarray(lines)[is_kept].tolist())
+        return True
+
+    def _read_tick(self, row: Row, clock: TimerColumn | None) -> int | None:
+        """Return when a sample was taken, ps; nothing where a trace ends before another."""
+        if clock and len(self.clocks) > 1 and not row.cell(clock.at):
+            return None
+        if clock and clock.role == "time":
+            return self.reader.read_time(row, clock)
+        count = (self.reader.rows - 1) * TICK_HZ
+        number = self.reader.read_time(row, clock) if clock else count
+        return None if number is None else round(TICK_HZ * self.base[0] + number * self.base[1])
+
+
+def read_samples(
+    reader: RowReader, sample: Sequence[Row], rows: Iterator[Row], table: Table, block: RowBlock
+) -> list[Reason]:
+    """Read rows of samples; give the changes to a reader, and say how many volts there are."""
+    samples = _Samples(reader, block.base)
+    further: Iterable[Row] = sample
+    while further:
+        for row in further:
+            samples.add(row)
+        places = [column.at for column in samples.columns]
+        while numbers := table.take_numbers(places):
+            if not samples.add_numbers(*numbers):
+                table.put_back()
+                break
+        further = list(itertools.islice(rows, _CHUNK))
+    clocks, values, lines = samples.clocks, samples.values, samples.lines
+    stamps, levels, origin = samples.stamps, samples.levels, samples.origin or 0
+    is_digital = samples.is_digital
     times: Array = np.frombuffer(stamps).reshape(-1, len(clocks)).T
     volts = np.frombuffer(levels, dtype=np.float32).reshape(-1, len(values)).T
     by_clock, by_value = (
@@ -87,6 +149,8 @@ def read_samples(reader: RowReader, rows: Iterable[Row], base: tuple[float, floa
     )
     notes = list[Reason]()
     for signal in reader.signals:
+        if signal.value is None:
+            continue
         at_time, trace = by_clock[signal.clock], by_value[signal.value]
         at = np.flatnonzero(np.isfinite(at_time) & np.isfinite(trace))
         threshold = Threshold(0.5, 0.0) if is_digital else find_threshold(trace[at])
@@ -103,16 +167,6 @@ def read_samples(reader: RowReader, rows: Iterable[Row], base: tuple[float, floa
             counted = {"crossings": len(crossings), "level": threshold.centre}
             notes.append(make_reason("crossings", input=signal.label, **counted))
     return notes
-
-
-def _read_tick(
-    reader: RowReader, row: Row, clock: TimerColumn | None, base: tuple[float, float]
-) -> int | None:
-    """Return when a sample was taken, ps; nothing where a trace ends before another."""
-    if clock and clock.role == "time":
-        return reader.read_time(row, clock)
-    number = reader.read_time(row, clock) if clock else (reader.rows - 1) * TICK_HZ
-    return None if number is None else round(TICK_HZ * base[0] + number * base[1])
 
 
 def _level_of(text: str) -> float | None:

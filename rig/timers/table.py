@@ -9,21 +9,29 @@ from __future__ import annotations
 import csv
 import itertools
 import re
+import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from rig.timers import vocabulary
 from rig.timers.vocabulary import LONGEST, POWERS, is_measured, is_number, is_value, words
 
 if TYPE_CHECKING:
+    from rig.arrays import Array
     from rig.timers.problems import ProblemList
 
 HEADER = ("run", "channel", "time_s", "state")
 """Of the project's own format, in which every line is a row."""
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
+_CHUNK = 4096
+"""Lines that are read at once, and row by row where that cannot be."""
+_ATTEMPTS = 20
+"""How often lines are read at once in vain before all are read row by row."""
 _PLAIN = re.compile(r"[-+0-9.,;eE\t ]*[0-9][-+0-9.,;eE\t ]*")
 _DECIMAL = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]{1,2})?")
 _AROUND = re.compile(
@@ -116,9 +124,11 @@ class Table:
 
     def __init__(self, lines: Iterable[tuple[int, str]], problems: ProblemList) -> None:
         self.problems, self.remarks, self.strays = problems, list[Row](), list[int]()
+        self._attempts = _ATTEMPTS
         numbered = ((number, _AROUND.sub(r"\1", line)) for number, line in lines)
         sample = list(itertools.islice(numbered, _SAMPLE))
-        self._lines, head = itertools.chain(sample, numbered), [line for _, line in sample]
+        self._lines: Iterator[tuple[int, str]] = itertools.chain(sample, numbered)
+        head, self._taken = [line for _, line in sample], list[tuple[int, str]]()
         plain = [line for line in head if line.strip() and not _REMARK.match(line[:LONGEST])]
         first = re.sub(r"\s", "", "".join(plain[:1])[:LONGEST].lower()).split(",")
         self.is_own = first[:2] == list(HEADER[:2])
@@ -136,6 +146,35 @@ class Table:
         """Yield blocks of rows; the rows of each are to be taken before the next."""
         for block, pairs in itertools.groupby(self._rows(), key=lambda pair: pair[0]):
             yield block, (row for _, row in pairs)
+
+    def take_numbers(self, places: Sequence[int]) -> tuple[list[int], Array] | None:
+        """Take further lines at once, if they are rows of plain numbers.
+
+        Returns
+        -------
+        tuple or None
+            Their numbers, and what the columns have, of shape ``(lines, len(places))``; `None`, and
+            nothing is taken, where a line is anything else.
+        """
+        lines = list(itertools.islice(self._lines, _CHUNK * (self._attempts > 0)))
+        texts = [line if self.separator == "," else line.replace(",", ".") for _, line in lines]
+        mark = None if self.separator == " " else self.separator
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # no line is left
+                numbers = np.loadtxt(texts, delimiter=mark, usecols=places, comments=None, ndmin=2)
+        except ValueError:
+            numbers = np.empty((0, 0))
+        self._taken = lines
+        if lines and len(numbers) == len(lines) and np.isfinite(numbers).all():
+            return [number for number, _ in lines], numbers
+        self.put_back()
+        return None
+
+    def put_back(self) -> None:
+        """Give back the lines taken last, to be read row by row."""
+        self._attempts -= 1
+        self._lines = itertools.chain(self._taken, self._lines)
 
     def split(self, line: str) -> list[str]:
         """Split a line into cells; numbers get a decimal point."""
@@ -159,7 +198,8 @@ class Table:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [])
         remark = Row(0, [])
-        for number, line in self._lines:
+        while pair := next(self._lines, None):
+            number, line = pair
             if not line or line.isspace():
                 continue
             mark = None if block.width and _PLAIN.fullmatch(line) else _REMARK.match(line[:LONGEST])

@@ -143,7 +143,7 @@ def _read_block(
     reader = RowReader(columns, sample, problems, table.is_own)
     is_sampled = any(column.role in VALUES[0] for column in columns)
     if is_sampled:
-        file.notes += read_samples(reader, itertools.chain(sample, rows), block.base)
+        file.notes += read_samples(reader, sample, rows, table, block)
     else:
         reader.read(itertools.chain(sample, rows))
     problems.raise_if_any()
