@@ -13,7 +13,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from rig.timers import vocabulary
 from rig.timers.table import HEADER, Row, RowBlock, Table, count_known, find_time_base
@@ -30,19 +30,10 @@ _FEWEST_TIMES = 4
 """Columns, each later than the one before, that are times side by side."""
 
 
-class Role(NamedTuple):
-    """A row of `roles.txt`."""
-
-    meaning: str
-    form: str
-    accepted: str
-    states: str
-
-
 @cache
-def roles() -> dict[str, Role]:
-    """Return what a column may be, by its role."""
-    return {name: Role(*row) for name, *row in vocabulary.read_rows("roles.txt", " |")}
+def roles() -> dict[str, list[str]]:
+    """Return of each role its meaning, a cell's form, what is accepted, and what 0 and 1 mean."""
+    return {name: row for name, *row in vocabulary.read_rows("roles.txt", " |")}
 
 
 @dataclass(eq=False, slots=True)
@@ -79,7 +70,7 @@ class TimerColumn:
     @property
     def meaning(self) -> str:
         """What it was taken for, in words."""
-        return roles()[self.role].meaning + f" in {SYMBOLS[self.power]}" * (self.role == "time")
+        return roles()[self.role][0] + f" in {SYMBOLS[self.power]}" * (self.role == "time")
 
 
 @dataclass(eq=False, slots=True)
@@ -102,10 +93,9 @@ class Signal:
 
 @cache
 def _rules() -> list[tuple[str, set[str], set[str]]]:
-    rows = [(role, facts.split()) for role, facts in vocabulary.read_rows("columns.txt", ":")]
     return [
-        (role, {f for f in facts if f[0] != "-"}, {f[1:] for f in facts if f[0] == "-"})
-        for role, facts in rows
+        (role, {f for f in facts.split() if f[0] != "-"}, set(re.findall(r"-(\S+)", facts)))
+        for role, facts in vocabulary.read_rows("columns.txt", ":")
     ]
 
 

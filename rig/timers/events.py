@@ -114,8 +114,9 @@ class RowReader:
 
     def put(self, key: object, name: str, number: int, event: TimerEvent) -> None:
         """Add an event to the part with a key, which the file calls by a name, or a number."""
-        part = self.parts.setdefault(key, FilePart(name, number or number_of(name) or 0))
-        part.events.append(event)
+        if key not in self.parts:
+            self.parts[key] = FilePart(name, number or number_of(name) or 0)
+        self.parts[key].events.append(event)
         self._count += 1
         if self._count > MAX_EVENTS:
             self.problems.refuse(event.line, 1, "too_many_events", limit=MAX_EVENTS)
@@ -126,13 +127,13 @@ class RowReader:
         """Return a cell's value; `None`, and a fault is noted, where it is not accepted."""
         if column is None:
             return absent
-        role = roles()["own " * self._is_own + column.role]
+        _, form, accepted, _ = roles()["own " * self._is_own + column.role]
         text = row.texts[column.at] if column.at < len(row.texts) else ""
-        is_formed = role.form == ".*" or re.fullmatch(role.form, text)
+        is_formed = form == ".*" or re.fullmatch(form, text)
         value = read(row.cell(column.at)) if is_formed else None
         if value is None:
             key = column.name if self._is_own else column.role
-            self.problems.reject(row.line, row.column(column.at), key, text, role.accepted)
+            self.problems.reject(row.line, row.column(column.at), key, text, accepted)
         return value
 
     def read_time(self, row: Row, clock: TimerColumn) -> int | None:
@@ -152,12 +153,12 @@ class RowReader:
 
     def _has_fault(self, row: Row) -> bool:
         """Whether a row of the project's own format has other than four values."""
-        is_open, width = row.raw.count('"') % 2 > 0, len(row.texts)
-        values = {"values": width, "needed": len(HEADER), "header": ",".join(HEADER)}
-        if is_open or width != len(HEADER):
+        width = {"values": len(row.texts), "needed": len(HEADER), "header": ",".join(HEADER)}
+        is_open, is_wide = row.raw.count('"') % 2 > 0, len(row.texts) != len(HEADER)
+        if is_open or is_wide:
             code = "open_quote" if is_open else "wrong_width"
-            self.problems.add(row.line, 1, "", code, **({} if is_open else values))
-        return is_open or width != len(HEADER)
+            self.problems.add(row.line, 1, "", code, **({} if is_open else width))
+        return is_open or is_wide
 
     def _read_row(self, row: Row) -> Iterator[bool]:
         """Add the events of a row; yield whether each is one, and no state as it was."""
@@ -211,25 +212,28 @@ class RowReader:
         self, row: Row, column: TimerColumn, event: TimerEvent, key: object, last: TimerEvent
     ) -> bool:
         """Whether a time can be of its run; within a numbered one, those of an input go on."""
-        part = self.parts.get(key, FilePart("", 0, [event]))
-        lasting_s = abs(event.tick - part.events[0].tick) / TICK_HZ
-        own = _HOUR_S, f"run {part.number}"
-        limit_s, recording = own if self._is_own else (_DAY_S, "the recording")
-        name = column.name if self._is_own else column.role
-        note = partial(self.problems.add, row.line, row.column(column.at), name)
+        part = self.parts.get(key)
+        number, first = (part.number, part.events[0]) if part else (0, event)
+        lasting_s = abs(event.tick - first.tick) / TICK_HZ
+        limit_s = _HOUR_S if self._is_own else _DAY_S
         is_long = column.power is not None and lasting_s > limit_s
         is_early = event.tick < last.tick and self.has_runs and not self._row_is_run
-        if is_long:
-            note("too_long", recording=recording, lasting_s=lasting_s, limit_s=limit_s)
-        elif is_early:
-            values = {"channel": event.label, "run": part.number, "text": row.cell(column.at)}
-            note("before_last", last=seconds(last.tick, Fraction(TICK_HZ)), **values)
+        if is_long or is_early:
+            place = row.line, row.column(column.at), column.name if self._is_own else column.role
+            recording = f"run {number}" if self._is_own else "the recording"
+            values = {"recording": recording, "lasting_s": lasting_s, "limit_s": limit_s}
+            before = {"last": seconds(last.tick, Fraction(TICK_HZ)), "text": row.cell(column.at)}
+            before |= {"channel": event.label}
+            code, said = (
+                ("too_long", values) if is_long else ("before_last", {**before, "run": number})
+            )
+            self.problems.add(*place, code, **said)
         return not (is_long or is_early)
 
 
 @lru_cache(1000)
 def _state_in(role: str, word: str) -> str | None:
     """Return what a word means in a column of that role; nothing if unknown, `None` if no state."""
-    accepted, state = roles()[role].states.split(), state_of(word)
+    accepted, state = roles()[role][-1].split(), state_of(word)
     state = dict(zip(("zero", "one"), accepted, strict=False)).get(state, state)
     return state if state in accepted else None

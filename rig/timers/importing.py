@@ -131,7 +131,7 @@ def import_drops(
     if not options.as_read:
         _refuse_excess(file, reading, bars, place)
     notes = [*file.notes, _account(file, reading, options)]
-    is_open = len([other for other in readings if not other.layout.is_contrary]) > 1
+    is_open = len([other for other in readings if other.layout.dark != "inverted"]) > 1
     if is_open or (match.share < _GOOD and not options.as_read):
         notes.append(make_reason("reading_chosen", option=str(layout), fit=match.text))
     notes += _assumptions(file, reading, gates)
@@ -166,12 +166,12 @@ def _choose(
     near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
     # What the file says comes first: the contrary may be proposed, and is never taken.
     matches = [
-        (fit(reading.drops, True), reading) for reading in near if not reading.layout.is_contrary
+        (fit(reading.drops, True), reading) for reading in near if reading.layout.dark != "inverted"
     ]
     ranked = [row for row in matches if row[0].share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
     if not ranked:
-        share = max(share for share, reading in rough if not reading.layout.is_contrary)
+        share = max(share for share, reading in rough if reading.layout.dark != "inverted")
         is_open = rough[0][1].layout.dark not in {"states", "inverted"}
         good = [reading.layout for share, reading in rough if share >= _GOOD or is_open]
         options = "; ".join(map(str, [*good[:3], "--as-read"]))
@@ -197,7 +197,7 @@ def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter((event.line, event.tick) for part in file.parts for event in part.events)
     line = next((line for (line, _), count in changes.items() if count > 1), 0)
-    if line and not file.is_regular:  # regular samples see changes together
+    if line and file.period_s is None:  # regular samples see changes together
         raise refusal(place, "at_once", line=line)
 
 

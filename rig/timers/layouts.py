@@ -66,15 +66,10 @@ class FileLayout:
         """Return that of the project's own format, in which inputs are called by channels."""
         return cls(channels={label: int(label) for label in file.labels})
 
-    @property
-    def is_contrary(self) -> bool:
-        """Whether it contradicts what the file says."""
-        return self.dark == "inverted"
-
     def is_dark(self, event: TimerEvent, n: int) -> bool:
         """Whether an event, the n-th of its input, begins a blocked beam."""
         if event.state in {"blocked", "clear"}:
-            return (event.state == "blocked") is not self.is_contrary
+            return (event.state == "blocked") is (self.dark != "inverted")
         if event.state:
             return (event.state == "high") is (self.dark != "low")
         return self.dark == "each" or (n % 2 == 0) is (self.dark != "turns-clear")

@@ -62,9 +62,8 @@ def find_kind(path: str | Path) -> str:
     """Return what a file is that is no timer's; nothing where that is not known."""
     with Path(path).open("rb") as stream:
         start = stream.read(_START).removeprefix(b"\xef\xbb\xbf").lstrip()
-    kinds = read_rows("kinds.txt", " ; ")
-    fitting = (name for name, form in kinds if re.match(form.encode(), start, re.DOTALL))
-    return next(fitting, "")
+    kinds = dict(read_rows("kinds.txt", " ; "))
+    return next((x for x in kinds if re.match(kinds[x].encode(), start, re.DOTALL)), "")
 
 
 def _find_encoding(path: Path, problems: ProblemList) -> str:

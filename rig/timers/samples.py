@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import itertools
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,13 +37,6 @@ _CHUNK = 4096
 _LEVELS = {"zero": 0.0, "low": 0.0, "one": 1.0, "high": 1.0}
 
 
-class Threshold(NamedTuple):
-    """The middle between two levels, and half the hysteresis."""
-
-    centre: float
-    half: float
-
-
 class _Samples:
     """Samples as they are read: those at which nothing changes are left out of levels."""
 
@@ -51,7 +44,6 @@ class _Samples:
         self.reader, self.base = reader, base
         self.clocks = list(dict.fromkeys(signal.clock for signal in reader.signals))
         self.values = [v for v in dict.fromkeys(s.value for s in reader.signals) if v]
-        self.columns = [*filter(None, self.clocks), *self.values]
         self.is_digital = all(value.role == "level" for value in self.values)
         self.stamps, self.levels, self.lines = array("d"), array("f"), array("L")
         self.origin: int | None = None
@@ -87,15 +79,12 @@ class _Samples:
             self.is_digital and not np.isin(numbers[:, width:], (0, 1)).all()
         ):
             return False
-        start, step = self.base
         ticks = np.empty((count, len(self.clocks)))
         for n, clock in enumerate(self.clocks):
-            number = numbers[:, n] if clock else self.reader.rows + np.arange(count)
             is_time = clock is not None and clock.role == "time"
-            seconds = (
-                number * 10.0 ** -(clock.power or 0) if clock and is_time else start + step * number
-            )
-            ticks[:, n] = seconds * TICK_HZ - self.origin
+            start, step = (0.0, 10.0 ** -((clock and clock.power) or 0)) if is_time else self.base
+            number = numbers[:, n] if clock else self.reader.rows + np.arange(count)
+            ticks[:, n] = (start + step * number) * TICK_HZ - self.origin
         # Beyond that, a float is not exact to the picosecond.
         if np.abs(ticks + self.origin).max() > _EXACT or np.any(
             np.diff(ticks[:, 0], prepend=self._last[0]) < 0
@@ -111,6 +100,31 @@ class _Samples:
         self.levels.frombytes(values[is_kept].tobytes())
         self.lines.extend(np.asarray(lines)[is_kept].tolist())
         return True
+
+    def find_changes(self) -> Iterator[Reason]:
+        """Give the changes of each input to the reader, and say how many volts have."""
+        times: Array = np.frombuffer(self.stamps).reshape(-1, len(self.clocks)).T
+        volts = np.frombuffer(self.levels, dtype=np.float32).reshape(-1, len(self.values)).T
+        by_clock = dict(zip(self.clocks, times, strict=True))
+        by_value = dict(zip(self.values, volts, strict=True))
+        for signal in self.reader.signals:
+            at_time, label = by_clock[signal.clock], signal.label
+            trace = by_value[signal.value or self.values[0]]
+            at = np.flatnonzero(np.isfinite(at_time) & np.isfinite(trace))
+            threshold = (0.5, 0.0) if self.is_digital else find_threshold(trace[at])
+            if threshold is None:
+                span = {"low": float(trace[at].min()), "high": float(trace[at].max())}
+                yield make_reason("no_passage", input=label, **span)
+                continue
+            crossings = list(_crossings(at_time[at], trace[at], threshold))
+            for n, tick, is_high in crossings:
+                ticks = round(float(at_time[at[n]]) if self.is_digital else tick)
+                level, line = "high" if is_high else "low", self.lines[at[n]]
+                event = TimerEvent((self.origin or 0) + ticks, label, level, line)
+                self.reader.put((0, signal.run), signal.run, 0, event)
+            if not self.is_digital:
+                values = {"crossings": len(crossings), "level": threshold[0]}
+                yield make_reason("crossings", input=label, **values)
 
     def _read_tick(self, row: Row, clock: TimerColumn | None) -> int | None:
         """Return when a sample was taken, ps; nothing where a trace ends before another."""
@@ -128,45 +142,16 @@ def read_samples(
 ) -> list[Reason]:
     """Read rows of samples; give the changes to a reader, and say how many volts there are."""
     samples = _Samples(reader, block.base)
-    further: Iterable[Row] = sample
+    further, columns = sample, [*filter(None, samples.clocks), *samples.values]
     while further:
         for row in further:
             samples.add(row)
-        places = [column.at for column in samples.columns]
-        while numbers := table.take_numbers(places):
+        while numbers := table.take_numbers([column.at for column in columns]):
             if not samples.add_numbers(*numbers):
                 table.put_back()
                 break
         further = list(itertools.islice(rows, _CHUNK))
-    clocks, values, lines = samples.clocks, samples.values, samples.lines
-    stamps, levels, origin = samples.stamps, samples.levels, samples.origin or 0
-    is_digital = samples.is_digital
-    times: Array = np.frombuffer(stamps).reshape(-1, len(clocks)).T
-    volts = np.frombuffer(levels, dtype=np.float32).reshape(-1, len(values)).T
-    by_clock, by_value = (
-        dict(zip(clocks, times, strict=True)),
-        dict(zip(values, volts, strict=True)),
-    )
-    notes = list[Reason]()
-    for signal in reader.signals:
-        if signal.value is None:
-            continue
-        at_time, trace = by_clock[signal.clock], by_value[signal.value]
-        at = np.flatnonzero(np.isfinite(at_time) & np.isfinite(trace))
-        threshold = Threshold(0.5, 0.0) if is_digital else find_threshold(trace[at])
-        crossings = list(_crossings(at_time[at], trace[at], threshold)) if threshold else []
-        for n, tick, is_high in crossings:
-            level = "high" if is_high else "low"
-            moment = float(at_time[at[n]]) if is_digital else tick
-            event = TimerEvent(origin + round(moment), signal.label, level, lines[at[n]])
-            reader.put((0, signal.run), signal.run, 0, event)
-        if threshold is None:
-            span = {"low": float(trace[at].min()), "high": float(trace[at].max())}
-            notes.append(make_reason("no_passage", input=signal.label, **span))
-        elif not is_digital:
-            counted = {"crossings": len(crossings), "level": threshold.centre}
-            notes.append(make_reason("crossings", input=signal.label, **counted))
-    return notes
+    return list(samples.find_changes())
 
 
 def _level_of(text: str) -> float | None:
@@ -177,20 +162,20 @@ def _level_of(text: str) -> float | None:
 
 
 def _crossings(
-    times: Array, volts: NDArray[np.float32], threshold: Threshold
+    times: Array, volts: NDArray[np.float32], threshold: tuple[float, float]
 ) -> Iterator[tuple[int, float, bool]]:
     """Yield the sample behind each crossing, its moment, and whether it rises."""
-    is_high = volts > threshold.centre
-    sure = np.flatnonzero(np.abs(volts - threshold.centre) > threshold.half)
+    is_high = volts > threshold[0]
+    sure = np.flatnonzero(np.abs(volts - threshold[0]) > threshold[1])
     turns = sure[1:][is_high[sure[1:]] != is_high[sure[:-1]]]
     crossings = np.flatnonzero(is_high[1:] != is_high[:-1]) + 1
     for n in crossings[np.searchsorted(crossings, turns, side="right") - 1]:
-        share = (volts[n] - threshold.centre) / (volts[n] - volts[n - 1])
+        share = (volts[n] - threshold[0]) / (volts[n] - volts[n - 1])
         yield int(n), float(times[n] - share * (times[n] - times[n - 1])), bool(is_high[n])
 
 
-def find_threshold(volts: NDArray[np.float32]) -> Threshold | None:
-    """Return the middle between two levels; `None` without two levels."""
+def find_threshold(volts: NDArray[np.float32]) -> tuple[float, float] | None:
+    """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
     low, high = float(volts.min()), float(volts.max())
     for _ in range(50):  # two means, one for each level
         above = volts > 0.5 * (low + high)
@@ -205,4 +190,4 @@ def find_threshold(volts: NDArray[np.float32]) -> Threshold | None:
     noise = max(float(np.median(np.abs(volts[mask] - level))) for mask, level in levels)
     swing = high - low
     is_clear = swing >= _CLEAR_SWING * _SCATTER * noise
-    return Threshold(0.5 * (low + high), 0.5 * _HYSTERESIS * swing) if is_clear else None
+    return (0.5 * (low + high), 0.5 * _HYSTERESIS * swing) if is_clear else None

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import itertools
 import re
-import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -124,11 +123,14 @@ class Table:
 
     def __init__(self, lines: Iterable[tuple[int, str]], problems: ProblemList) -> None:
         self.problems, self.remarks, self.strays = problems, list[Row](), list[int]()
-        self._attempts = _ATTEMPTS
-        numbered = ((number, _AROUND.sub(r"\1", line)) for number, line in lines)
+        # Most lines begin otherwise: to search them costs less than to change them.
+        numbered = (
+            (number, _AROUND.sub(r"\1", line) if _AROUND.match(line) else line)
+            for number, line in lines
+        )
         sample = list(itertools.islice(numbered, _SAMPLE))
         self._lines: Iterator[tuple[int, str]] = itertools.chain(sample, numbered)
-        head, self._taken = [line for _, line in sample], list[tuple[int, str]]()
+        head, self._taken, self._attempts = [line for _, line in sample], sample, _ATTEMPTS
         plain = [line for line in head if line.strip() and not _REMARK.match(line[:LONGEST])]
         first = re.sub(r"\s", "", "".join(plain[:1])[:LONGEST].lower()).split(",")
         self.is_own = first[:2] == list(HEADER[:2])
@@ -157,16 +159,16 @@ class Table:
             nothing is taken, where a line is anything else.
         """
         lines = list(itertools.islice(self._lines, _CHUNK * (self._attempts > 0)))
+        if not lines:
+            return None
         texts = [line if self.separator == "," else line.replace(",", ".") for _, line in lines]
         mark = None if self.separator == " " else self.separator
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # no line is left
-                numbers = np.loadtxt(texts, delimiter=mark, usecols=places, comments=None, ndmin=2)
+            numbers = np.loadtxt(texts, delimiter=mark, usecols=places, comments=None, ndmin=2)
         except ValueError:
             numbers = np.empty((0, 0))
         self._taken = lines
-        if lines and len(numbers) == len(lines) and np.isfinite(numbers).all():
+        if len(numbers) == len(lines) and np.isfinite(numbers).all():
             return [number for number, _ in lines], numbers
         self.put_back()
         return None
@@ -202,7 +204,10 @@ class Table:
             number, line = pair
             if not line or line.isspace():
                 continue
-            mark = None if block.width and _PLAIN.fullmatch(line) else _REMARK.match(line[:LONGEST])
+            if block.width and not self._beside and _PLAIN.fullmatch(line):
+                yield block, Row(number, self.split(line), line, self.separator)
+                continue
+            mark = _REMARK.match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, self.separator)
             if mark:

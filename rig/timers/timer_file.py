@@ -23,7 +23,7 @@ from rig.timers.moments import TICK_HZ, moment
 from rig.timers.problems import ProblemList
 from rig.timers.samples import read_samples
 from rig.timers.table import HEADER, Row, RowBlock, Table
-from rig.timers.vcd import is_vcd, vcd_rows
+from rig.timers.vcd import BEGINNINGS, vcd_rows
 from rig.timers.vocabulary import LONGEST, number_of, recognise_format
 
 _SAMPLE = 200
@@ -51,9 +51,8 @@ class TimerFile:
     parts
         Events of each run, or of each gate where these stand one below the other.
     period_s
-        Of samples: no edge is known better than that; `None` for stamps.
-    is_regular
-        Whether samples are all as far apart, so that a row may have several changes.
+        Of samples that are all as far apart, so that a row may have several changes: no edge is
+        known better than that; `None` for others.
     has_unit
         Whether the file says the unit of its times; without it they are read as seconds.
     rows
@@ -71,7 +70,6 @@ class TimerFile:
     columns: dict[str, str] = field(default_factory=dict)
     parts: list[FilePart] = field(default_factory=list)
     period_s: float | None = None
-    is_regular: bool = False
     has_unit: bool = True
     rows: int = 0
     is_sampled: bool = False
@@ -111,7 +109,8 @@ def read_timer_file(path: str | Path, unit: str | None = None) -> TimerFile:
 def _read(lines: Iterator[str], unit: str | None, problems: ProblemList) -> TimerFile:
     head = list(itertools.islice(lines, 50))
     numbered = enumerate(itertools.chain(head, lines), 1)
-    table = Table(vcd_rows(numbered, problems) if is_vcd(head) else numbered, problems)
+    is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
+    table = Table(vcd_rows(numbered, problems) if is_dump else numbered, problems)
     file = TimerFile(f"the project's own format: {','.join(HEADER)}", table.is_own)
     if table.is_own:
         problems.hint = ""  # its faults are told each
@@ -156,7 +155,6 @@ def _read_block(
         )
         steps = [b - a for a, b in itertools.pairwise(ticks)] or [TICK_HZ]
         if max(steps) < 1.5 * statistics.median(steps):
-            file.is_regular = True
             file.period_s = statistics.median(steps) / TICK_HZ * block.base[1]
     else:
         is_stated = bool({"edge", "state", "gate", "run"} & {column.role for column in columns})

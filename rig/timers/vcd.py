@@ -14,14 +14,9 @@ _ACCEPTED = re.compile(r"(1|10|100)\s*([munp]?)s")
 _WIRE = re.compile(r"\$var\s+\w+\s+1\s+(\S+)\s+(\S+)")
 """A wire of one bit: ``$var wire 1 ! D0``."""
 _POWERS = {"": 0, "m": 3, "u": 6, "n": 9, "p": 12}
-_BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
+BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
 _LONGEST_HEAD = 1_000_000
 """Characters, before which the wires have to be listed."""
-
-
-def is_vcd(head: list[str]) -> bool:
-    """Whether a file begins as a value change dump does."""
-    return "".join(head).lstrip().startswith(_BEGINNINGS)
 
 
 def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterator[tuple[int, str]]:
