@@ -131,7 +131,7 @@ def import_drops(
     if not options.as_read:
         _refuse_excess(file, reading, bars, place)
     notes = [*file.notes, _account(file, reading, options)]
-    is_open = len([other for other in readings if not other.layout.is_contrary]) > 1
+    is_open = len([other for other in readings if other.layout.dark != "inverted"]) > 1
     if is_open or (match.share < _GOOD and not options.as_read):
         notes.append(make_reason("reading_chosen", option=str(layout), fit=match.text))
     notes += _assumptions(file, reading, gates)
@@ -157,26 +157,29 @@ def _choose(
     """
     readings = [reading for reading in readings if reading.is_whole] or readings
     distinct = {repr(reading.drops): reading for reading in reversed(readings) if reading.drops}
-    candidates = list(reversed(distinct.values()))
-    if is_stated and len(candidates) == 1:
-        return candidates[0], fit(candidates[0].drops, True)
-    rough = [(fit(reading.drops, False).share, reading) for reading in candidates]
+    if is_stated and len(distinct) == 1:
+        (reading,) = distinct.values()
+        return reading, fit(reading.drops, True)
+    rough = [(fit(reading.drops, False).share, reading) for reading in distinct.values()]
+    rough.reverse()  # the most usual first
     rough.sort(key=lambda row: -row[0])
     near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
     # What the file says comes first: the contrary may be proposed, and is never taken.
-    ranked = [(match, reading) for reading in near if not reading.layout.is_contrary
-              and (match := fit(reading.drops, True)).share >= _GOOD]  # fmt: skip
+    matches = [
+        (fit(reading.drops, True), reading) for reading in near if reading.layout.dark != "inverted"
+    ]
+    ranked = [row for row in matches if row[0].share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
     if not ranked:
-        share = max(share for share, reading in rough if not reading.layout.is_contrary)
-        open_ = [row for row in rough if row[1].layout.dark not in {"states", "inverted"}]
-        good = [row for row in rough if row[0] >= _GOOD] or open_
-        options = [*(str(reading.layout) for _, reading in good[:3]), "--as-read"]
-        raise refusal(place, "no_reading_fits", share=100 * share, options="; ".join(options))
+        share = max(share for share, reading in rough if reading.layout.dark != "inverted")
+        is_open = rough[0][1].layout.dark not in {"states", "inverted"}
+        good = [reading.layout for share, reading in rough if share >= _GOOD or is_open]
+        options = "; ".join(map(str, [*good[:3], "--as-read"]))
+        raise refusal(place, "no_reading_fits", share=100 * share, options=options)
     (match, reading), *rest = ranked
     if rest and match.evidence - rest[0][0].evidence < _DECISIVE:
-        options = [str(row[1].layout) for row in ranked[:2]]
-        raise refusal(place, "several_readings", options=" or ".join(options))
+        options = " or ".join(str(row[1].layout) for row in ranked[:2])
+        raise refusal(place, "several_readings", options=options)
     return reading, match
 
 
@@ -194,7 +197,7 @@ def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter((event.line, event.tick) for part in file.parts for event in part.events)
     line = next((line for (line, _), count in changes.items() if count > 1), 0)
-    if line and not file.is_regular:  # regular samples see changes together
+    if line and file.period_s is None:  # regular samples see changes together
         raise refusal(place, "at_once", line=line)
 
 
@@ -202,16 +205,13 @@ def _account(file: TimerFile, reading: FileReading, options: Namespace) -> Reaso
     """Say what became of every row; refuse rows that are not used."""
     lines = {event.line for part in file.parts for event in part.events}
     # A level that changes may be of an input that is no gate.
-    unused = set[int]() if file.is_sampled else lines - reading.lines
-    missing = file.rows - file.silent - len(lines) + len(unused)
+    unused = sorted({*file.unread, *(() if file.is_sampled else lines - reading.lines)})
     edges = sum(len(drop.edges) for drop in reading.drops)
     counts = {"runs": len(reading.drops), "rows": file.rows, "edges": edges}
-    if not missing:
-        silent = file.rows - len(reading.lines)
-        return make_reason("rows_used", silent=silent, **counts)
-    unread = sorted(unused.union(file.unread))
-    listed = ", ".join(map(str, unread[:8])) + (" …" if len(unread) > 8 else "")
-    rest = {"unused": missing, "lines": listed}
+    if not unused:
+        return make_reason("rows_used", silent=file.rows - len(reading.lines), **counts)
+    listed = ", ".join(map(str, unused[:8])) + (" …" if len(unused) > 8 else "")
+    rest = {"unused": len(unused), "lines": listed}
     if not options.allow_unused:
         raise refusal(options.events, "rows_unused", **counts, **rest)
     return make_reason("rows_left_out", **counts, **rest)

@@ -8,21 +8,21 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.records import Drop, Edge
-from rig.timers.events import TimerEvent, widest_pause
 from rig.timers.moments import TICK_HZ
 from rig.timers.vocabulary import POWERS, number_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
+    from rig.timers.events import TimerEvent
     from rig.timers.timer_file import TimerFile
 
 _LONGEST_S = 60
 """A drop lasts half a second, and nobody waits a minute until it is recorded."""
+_CLEAR_PAUSE = 3.0
 _MOST_MAPS = 200
 
 SETTINGS = {
@@ -66,15 +66,10 @@ class FileLayout:
         """Return that of the project's own format, in which inputs are called by channels."""
         return cls(channels={label: int(label) for label in file.labels})
 
-    @property
-    def is_contrary(self) -> bool:
-        """Whether it contradicts what the file says."""
-        return self.dark == "inverted"
-
     def is_dark(self, event: TimerEvent, n: int) -> bool:
         """Whether an event, the n-th of its input, begins a blocked beam."""
         if event.state in {"blocked", "clear"}:
-            return (event.state == "blocked") is not self.is_contrary
+            return (event.state == "blocked") is (self.dark != "inverted")
         if event.state:
             return (event.state == "high") is (self.dark != "low")
         return self.dark == "each" or (n % 2 == 0) is (self.dark != "turns-clear")
@@ -82,13 +77,10 @@ class FileLayout:
     @property
     def text(self) -> str:
         """What ``--map`` accepts."""
-        settings = [
-            f"{name}={value}"
-            for name, value in asdict(self).items()
-            if name != "channels" and value and value not in {"states", "runs"}
-        ]
-        inputs = [f"{label or 'input'}={channel}" for label, channel in self.channels.items()]
-        return ",".join([*settings, *inputs])
+        stated = {name: value for name, value in asdict(self).items() if name in SETTINGS and value}
+        stated |= {label or "input": channel for label, channel in self.channels.items()}
+        usual = {"states", "runs"}
+        return ",".join(f"{name}={value}" for name, value in stated.items() if value not in usual)
 
     def __str__(self) -> str:
         return f"--map '{self.text}'"
@@ -110,36 +102,25 @@ class FileReading(NamedTuple):
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    runs: dict[int, list[TimerEvent]] = {}
-    for run, number in _runs(file, layout):
-        free = number and number not in runs
-        runs[number if free else max(runs, default=0) + 1] = run
-    drops, lines, power = [], set[int](), POWERS.get(layout.unit, 0)
-    for number, run in sorted(runs.items()):
-        counts, edges = Counter[str](), []
-        for event in run:
+    runs: dict[int, Drop] = {}
+    lines, power = set[int](), 10 ** POWERS.get(layout.unit, 0)
+    for events, number in _runs(file, layout):
+        counts, edges, first = Counter[str](), list[Edge](), dict[int, bool]()
+        for event in events:
             if event.label in layout.channels:
+                channel = layout.channels[event.label]
                 dark = layout.is_dark(event, counts[event.label])
-                tick = event.tick // 10**power
-                edges.append(Edge(tick, layout.channels[event.label], dark))
+                edges.append(Edge(event.tick // power, channel, dark))
+                first.setdefault(channel, dark)
                 lines.add(event.line)
                 counts[event.label] += 1
-        if edges:
-            drops.append(_drop_of(number, edges))
-    return FileReading(layout, drops, lines)
-
-
-def _drop_of(run: int, edges: list[Edge]) -> Drop:
-    """Count the edges of a run, which are in order, from the whole second before them."""
-    start = edges[0].tick // TICK_HZ * TICK_HZ
-    first = {edge.channel: edge.blocked for edge in reversed(edges)}
-    return Drop(
-        run=run,
-        attempt=1,
-        tick_hz=TICK_HZ,
-        edges=tuple(edge._replace(tick=edge.tick - start) for edge in edges),
-        initial_state=sum(1 << channel for channel, blocked in first.items() if not blocked),
-    )
+        if edges:  # they are counted from the whole second before them
+            run = number if number and number not in runs else max(runs, default=0) + 1
+            start = edges[0].tick // TICK_HZ * TICK_HZ
+            stamps = tuple(edge._replace(tick=edge.tick - start) for edge in edges)
+            clear = sum(1 << channel for channel, blocked in first.items() if not blocked)
+            runs[run] = Drop(run, 1, TICK_HZ, stamps, initial_state=clear)
+    return FileReading(layout, [runs[run] for run in sorted(runs)], lines)
 
 
 def _runs(file: TimerFile, layout: FileLayout) -> Iterator[tuple[list[TimerEvent], int]]:
@@ -149,16 +130,19 @@ def _runs(file: TimerFile, layout: FileLayout) -> Iterator[tuple[list[TimerEvent
         names = zip(part_names(file), file.parts, strict=True)
         parts = [([e._replace(label=e.label or name) for name, p in names for e in p.events], 0)]
     limit = round(layout.pause_s * TICK_HZ) * 10 ** POWERS.get(layout.unit, 0)
+    gates = list(layout.channels)
     for events, number in parts:
         ordered = sorted(events, key=lambda event: event.tick)  # equal times stay in their order
         gaps = [b.tick - a.tick for a, b in itertools.pairwise(ordered)]
         cuts = [0, *(n for n, gap in enumerate(gaps, 1) if limit and gap >= limit), len(ordered)]
         for begin, end in itertools.pairwise(cuts):
-            run, gates = ordered[begin:end], list(layout.channels)
+            run = ordered[begin:end]
             if layout.groups == "passing":  # as many at each gate
                 size = max(1, len(run) // len(gates))
-                at = [gates[min(k // size, len(gates) - 1)] for k in range(len(run))]
-                run = [event._replace(label=gate) for event, gate in zip(run, at, strict=True)]
+                run = [
+                    e._replace(label=gates[min(k // size, len(gates) - 1)])
+                    for k, e in enumerate(run)
+                ]
             yield run, number if len(cuts) == 2 else 0
 
 
@@ -167,8 +151,8 @@ def part_names(file: TimerFile) -> list[str]:
     if _is_part_a_gate(file):
         return [part.events[0].label for part in file.parts]
     names = [part.name for part in file.parts]
-    alike = len(set(names)) < len(names) or "" in names
-    return [f"part {n}" for n in range(1, len(names) + 1)] if alike else names
+    is_clear = "" not in names and len(set(names)) == len(names)
+    return names if is_clear else [f"part {n}" for n in range(1, len(names) + 1)]
 
 
 def find_layouts(
@@ -201,26 +185,26 @@ def find_layouts(
 
 
 def _darkness(file: TimerFile, bars: int) -> list[str]:
-    inputs = Counter((n, e.label) for n, part in enumerate(file.parts) for e in part.events)
-    firsts = [{e.label: e.state for e in reversed(part.events)} for part in file.parts]
-    first = [state for states in firsts for state in states.values()]
-    states = set(first)
-    if states <= {"blocked", "clear"}:
+    firsts = [{event.label: event.state for event in reversed(part.events)} for part in file.parts]
+    states = [state for labels in firsts for state in labels.values()]
+    if {"blocked", "clear"} & set(states):
         return ["states", "inverted"]
-    if states == {""}:
-        turns = ["turns", "turns-clear"]
-        return [*turns, "each"] if max(inputs.values()) > bars else ["each", *turns]
-    order = ["low", "high"] if first.count("low") * 2 > len(first) else ["high", "low"]
+    if "" in states:
+        most = max(
+            Counter(e.label for e in part.events).most_common(1)[0][1] for part in file.parts
+        )
+        return ["turns", "turns-clear", "each"] if most > bars else ["each", "turns", "turns-clear"]
+    order = ["low", "high"] if states.count("low") * 2 > len(states) else ["high", "low"]
     # A protocol has all beams clear before the release: where all inputs begin alike, that level
     # is the clear one.
-    return order[:1] if file.is_sampled and len(states) == 1 else order
+    return order[:1] if file.is_sampled and len(set(states)) == 1 else order
 
 
 def _is_part_a_gate(file: TimerFile) -> bool:
     """Whether each part of a file is of an input of its own."""
     labels = [{event.label for event in part.events} for part in file.parts]
-    single = all(len(part) == 1 and "" not in part for part in labels)
-    return single and len(set().union(*labels)) == len(labels)
+    own = set().union(*labels)
+    return "" not in own and len(own) == len(labels) == sum(map(len, labels))
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
@@ -234,12 +218,20 @@ def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
 
 
 def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
-    if layout.groups == "gates" or (len(file.parts) > 1 and layout.groups != "passing"):
-        return [0.0]
-    for part in file.parts:
+    """Return the pause, s, at which drops one after the other are parted, if there may be any.
+
+    Between drops nothing passes for far longer than ever within one: the pauses in order, the
+    widest step from one to the next, by a factor of 3 at least, up to half a second or more.
+    """
+    is_parted = layout.groups == "gates" or (len(file.parts) > 1 and layout.groups != "passing")
+    for part in [] if is_parted else file.parts:
         ticks = sorted(event.tick // 10 ** POWERS.get(layout.unit, 0) for event in part.events)
-        if pause := widest_pause(ticks) / TICK_HZ:
-            return [pause] if ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ else [0.0, pause]
+        pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
+        steps = [(b / max(a, TICK_HZ // 1000), b) for a, b in itertools.pairwise(pauses)]
+        ratio, pause = max((step for step in steps if 2 * step[1] >= TICK_HZ), default=(0.0, 0))
+        if ratio >= _CLEAR_PAUSE:
+            is_long = ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ
+            return [0.0, pause / TICK_HZ][is_long:]
     return [0.0]
 
 
@@ -248,17 +240,14 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     labels = part_names(file) if layout.groups == "gates" else list(file.labels)
     if layout.groups == "passing":
         return [{f"gate {n}": channel for n, channel in enumerate(gates, 1)}]
-    numbers = {label: number_of(label) for label in labels}
-    by_number = {label: n for label, n in numbers.items() if n is not None and n in gates}
-    if len(set(by_number.values())) == len(by_number) == len(labels) > 0:
+    by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
+    if by_number and (len(set(by_number.values())) == len(labels) or len(labels) == 1):
         return [by_number]
     if len(labels) < 2:
-        return [by_number] if by_number else [{"".join(labels): channel} for channel in gates]
-    distinct = len({n for n in numbers.values() if n is not None}) == len(labels)
-    first = {e.label: e.tick for part in file.parts for e in reversed(part.events)}
-    ordered = sorted(labels, key=lambda label: numbers[label] or 0) if distinct else labels
+        return [{"".join(labels): channel} for channel in gates]
     # In order of their numbers, or as they are passed first; and the reverse.
-    rows = [(ordered, chosen) for chosen in itertools.combinations(sorted(gates), len(labels))]
+    first = {e.label: e.tick for part in file.parts for e in reversed(part.events)}
+    rows = [(labels, chosen) for chosen in itertools.combinations(sorted(gates), len(labels))]
     if len(labels) == len(gates):
         rows += [(sorted(labels, key=lambda label: first.get(label, 0)), tuple(gates))]
     rows += [(inputs, chosen[::-1]) for inputs, chosen in rows]

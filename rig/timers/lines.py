@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.files import require_file
 from rig.timers.problems import ProblemList, refusal
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Iterator
-
+from rig.timers.vocabulary import read_rows
 
 MAX_BYTES = 200_000_000
 LONGEST_LINE = 20_000
 """Characters: no text that people or timers write has a longer one."""
 _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+_START = 4096
+"""Bytes that show the encoding, or another kind of file."""
 
 
-def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
+def read_lines(path: str | Path) -> Iterator[str]:
     """Yield the lines of a text file: UTF-8, UTF-16 with its mark and without, or Windows'.
 
     Raises
@@ -45,7 +44,7 @@ def read_lines(path: str | os.PathLike[str]) -> Iterator[str]:
         raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
 
 
-def check_is_file(path: str | os.PathLike[str]) -> None:
+def check_is_file(path: str | Path) -> None:
     """Refuse what is no file, and a pipe too: a file is read more than once.
 
     Raises
@@ -59,9 +58,17 @@ def check_is_file(path: str | os.PathLike[str]) -> None:
         raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
 
 
+def find_kind(path: str | Path) -> str:
+    """Return what a file is that is no timer's; nothing where that is not known."""
+    with Path(path).open("rb") as stream:
+        start = stream.read(_START).removeprefix(b"\xef\xbb\xbf").lstrip()
+    kinds = dict(read_rows("kinds.txt", " ; "))
+    return next((x for x in kinds if re.match(kinds[x].encode(), start, re.DOTALL)), "")
+
+
 def _find_encoding(path: Path, problems: ProblemList) -> str:
     with path.open("rb") as stream:
-        start = stream.read(4096)
+        start = stream.read(_START)
     zeros = [start[n::2].count(0) * 3 > len(start) for n in (0, 1)]
     if start[:2] in _MARKS or sum(zeros) == 1:
         return _MARKS.get(start[:2], "utf-16-be" if zeros[0] else "utf-16-le")

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from rig.timers.columns import TimerColumn
-from rig.timers.table import Row
-
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from rig.timers.problems import ProblemList
 
 _SCALE = re.compile(r"\$timescale\s+(.{0,40}?)\s*(?:\$end|$)")
@@ -18,54 +14,40 @@ _ACCEPTED = re.compile(r"(1|10|100)\s*([munp]?)s")
 _WIRE = re.compile(r"\$var\s+\w+\s+1\s+(\S+)\s+(\S+)")
 """A wire of one bit: ``$var wire 1 ! D0``."""
 _POWERS = {"": 0, "m": 3, "u": 6, "n": 9, "p": 12}
-_BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
+BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
 _LONGEST_HEAD = 1_000_000
 """Characters, before which the wires have to be listed."""
 
 
-def is_vcd(head: list[str]) -> bool:
-    """Whether a file begins as a value change dump does."""
-    return "".join(head).lstrip().startswith(_BEGINNINGS)
-
-
-def vcd_columns(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[TimerColumn]:
-    """Read the head of a dump: which wires there are, and the unit of time."""
+def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterator[tuple[int, str]]:
+    """Yield a heading, and a line of all levels for each time at which a level may change."""
     head = ""
     for _, line in lines:
         head += line[:200] + " "
         if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
             break
-    stated, wires = _SCALE.search(head), _WIRE.findall(head)
+    stated, names = _SCALE.search(head), dict(_WIRE.findall(head))
     scale = _ACCEPTED.fullmatch(stated[1] if stated else "")
     if stated is None:
         problems.refuse(1, 1, "no_rate", lacks="a $timescale")
     if scale is None:
         problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
-    elif not wires:
+    elif not names:
         problems.add(1, 1, "", "no_edges")
     problems.raise_if_any()
     power = _POWERS[scale[2]] - scale[1].count("0") if scale else 0
-    columns = [TimerColumn(n, mark, "level", gate=name) for n, (mark, name) in enumerate(wires, 1)]
-    return [TimerColumn(0, "time", "time", power), *columns]
-
-
-def vcd_rows(
-    lines: Iterator[tuple[int, str]], columns: list[TimerColumn], problems: ProblemList
-) -> Iterator[Row]:
-    """Yield a row of all levels for each time at which a level may change."""
-    places = {column.name: column.at for column in columns[1:]}
-    row, written = Row(0, ["0", *("x" for _ in places)]), set[int]()
+    yield 0, ",".join(["time (s)", *names.values()])
+    at, time, levels, changed = 0, "0", dict.fromkeys(names, "x"), set[str]()
     for number, line in lines:
         for word in line.split() if not line.startswith("$comment") else ():
-            at = places.get(word[1:], 0)
             if word[0] == "#" and word[1:].isdecimal():
-                if row.line or written:
-                    yield row
-                row, written = Row(number, [word[1:], *row.texts[1:]], word), set[int]()
-            elif word[0] in "01xzXZ" and at:
-                if at in written and row.texts[at] != word[0]:
+                if at or changed:
+                    yield at, ",".join([f"{time}e-{power}", *levels.values()])
+                at, time, changed = number, word[1:], set()
+            elif word[0] in "01xzXZ" and word[1:] in levels:
+                if word[1:] in changed and levels[word[1:]] != word[0]:
                     accepted = "a change: this wire has another value at this time already"
-                    problems.reject(number, 1, columns[at].gate, word, accepted)
-                written.add(at)
-                row.texts[at] = word[0]
-    yield row
+                    problems.reject(number, 1, names[word[1:]], word, accepted)
+                changed.add(word[1:])
+                levels[word[1:]] = word[0]
+    yield at, ",".join([f"{time}e-{power}", *levels.values()])

@@ -14,7 +14,7 @@ from rig.timers.table import RowBlock, Table
 from rig.timers.vocabulary import is_number
 
 if TYPE_CHECKING:
-    import os
+    from pathlib import Path
 
     from rig.arrays import Array
     from rig.timers.table import Row
@@ -39,7 +39,7 @@ class VideoTrack(NamedTuple):
     y: Array
 
 
-def read_video(path: str | os.PathLike[str]) -> VideoTrack:
+def read_video(path: str | Path) -> VideoTrack:
     """Read a table of places; frames without one are left out.
 
     Raises
@@ -48,7 +48,9 @@ def read_video(path: str | os.PathLike[str]) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), _HINT)
-    block, rows = next(Table(read_lines(path)).blocks(), (RowBlock(), iter(())))
+    block, rows = next(
+        Table(enumerate(read_lines(path), 1), problems).blocks(), (RowBlock(), iter(()))
+    )
     first = next(rows, None)
     columns = next(filter(None, map(_find_columns, reversed(block.headings))), {})
     if first is None or not columns:

@@ -6,14 +6,10 @@ import re
 import unicodedata
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
 """Decimal power from seconds, by the unit's name."""
-SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns"}
+SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns", None: "an unknown unit"}
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 CLOCK = re.compile(
@@ -27,6 +23,7 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,
 _NAME = re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}")
 _BRACKETED = re.compile(r"[\[({]\s*([^\W\d_]{1,20})\s*[\])}]")
 _LAST = re.compile(r"(?:^|[\W_])([^\W\d_]{1,20})\W*$")
+_NUMBERED = r"[\s#:_-]{0,3}(?:nr\.?|no\.?)?\s?(?:[0-9]{1,4}|[a-d])(?![^\W_])"
 
 
 def read_rows(name: str, mark: str) -> list[list[str]]:
@@ -44,15 +41,9 @@ def words() -> dict[str, frozenset[str]]:
 
 
 @cache
-def _pattern(role: str) -> re.Pattern[str]:
+def _pattern(role: str, ending: str = r"(?![^\W\d_])") -> re.Pattern[str]:
     listed = "|".join(sorted(map(re.escape, words()[role]), key=len, reverse=True))
-    return re.compile(rf"(?<![^\W\d_])(?:{listed})(?![^\W\d_])")
-
-
-@cache
-def _numbered(role: str) -> re.Pattern[str]:
-    ending = r"[\s#:_-]{0,3}(?:nr\.?|no\.?)?\s?(?:[0-9]{1,4}|[a-d])(?![^\W_])"
-    return re.compile(_pattern(role).pattern.removesuffix(r"(?![^\W\d_])") + ending, re.IGNORECASE)
+    return re.compile(rf"(?<![^\W\d_])(?:{listed}){ending}", re.IGNORECASE)
 
 
 def without_accents(text: str) -> str:
@@ -64,21 +55,22 @@ def without_accents(text: str) -> str:
 @lru_cache(10_000)
 def normal(heading: str) -> str:
     """Return a heading in lower case, its words apart, without accents."""
-    text = re.sub(
-        r"(?<=[a-z])(?=[A-Z])|(?<=[0-9])(?=[A-Za-z])", " ", without_accents(heading[:200])
-    )
-    return " ".join(text.replace("_", " ").casefold().split())
+    text = without_accents(heading[:LONGEST])
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[0-9])(?=[A-Za-z])|_", " ", text)
+    return " ".join(text.casefold().split())
 
 
 @lru_cache(10_000)
-def has_role(heading: str, role: str) -> bool:
-    """Whether a heading has a word of a role."""
-    return _pattern(role).search(normal(heading)) is not None
+def roles_in(heading: str) -> frozenset[str]:
+    """Return the roles of which a heading has a word, and ``setting`` where it names one."""
+    facts = {role for role in words() if _pattern(role).search(normal(heading))}
+    is_setting = is_number(heading) or bool({"start", "step", "rate"} & facts)
+    return frozenset(facts | ({"setting"} if is_setting else set()))
 
 
 def find_label(name: str, role: str) -> str:
     """Return the part of a heading that names an input, or a run, with its number."""
-    match = _numbered(role).search(without_accents(name[:200]))
+    match = _pattern(role, _NUMBERED).search(without_accents(name[:LONGEST]))
     return match[0] if match else ""
 
 
@@ -93,8 +85,7 @@ def unit_of(heading: str) -> str:
     """
     text = normal(heading)
     units = _BRACKETED.findall(text)
-    last = _LAST.search(text)
-    for word in (*units, *([last[1]] if last else ())):
+    for word in (*units, *_LAST.findall(text)):
         for unit in (*POWERS, "v"):
             if word in words()[f"unit {unit}"]:
                 return unit
@@ -120,19 +111,18 @@ def is_number(text: str) -> bool:
     return len(text) <= LONGEST and _NUMBER.fullmatch(text) is not None
 
 
-def is_clock(text: str) -> bool:
-    """Whether a text is a time of day, perhaps with its date."""
-    return ":" in text and len(text) <= LONGEST and CLOCK.fullmatch(text) is not None
+def is_measured(text: str) -> bool:
+    """Whether a text is a number, or a time of day, perhaps with its date."""
+    return is_number(text) or (":" in text and CLOCK.fullmatch(text[:LONGEST]) is not None)
 
 
 def is_value(text: str) -> bool:
     """Whether a word is a number, a date, a state or the name of an input."""
     if is_number(text.replace(",", ".", 1)) or state_of(text):
         return True
-    if len(text) > LONGEST or has_role(text, "start"):
-        return False
-    unknown = text.casefold() in {"x", "z", *words()["missing"]}
-    return unknown or any(form.fullmatch(text) for form in (_NAME, CLOCK, TIMED))
+    forms = () if len(text) > LONGEST or "start" in roles_in(text) else (_NAME, CLOCK, TIMED)
+    is_unknown = text.casefold() in {"x", "z", *words()["missing"]}
+    return is_unknown or any(form.fullmatch(text) for form in forms)
 
 
 def number_of(label: str) -> int | None:
@@ -141,13 +131,12 @@ def number_of(label: str) -> int | None:
     return int(match[1]) if match else None
 
 
-def recognise_format(lines: Iterable[str]) -> str:
+def recognise_format(head: str) -> str:
     """Return the name of the maker's format that the first lines are like; nothing if of none.
 
     The rows of `formats.txt`: name, what it is recognised by, what differs, its example.
     """
-    head = "\n".join(lines).casefold()
     for name, marks, *_ in read_rows("formats.txt", "|"):
-        if marks and all(mark.strip().casefold() in head for mark in marks.split("+")):
+        if marks and all(mark.strip().casefold() in head.casefold() for mark in marks.split("+")):
             return name
     return ""

@@ -15,6 +15,7 @@ from rig.timers import events
 from rig.timers.layouts import find_layouts, read_drops
 from rig.timers.lines import read_lines
 from rig.timers.moments import TICK_HZ
+from rig.timers.problems import ProblemList
 from rig.timers.table import Table
 from rig.timers.timer_file import read_timer_file
 from tests.examples import examples
@@ -110,10 +111,6 @@ def test_a_missing_file_is_said(tmp_path):
         read_timer_file(tmp_path / "none")
 
 
-def is_own(path):
-    return Table(read_lines(path)).is_own
-
-
 def test_own_files_are_told_from_others(tmp_path):
     path = tmp_path / "f"
     for text, ours in [
@@ -126,7 +123,7 @@ def test_own_files_are_told_from_others(tmp_path):
         ("0.1,1\n", False),
     ]:
         path.write_text(text)
-        assert is_own(path) is ours, text
+        assert Table(enumerate(read_lines(path), 1), ProblemList("")).is_own is ours, text
 
 
 SHAPES = st.sampled_from(["\t", ";", ","]), st.booleans(), st.integers(1, 4)
@@ -203,7 +200,7 @@ def test_a_column_a_gate(tmp_path):
          "nothing_passes", "nothing passes"),
         ("D0,D1\n0,1\n1,1\n0,1\n", "no_rate", "without a column of times"),
         ("$timescale 3 moons $end\n", "not_accepted", "'3 moons' is not a unit of time"),
-        ("PK\x03\x04\0\0", "not_text", "this is no text"),
+        ("PK\x03\x04\0\0", "other_kind", "this is a zip archive"),
     ],
 )  # fmt: skip
 def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, code, reason):
