@@ -246,9 +246,12 @@ async def _looks(
             assert app.view is not None
             first = app.view.jobs[0]
             end = end_of(app.view.drops[first], app.view.scales[first].hz)
-            app.history.player = Player(0, 0.8 * end)
+            app.desk.tape = Player(0, 0.8 * end)
             app.turn("history")
         await until(lambda: app.page == shot.page)
+        await until(lambda: shot.page != "protocol" or app.desk.rows)
+        if shot.name == "result":  # its slow motion is over
+            app.desk.replayed = shot.flow.job
         # All edges came at once, which looks like flicker for a while.
         await until(lambda: _all_counted(app, shot) and _quiet(app))
         for size in sizes:

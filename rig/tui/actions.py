@@ -34,8 +34,8 @@ class Action(NamedTuple):
         Where it makes sense.
     driving
         Whether it needs control of the rig.
-    two_chains
-        Whether it is about what only a scene of two chains has.
+    group
+        Its heading in the help.
     """
 
     name: str
@@ -45,60 +45,69 @@ class Action(NamedTuple):
     command: str = ""
     stages: frozenset[Stage] = ANY
     driving: bool = False
-    two_chains: bool = False
+    group: str = "This program"
 
 
+_RIG, _JUDGE, _PAGES, _REPLAY = "At the rig", "Judge a drop, write files", "Pages", "Replay"
 ACTIONS: tuple[Action, ...] = (
-    Action("stop", "f9", "STOP", "Stop: switch everything off", "Ctrl-C in rig run"),
+    Action("stop", "f9", "STOP", "Stop: switch everything off", "Ctrl-C in rig run", group=_RIG),
     Action("go_on", "enter", "continue", "Continue: open, next run; on the run page, arm",
            "rig run PROTOCOL --port URL --session FILE",
-           ANY - {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}, driving=True),
-    Action("reject", "x", "reject", "Reject this drop with a reason, or undo that", "",
-           _JUDGED, driving=True),
-    Action("note", "n", "note", "Write or change a note on this drop", "", _JUDGED,
-           driving=True),
+           ANY - {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}, driving=True, group=_RIG),
     Action("again", "a", "repeat", "Repeat this run", "",
-           frozenset({Stage.RESULT, Stage.HALTED, Stage.DONE}), driving=True),
-    Action("unblind", "b", "unblind", "Show a blind session's numbers; cannot be undone",
-           "rig unblind SESSION", _AT_REST, driving=True),
-    Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST),
-    Action("close", "z", "close", "Close the session and choose another protocol", "",
-           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.HALTED, Stage.DONE}), driving=True),
+           frozenset({Stage.RESULT, Stage.HALTED, Stage.DONE}), driving=True, group=_RIG),
     Action("release_test", "l", "test release", "Test the release with nothing attached",
            "rig selftest --port PORT --release",
-           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),
-    Action("wave", "w", "wave", "Restart the hand test of the gates and their counters"),
-    Action("page_protocol", "1,p", "protocol", "Page: protocol, its scene and plan",
-           "rig check PROTOCOL"),
-    Action("page_device", "2,d", "device", "Page: device, clock and gates", "rig selftest"),
-    Action("page_run", "3,u", "run", "Page: the current run"),
-    Action("page_result", "4,v", "result", "Page: result and verdict of the latest drop",
-           "rig analyze SESSION"),
-    Action("page_session", "5,s", "session", "Page: plan, means and control charts",
-           "rig report SESSION -o FILE.html"),
-    Action("page_history", "6,h", "history", "Page: replay any drop, forwards or backwards",
-           "rig replay SESSION"),
-    Action("earlier", "left", "earlier", "History: back in time; other pages: plot cursor left"),
-    Action("later", "right", "later", "History: forward in time; other pages: plot cursor right"),
-    Action("slower", "minus", "slower", "History: half the speed"),
-    Action("faster", "plus", "faster", "History: twice the speed"),
-    Action("play", "full_stop", "play", "History: play or pause"),
-    Action("turn_round", "i", "reverse", "History: play in the other direction"),
-    Action("sessions", "o", "sessions", "History: choose another session"),
-    Action("drops", "g", "drops", "History: choose another drop"),
-    Action("filter", "f", "filter", "History: show only some drops, such as accepted"),
-    Action("compare", "k", "compare", "History: all these drops in one picture, or only one"),
+           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True, group=_RIG),
+    Action("wave", "w", "wave again", "Restart the hand test of the gates and their counters",
+           group=_RIG),
+    Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST,
+           group=_RIG),
+    Action("close", "z", "close", "Close the session and choose another experiment", "",
+           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.HALTED, Stage.DONE}), driving=True,
+           group=_RIG),
+    Action("reject", "x", "reject", "Reject this drop with a reason, or undo that", "",
+           _JUDGED, driving=True, group=_JUDGE),
+    Action("note", "n", "note", "Write or change a note on this drop", "", _JUDGED,
+           driving=True, group=_JUDGE),
+    Action("unblind", "b", "unblind", "Show a blind session's numbers; cannot be undone",
+           "rig unblind SESSION", _AT_REST, driving=True, group=_JUDGE),
     Action("report", "m", "report", "Write the session's report beside it",
-           "rig report SESSION -o FILE.html"),
+           "rig report SESSION -o FILE.html", group=_JUDGE),
     Action("export", "e", "export", "Write the session's CSV files beside it",
-           "rig export SESSION --csv DIR"),
-    Action("control_chart", "y", "skew/g", "Session: other quantity in the control chart",
-           two_chains=True),
-    Action("previous", "up", "previous", "Previous drop, protocol or line"),
-    Action("next", "down", "next", "Next drop, protocol or line"),
+           "rig export SESSION --csv DIR", group=_JUDGE),
+    Action("page_protocol", "1,p", "home", "Page: home, or the open session's protocol",
+           "rig check PROTOCOL", group=_PAGES),
+    Action("page_device", "2,d", "device", "Page: device, clock and gates", "rig selftest",
+           group=_PAGES),
+    Action("page_run", "3,u", "run", "Page: the current run", group=_PAGES),
+    Action("page_result", "4,v", "result", "Page: result and verdict of the latest drop",
+           "rig analyze SESSION", group=_PAGES),
+    Action("page_session", "5,s", "session", "Page: plan, means and control charts",
+           "rig report SESSION -o FILE.html", group=_PAGES),
+    Action("page_history", "6,h", "history", "Page: replay any drop, forwards or backwards",
+           "rig replay SESSION", group=_PAGES),
+    Action("part", "tab", "more", "Turn to the rig, the plot or the tables", group=_PAGES),
+    Action("control_chart", "y", "other plot", "Show another plot", group=_PAGES),
+    Action("previous", "up", "up", "Previous drop or line; scroll", group=_PAGES),
+    Action("next", "down", "down", "Next drop or line; scroll", group=_PAGES),
+    Action("play", "full_stop", "play", "Replay: play or pause", group=_REPLAY),
+    Action("turn_round", "i", "reverse", "Replay: play in the other direction", group=_REPLAY),
+    Action("earlier", "left", "earlier", "Replay: back in time; other pages: plot cursor left",
+           group=_REPLAY),
+    Action("later", "right", "later", "Replay: forward in time; other pages: plot cursor right",
+           group=_REPLAY),
+    Action("slower", "minus", "slower", "Replay: half the speed", group=_REPLAY),
+    Action("faster", "plus", "faster", "Replay: twice the speed", group=_REPLAY),
+    Action("drops", "g", "drops", "History: choose another drop", group=_REPLAY),
+    Action("filter", "f", "filter", "History: show only some drops, such as accepted",
+           group=_REPLAY),
+    Action("compare", "k", "compare", "History: all these drops in one picture, or only one",
+           group=_REPLAY),
+    Action("sessions", "o", "sessions", "History: choose another session", group=_REPLAY),
     Action("theme", "t", "theme", "Change colours: dark, light, high contrast"),
     Action("help", "question_mark,f1", "help", "Show all keys", "rig --help"),
-    Action("palette", "ctrl+p", "commands", "Search commands"),
+    Action("palette", "ctrl+p", "more", "Search commands"),
     Action("quit", "q,ctrl+q", "quit", "Quit; the rig keeps running"),
 )  # fmt: skip
 
@@ -125,25 +134,19 @@ _NOT = {
 }
 
 
-def hindrance(
-    action: Action, stage: Stage, *, driving: bool, two_chains: bool | None = None
-) -> str:
-    """Say why an action makes no sense now; empty where it does.
-
-    Which scene it is may not be known yet.
-    """
+def hindrance(action: Action, stage: Stage, *, driving: bool) -> str:
+    """Say why an action makes no sense now; empty where it does."""
     if stage not in action.stages:
         return f"not {_NOT.get(stage, 'with the release armed')}"
-    if action.driving and not driving:
-        return "this screen only watches"
-    return "not in this scene" if action.two_chains and two_chains is False else ""
+    return "this screen only watches" if action.driving and not driving else ""
 
 
 def shown_key(keys: str) -> str:
     """Write the first of an action's keys as it stands on a keyboard."""
     first = keys.partition(",")[0]
     names = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
-             "left": "←", "right": "→", "up": "↑", "down": "↓", "space": "Space"}  # fmt: skip
+             "left": "←", "right": "→", "up": "↑", "down": "↓", "space": "Space",
+             "tab": "Tab"}  # fmt: skip
     if first in names:
         return names[first]
     if first.startswith("ctrl+"):

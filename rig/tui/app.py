@@ -5,27 +5,29 @@ from __future__ import annotations
 import asyncio
 from importlib import import_module
 from time import monotonic, process_time
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from textual import events
 from textual.app import App, ComposeResult
 from textual.css.query import NoMatches
 from textual.theme import Theme
-from textual.widgets import ContentSwitcher, Input, Label
+from textual.widgets import Input
 
 from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands
 from rig.tui.actions import BY_NAME, OFFLINE, Action, hindrance
 from rig.tui.client import ReconnectingClient
+from rig.tui.desk import Desk
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
 from rig.tui.model import Model
-from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Dialog, Palette, Pick
 from rig.tui.stillness import Stillness
+from rig.tui.survey import look_around
 from rig.tui.terminal import Terminal
-from rig.tui.widgets.status import PAGES, StatusBar
-from rig.tui.widgets.stopbar import StopBar, StopLine
+from rig.tui.widgets.bars import StatusBar, StopBar, StopLine
+from rig.tui.widgets.dialogs import Ask, Confirm, Dialog
+from rig.tui.widgets.page import Page
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
@@ -34,14 +36,12 @@ if TYPE_CHECKING:
 
     from rig.results.live import SessionView
     from rig.tui.context import Options
+    from rig.tui.desk import Face
     from rig.tui.indicators import Indicators
-    from rig.tui.screens.history import HistoryPage
-    from rig.tui.screens.page import Page
-    from rig.tui.screens.protocol import ProtocolPage
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # between ticks, when one was late
-_TYPED_IN = (Ask, AskReason, Palette)
+_LOOK_S = 2.0  # between two looks at folder and USB
 _COUNTED_S = 0.3
 """Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
 _TOLD_S = 15.0
@@ -84,13 +84,6 @@ THEMES = tuple(
 )
 
 
-def _page(name: str) -> Callable[..., Page]:
-    """Load a page, which the first paint does not need; safe in any thread."""
-    module = import_module(f"rig.tui.screens.{name}")
-    kind: Callable[..., Page] = getattr(module, f"{name.title()}Page")
-    return kind
-
-
 class RigApp(App[None], inherit_bindings=False):
     """The lab session.
 
@@ -108,10 +101,6 @@ class RigApp(App[None], inherit_bindings=False):
 
     TITLE = "chainrig"
     ENABLE_COMMAND_PALETTE = False  # there is one that knows what can be done now
-    CSS = """
-    #pages { height: 1fr; }
-    .-high #pages { padding: 1 1 0 1; }
-    """
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-normal"), (160, "-wide")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
 
@@ -135,9 +124,10 @@ class RigApp(App[None], inherit_bindings=False):
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
         self.driver: Driver = Driver(flow, self.client, self.follower, self.begin)
-        self.pages: dict[str, Page] = {}
-        self._turning = asyncio.Lock()
-        self._turned_to = ""
+        self.desk = Desk(options)
+        self._faces: Mapping[str, Callable[[Model, Desk, int], Face]] = {}
+        self._drawn = ""
+        self._looked_s = 0.0
         self._stillness = Stillness(options.still_s)
         self._last = self._due = monotonic()
         self._spent, self._saved_s = process_time(), _SAVED_S
@@ -160,8 +150,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def compose(self) -> ComposeResult:
         yield StatusBar()
-        with ContentSwitcher(initial="loading", id="pages"):
-            yield Label("loading …", id="loading")
+        yield Page()
         yield StopBar()
 
     async def on_mount(self) -> None:
@@ -192,8 +181,8 @@ class RigApp(App[None], inherit_bindings=False):
         self._stillness.alive(now)
         if self.flow.stage is Stage.COUNTDOWN:
             self.driver.take(Tick(min(passed, _COUNTED_S)))
-        if "history" in self.pages:
-            self.history.tick(passed)
+        self.desk.tick(self.model, passed)
+        self._look_around(now)
         if self.client is not None and self.client.changed:
             self.client.changed = False
             reopens = self.driver.asked is not None
@@ -219,14 +208,15 @@ class RigApp(App[None], inherit_bindings=False):
         except NoMatches:
             return  # on its way in, or out
         message = self._told if model.now_s - self._told_s < _TOLD_S else ""
-        base.query_one(StatusBar).show(model, self.page, self.keys, size, message)
-        base.query_one(StopBar).show(model, self.page, self.keys, size.width)
+        base.query_one(StatusBar).show(model, self.keys, size.width, message)
+        base.query_one(StopBar).show(model, self.keys, size.width, self.hindrance)
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
-        page = self.pages.get(self.page)
-        if page is not None and page.is_mounted:
-            page.show(model)
+        if self._faces and self.page:
+            face = self._faces[self.page](model, self.desk, self.sheet.tables_width())
+            self.sheet.show(face, self.desk, fresh=self.page != self._drawn)
+            self._drawn = self.page
         # What is drawn is seen when it is painted.
         self.call_after_refresh(self._stillness.shown, self._face)
 
@@ -279,6 +269,7 @@ class RigApp(App[None], inherit_bindings=False):
             unreadable=follower.unreadable,
             read=follower.done,
             page=self.page,
+            idle=client is not None and client.idle,
         )
 
     # ------------------------------------------------------------------ flow and pages
@@ -303,50 +294,48 @@ class RigApp(App[None], inherit_bindings=False):
 
     async def _load_pages(self) -> None:
         """Have ready what was not needed for the first paint."""
-        for name in PAGES:
-            await asyncio.to_thread(_page, name)
+        pages = await asyncio.to_thread(import_module, "rig.tui.pages")
+        self._faces = pages.FACES
+        self.draw()
         await asyncio.to_thread(import_module, "rig.results.live")
         if self._loaded is not None:
             self._loaded()
 
     @property
-    def history(self) -> HistoryPage:
-        """The page with the tape."""
-        return cast("HistoryPage", self._made("history"))
-
-    @property
-    def protocols(self) -> ProtocolPage:
-        """The page with the files."""
-        return cast("ProtocolPage", self._made("protocol"))
-
-    def _made(self, name: str) -> Page:
-        if name not in self.pages:
-            self.pages[name] = _page(name)(self.options)
-        return self.pages[name]
+    def sheet(self) -> Page:
+        """What the pages are drawn on."""
+        return self.screen_stack[0].query_one(Page)
 
     def turn(self, page: str) -> None:
-        """Show a page: at once where it was shown before."""
-        self._turned_to = page
-        if page in self.pages and self.pages[page].is_mounted:
-            self._show(page)
-        else:
-            self.begin(self._make(page))
-
-    async def _make(self, page: str) -> None:
-        """Make a page and show it, if it is still wanted then."""
-        async with self._turning:  # it may have been asked for twice
-            await asyncio.to_thread(_page, page)
-            if not self._open():
-                return
-            switcher = self.screen_stack[0].query_one("#pages", ContentSwitcher)
-            if not self._made(page).is_mounted:
-                await switcher.add_content(self._made(page), id=page)
-        if self._open() and page == self._turned_to:
-            self._show(page)
-
-    def _show(self, page: str) -> None:
-        self.screen_stack[0].query_one("#pages", ContentSwitcher).current = page
+        """Show a page, from its first part on."""
         self.page = page
+        self.desk.part = self.desk.chart = 0
+        self.draw()
+
+    def next_part(self) -> None:
+        """Turn to the part of the page that comes after the first that is shown."""
+        self.desk.part += 1
+        self.draw()
+
+    def next_chart(self) -> None:
+        """Show another plot first."""
+        self.desk.chart += 1
+        self.draw()
+
+    def _look_around(self, now_s: float) -> None:
+        """See again and again what there is to begin with, while nothing is begun."""
+        if self.client is None or self.flow.stage is not Stage.PROTOCOL:
+            return
+        if now_s - self._looked_s >= _LOOK_S:
+            self._looked_s = now_s
+            self.begin(self._survey())
+
+    async def _survey(self) -> None:
+        client = self.client
+        assert client is not None
+        self.desk.survey = await asyncio.to_thread(look_around, self.options)
+        other = client.in_the_way[0] if client.in_the_way else ""
+        self.desk.begin_with("" if client.idle else client.port, other)
         self.draw()
 
     def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None:
@@ -399,7 +388,7 @@ class RigApp(App[None], inherit_bindings=False):
         if name == "stop" or (key == "escape" and not isinstance(self.focused, Input)):
             self.action_do("stop")
             if isinstance(screen, Dialog) and (
-                not isinstance(screen, _TYPED_IN)
+                not isinstance(screen, Ask)
                 or (key == "escape" and screen.is_mounted)  # a click has left its field
             ):
                 screen.dismiss(None)
@@ -424,13 +413,13 @@ class RigApp(App[None], inherit_bindings=False):
     def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
         """Let a key answer a dialog; say whether it did."""
         by = {"up": -1, "down": 1}.get(key, 0)
-        if by and not isinstance(dialog, (Confirm, Pick)):
+        if by and not isinstance(dialog, Confirm):
             if dialog.is_mounted:
                 dialog.move(by)
         elif key == "enter" and isinstance(dialog, Confirm):
             if self._stillness.meant(self._face, at_s):
                 dialog.dismiss(True)
-        elif key == "enter" and isinstance(dialog, _TYPED_IN):
+        elif key == "enter" and isinstance(dialog, Ask):
             return not self._stillness.read(self._face, at_s)  # pasted with what opened it
         elif dialog.LEAVE in {"", key}:
             dialog.dismiss(None)
@@ -464,10 +453,14 @@ class RigApp(App[None], inherit_bindings=False):
         """Say why an action makes no sense now; empty where it does."""
         if self.client is None and action.name not in OFFLINE:
             return "no rig is connected"
-        two = self.model.two_chains
-        return hindrance(action, self.flow.stage, driving=self.driving, two_chains=two)
+        stage, driving = self.flow.stage, self.driving
+        # Whoever has no rig yet may begin with one.
+        driving |= action.name == "go_on" and stage is Stage.PROTOCOL
+        return hindrance(action, stage, driving=driving)
 
-    def action_choose(self, page: str, at: int) -> None:
-        """Choose a line of a page's list by mouse."""
-        self.pages[page].choose(at)
+    def action_choose(self, at: int) -> None:
+        """Choose a row of the home page."""
+        self.desk.row = at
+        sections = {row.section for row in self.desk.rows[: at + 1]}
+        self.sheet.show_row(at + len(sections))
         self.draw()

@@ -73,6 +73,8 @@ class Model:
         How long the disk has been at one write.
     page
         The page that is shown.
+    idle
+        Whether no rig was ever asked for or heard: nothing is wrong with that.
     """
 
     state: DaemonState
@@ -91,6 +93,7 @@ class Model:
     stop: StopAnswer | None = None
     disk_s: float = 0.0
     page: str = ""
+    idle: bool = False
 
     @property
     def protocol(self) -> Protocol | None:
@@ -158,11 +161,6 @@ class Model:
         return self.stage in HOT
 
     @property
-    def two_chains(self) -> bool | None:
-        """Whether a free chain falls beside the one that strikes; `None` before that is known."""
-        return None if self.protocol is None else self.protocol.two_chains
-
-    @property
     def words(self) -> Vocabulary:
         """The words of the scene."""
         return ANY_SCENE if self.protocol is None else self.protocol.vocabulary
@@ -210,7 +208,7 @@ class Model:
 
 def alarm(model: Model) -> Alarm | None:
     """Name what is most wrong now; `None` when all is well."""
-    if not model.connected:
+    if not model.connected and not model.idle:
         silence, _, hint = model.silence.partition("\n")
         return Alarm(
             f"no daemon: {silence or 'connecting'}",

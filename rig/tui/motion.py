@@ -45,6 +45,8 @@ class ChainFall:
         `None` outside the model's domain.
     delay_s
         By how much the model's release is later than the fire stamp, so that it meets the points.
+    end_s
+        When all of it has struck or passed the last gate, by the model and by the points.
     """
 
     role: str
@@ -52,6 +54,7 @@ class ChainFall:
     heights: Array
     model: Trajectory | None
     delay_s: float
+    end_s: float = 0.0
 
     def curve(self, end_s: float) -> tuple[Array, Array]:
         """Model's heights from the fire stamp to a time; empty without a model.
@@ -70,7 +73,7 @@ def motions(
     protocol: Protocol,
     run: Run,
     edges: Table,
-    hz: float,
+    hz: float = 1.0,
     matches: Mapping[int, int] | None = None,
 ) -> tuple[ChainFall, ...]:
     """Turn a drop's edges into heights.
@@ -107,7 +110,13 @@ def motions(
         delay = 0.0
         if model is not None and times.size:
             delay = float(np.median(times - model.times(heights)))
-        falls.append(ChainFall(role, times, heights, model, delay))
+        end = float(times[-1]) if times.size else 0.0
+        if model is not None:
+            struck = model.hits is not None
+            levels = [level for part in parts for level in part.levels.tolist()]
+            lowest = np.array([min(levels, default=0.0)])
+            end = max(end, delay + float(model.time[-1] if struck else model.times(lowest)[0]))
+        falls.append(ChainFall(role, times, heights, model, delay, end))
     return tuple(falls)
 
 

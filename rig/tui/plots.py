@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.result import GOOD
-from rig.measurands import RELEASE_SKEW, acceleration_in, averaged
-from rig.tui.motion import motions, separation
+from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
+from rig.predictions import predicted_run
+from rig.tui.motion import model_fall, motions, separation
 from rig.tui.plotting import Picture, Series
 
 if TYPE_CHECKING:
@@ -27,13 +28,14 @@ _BEFORE_S = 0.02
 _WITH_BARS = 40  # numbers in a chart: the bars of more stand in each other's way
 _MOST = 300  # marks of a chain: more would stand on each other
 _LAID = 12  # drops over each other
+_STEPS = 400  # of a curve whose steps stand 10 ms apart
 _TIME = "t (ms)"
 
 
-def chain_pictures(
-    falls: tuple[ChainFall, ...], skew_s: float | None = None
-) -> tuple[Picture | None, Picture | None]:
-    """Draw z(t) of each chain and Δz(t), with the model's curves; `None` for what is not there.
+def fall_pictures(
+    falls: tuple[ChainFall, ...], skew_s: float | None = None, gap_u: float = 0.0
+) -> list[Picture]:
+    """Draw Δz(t) of two chains, then z(t), with the model's curves.
 
     Parameters
     ----------
@@ -42,12 +44,13 @@ def chain_pictures(
     skew_s
         What was measured of the release: Δz is then that of chains let go together, or else as it
         fell; z(t) always is as it fell.
+    gap_u
+        Expanded uncertainty of the model's Δz at its end, relative. Before, its band is as wide as
+        Δz is large: what the impacts leave open grows with what they did.
     """
     if not falls:
-        return None, None
-    measured = [float(fall.times[-1]) for fall in falls if fall.times.size]
-    expected = [float(fall.model.time[-1]) for fall in falls if fall.model is not None]
-    end = max(0.0, *measured, *expected) + _BEFORE_S
+        return []
+    end = max(fall.end_s for fall in falls) + _BEFORE_S
     series, residuals, pair = [], [], len(falls) > 1
     for fall in falls:
         times, heights = fall.curve(end)
@@ -62,18 +65,22 @@ def chain_pictures(
         if fall.model is not None and times.size:
             off = heights - fall.model.heights(times - fall.delay_s)[0]
             residuals.append(Series("dots", times * 1e3, off * 1e3, color, mark))
-    z = _against_time("z (cm) as it fell", series, residuals, end)
-    if not pair:
-        return z, None
-    gap = separation(falls, end, skew_s)
-    off = gap.gaps - gap.expected if gap.expected.size else gap.expected
-    series = [
-        Series("line", gap.curve * 1e3, gap.model * 1e2, "accent", label="model"),
-        Series("dots", gap.times * 1e3, gap.gaps * 1e2, "success", "+", "measured"),
-    ]
-    residuals = [Series("dots", gap.times[: off.size] * 1e3, off * 1e3, "success", "+")]
-    label = "as it fell" if skew_s is None else "corrected"
-    return z, _against_time(f"Δz {label} (cm)", series, residuals, end)
+    pictures = [_against_time("z (cm) as it fell", series, residuals, end)]
+    if pair:
+        gap = separation(falls, end, skew_s)
+        off = gap.gaps - gap.expected if gap.expected.size else gap.expected
+        curve, model = gap.curve * 1e3, gap.model * 1e2
+        series = [
+            Series("line", curve, model, "accent", label="model"),
+            Series("dots", gap.times * 1e3, gap.gaps * 1e2, "success", "+", "measured"),
+        ]
+        if gap_u:
+            band = Series("band", curve, model, "border", label="± U", errors=abs(gap_u * model))
+            series = [band, *series]
+        residuals = [Series("dots", gap.times[: off.size] * 1e3, off * 1e3, "success", "+")]
+        label = "as it fell" if skew_s is None else "corrected"
+        pictures = [_against_time(f"Δz {label} (cm)", series, residuals, end), *pictures]
+    return pictures
 
 
 def _against_time(
@@ -83,20 +90,17 @@ def _against_time(
                    residuals=tuple(residuals), residual_label="minus model (mm)")  # fmt: skip
 
 
-def drop_pictures(
-    view: SessionView, job: Job, edges: Table | None = None
-) -> tuple[Picture | None, Picture | None]:
+def drop_pictures(view: SessionView, job: Job, edges: Table | None = None) -> list[Picture]:
     """Draw a recorded drop, or its first `edges`, with rods and skew as the analysis found them."""
-    result, hz = view.results[job], view.scales[job].hz
+    result, hz, run = view.results[job], view.scales[job].hz, view.plan[job.run]
     skew = result.quantities.get(RELEASE_SKEW.name)
-    falls = motions(
-        view.protocol,
-        view.plan[job.run],
-        view.drops[job].edges if edges is None else edges,
-        hz,
-        result.matches or None,
-    )
-    return chain_pictures(falls, None if skew is None else skew.value)
+    edges = view.drops[job].edges if edges is None else edges
+    falls = motions(view.protocol, run, edges, hz, result.matches or None)
+    expected = predicted_run(view.protocol, run).get(SEPARATION.name)
+    gap_u = 2.0 * expected.u / abs(expected.value) if expected and expected.value else 0.0
+    speed = speed_picture(view, job)
+    pictures = fall_pictures(falls, None if skew is None else skew.value, gap_u)
+    return pictures if speed is None else [*pictures, speed]
 
 
 def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:
@@ -109,10 +113,10 @@ def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | Non
     for drop in (*rest, job):
         apart = None
         if RELEASE_SKEW.name in view.results[drop].quantities:
-            apart = drop_pictures(view, drop)[1]
+            apart = next(iter(drop_pictures(view, drop)), None)
         if apart is None:
             continue
-        model, dots = apart.series
+        *_, model, dots = apart.series
         if drop == job:
             series += [model, dots._replace(label=f"run {job.run}")]
         else:
@@ -146,8 +150,7 @@ def _bars(points: Sequence[Point], color: str, mark: str, label: str = "") -> Se
 
 def _over_runs(title: str, view: SessionView, series: Sequence[Series]) -> Picture:
     """Draw series over all runs of the plan."""
-    count = len(view.plan)
-    return Picture(title, "run", tuple(series), (0.5, count + 0.5), x_ticks=_whole(count))
+    return Picture(title, "run", tuple(series), (0.5, len(view.plan) + 0.5), counts=True)
 
 
 def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
@@ -276,7 +279,24 @@ def _chart(
     return _over_runs(title, view, series)
 
 
-def _whole(count: int) -> list[float]:
-    """At most about eight whole numbers up to a count."""
-    step = next(step for step in (1, 2, 5, 10, 20, 50, 100, 200, 500, 10**9) if count <= 8 * step)
-    return [float(number) for number in range(max(1, step), count + 1, step)]
+def speed_picture(view: SessionView, job: Job) -> Picture | None:
+    """Draw V(t) by the model, a step for each rod that strikes, and what was measured at its end.
+
+    `None` where no chain strikes, or the model has no answer.
+    """
+    run = view.plan[job.run]
+    fall = model_fall(view.protocol, run, "impact") if run.impact is not None else None
+    if fall is None or fall.hits is None:
+        return None
+    end = float(fall.time[-1])
+    times = np.linspace(0.0, end, _STEPS)
+    series = [Series("line", times * 1e3, fall.heights(times)[1], "accent", label="model")]
+    free = model_fall(view.protocol, run, "free")
+    if free is not None:
+        series.append(Series("line", times * 1e3, free.heights(times)[1], "secondary",
+                             label="free fall"))  # fmt: skip
+    measured = view.results[job].quantities.get(SPEED.name)
+    if measured is not None:
+        series.append(Series("bars", [end * 1e3], [measured.value], "primary", "●", "measured ± U",
+                             [measured.expanded]))  # fmt: skip
+    return Picture("V (m/s)", "t (ms)", tuple(series), (0.0, 1e3 * (end + _BEFORE_S)))

@@ -1,4 +1,8 @@
-"""One way to plot: curves, marks, error bars and residuals, all on the same dots of braille."""
+"""One way to plot: curves, bands, marks, error bars and residuals, all on the same dots of braille.
+
+An axis is a number of units a character: its ticks stand in the middle of the characters that name
+them, and what is drawn lies where the tick says, to the dot.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +20,11 @@ if TYPE_CHECKING:
 
     Numbers = Sequence[float] | Array
 
-_COLORS = ("foreground", "accent", "warning", "secondary", "primary", "success", "error")
+_COLORS = ("border", "foreground", "accent", "warning", "secondary", "primary", "success", "error")
 """Of series, the last above the others."""
-_TICK_COLUMNS, _TICK_ROWS = 9, 3
-"""What one number at an axis takes, with the room around it."""
-_FEWEST = 3  # numbers at an axis, however short it is
-_ROOM = 0.06  # of an axis, above and below what is drawn
+_TICK_COLUMNS, _TICK_ROWS = 9, 2
+"""Characters from one number at an axis to the next, at least."""
+_ROOM = 0.04  # of an axis, above and below what is drawn
 _STRIP_OF, _STRIP_LEAST, _STRIP_FROM = 4, 4, 12  # lines for one of residuals, and from how many on
 _NEAR = 0.03  # of the axis: as near as the cursor must be to a mark for its value
 _OUTSIDE = 4  # sheets: what is drawn farther away is drawn there
@@ -29,7 +32,6 @@ _SHAPES = {
     "●": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)],
     "+": [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)],
     "×": [(0, 0), (-1, -1), (1, -1), (-1, 1), (1, 1)],
-    "○": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y],
     "·": [(0, 0)],
 }
 """Dots of each marker around its place."""
@@ -42,16 +44,16 @@ class Series(NamedTuple):
     Attributes
     ----------
     kind
-        Line, markers, or markers with error bars.
+        Line, band as wide as the errors, markers, or markers with error bars.
     color
         Name of a theme's colour.
     marker
-        ``●``, ``○``, ``+``, ``×`` or ``·``; of a line unused.
+        ``●``, ``+``, ``×`` or ``·``; of lines and bands unused.
     label
         At the line where there is room, or else in the legend; empty for none.
     """
 
-    kind: Literal["line", "dots", "bars"]
+    kind: Literal["line", "band", "dots", "bars"]
     x: Numbers
     y: Numbers
     color: str = "foreground"
@@ -67,6 +69,8 @@ class Picture(NamedTuple):
     ----------
     y_label, x_label
         What is drawn, with its unit.
+    counts
+        Whether the horizontal axis counts something, so that its numbers are whole.
     residuals
         What is drawn in a strip below, if anything.
     residual_label
@@ -77,9 +81,82 @@ class Picture(NamedTuple):
     x_label: str
     series: tuple[Series, ...]
     x_limits: tuple[float | None, float | None] = (None, None)
-    x_ticks: Sequence[float] | None = None
+    counts: bool = False
     residuals: tuple[Series, ...] = ()
     residual_label: str = ""
+
+
+class Axis(NamedTuple):
+    """Units a character, such that numbers stand in the middle of characters.
+
+    Attributes
+    ----------
+    unit
+        Of one character.
+    first
+        Number of units in the middle of the first character, from below or from the left.
+    cells
+        Characters.
+    every
+        Characters from one tick to the next.
+    """
+
+    unit: float
+    first: int
+    cells: int
+    every: int
+
+    def at(self, values: Numbers, dots: int) -> Array:
+        """Where values are, in dots from the axis' beginning, with so many a character."""
+        place = np.asarray(values, dtype=np.float64) / self.unit - self.first
+        return np.clip(place, -_OUTSIDE * self.cells, _OUTSIDE * self.cells) * dots + _middle(dots)
+
+    def value(self, cell: float) -> float:
+        """Value in the middle of a character."""
+        return self.unit * (self.first + cell)
+
+    @property
+    def ticks(self) -> dict[int, float]:
+        """The number of each character that has one."""
+        begin = -self.first % self.every
+        return {
+            cell: float(f"{self.value(cell):.9g}") for cell in range(begin, self.cells, self.every)
+        }
+
+
+def _middle(dots: int) -> float:
+    return 0.5 * (dots - 1)
+
+
+def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = False) -> Axis:
+    """Find the axis that shows a range as large as there is room.
+
+    Parameters
+    ----------
+    low, high
+        Ends, low < high.
+    cells
+        Characters.
+    least
+        Characters from one tick to the next, at least.
+    whole
+        Whether ticks are whole numbers only.
+    """
+    power = math.floor(math.log10((high - low) / cells))
+    steps = [share * 10.0**exponent for exponent in range(power, power + 4) for share in (1, 2, 5)]
+    axes = []
+    for step in steps if not whole else [step for step in steps if step >= 1.0] or [1.0]:
+        most = min(cells, math.floor(step * (cells - 1) / (high - low)))
+        for every in range(most, max(0, most - 3), -1):
+            unit = step / every
+            first = math.floor(low / unit + 0.5)
+            axis = Axis(unit, first, cells, every)
+            if every >= least and high <= axis.value(cells - 0.5) and len(axis.ticks) > 1:
+                axes.append(axis)
+                break
+    fallback = Axis((high - low) / max(1, cells - 1), 0, cells, max(1, cells))
+    many = [axis for axis in axes if len(axis.ticks) > 2] or axes
+    return min(many, key=lambda axis: axis.unit, default=fallback)
 
 
 class Plot(NamedTuple):
@@ -91,28 +168,13 @@ class Plot(NamedTuple):
         Legend, plot, strip of residuals and horizontal axis, a list of spans a line.
     margin
         Characters left of what is drawn.
-    columns
-        Characters of what is drawn.
+    axis
+        The horizontal one.
     """
 
     rows: list[list[Span]]
     margin: int
-    columns: int
-
-
-class _Axis(NamedTuple):
-    """One axis: its ends, and where on a sheet they are, in dots."""
-
-    low: float
-    high: float
-    first: float
-    last: float
-
-    def at(self, values: Numbers) -> Array:
-        """Where values are, in dots."""
-        share = (np.asarray(values, dtype=np.float64) - self.low) / (self.high - self.low)
-        reach = _OUTSIDE * abs(self.last - self.first)
-        return np.clip(self.first + share * (self.last - self.first), -reach, reach)
+    axis: Axis
 
 
 def plotted(picture: Picture, width: int, height: int, cursor: float | None = None) -> Plot:
@@ -125,24 +187,23 @@ def plotted(picture: Picture, width: int, height: int, cursor: float | None = No
     cursor
         Where on the horizontal axis values are read off; `None` for nowhere.
     """
-    lows, highs = spread(picture)
     strip = _strip(picture, height)
-    upper, lower = _roomy(picture.series), _roomy(picture.residuals, level=0.0)
     rows = max(1, height - 3 - strip - (cursor is not None))
-    upright = ticks(*upper, max(_FEWEST, rows // _TICK_ROWS))
-    beside = ticks(*lower, _FEWEST) if strip else []
-    margin = 1 + max(len(_number(value)) for value in (*upright, *beside))
+    upright = axis_over(*_roomy(picture.series), rows, min(_TICK_ROWS, max(1, rows // 3)))
+    lower = axis_over(*_roomy(picture.residuals, level=0.0), max(1, strip - 1), 1)
+    numbers = [*upright.ticks.values(), *(lower.ticks.values() if strip else ())]
+    margin = 1 + max((len(_number(value)) for value in numbers), default=0)
     columns = max(1, width - margin - 1)
-    x = _Axis(lows, highs, 0.0, COLUMNS * columns - 1.0)
-    lines, labels = _panel(picture.series, columns, rows, x, upper, cursor)
+    x = axis_over(*spread(picture), columns, _TICK_COLUMNS, whole=picture.counts)
+    lines, labels = _panel(picture.series, x, upright, cursor)
     read = [] if cursor is None else [_readings(picture, cursor, width)]
-    out = [legend(picture, labels, width), *read, *_framed(lines, upright, upper, margin)]
+    out = [_legend(picture, labels, width), *read, *_framed(lines, upright, margin)]
     if strip:
-        rows_of_strip, _ = _panel(picture.residuals, columns, strip - 1, x, lower, cursor)
+        residual_rows, _ = _panel(picture.residuals, x, lower, cursor)
         head = f" {picture.residual_label} "[:columns]
         out.append([Span(" " * margin + "├" + head + "╌" * (columns - len(head)))])
-        out += _framed(rows_of_strip, beside, lower, margin)
-    return Plot([*out, *_foot(picture, x, columns, margin)], margin + 1, columns)
+        out += _framed(residual_rows, lower, margin)
+    return Plot([*out, *_foot(picture.x_label, x, margin)], margin + 1, x)
 
 
 def spread(picture: Picture) -> tuple[float, float]:
@@ -154,14 +215,8 @@ def spread(picture: Picture) -> tuple[float, float]:
     return (low, high) if low < high else (low - 0.5, low + 0.5)
 
 
-def legend(picture: Picture, labels: Collection[str], width: int) -> list[Span]:
-    """Say what is drawn: the upright axis, then what each mark means.
-
-    Parameters
-    ----------
-    labels
-        Labels that stand where they belong.
-    """
+def _legend(picture: Picture, labels: Collection[str], width: int) -> list[Span]:
+    """Say what is drawn: the upright axis, then each mark that is not named beside its line."""
     parts = [Span(picture.y_label, bold=True)]
     for line in picture.series:
         if line.label and len(line.x) and line.label not in labels:
@@ -188,78 +243,58 @@ def _number(value: float) -> str:
 
 
 def _mark(curve: Series) -> str:
-    return "⠒⠒" if curve.kind == "line" else curve.marker
-
-
-def ticks(low: float, high: float, limit: int) -> list[float]:
-    """Choose round numbers between two, at least three and otherwise at most so many.
-
-    Parameters
-    ----------
-    low, high
-        Ends, low < high.
-    limit
-        That fit; steps are 1, 2 or 5 times a power of ten.
-    """
-    power = 10.0 ** math.floor(math.log10(high - low))
-    chosen: list[float] = []
-    for step in (share * power for power in (power, power / 10.0) for share in (5, 2, 1)):
-        first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-        values = [float(f"{number * step:.12g}") for number in range(first, last + 1)]
-        if len(chosen) >= _FEWEST and len(values) > limit:
-            break
-        chosen = values
-    return chosen
+    return {"line": "⠒⠒", "band": "⣿⣿"}.get(curve.kind, curve.marker)
 
 
 def _panel(
-    series: Sequence[Series],
-    columns: int,
-    rows: int,
-    x: _Axis,
-    ends: tuple[float, float],
-    cursor: float | None,
+    series: Sequence[Series], x: Axis, y: Axis, cursor: float | None
 ) -> tuple[list[list[Span]], set[str]]:
     """Draw series on one pair of axes; and say which labels were written there."""
-    sheet = Sheet(columns, rows, _COLORS)
-    y = _Axis(*ends, ROWS * rows - 1.0, 0.0)
+    sheet = Sheet(x.cells, y.cells, _COLORS)
     if cursor is not None:
-        down = np.arange(0, ROWS * rows, 2.0)
-        across = np.full(down.size, float(x.at([cursor])[0]))
-        sheet.dots(np.column_stack([across, down]), 0)
+        down = np.arange(0, ROWS * y.cells, 2.0)
+        across = np.full(down.size, float(x.at([cursor], COLUMNS)[0]))
+        sheet.dots(np.column_stack([across, down]), 1)
     for curve in series:
         if len(curve.x):
             _draw(sheet, curve, x, y)
-    labels = {curve.label for curve in series if _named(sheet, curve, x, y)}
-    return sheet.rows(), labels
+    return sheet.rows(), {curve.label for curve in series if _named(sheet, curve, x, y)}
 
 
-def _draw(sheet: Sheet, curve: Series, x: _Axis, y: _Axis) -> None:
+def _places(x: Axis, y: Axis, across: Numbers, up: Numbers) -> Array:
+    """Where points are on a sheet, in dots from the top left."""
+    down = ROWS * y.cells - 1.0 - y.at(up, ROWS)
+    return np.column_stack([x.at(across, COLUMNS), down])
+
+
+def _draw(sheet: Sheet, curve: Series, x: Axis, y: Axis) -> None:
     ink = _COLORS.index(curve.color)
-    places = np.column_stack([x.at(curve.x), y.at(curve.y)])
+    places = _places(x, y, curve.x, curve.y)
     if curve.kind == "line":
         sheet.strokes(np.stack([places[:-1], places[1:]], axis=1), ink)
         return
-    if curve.kind == "bars":
-        off = np.asarray(curve.errors, dtype=np.float64)
-        for sign in (-1.0, 1.0):
-            tips = np.column_stack([places[:, 0], y.at(np.asarray(curve.y) + sign * off)])
-            sheet.strokes(np.stack([places, tips], axis=1), ink)
-            sheet.strokes(tips[:, None] + _CAP, ink)
+    if curve.kind in {"band", "bars"}:
+        values, off = np.asarray(curve.y), np.asarray(curve.errors, dtype=np.float64)
+        tips = [_places(x, y, curve.x, values + sign * off) for sign in (-1.0, 1.0)]
+        sheet.strokes(np.stack(tips, axis=1), ink)
+        if curve.kind == "band":
+            return
+        for tip in tips:
+            sheet.strokes(tip[:, None] + _CAP, ink)
     places = np.rint(places[np.isfinite(places).all(axis=1)])
     shape = np.array(_SHAPES[curve.marker], dtype=np.float64)
     sheet.dots((places[:, None] + shape).reshape(-1, 2), ink)
 
 
-def _named(sheet: Sheet, curve: Series, x: _Axis, y: _Axis) -> bool:
+def _named(sheet: Sheet, curve: Series, x: Axis, y: Axis) -> bool:
     """Write a line's name beside it, where nothing else is drawn; whether there was room."""
     if curve.kind != "line" or not curve.label or not len(curve.x):
         return False
-    across, up = x.at(curve.x), y.at(curve.y)
-    finite = np.flatnonzero(np.isfinite(across) & np.isfinite(up))
+    places = _places(x, y, curve.x, curve.y)
+    places = places[np.isfinite(places).all(axis=1)].astype(int)
     length = len(curve.label)
-    for point in finite[:: -max(1, finite.size // 16)]:
-        row, end = int(up[point]) // ROWS, int(across[point]) // COLUMNS
+    for across, down in places[:: -max(1, len(places) // 16)].tolist():
+        row, end = down // ROWS, across // COLUMNS
         for at, column in ((row - 1, end - length), (row + 1, end - length), (row - 1, end)):
             if sheet.free(at, column, length):
                 sheet.write(at, column, Span(curve.label, curve.color))
@@ -267,44 +302,36 @@ def _named(sheet: Sheet, curve: Series, x: _Axis, y: _Axis) -> bool:
     return False
 
 
-def _framed(
-    lines: list[list[Span]], numbers: Sequence[float], ends: tuple[float, float], margin: int
-) -> Iterator[list[Span]]:
+def _framed(lines: list[list[Span]], axis: Axis, margin: int) -> Iterator[list[Span]]:
     """Set the upright axis before the lines of a panel."""
-    axis = _Axis(*ends, ROWS * len(lines) - 1.0, 0.0)
-    where = {round(float(axis.at([value])[0])) // ROWS: value for value in numbers}
     for row, line in enumerate(lines):
-        number = _number(where[row]) if row in where else ""
+        value = axis.ticks.get(axis.cells - 1 - row)
+        number = "" if value is None else _number(value)
         yield [Span(f"{number:>{margin}}{'┤' if number else '│'}"), *line]
 
 
-def _foot(picture: Picture, x: _Axis, columns: int, margin: int) -> Iterator[list[Span]]:
+def _foot(label: str, axis: Axis, margin: int) -> Iterator[list[Span]]:
     """Write the horizontal axis with its numbers, and what it is where there is most room right."""
-    numbers = picture.x_ticks or ticks(x.low, x.high, max(_FEWEST, columns // _TICK_COLUMNS))
-    line, below = ["─"] * columns, [" "] * (margin + 1 + columns)
-    used = -1
-    for value in numbers:
-        column, text = round(float(x.at([value])[0])) // COLUMNS, _number(value)
-        if not 0 <= column < columns:
-            continue
+    width = margin + 1 + axis.cells
+    line, below = ["─"] * axis.cells, [" "] * width
+    for column, value in axis.ticks.items():
+        text = _number(value)
         line[column] = "┴"
-        begin = min(max(0, margin + 1 + column - len(text) // 2), len(below) - len(text))
-        if begin > used:
-            below[begin : begin + len(text)] = text
-            used = begin + len(text)
-    written, room = "".join(below), " " * (len(picture.x_label) + 2)
-    at = (written + " ").rfind(room)
-    at = len(written) - len(room) if at < 0 else at
-    label = picture.x_label[: len(written)]
-    written = f"{written[: at + 1]}{label}{written[at + 1 + len(label) :]}"[: len(below)]
+        begin = min(margin + 1 + column - len(text) // 2, width - len(text))
+        below[begin : begin + len(text)] = text
+    written = "".join(below)
+    at = (written + " ").rfind(" " * (len(label) + 2))
     yield [Span(" " * margin + "└" + "".join(line))]
-    yield [Span(written)]
+    if at < 0:  # no room between the numbers
+        yield [Span(f"{written.rstrip()} {label}"[:width])]
+    else:
+        yield [Span(f"{written[: at + 1]}{label}{written[at + 1 + len(label) :]}")]
 
 
 def _read(curve: Series, at: float, near: float) -> str:
     """Say what a series is at the cursor."""
     x, y = np.asarray(curve.x, dtype=np.float64), np.asarray(curve.y, dtype=np.float64)
-    if curve.kind == "line":
+    if curve.kind in {"line", "band"}:
         inside = x.size > 0 and x.min() <= at <= x.max()
         return _number(float(np.interp(at, x, y))) if inside else "–"
     point = int(np.argmin(np.abs(x - at)))

@@ -1,4 +1,4 @@
-"""Both chains to scale at one moment of a drop, as strokes in metres: rods, board, gates, Δz.
+"""A rig to scale at one moment of a drop, as strokes in metres: what falls, board, posts, Δz.
 
 Heights are above the contact point, as those of falls and films are.
 """
@@ -6,11 +6,13 @@ Heights are above the contact point, as those of falls and films are.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rig.protocol.contact import at_contact
+from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 
 _WIDTH_M = 0.1  # of a rod whose length nobody stated
 _MARGIN_M = 0.04
+_BALL = 0.012  # of the height that is shown: a smaller ball would not be seen
+_COLORS = ("border", "foreground", "accent", "primary", "secondary", "success", "warning")
 
 
 class Stroke(NamedTuple):
@@ -34,6 +38,15 @@ class Stroke(NamedTuple):
     color: str
 
 
+class Lamp(NamedTuple):
+    """Channel of a gate, and where its beam begins, m."""
+
+    channel: int
+    x: float
+    z: float
+    lit: bool
+
+
 class Drawing(NamedTuple):
     """Strokes, and what of the world they show, m; `apart_m` is Δz as far as it was measured."""
 
@@ -42,6 +55,7 @@ class Drawing(NamedTuple):
     bottom_m: float
     top_m: float
     apart_m: float | None
+    lamps: tuple[Lamp, ...] = ()
 
 
 def drawing(
@@ -52,7 +66,7 @@ def drawing(
     time_s: float,
     film: Film | None = None,
 ) -> Drawing:
-    """Draw each chain as measured, and beside it where the model has it.
+    """Draw what falls as measured, over where the model has it, between the posts of its gates.
 
     Parameters
     ----------
@@ -67,34 +81,46 @@ def drawing(
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
+    lamps: list[Lamp] = []
     names = {"impact": run.impact, "free": run.free}
     pitch = 2.4 * max(_rod_m(protocol, name) for name in names.values())
     half = 0.5 * pitch
     length = max(rods.chain.length for rods in protocol.chains.values())
+    gates = protocol.gates.gates if protocol.gates else ()
+    top = protocol.drop.value + length + _MARGIN_M
+    # A free chain that passes the contact point is shown as far down as one that struck it lies.
+    lowest = min((gate.height - length for gate in gates), default=0.0)
+    bottom = -0.35 * length if protocol.surface else lowest - _MARGIN_M
     for column, fall in enumerate(falls):
         side: Side = "impact" if fall.role == "impact" else "free"
-        name = names[side]
+        name = names[side] or run.impact
         assert name is not None
-        left, right = pitch * (2 * column + 0.5), pitch * (2 * column + 1.5)
+        middle = pitch * (2.0 * column + 1.2)
+        own = [gate for gate in gates if gate.side == side]
+        reach = [gate.height + sign * _MARGIN_M for gate in own for sign in (-1.0, 1.0)]
+        for x in (middle - half, middle + half):
+            post = Stroke(x, min(reach, default=0.0), x, max(reach, default=0.0), "border")
+            strokes += [post] if reach else []
+        for gate in own:
+            lit = gate.channel in indicators.blocked
+            lamps.append(Lamp(gate.channel, middle - half, gate.height, lit))
+            end, color = (middle + half, "warning") if lit else (middle - 0.8 * half, "foreground")
+            strokes.append(Stroke(middle - half, gate.height, end, gate.height, color))
         model = _model(fall, time_s)
         if model is not None:
-            strokes += _rods(protocol, name, side, right, model, "accent")
+            strokes += _rods(protocol, name, side, middle, model, "accent", top - bottom)
         if fall.times.size:
             color = "primary" if side == "impact" else "secondary"
             if film is not None and side == "impact":
-                strokes += _filmed(film, left, time_s - fall.delay_s, color)
+                strokes += _filmed(film, middle, time_s - fall.delay_s, color)
             else:
                 hangs = model is not None and time_s < fall.times[0]
                 height = model if hangs and model is not None else _measured(fall, time_s)
-                strokes += _rods(protocol, name, side, left, height, color)
-        for gate in protocol.gates.on(side) if protocol.gates else ():
-            lit = gate.channel in indicators.blocked
-            end, color = (left + half, "warning") if lit else (left - 0.7 * half, "foreground")
-            strokes.append(Stroke(left - half, gate.height, end, gate.height, color))
+                strokes += _rods(protocol, name, side, middle, height, color, top - bottom)
         if side == "impact":
             fallen = half * math.tan(math.radians(run.incline_deg))
-            strokes.append(Stroke(left - half, fallen, left + half, -fallen, "foreground"))
-    width = 2.0 * pitch * max(1, len(falls))
+            strokes.append(Stroke(middle - half, fallen, middle + half, -fallen, "foreground"))
+    width = 2.0 * pitch * max(1, len(falls)) + 0.4 * pitch
     apart = None
     begun = [fall for fall in falls if fall.times.size and fall.times[0] <= time_s]
     if len(begun) == 2:
@@ -104,12 +130,43 @@ def drawing(
             for fall, name in zip(begun, names.values(), strict=True)
             if name is not None
         )
-        apart, at = high - low, 0.5 * width
+        apart, at = high - low, 2.2 * pitch
         strokes.append(Stroke(at, low, at, high, "success"))
         strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in (low, high)]
-    top = protocol.drop.value + length + _MARGIN_M
-    # A free chain that passes the contact point is shown as far down as one that struck it lies.
-    return Drawing(tuple(strokes), width, -0.35 * length, top, apart)
+    return Drawing(tuple(strokes), width, bottom, top, apart, tuple(lamps))
+
+
+def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
+    """Draw into so many columns and lines of characters, the last line in words.
+
+    A dot is as high as it is wide.
+    """
+    rows = max(1, height - 1)
+    scale = min(
+        (ROWS * rows - 1) / (drawing.top_m - drawing.bottom_m),
+        (COLUMNS * width - 1) / drawing.width_m,
+    )
+    top = drawing.top_m
+    left = 0.5 * ((COLUMNS * width - 1) / scale - drawing.width_m)
+    sheet = Sheet(width, rows, _COLORS)
+    rows_named: dict[tuple[int, int], list[Lamp]] = {}
+    for lamp in drawing.lamps:
+        place = round(scale * (top - lamp.z)) // ROWS, round(scale * (left + lamp.x)) // COLUMNS
+        rows_named.setdefault(place, []).append(lamp)
+    for (row, column), lamps in rows_named.items():
+        lit = any(lamp.lit for lamp in lamps)
+        text = ",".join(str(lamp.channel) for lamp in sorted(lamps)) + " ○●"[1 + lit]
+        if sheet.free(row, column - len(text), len(text)):
+            color = "warning" if lit else "foreground"
+            sheet.write(row, column - len(text), Span(text, color, bold=lit))
+    ends = np.array(
+        [[(s.x + left, top - s.z), (s.to_x + left, top - s.to_z)] for s in drawing.strokes]
+    )
+    inks = np.array([_COLORS.index(stroke.color) for stroke in drawing.strokes], dtype=np.int64)
+    sheet.strokes(scale * ends.reshape(-1, 2, 2), inks)
+    apart = "" if drawing.apart_m is None else f"  Δz {drawing.apart_m * 1e2:.1f} cm as it falls"
+    words = [Span("model", "accent"), Span(" behind measured"), Span(apart, "success", bold=True)]
+    return [*sheet.rows(), words]
 
 
 def _rod_m(protocol: Protocol, name: str | None) -> float:
@@ -132,11 +189,18 @@ def _model(fall: ChainFall, time_s: float) -> float | None:
 
 
 def _rods(
-    protocol: Protocol, name: str, side: Side, x: float, height: float, color: str
+    protocol: Protocol, name: str, side: Side, x: float, height: float, color: str, shown_m: float
 ) -> Iterator[Stroke]:
-    """Rods on their strings; those that struck lie at the contact point."""
+    """Rods on their strings; those that struck lie at the contact point. An object is round."""
     rods = protocol.chains[name]
     half = 0.5 * _rod_m(protocol, name)
+    if protocol.vocabulary.part == "object":
+        radius = max(0.5 * rods.widths[0], _BALL * shown_m)
+        around = np.linspace(0.0, 2.0 * np.pi, 13)
+        points = np.column_stack([x + radius * np.cos(around), height + radius * np.sin(around)])
+        for (from_x, from_z), (to_x, to_z) in pairwise(points.tolist()):
+            yield Stroke(from_x, from_z, to_x, to_z, color)
+        return
     lies = side == "impact" and protocol.surface is not None
     for number, place in enumerate(rods.chain.heights):
         z = height + place

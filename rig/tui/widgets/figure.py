@@ -21,42 +21,35 @@ _STEPS = 100  # of the cursor from end to end
 class Figure(SpanView):
     """A picture, as large as there is room for."""
 
-    DEFAULT_CSS = "Figure { width: 1fr; height: 1fr; min-height: 6; padding: 0 1 0 0; }"
-
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
-        super().__init__(id=id)
-        self._drawn: object = None
+    def __init__(self) -> None:
+        super().__init__()
         self._at = -PAUSE_S
         self._picture: Picture | None = None
         self._share: float | None = None  # of the horizontal axis, where the cursor is
-        self._across = (0, 1)  # columns before the axis, and of it
+        self._margin, self._low, self._unit = 0, 0.0, 1.0  # of the drawn axis
 
-    def wants(self, key: object) -> bool:
-        """Whether what `key` stands for is not drawn yet, and the last drawing was long ago."""
-        return key != self._drawn and monotonic() - self._at >= PAUSE_S
-
-    def show(self, picture: Picture | None, key: object = None) -> None:
-        """Draw; with no picture, give the room to others."""
-        self._drawn, self._at = key, monotonic()
-        self._picture = picture
+    def show(self, picture: Picture | None) -> None:
+        """Draw another picture, if the last one was long ago; with none, give the room away."""
         self.display = picture is not None
-        self._draw()
+        if picture is not self._picture and (
+            picture is None or self._picture is None or monotonic() - self._at >= PAUSE_S
+        ):
+            self._picture, self._at = picture, monotonic()
+            self._draw()
 
     def step(self, by: int) -> None:
         """Move the cursor; the first step puts it into the middle."""
         self._put(0.5 if self._share is None else self._share + by / _STEPS)
 
-    def point_at(self, value: float | None) -> None:
-        """Put the cursor at a value of the horizontal axis, or take it away."""
-        if self._picture is None:
-            return
-        low, high = spread(self._picture)
-        self._put(None if value is None else (value - low) / (high - low))
+    def point_at(self, value: float) -> None:
+        """Put the cursor at a value of the horizontal axis."""
+        if self._picture is not None:
+            low, high = spread(self._picture)
+            self._put((value - low) / (high - low))
 
-    def _put(self, share: float | None) -> None:
-        """Put the cursor at a share of the horizontal axis, or at its end, or take it away."""
-        if share is not None:
-            share = min(1.0, max(0.0, share))
+    def _put(self, share: float) -> None:
+        """Put the cursor at a share of the horizontal axis, or at its end."""
+        share = min(1.0, max(0.0, share))
         if share != self._share:
             self._share = share
             self._draw()
@@ -68,9 +61,8 @@ class Figure(SpanView):
     def on_click(self, event: events.Click) -> None:
         """Put the cursor there."""
         offset = event.get_content_offset(self)
-        margin, columns = self._across
         if offset is not None:
-            self._put((offset.x - margin + 0.5) / columns)
+            self.point_at(self._low + self._unit * (offset.x - self._margin))
 
     def _draw(self) -> None:
         if self._picture is None or not self.size:
@@ -80,5 +72,5 @@ class Figure(SpanView):
             low, high = spread(self._picture)
             cursor = low + self._share * (high - low)
         plot = plotted(self._picture, self.size.width, self.size.height, cursor)
-        self._across = plot.margin, plot.columns
+        self._margin, self._low, self._unit = plot.margin, plot.axis.value(0), plot.axis.unit
         self.take(plot.rows)

@@ -6,7 +6,6 @@ from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from textual.containers import Grid, VerticalScroll
 from textual.content import Content
 
 from rig.analysis.joint_fit import FEWEST
@@ -15,84 +14,36 @@ from rig.measurands import averaged
 from rig.protocol.protocol import Condition
 from rig.report.numbers import fixed, plus_minus
 from rig.report.parts import main_error
+from rig.tui.desk import Face
+from rig.tui.looks import LOOKS
 from rig.tui.plots import control_pictures, inclined, meaning
-from rig.tui.screens.page import Page
-from rig.tui.widgets.banner import LOOKS
-from rig.tui.widgets.figure import Figure
-from rig.tui.widgets.text import Words, duration, plain
+from rig.tui.widgets.text import duration, plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from textual.app import ComposeResult
-
     from rig.analysis.summary import Incline
     from rig.campaign.plan import RunLine
-    from rig.tui.context import Options
+    from rig.tui.desk import Desk
     from rig.tui.model import Model
 
 
-_FIGURES = ("separation", "speed", "control", "second")
-
-
-class SessionPage(Page):
-    """Plan, results against incline, control chart."""
-
-    SCOPED_CSS = False
-    DEFAULT_CSS = """
-    SessionPage #plan { height: auto; max-height: 8; padding: 0 1; }
-    .-wide SessionPage #plan { max-height: 24; }
-    SessionPage #figures { height: 1fr; grid-size: 2 2; grid-rows: 3fr 2fr; }
-    SessionPage #meaning { color: $foreground 80%; }
-    SessionPage #control { column-span: 2; }
-    .-low SessionPage #figures { grid-size: 2 1; grid-rows: 1fr; }
-    .-low SessionPage #control, .-wide SessionPage #control { column-span: 1; }
-    .-wide SessionPage #figures { grid-rows: 1fr 1fr; }
-    .-low SessionPage #plan { max-height: 5; }
-    """
-
-    def __init__(self, options: Options) -> None:
-        super().__init__(options)
-        self._chart = 0
-
-    def compose(self) -> ComposeResult:
-        yield Words(id="progress")
-        with VerticalScroll(id="plan", can_focus=False):
-            yield Words(id="lines")
-        with Grid(id="figures"):
-            for name in _FIGURES:
-                yield Figure(id=name)
-        yield Words(id="meaning")
-
-    def show(self, model: Model) -> None:
-        """Draw what holds now."""
-        self.say("progress", _progress(model))
-        self.say("lines", _plan(model))
-        figures = [self.query_one(f"#{name}", Figure) for name in _FIGURES]
-        view = model.view
-        if view is None:
-            for figure in figures:
-                figure.show(None)
-            return
-        low, wide = self.screen.has_class("-low"), self.screen.has_class("-wide")
-        key = (view.path, view.reading, self._chart, low, wide)
-        if not any(figure.wants(key) for figure in figures):
-            return
-        means, charts = inclined(view.analysis, view.curves), control_pictures(view)
-        turned = [*charts[self._chart % len(charts) :], *charts] if charts else []
-        speed = [] if low else means[1:2]  # no room for both; Δz says more
-        charted = charts[:2] if wide else turned[:1]
-        self.say("meaning", "\n".join(meaning(picture.y_label) for picture in charted))
-        for figure, data in zip(figures, (means[:1], speed, charted[:1], charted[1:]), strict=True):
-            figure.show(next(iter(data), None), key)
-
-    def other_chart(self) -> None:
-        """Show the other quantity in the control chart."""
-        self._chart += 1
-
-    def move(self, by: int) -> None:
-        """Scroll the plan."""
-        self.query_one("#plan", VerticalScroll).scroll_relative(y=by, animate=False)
+def face(model: Model, desk: Desk, width: int) -> Face:
+    """Show the plan, results against incline, and control charts."""
+    del width
+    head = Content("\n").join([_progress(model), _plan(model)])
+    view = model.view
+    if view is None:
+        return Face(head)
+    means, charts = desk.latest(
+        "charts", (view.path, view.reading),
+        lambda: (inclined(view.analysis, view.curves), control_pictures(view)),
+    )  # fmt: skip
+    turned = desk.chart % max(1, len(charts))
+    # Δz says more than V does, so a chart comes before V.
+    pictures = [*means[:1], *charts[turned:], *charts[:turned], *means[1:]]
+    foot = meaning(charts[turned].y_label) if charts else ""
+    return Face(head, pictures=pictures, foot=Content(foot), beside=2)
 
 
 def _progress(model: Model) -> Content:

@@ -1,4 +1,4 @@
-"""State of the rig: connection, firmware, clock, and an indicator for every gate."""
+"""State of the rig: connection, firmware, clock, and a line for every gate."""
 
 from __future__ import annotations
 
@@ -8,38 +8,28 @@ from textual.content import Content
 
 from rig.campaign.events import Stage
 from rig.report.numbers import decimals_for, fixed
-from rig.tui.screens.page import Page
-from rig.tui.widgets.gates import GateBoard, named
-from rig.tui.widgets.text import Words, checked, plain
+from rig.tui.desk import Face
+from rig.tui.motion import motions
+from rig.tui.scale import drawing
+from rig.tui.widgets.gates import board, named
+from rig.tui.widgets.text import checked, plain
 
 if TYPE_CHECKING:
-    from textual.app import ComposeResult
-
+    from rig.tui.desk import Desk
     from rig.tui.model import Model
 
 
-class DevicePage(Page):
-    """What is connected, and what its gates see."""
-
-    SCOPED_CSS = False
-    DEFAULT_CSS = """
-    DevicePage #facts { padding: 0 1 1 1; }
-    DevicePage #check { padding: 1 1 0 1; }
-    .-low DevicePage #facts { padding: 0 1; }
-    """
-
-    def compose(self) -> ComposeResult:
-        yield Words(id="facts")
-        yield GateBoard(id="indicators")
-        yield Words(id="check")
-        yield Words(id="release")
-
-    def show(self, model: Model) -> None:
-        """Draw what holds now."""
-        self.say("facts", _facts(model))
-        self.query_one(GateBoard).show(model.protocol, model.indicators, model.now_s)
-        self.say("check", _gate_check(model))
-        self.say("release", _release(model))
+def face(model: Model, desk: Desk, width: int) -> Face:
+    """Show what is connected, and what its gates see."""
+    del width
+    protocol, run = model.protocol, model.run
+    picture = None
+    if protocol is not None and run is not None:
+        falls = desk.latest("hanging", (protocol, run), lambda: motions(protocol, run, ()))
+        picture = drawing(protocol, run, falls, model.indicators, 0.0)
+    gates = board(protocol, model.indicators, model.now_s)
+    words = [*gates, Content(""), _gate_check(model), _release(model)]
+    return Face(_facts(model), picture, words=Content("\n").join(words), top=True)
 
 
 def _facts(model: Model) -> Content:

@@ -1,4 +1,4 @@
-"""The verdict, large enough to be seen from the rig."""
+"""Symbol and colour of every state of a run, and the verdict in words."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ LOOKS = {
     "interrupted": ("■", "$warning"),
     "planned": ("·", "$foreground 70%"),
 }
-"""Symbol and colour of every state of a run."""
 _REMEDIES = 2
 """Things to do that are shown: what else is wrong shows when these are mended."""
 
@@ -33,15 +32,11 @@ def verdict_words(model: Model) -> Content:
     """Write the verdict and its reasons."""
     if model.job is None:
         return Content(model.loading or "No drop yet.")
-    run = f"run {model.job.run}, attempt {model.job.attempt}"
     verdict, reasons = model.verdict
     if not verdict:
-        return Content(model.loading or f"{run}: no verdict yet")
+        return Content(model.loading or "no verdict yet")
     symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
-    lines = [
-        Content.assemble((f" {symbol} {verdict.upper()} ", f"bold $background on {colour}"),
-                         f"  {run}")
-    ]  # fmt: skip
+    lines = [Content.styled(f" {symbol} {verdict.upper()} ", f"bold $background on {colour}")]
     lines += [Content.assemble("  ", (plain(reason, 200), "")) for reason in reasons[:4]]
     if len(reasons) > 4:
         lines.append(Content(f"  and {len(reasons) - 4} more reasons, in the session file"))

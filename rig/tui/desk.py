@@ -1,0 +1,189 @@
+"""What the operator looks at: which drop, which moment, which row, which part of a page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from textual.content import Content
+
+from rig.tui.choosing import chosen
+from rig.tui.replay import Player, end_of
+from rig.tui.survey import Survey, first_row, read_file, rows_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from rig.records import Job
+    from rig.results.live import SessionView
+    from rig.tui.context import Options
+    from rig.tui.model import Model
+    from rig.tui.plotting import Picture
+    from rig.tui.scale import Drawing
+    from rig.tui.survey import Reading, Row
+
+T = TypeVar("T")
+REPLAY_S = 6.0
+"""How long the slow motion after a fall lasts."""
+
+
+class Face(NamedTuple):
+    """What a page shows, as data.
+
+    Attributes
+    ----------
+    head, foot
+        Above and below all else.
+    drawing
+        The rig to scale.
+    pictures
+        Plots, the most wanted first; `beside` of them at once on a screen of 120 columns.
+    cursor
+        Where the plots are read off; `None` where the operator has put the cursor.
+    words
+        Tables. Where there is no room for drawing, plots and tables, Tab turns to the others.
+    digits
+        Large digits over the drawing.
+    menu
+        A list to choose from, left of all else.
+    top
+        Whether words come before the drawing.
+    """
+
+    head: Content
+    drawing: Drawing | None = None
+    pictures: Sequence[Picture] = ()
+    cursor: float | None = None
+    words: Content = Content("")
+    foot: Content = Content("")
+    digits: str = ""
+    beside: int = 1
+    menu: Content = Content("")
+    top: bool = False
+
+
+class Desk:
+    """What is looked at.
+
+    Attributes
+    ----------
+    tape, replay
+        Of the history page, and of the latest drop after its fall.
+    other
+        Another session than the one in hand, on the history page.
+    words
+        Which drops are looked at, as `rig.tui.choosing` reads them.
+    comparing
+        Whether all drops that are looked at lie over each other.
+    replayed
+        The latest drop whose slow motion was begun.
+    chart, part, row
+        How often another plot, and another part of the page, was asked for; the row of a list.
+    """
+
+    def __init__(self, options: Options) -> None:
+        self.options = options
+        self.tape = Player()
+        self.replay = Player()
+        self.other: SessionView | None = None
+        self.words = ""
+        self.comparing = False
+        self.chart = self.part = 0
+        self.row = -1  # none yet
+        self.rows: list[Row] = []
+        self.opened: Path | None = None  # the protocol that was opened here last
+        self.survey = Survey()
+        self.replayed: Job | None = None
+        self._latest: dict[str, tuple[object, Any]] = {}
+
+    def latest(self, name: str, key: object, work: Callable[[], T]) -> T:
+        """Return what `work` gives, worked out anew only where `key` differs from the last time.
+
+        Pages are drawn many times a second, and what they show may take long.
+        """
+        if name not in self._latest or self._latest[name][0] != key:
+            self._latest[name] = key, work()
+        value: T = self._latest[name][1]
+        return value
+
+    @property
+    def chosen(self) -> Row | None:
+        """The row of the home page that Enter takes."""
+        return self.rows[self.row % len(self.rows)] if self.rows else None
+
+    def reading(self, file: Path) -> Reading:
+        """A protocol, read again when it changed: it may be open in an editor beside this."""
+        try:
+            changed_ns = file.stat().st_mtime_ns
+        except OSError:
+            changed_ns = -1
+        return self.latest("reading", (file, changed_ns), lambda: read_file(file))
+
+    def begin_with(self, port: str, other: str) -> None:
+        """List what can be begun, and keep the row that was chosen."""
+        before = self.chosen
+        self.rows = rows_of(self.survey, port, other)
+        if before in self.rows:
+            self.row = self.rows.index(before)
+        elif self.survey.ready:
+            self.row = first_row(self.rows, self.options)
+
+    def view(self, model: Model) -> SessionView | None:
+        """The session of the history page; `None` without a drop."""
+        view = self.other or model.view
+        return view if view and view.jobs else None
+
+    def jobs(self, model: Model) -> tuple[Job, ...]:
+        """The drops that are looked at."""
+        view = self.view(model)
+        if view is None:
+            return ()
+        return self.latest("jobs", (view.path, view.reading, self.words),
+                           lambda: chosen(view, self.words))  # fmt: skip
+
+    def job(self, model: Model) -> Job | None:
+        """The drop of the history page."""
+        jobs = self.jobs(model)
+        return jobs[self.tape.at % len(jobs)] if jobs else None
+
+    def drop(self, model: Model) -> tuple[SessionView | None, Job | None]:
+        """The drop of the page that is shown, where it was analysed."""
+        if model.page == "history":
+            return self.view(model), self.job(model)
+        view, job = model.view, model.job
+        return (view, job) if view is not None and job in view.results else (None, None)
+
+    def player(self, page: str) -> Player:
+        """How the drop of a page is played."""
+        return self.tape if page == "history" else self.replay
+
+    def change(self, model: Model, change: Callable[[Player, float], Player]) -> None:
+        """Change how the drop of the page is played, knowing when it ends (s)."""
+        view, job = self.drop(model)
+        end_s = end_of(view.drops[job], view.scales[job].hz) if view and job else 0.0
+        player = change(self.player(model.page), end_s)
+        if model.page == "history":
+            self.tape = player
+        else:
+            self.replay = player
+
+    def tick(self, model: Model, seconds: float) -> None:
+        """Let time pass, and begin the slow motion of a drop that has just been analysed."""
+        view, job = model.view, model.flow.job
+        fresh = model.page == "result" and view is not None and job in view.results
+        if fresh and view is not None and job is not None and job != self.replayed:
+            self.replayed = job
+            end_s = end_of(view.drops[job], view.scales[job].hz)
+            self.replay = Player(speed=end_s / REPLAY_S, playing=True)
+        if self.player(model.page).playing:
+            self.change(model, lambda player, end_s: player.ticked(seconds, end_s))
+
+    def sift(self, words: str) -> None:
+        """Look at some drops only."""
+        self.words = words
+        self.tape = replace(self.tape, at=0, time_s=0.0)
+
+    def choose(self, model: Model, at: int) -> None:
+        """Take one drop of the list."""
+        self.tape = self.tape.other(at - self.tape.at, len(self.jobs(model)))

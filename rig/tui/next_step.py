@@ -1,0 +1,107 @@
+"""What comes next: one answer for the page's coloured line, the footer, and what Enter does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.campaign.events import Stage
+from rig.tui.widgets.gates import named
+from rig.tui.widgets.text import duration, plain
+
+if TYPE_CHECKING:
+    from rig.tui.model import Model
+
+
+class NextStep(NamedTuple):
+    """What Enter does, in the footer; empty where it does nothing. And what to do, on the page."""
+
+    enter: str
+    text: str
+    color: str = "$primary"
+
+
+_HANDS = {"holding": "Hold", "placing": "Place", "hanging": "Hang"}
+_PASSING = {
+    Stage.TESTING: "Testing the release; any key stops.",
+    Stage.ARMING: "Arming …; any key stops.",
+    Stage.COUNTDOWN: "ARMED. The release opens at zero. Any key stops.",
+    Stage.FIRING: "Releasing …",
+    Stage.JUDGING: "Reading and analysing the drop …",
+}
+
+
+def hand(model: Model) -> str:
+    """Name what is done by hand before a drop, in the scene's verb."""
+    return _HANDS.get(model.words.reset.split()[0], "Set up")
+
+
+def at_rest(model: Model) -> str:
+    """Say how what falls waits, in the scene's words."""
+    return "hang still" if model.words.part == "rod" else "come to rest"
+
+
+def next_step(model: Model) -> NextStep:
+    """Say what comes next where the session is now, on the page that is shown."""
+    stage, left = model.stage, model.next_job is not None
+    if model.offline:
+        return NextStep("", "")
+    if stage is Stage.COUNTDOWN and not model.driving:
+        return NextStep("", "ARMED by another client. Keep clear.", "$warning")
+    if stage is Stage.SETTLING:
+        wait = f"Waiting: let everything {at_rest(model)} …; any key stops."
+        return NextStep("", wait, "$warning")
+    if stage is Stage.LIVE:
+        return NextStep("", f"FALLING  {len(model.state.edges)} edges so far")
+    if stage in _PASSING:
+        return NextStep("", _PASSING[stage], "$warning")
+    if not model.driving and model.connected and stage is not Stage.PROTOCOL:
+        return NextStep("", "Watching. Press c to take control when it is free.")
+    if stage is Stage.PREPARE:
+        return _prepare(model) if model.page == "run" else NextStep(
+            "to the run", "Enter goes to the run.")  # fmt: skip
+    if stage is Stage.RESULT:
+        if not model.flow.logged:  # what comes next depends on it
+            return NextStep("after the verdict is saved", "Saving the verdict …")
+        end = ("next run", "Enter prepares the next run.") if left else (
+            "end", "That was the last run. Enter shows the session.")  # fmt: skip
+        return NextStep(*end)
+    if stage is Stage.HALTED:
+        return NextStep("try again", "Mend the cause, then Enter prepares the run again.")
+    if stage is Stage.DEVICE:
+        check = "Wave a hand through each beam. Enter goes to the first run."
+        return NextStep("to the first run", check)
+    if stage is Stage.DONE:
+        return NextStep("next run", "Enter prepares the next run.") if left else NextStep(
+            "", "All runs of the plan are complete.")  # fmt: skip
+    return NextStep("open", "") if model.page == "protocol" else NextStep(
+        "home", "No session is open. Enter goes to the home page.")  # fmt: skip
+
+
+def _prepare(model: Model) -> NextStep:
+    """Say what is missing before the drop; the device refuses to arm until it is there."""
+    indicators = model.indicators
+    if not model.connected or model.state.link != "up":
+        return NextStep("arm", "The device is not connected; Enter arms when it is.", "$warning")
+    if not indicators.known:
+        return NextStep("arm", "Waiting for the gates; Enter arms when they answer.", "$warning")
+    if indicators.blocked:
+        more = f" and {len(indicators.blocked) - 1} more" * (len(indicators.blocked) > 1)
+        blocked = f"Clear the beam of {named(model, indicators.blocked[0])}{more}"
+        return NextStep("arm", f"{blocked}; Enter arms when it is clear.", "$warning")
+    if indicators.restless(model.now_s):
+        moving = f"A beam keeps changing. Let everything {at_rest(model)}, then Enter arms."
+        return NextStep("arm", moving, "$warning")
+    run = model.run
+    names = [name for name in (run.impact, run.free) if name is not None] if run else []
+    body = " and ".join(plain(name, 20) for name in names)
+    sides = " (free side)" if len(names) > 1 else ""
+    body = body.replace(" and ", " (impact side) and ") + sides
+    if run is not None and run.impact is not None:
+        body += f", board at {run.incline_deg:g}°"
+    settle = duration(model.settle_s)
+    return NextStep(
+        "arm",
+        f"{hand(model)} {body}; hands away. "
+        f"Enter arms: {settle} of rest, 3 s of countdown, release.",
+        "$success",
+    )

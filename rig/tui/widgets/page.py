@@ -1,0 +1,123 @@
+"""The page: whatever face it is given, as many parts of it as the screen has room for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.widgets import Digits
+
+from rig.tui.scale import painted
+from rig.tui.widgets.figure import Figure
+from rig.tui.widgets.spans import SpanView
+from rig.tui.widgets.text import Words
+
+if TYPE_CHECKING:
+    from textual.app import ComposeResult
+
+    from rig.tui.desk import Desk, Face
+
+_FIGURES = 4
+_WIDE, _NORMAL = 160, 100
+"""Columns for three parts beside each other, and for two; on fewer there is room for one."""
+
+
+class Page(Vertical):
+    """Head, then drawing, plots and tables beside each other, then foot."""
+
+    SCOPED_CSS = False
+    DEFAULT_CSS = """
+    Page { height: 1fr; layers: below above; }
+    Page Words { padding: 0 1; }
+    Page #top { height: auto; max-height: 50%; }
+    Page #menu { width: 38; border-right: solid $border; }
+    Page #drawing, Page #plots, Page #tables { width: 1fr; height: 1fr; }
+    Page Figure { width: 1fr; height: 1fr; min-height: 6; }
+    Page Horizontal { height: 1fr; }
+    Page #foot { height: auto; }
+    Page Digits { layer: above; offset: 2 5; width: auto; height: 3; color: $warning;
+        background: $surface; padding: 0 1; position: absolute; }
+    .-high Page #top { margin: 0 0 1 0; }
+    """
+
+    def compose(self) -> ComposeResult:
+        with VerticalScroll(id="top", can_focus=False):
+            yield Words(id="head")
+        with Horizontal(id="parts"):
+            with VerticalScroll(id="menu", can_focus=False):
+                yield Words(id="list")
+            yield SpanView(id="drawing")
+            with Vertical(id="plots"):
+                for row in range(_FIGURES // 2):
+                    with Horizontal(id=f"row{row}"):
+                        yield Figure()
+                        yield Figure()
+            with VerticalScroll(id="tables", can_focus=False):
+                yield Words(id="words")
+        yield Words(id="foot")
+        yield Digits("3", id="count")
+
+    def tables_width(self) -> int:
+        """Columns of the tables, as they were laid out last."""
+        return max(20, (self.query_one("#tables").size.width or self.app.size.width) - 3)
+
+    def show(self, face: Face, desk: Desk, *, fresh: bool) -> None:
+        """Draw a face; `fresh` where another page was shown before."""
+        for name, content in (("head", face.head), ("list", face.menu), ("words", face.words),
+                              ("foot", face.foot)):  # fmt: skip
+            words = self.query_one(f"#{name}", Words)
+            words.say(content)
+            words.display = bool(content.plain)
+        self.query_one("#menu").display = bool(face.menu.plain)
+        self._parts(face, desk)
+        count = self.query_one(Digits)
+        count.display = bool(face.digits)
+        count.update(face.digits)
+        if fresh:
+            for name in ("top", "tables"):
+                self.query_one(f"#{name}", VerticalScroll).scroll_home(animate=False)
+
+    def _parts(self, face: Face, desk: Desk) -> None:
+        """Show as many parts as there is room for, beginning with the one that was turned to."""
+        columns, lines = self.app.size
+        room = 3 if columns >= _WIDE else 2 if columns >= _NORMAL else 1
+        there = {"drawing": face.drawing is not None, "plots": bool(face.pictures),
+                 "tables": bool(face.words.plain)}  # fmt: skip
+        order = ("tables", "drawing", "plots") if face.top else tuple(there)
+        parts = [part for part in order if there[part]]
+        turned = desk.part % len(parts) if len(parts) > room else 0
+        shown = [*parts[turned:], *parts[:turned]][:room]
+        for part in there:
+            self.query_one(f"#{part}").display = part in shown
+        if face.drawing is not None and "drawing" in shown:
+            view = self.query_one("#drawing", SpanView)
+            view.take(painted(face.drawing, view.size.width or 38, view.size.height or 16))
+        most = face.beside * (2 if columns >= _WIDE and lines >= 40 else 1) if room > 1 else 1
+        turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
+        pictures = [*face.pictures[turn:], *face.pictures[:turn]][:most]
+        if "plots" not in shown:
+            pictures = []
+        # One below the other, but for pairs.
+        places = (0, 1, 2, 3) if face.beside > 1 else (0, 2, 1, 3)
+        figures = [*self.query(Figure)]
+        for at, place in enumerate(places):
+            figures[place].show(pictures[at] if at < len(pictures) else None)
+            if at < len(pictures) and face.cursor is not None:
+                figures[place].point_at(face.cursor)
+        self.query_one("#row1").display = any(places[at] > 1 for at in range(len(pictures)))
+
+    def scroll_tables(self, by: int) -> None:
+        """Scroll what is longer than its place."""
+        for part in self.query(VerticalScroll):
+            if part.id != "menu":
+                part.scroll_relative(y=by, animate=False)
+
+    def show_row(self, line: int) -> None:
+        """Scroll the list so that a line of it is seen."""
+        menu = self.query_one("#menu", VerticalScroll)
+        menu.scroll_to(y=line - menu.size.height // 2, animate=False)
+
+    def point(self, by: int) -> None:
+        """Move the cursor of every plot."""
+        for figure in self.query(Figure):
+            figure.step(by)
