@@ -16,7 +16,7 @@ from textual.widgets import Input
 from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands
-from rig.tui.actions import BY_NAME, OFFLINE, Action, hindrance
+from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, hindrance
 from rig.tui.client import ReconnectingClient
 from rig.tui.desk import Desk
 from rig.tui.driver import Driver
@@ -451,7 +451,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def hindrance(self, action: Action) -> str:
         """Say why an action makes no sense now; empty where it does."""
-        if self.client is None and action.name not in OFFLINE:
+        if self.client is None and (action.driving or action.name in NEEDS_RIG):
             return "no rig is connected"
         stage, driving = self.flow.stage, self.driving
         # Whoever has no rig yet may begin with one.

@@ -19,10 +19,9 @@ from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopp
 from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
-from rig.tui.actions import ACTIONS, shown_key
+from rig.tui.actions import ACTIONS, help_text, shown_key
 from rig.tui.choosing import condition, labels
 from rig.tui.follow import open_live
-from rig.tui.help import table
 from rig.tui.looks import LOOKS
 from rig.tui.replay import Player
 from rig.tui.survey import session_list
@@ -414,7 +413,7 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "previous": lambda app: _move(app, -1),
     "next": lambda app: _move(app, 1),
     "theme": lambda app: app.next_theme(),
-    "help": lambda app: app.ask(Reader(table(app.page, app.keys, app.size.width >= 100))),
+    "help": lambda app: app.ask(Reader(help_text(app.keys, wide=app.size.width >= 120))),
     "palette": _palette,
     "quit": _quit,
     "go_on": _go_on,

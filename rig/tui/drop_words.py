@@ -9,9 +9,9 @@ from textual.content import Content
 
 from rig.analysis.comparison import compare
 from rig.analysis.result import GOOD, Measured
-from rig.measurands import MEASURANDS, RELEASE_SKEW, SEPARATION, SPEED, averaged, listed
-from rig.predictions import predict_incline, predicted_run
-from rig.report.numbers import decimals_for, fixed, plus_minus
+from rig.measurands import RELEASE_SKEW, SEPARATION, averaged, listed
+from rig.predictions import predicted_run
+from rig.report.numbers import fixed, plus_minus
 from rig.tui.looks import LOOKS
 from rig.tui.motion import model_fall
 from rig.tui.widgets.text import plain
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.analysis.result import DropResult
-    from rig.measurands import Measurand
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
     from rig.results.live import SessionView
@@ -52,11 +51,17 @@ def sentence(view: SessionView, job: Job) -> str:
     measured = result.quantities[row.name]
     expected = predicted_run(view.protocol, run).get(row.name)
     beside = "" if expected is None else f"; model {plus_minus(stated(expected), row.scale)}"
-    if row == SEPARATION and run.impact is not None:
-        size = Measured(abs(measured.value), measured.u)
-        wins = "wins" if measured.value > 0.0 else "loses"
-        return f"{plain(run.impact, 20)} {wins} by {plus_minus(size, row.scale)} {row.unit}{beside}"
-    return f"{row.symbol} = {plus_minus(measured, row.scale)} {row.unit}{beside}"
+    fall = model_fall(view.protocol, run, "free")
+    if row != SEPARATION or run.impact is None or run.free is None or fall is None:
+        return f"{row.symbol} = {plus_minus(measured, row.scale)} {row.unit}{beside}"
+    size = Measured(abs(measured.value), measured.u)
+    length = view.protocol.chains[run.free].chain.length
+    lead = np.diff(fall.times(np.array([measured.value - length, -length])))[0]
+    wins = f"{plain(run.impact, 20)} {'wins' if lead > 0.0 else 'loses'}"
+    return (
+        f"{wins} by {plus_minus(size, row.scale)} {row.unit}{beside}. "
+        f"That is {abs(lead) * 1e3:.0f} ms of free fall."
+    )
 
 
 def past_runs(view: SessionView, job: Job, width: int) -> Content:
@@ -74,47 +79,6 @@ def past_runs(view: SessionView, job: Job, width: int) -> Content:
             break
         parts.insert(0, part)
     return Content.assemble(("past runs", "$foreground 70%"), *parts)
-
-
-def why_words(view: SessionView, job: Job) -> str:
-    """Compare a drop with the model and with free fall; empty where nothing was measured."""
-    run, measured = view.plan[job.run], view.results[job].quantities
-    expected = predicted_run(view.protocol, run)
-    lines = []
-    speed = measured.get(SPEED.name)
-    if speed is not None and run.impact is not None:
-        free = predict_incline(view.protocol, run.incline_deg, run.impact, run.free).free_fall_speed
-        model = expected.get(SPEED.name)
-        by_model = f"model {plus_minus(stated(model), SPEED.scale)}, " if model is not None else ""
-        by_gates = f"measured {plus_minus(speed, SPEED.scale)} {SPEED.unit}"
-        lines.append(f"V: free fall {free:.3f}, {by_model}{by_gates}")
-    apart = measured.get(SEPARATION.name)
-    fall = model_fall(view.protocol, run, "free") if run.free is not None else None
-    if apart is not None and fall is not None and run.free is not None:
-        length = view.protocol.chains[run.free].chain.length
-        lead = np.diff(fall.times(np.array([apart.value - length, -length])))[0]
-        lines.append(
-            f"the striking chain {'wins' if lead > 0.0 else 'loses'} by "
-            f"{abs(apart.value) * SEPARATION.scale:.1f} {SEPARATION.unit}, "
-            f"or {abs(lead) * 1e3:.0f} ms"
-        )
-    for comparison in compare(view.protocol, [[view.results[job]]]):
-        difference = comparison.differences[0]
-        error = difference.normalized_error
-        if error:
-            row = MEASURANDS[comparison.quantity]
-            lines.append(_difference(row, abs(difference.value), abs(difference.value / error)))
-    return "\n".join(lines)
-
-
-def _difference(row: Measurand, difference: float, limit: float) -> str:
-    """State a difference from the model beside the expanded uncertainty that it has."""
-    decimals = decimals_for(limit * row.fine_scale)
-    size, normal = (fixed(value * row.fine_scale, decimals) for value in (difference, limit))
-    return (
-        f"{row.symbol} differs from the model by {size} {row.fine}; "
-        f"± {normal} {row.fine} would be normal"
-    )
 
 
 def number_table(view: SessionView, job: Job, width: int) -> Content:

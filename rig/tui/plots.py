@@ -125,32 +125,10 @@ def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | Non
     return Picture("Δz corrected (cm)", _TIME, tuple(series)) if series else None
 
 
-def run_picture(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:
-    """Draw what several drops measured, in order of the runs, one of them above the others."""
-    row = next((row for row in averaged() if row.name in view.results[job].quantities), None)
-    if row is None:
-        return None
-    points = {
-        drop: (drop.run, *_point(view.results[drop].quantities[row.name], row.scale))
-        for drop in jobs
-        if row.name in view.results[drop].quantities
-    }
-    rest = [point for drop, point in points.items() if drop != job]
-    own_points = [point for drop, point in points.items() if drop == job]
-    series = (_bars(rest, "secondary", "●", "others ± U"),
-              _bars(own_points, "primary", "●", f"run {job.run} ± U"))  # fmt: skip
-    return _over_runs(f"{row.label} ({row.unit})", view, series)
-
-
 def _bars(points: Sequence[Point], color: str, mark: str, label: str = "") -> Series:
     """Draw values with their U95."""
     x, y, errors = zip(*points, strict=True) if points else ((), (), ())
     return Series("bars", x, y, color, mark, label, errors)
-
-
-def _over_runs(title: str, view: SessionView, series: Sequence[Series]) -> Picture:
-    """Draw series over all runs of the plan."""
-    return Picture(title, "run", tuple(series), (0.5, len(view.plan) + 0.5), counts=True)
 
 
 def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
@@ -276,7 +254,8 @@ def _chart(
         if len(values) > _WITH_BARS:
             bars = bars._replace(kind="dots", label=label.removesuffix(" ± U"), errors=())
         series.append(bars)
-    return _over_runs(title, view, series)
+    limits = 0.5, len(view.plan) + 0.5
+    return Picture(title, "run", tuple(series), limits, counts=True)
 
 
 def speed_picture(view: SessionView, job: Job) -> Picture | None:

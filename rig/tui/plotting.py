@@ -14,7 +14,7 @@ import numpy as np
 from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.arrays import Array
 
@@ -35,6 +35,7 @@ _SHAPES = {
     "·": [(0, 0)],
 }
 """Dots of each marker around its place."""
+_MARK = {"line": "⠒⠒", "band": "⣿⣿"}
 _CAP = np.array([[-1.0, 0.0], [1.0, 0.0]])  # of an error bar
 
 
@@ -50,7 +51,7 @@ class Series(NamedTuple):
     marker
         ``●``, ``+``, ``×`` or ``·``; of lines and bands unused.
     label
-        At the line where there is room, or else in the legend; empty for none.
+        In the legend; empty for none.
     """
 
     kind: Literal["line", "band", "dots", "bars"]
@@ -188,21 +189,18 @@ def plotted(picture: Picture, width: int, height: int, cursor: float | None = No
         Where on the horizontal axis values are read off; `None` for nowhere.
     """
     strip = _strip(picture, height)
-    rows = max(1, height - 3 - strip - (cursor is not None))
+    rows = max(1, height - 3 - strip)
     upright = axis_over(*_roomy(picture.series), rows, min(_TICK_ROWS, max(1, rows // 3)))
     lower = axis_over(*_roomy(picture.residuals, level=0.0), max(1, strip - 1), 1)
     numbers = [*upright.ticks.values(), *(lower.ticks.values() if strip else ())]
     margin = 1 + max((len(_number(value)) for value in numbers), default=0)
     columns = max(1, width - margin - 1)
     x = axis_over(*spread(picture), columns, _TICK_COLUMNS, whole=picture.counts)
-    lines, labels = _panel(picture.series, x, upright, cursor)
-    read = [] if cursor is None else [_readings(picture, cursor, width)]
-    out = [_legend(picture, labels, width), *read, *_framed(lines, upright, margin)]
+    out = [_legend(picture, cursor, width), *_panel(picture.series, x, upright, cursor, margin)]
     if strip:
-        residual_rows, _ = _panel(picture.residuals, x, lower, cursor)
         head = f" {picture.residual_label} "[:columns]
         out.append([Span(" " * margin + "├" + head + "╌" * (columns - len(head)))])
-        out += _framed(residual_rows, lower, margin)
+        out += _panel(picture.residuals, x, lower, cursor, margin)
     return Plot([*out, *_foot(picture.x_label, x, margin)], margin + 1, x)
 
 
@@ -215,41 +213,31 @@ def spread(picture: Picture) -> tuple[float, float]:
     return (low, high) if low < high else (low - 0.5, low + 0.5)
 
 
-def _legend(picture: Picture, labels: Collection[str], width: int) -> list[Span]:
-    """Say what is drawn: the upright axis, then each mark that is not named beside its line."""
-    parts = [Span(picture.y_label, bold=True)]
-    for line in picture.series:
-        if line.label and len(line.x) and line.label not in labels:
-            parts += [Span("  "), Span(_mark(line), line.color, bold=True), Span(f" {line.label}")]
-    return _cut(parts, width)
-
-
-def _readings(picture: Picture, cursor: float, width: int) -> list[Span]:
-    """Say what each series is at the cursor, by name or, where there is no room, by mark."""
+def _legend(picture: Picture, cursor: float | None, width: int) -> list[Span]:
+    """Say what is drawn, and what it is at the cursor."""
     low, high = spread(picture)
-    curves = [curve for curve in picture.series if curve.label and len(curve.x)]
-    values = [_read(curve, cursor, _NEAR * (high - low)) for curve in curves]
-    parts = [Span(f"{picture.x_label} {_number(cursor)}")]
-    names = [curve.label for curve in curves]
-    if sum(map(len, (parts[0].text, *names, *values))) + 3 * len(names) > width:
-        names = [_mark(curve) for curve in curves]
-    for curve, name, value in zip(curves, names, values, strict=True):
-        parts += [Span(f"  {name} ", curve.color), Span(value, curve.color, bold=True)]
-    return _cut(parts, width)
+    at = "" if cursor is None else f"  {picture.x_label} {_number(cursor)}"
+    parts = [Span(picture.y_label, bold=True), Span(at)]
+    for curve in picture.series:
+        if curve.label and len(curve.x):
+            mark = Span(f"  {_MARK.get(curve.kind, curve.marker)}", curve.color, bold=True)
+            value = "" if cursor is None else _read(curve, cursor, _NEAR * (high - low))
+            parts += [mark, Span(f" {curve.label}"), Span(f" {value}" * bool(value), curve.color)]
+    spans = []
+    for part in parts:
+        spans.append(part._replace(text=part.text[: max(0, width)]))
+        width -= len(part.text)
+    return spans
 
 
 def _number(value: float) -> str:
     return f"{value:.4g}".replace("-", "−")
 
 
-def _mark(curve: Series) -> str:
-    return {"line": "⠒⠒", "band": "⣿⣿"}.get(curve.kind, curve.marker)
-
-
 def _panel(
-    series: Sequence[Series], x: Axis, y: Axis, cursor: float | None
-) -> tuple[list[list[Span]], set[str]]:
-    """Draw series on one pair of axes; and say which labels were written there."""
+    series: Sequence[Series], x: Axis, y: Axis, cursor: float | None, margin: int
+) -> Iterator[list[Span]]:
+    """Draw series on one pair of axes, behind the upright one."""
     sheet = Sheet(x.cells, y.cells, _COLORS)
     if cursor is not None:
         down = np.arange(0, ROWS * y.cells, 2.0)
@@ -258,7 +246,10 @@ def _panel(
     for curve in series:
         if len(curve.x):
             _draw(sheet, curve, x, y)
-    return sheet.rows(), {curve.label for curve in series if _named(sheet, curve, x, y)}
+    for row, line in enumerate(sheet.rows()):
+        value = y.ticks.get(y.cells - 1 - row)
+        number = "" if value is None else _number(value)
+        yield [Span(f"{number:>{margin}}{'┤' if number else '│'}"), *line]
 
 
 def _places(x: Axis, y: Axis, across: Numbers, up: Numbers) -> Array:
@@ -286,46 +277,18 @@ def _draw(sheet: Sheet, curve: Series, x: Axis, y: Axis) -> None:
     sheet.dots((places[:, None] + shape).reshape(-1, 2), ink)
 
 
-def _named(sheet: Sheet, curve: Series, x: Axis, y: Axis) -> bool:
-    """Write a line's name beside it, where nothing else is drawn; whether there was room."""
-    if curve.kind != "line" or not curve.label or not len(curve.x):
-        return False
-    places = _places(x, y, curve.x, curve.y)
-    places = places[np.isfinite(places).all(axis=1)].astype(int)
-    length = len(curve.label)
-    for across, down in places[:: -max(1, len(places) // 16)].tolist():
-        row, end = down // ROWS, across // COLUMNS
-        for at, column in ((row - 1, end - length), (row + 1, end - length), (row - 1, end)):
-            if sheet.free(at, column, length):
-                sheet.write(at, column, Span(curve.label, curve.color))
-                return True
-    return False
-
-
-def _framed(lines: list[list[Span]], axis: Axis, margin: int) -> Iterator[list[Span]]:
-    """Set the upright axis before the lines of a panel."""
-    for row, line in enumerate(lines):
-        value = axis.ticks.get(axis.cells - 1 - row)
-        number = "" if value is None else _number(value)
-        yield [Span(f"{number:>{margin}}{'┤' if number else '│'}"), *line]
-
-
 def _foot(label: str, axis: Axis, margin: int) -> Iterator[list[Span]]:
-    """Write the horizontal axis with its numbers, and what it is where there is most room right."""
-    width = margin + 1 + axis.cells
-    line, below = ["─"] * axis.cells, [" "] * width
+    """Write the horizontal axis with its numbers, as far as its name at the end leaves room."""
+    line, below = ["─"] * axis.cells, [" "] * (margin + 1 + axis.cells)
+    free = len(below) - len(label) - 1
     for column, value in axis.ticks.items():
         text = _number(value)
         line[column] = "┴"
-        begin = min(margin + 1 + column - len(text) // 2, width - len(text))
-        below[begin : begin + len(text)] = text
-    written = "".join(below)
-    at = (written + " ").rfind(" " * (len(label) + 2))
+        begin = margin + 1 + column - len(text) // 2
+        if begin + len(text) <= free:
+            below[begin : begin + len(text)] = text
     yield [Span(" " * margin + "└" + "".join(line))]
-    if at < 0:  # no room between the numbers
-        yield [Span(f"{written.rstrip()} {label}"[:width])]
-    else:
-        yield [Span(f"{written[: at + 1]}{label}{written[at + 1 + len(label) :]}")]
+    yield [Span(("".join(below[: max(0, free)]) + f" {label}")[: len(below)])]
 
 
 def _read(curve: Series, at: float, near: float) -> str:
@@ -361,12 +324,3 @@ def _roomy(series: Sequence[Series], level: float | None = None) -> tuple[float,
     bottom, top = float(values.min()), float(values.max())
     room = _ROOM * (top - bottom) or 0.5 * abs(top) or 0.5
     return bottom - room, top + room
-
-
-def _cut(parts: Sequence[Span], width: int) -> list[Span]:
-    """Take what fits one line."""
-    spans = []
-    for part in parts:
-        spans.append(part._replace(text=part.text[: max(0, width)]))
-        width -= len(part.text)
-    return spans

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.tui.pages import device, drop, history, home, session
+from rig.tui.pages import device, drop, home, session
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -18,6 +18,6 @@ FACES: Mapping[str, Callable[[Model, Desk, int], Face]] = {
     "run": drop.face,
     "result": drop.face,
     "session": session.face,
-    "history": history.face,
+    "history": drop.face,
 }
 """A function a page; the last argument is how many columns its tables have."""

@@ -1,19 +1,24 @@
-"""The run in hand, from the first look at its gates to its result: steps, rig, plot and words."""
+"""A drop, from the first look at its gates to its result and any later look: steps, rig, plot."""
 
 from __future__ import annotations
 
+from statistics import mean, stdev
 from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from rig.campaign.events import Stage
 from rig.films import read_films
+from rig.measurands import listed
+from rig.reasons import notes_in
+from rig.report.numbers import fixed
+from rig.tui.choosing import condition
 from rig.tui.desk import Face
-from rig.tui.drop_words import expected_words, number_table, past_runs, sentence, why_words
-from rig.tui.looks import verdict_words
+from rig.tui.drop_words import expected_words, number_table, past_runs, sentence
+from rig.tui.looks import LOOKS, verdict_words
 from rig.tui.motion import as_table, motions
 from rig.tui.next_step import hand, next_step
-from rig.tui.plots import drop_pictures, fall_pictures
+from rig.tui.plots import drop_pictures, fall_pictures, laid_over
 from rig.tui.replay import indicators_at, until
 from rig.tui.scale import drawing
 from rig.tui.widgets.gates import board
@@ -26,9 +31,7 @@ if TYPE_CHECKING:
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.desk import Desk
-    from rig.tui.indicators import Indicators
     from rig.tui.model import Model
-    from rig.tui.scale import Drawing
 
 _FALLING = (Stage.LIVE, Stage.JUDGING)
 _DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
@@ -38,7 +41,7 @@ _DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3
 
 def face(model: Model, desk: Desk, width: int) -> Face:
     """Show the run in hand: before the drop, during it, or what it said."""
-    if model.page == "result" or model.stage in {Stage.RESULT, Stage.HALTED}:
+    if model.page in {"result", "history"} or model.stage in {Stage.RESULT, Stage.HALTED}:
         return _result(model, desk, width)
     protocol, run = model.protocol, model.run
     if model.loading or protocol is None or run is None:
@@ -101,59 +104,85 @@ def _action(model: Model) -> Content:
 
 
 def _result(model: Model, desk: Desk, width: int) -> Face:
-    """Show what the latest drop said, in slow motion first."""
-    parts = [verdict_words(model)]
-    run = model.run
-    if model.job is not None and run is not None:
-        parts.insert(0, _headline(model, run))
-    if model.stage in {Stage.RESULT, Stage.HALTED}:
-        parts = [steps(model), *parts, _action(model)]
-    head = Content("\n").join(parts)
+    """Show what a drop said: the latest, in slow motion first, or any on the history page."""
     view, job = desk.drop(model)
+    own = model.page != "history"
+    parts = [verdict_words(model)] if own else []
+    if own and model.run is not None:
+        parts.insert(0, _headline(model, model.run))
+    if own and model.stage in {Stage.RESULT, Stage.HALTED}:
+        parts = [steps(model), *parts, _action(model)]
     if view is None or job is None:
-        return Face(head)
-    player = desk.replay
-    foot = Content("slow motion …  . pauses" if player.playing else sentence(view, job))
-    return played(desk, view, job, model, head, width)._replace(
-        foot=Content("\n").join([foot.stylize("bold $success"), past_runs(view, job, width)])
-    )
-
-
-def played(
-    desk: Desk, view: SessionView, job: Job, model: Model, head: Content, width: int
-) -> Face:
-    """Show a recorded drop at the moment its player is at; all of it where nothing was played."""
-    player = desk.player(model.page)
-    drop, hz = view.drops[job], view.scales[job].hz
-    begun = player.playing or player.time_s > 0.0 or model.page == "history"
-    seen = until(drop.edges, hz, player.time_s) if begun else drop.edges
+        missing = model.loading or "No drop recorded yet. Press o to choose another session."
+        if desk.jobs(model) == () and desk.words:
+            missing = f"No drop matches {plain(desk.words, 40)}. Press f to change this."
+        return Face(Content("\n").join(parts or [Content(missing)]))
+    player, jobs, hz = desk.player(model.page), desk.jobs(model), view.scales[job].hz
+    drop, edges = view.drops[job], view.drops[job].edges
+    begun = player.playing or player.time_s > 0.0 or not own
+    seen = until(edges, hz, player.time_s) if begun else edges
     indicators = indicators_at(view.channels, drop, seen)
-    time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
-    words = desk.latest(
-        "words", (view.path, view.reading, job, width),
-        lambda: Content("\n\n").join(
-            [number_table(view, job, width), Content(why_words(view, job))]
-        ),
-    )  # fmt: skip
-    gates = board(view.protocol, indicators, 0.0)
-    return Face(
-        head,
-        _moment(desk, view, job, indicators, time_s),
-        desk.latest("pictures", (view.path, job, hz, len(seen)),
-                    lambda: drop_pictures(view, job, seen)),
-        player.time_s * 1e3 if begun else None,
-        Content("\n").join([words, Content(""), *gates]),
-    )  # fmt: skip
-
-
-def _moment(
-    desk: Desk, view: SessionView, job: Job, indicators: Indicators, time_s: float
-) -> Drawing:
-    """Draw the rig at a moment of a recorded drop, from all of its edges."""
-    run, hz = view.plan[job.run], view.scales[job].hz
-    edges, matches = view.drops[job].edges, view.results[job].matches or None
+    key = view.path, view.reading, job, width
+    if desk.comparing and not own:
+        laid = desk.latest("laid", (key, jobs), lambda: laid_over(view, jobs, job))
+        pictures = [] if laid is None else [laid]
+        words = desk.latest("compared", (key, jobs), lambda: comparison(view, jobs))
+    else:
+        pictures = desk.latest(
+            "pictures", (*key[:3], hz, len(seen)), lambda: drop_pictures(view, job, seen)
+        )
+        words = desk.latest("words", key, lambda: number_table(view, job, width))
+    run, matches = view.plan[job.run], view.results[job].matches or None
     falls, film = desk.latest(
         "moment", (view.path, job, hz),
         lambda: (motions(view.protocol, run, edges, hz, matches), read_films(view.path).get(job)),
     )  # fmt: skip
-    return drawing(view.protocol, run, falls, indicators, time_s, film)
+    time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
+    said = sentence(view, job) if not (own and player.playing) else "slow motion …"
+    foot = [Content.styled(said, "bold $success"), past_runs(view, job, width)]
+    return Face(
+        Content("\n").join(parts or _which(view, job, desk, jobs)),
+        drawing(view.protocol, run, falls, indicators, time_s, film),
+        pictures,
+        player.time_s * 1e3 if begun and not desk.comparing else None,
+        Content("\n").join([words, Content(""), *board(view.protocol, indicators, 0.0)]),
+        Content("\n").join([line for line in foot if line.plain]),
+    )
+
+
+def comparison(view: SessionView, jobs: Sequence[Job]) -> Content:
+    """Write mean and standard deviation of what some drops measured."""
+    lines = [Content.styled(f"{'':20}{'n':>4}{'mean':>9}{'SD':>9}", "bold")]
+    for row in listed():
+        measured = [view.results[job].quantities.get(row.name) for job in jobs]
+        values = [quantity.value * row.scale for quantity in measured if quantity is not None]
+        if values:
+            scatter = fixed(stdev(values), 3) if len(values) > 1 else "–"
+            label = f"{row.label} ({row.unit})"
+            line = f"{label:20}{len(values):4}{fixed(mean(values), 3):>9}{scatter:>9}"
+            lines.append(Content(line))
+    return Content("\n").join(lines)
+
+
+def _which(view: SessionView, job: Job, desk: Desk, jobs: Sequence[Job]) -> list[Content]:
+    """Name the drop that is played, and say how."""
+    player, verdict = desk.tape, view.results[job].verdict
+    only = f" ({plain(desk.words, 40)})" if desk.words else ""
+    reasons = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
+    arrow = "◀" if player.back else "▶"
+    state = f"{arrow} playing" if player.playing else f"‖ paused {arrow}"
+    speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} ×"
+    return [
+        Content.assemble(
+            (f"drop {jobs.index(job) + 1} of {len(jobs)}{only}", "bold $primary"),
+            f"  run {job.run}, attempt {job.attempt} · {condition(view.plan[job.run])} · ",
+            (f"{LOOKS[verdict][0]} {verdict}", LOOKS[verdict][1]),
+        ),
+        Content.assemble(
+            f"{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · ",
+            (plain(view.path.name, 60), "$foreground 70%"),
+            ("  ▲ SIMULATED" if view.simulated else "", "bold $warning"),
+        ),
+        *(Content.styled(f"note: {plain(text, 160)}", "bold")
+          for text in notes_in(next(reasons, ()))),
+    ]  # fmt: skip
