@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SLOW_DISK_S = 0.5
 """A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
 HOT = frozenset({*BEFORE_RELEASE, Stage.LIVE})
+UNDER_WAY = HOT | {Stage.JUDGING}
 _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
 """Where a watcher is, by the state of the drop."""

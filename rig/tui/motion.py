@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -134,63 +134,6 @@ def _thinned(table: NDArray[np.int64]) -> NDArray[np.int64]:
         taken[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
     thinned: NDArray[np.int64] = table[taken]
     return thinned
-
-
-class Separation(NamedTuple):
-    """Δz against time: m and s since the release fired, measured and by the model.
-
-    Attributes
-    ----------
-    times, gaps
-        At the impact side's edges, the free chain's height read between its neighbours.
-    curve, model
-        The same times as far as the model goes, and its Δz.
-    expected
-        The model's at `times`; empty without one.
-    """
-
-    times: Array
-    gaps: Array
-    curve: Array
-    model: Array
-    expected: Array
-
-
-def separation(
-    pair: tuple[ChainFall, ...], end_s: float, skew_s: float | None = None
-) -> Separation:
-    """Find Δz against time.
-
-    Parameters
-    ----------
-    pair
-        The chain that strikes, then the free one.
-    end_s
-        Where the model's curve ends.
-    skew_s
-        By how much the free chain left later: then Δz is what it would have been had both been let
-        go together, measured and by the model. `None` for Δz as it fell, measured and by the model.
-    """
-    nothing = np.empty(0)
-    impact, free = pair
-    times, gaps = nothing, nothing
-    if free.times.size > 1 and impact.times.size:
-        at = impact.times + (skew_s or 0.0)
-        inside = (at >= free.times[0]) & (at <= free.times[-1])
-        times = impact.times[inside]
-        gaps = np.interp(at[inside], free.times, free.heights) - impact.heights[inside]
-    if impact.model is None or free.model is None:
-        return Separation(times, gaps, nothing, nothing, nothing)
-    delay = free.delay_s if skew_s is None else impact.delay_s
-    expected = impact.model.heights(times - impact.delay_s)[0]
-    curve, heights = impact.curve(end_s)
-    return Separation(
-        times,
-        gaps,
-        curve,
-        free.model.heights(curve - delay)[0] - heights,
-        free.model.heights(times - delay)[0] - expected,
-    )
 
 
 def _nearest(parts: Sequence[EdgeTrain], model: Trajectory | None) -> list[tuple[Array, Array]]:

@@ -24,7 +24,6 @@ _HANDS = {"holding": "Hold", "placing": "Place", "hanging": "Hang"}
 _PASSING = {
     Stage.TESTING: "Testing the release; any key stops.",
     Stage.ARMING: "Arming …; any key stops.",
-    Stage.COUNTDOWN: "ARMED. The release opens at zero. Any key stops.",
     Stage.FIRING: "Releasing …",
     Stage.JUDGING: "Reading and analysing the drop …",
 }
@@ -45,8 +44,10 @@ def next_step(model: Model) -> NextStep:
     stage, left = model.stage, model.next_job is not None
     if model.offline:
         return NextStep("", "")
-    if stage is Stage.COUNTDOWN and not model.driving:
-        return NextStep("", "ARMED by another client. Keep clear.", "$warning")
+    if stage is Stage.COUNTDOWN:
+        left_s = f"ARMED: release in {max(0.0, model.flow.left_s):.1f} s. Any key stops."
+        other = "ARMED by another client. Keep clear."
+        return NextStep("", left_s if model.driving else other, "$warning")
     if stage is Stage.SETTLING:
         wait = f"Waiting: let everything {at_rest(model)} …; any key stops."
         return NextStep("", wait, "$warning")

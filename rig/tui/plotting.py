@@ -32,6 +32,7 @@ _SHAPES = {
     "●": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)],
     "+": [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)],
     "×": [(0, 0), (-1, -1), (1, -1), (-1, 1), (1, 1)],
+    "○": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y],
     "·": [(0, 0)],
 }
 """Dots of each marker around its place."""
@@ -49,7 +50,7 @@ class Series(NamedTuple):
     color
         Name of a theme's colour.
     marker
-        ``●``, ``+``, ``×`` or ``·``; of lines and bands unused.
+        ``●``, ``○``, ``+``, ``×`` or ``·``; of lines and bands unused.
     label
         In the legend; empty for none.
     """

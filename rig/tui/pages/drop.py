@@ -18,7 +18,7 @@ from rig.tui.drop_words import expected_words, number_table, past_runs, sentence
 from rig.tui.looks import LOOKS, verdict_words
 from rig.tui.motion import as_table, motions
 from rig.tui.next_step import hand, next_step
-from rig.tui.plots import drop_pictures, fall_pictures, laid_over
+from rig.tui.plots import drop_figures, fall_pictures, laid_over, pictures_of
 from rig.tui.replay import indicators_at, until
 from rig.tui.scale import drawing
 from rig.tui.widgets.gates import board
@@ -122,6 +122,11 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     begun = player.playing or player.time_s > 0.0 or not own
     seen = until(edges, hz, player.time_s) if begun else edges
     indicators = indicators_at(view.channels, drop, seen)
+    run, matches = view.plan[job.run], view.results[job].matches or None
+    falls, film = desk.latest(
+        "moment", (view.path, job, hz),
+        lambda: (motions(view.protocol, run, edges, hz, matches), read_films(view.path).get(job)),
+    )  # fmt: skip
     key = view.path, view.reading, job, width
     if desk.comparing and not own:
         laid = desk.latest("laid", (key, jobs), lambda: laid_over(view, jobs, job))
@@ -129,14 +134,11 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
         words = desk.latest("compared", (key, jobs), lambda: comparison(view, jobs))
     else:
         pictures = desk.latest(
-            "pictures", (*key[:3], hz, len(seen)), lambda: drop_pictures(view, job, seen)
+            "figures",
+            key[:3],
+            lambda: pictures_of(*drop_figures(view, job)) or fall_pictures(falls),
         )
         words = desk.latest("words", key, lambda: number_table(view, job, width))
-    run, matches = view.plan[job.run], view.results[job].matches or None
-    falls, film = desk.latest(
-        "moment", (view.path, job, hz),
-        lambda: (motions(view.protocol, run, edges, hz, matches), read_films(view.path).get(job)),
-    )  # fmt: skip
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
     said = sentence(view, job) if not (own and player.playing) else "slow motion …"
     foot = [Content.styled(said, "bold $success"), past_runs(view, job, width)]

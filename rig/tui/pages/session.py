@@ -16,7 +16,7 @@ from rig.report.numbers import fixed, plus_minus
 from rig.report.parts import main_error
 from rig.tui.desk import Face
 from rig.tui.looks import LOOKS
-from rig.tui.plots import control_pictures, inclined, meaning
+from rig.tui.plots import session_pictures
 from rig.tui.widgets.text import duration, plain
 
 if TYPE_CHECKING:
@@ -35,15 +35,11 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     view = model.view
     if view is None:
         return Face(head)
-    means, charts = desk.latest(
-        "charts", (view.path, view.reading),
-        lambda: (inclined(view.analysis, view.curves), control_pictures(view)),
-    )  # fmt: skip
-    turned = desk.chart % max(1, len(charts))
-    # Δz says more than V does, so a chart comes before V.
-    pictures = [*means[:1], *charts[turned:], *charts[:turned], *means[1:]]
-    foot = meaning(charts[turned].y_label) if charts else ""
-    return Face(head, pictures=pictures, foot=Content(foot), beside=2)
+    shown = desk.latest("charts", (view.path, view.reading), lambda: [*session_pictures(view)])
+    turned = desk.chart % max(1, len(shown))
+    pictures = [*shown[turned:], *shown[:turned]]
+    foot = pictures[0][1] if pictures else ""
+    return Face(head, pictures=[picture for picture, _ in pictures], foot=Content(foot), beside=2)
 
 
 def _progress(model: Model) -> Content:

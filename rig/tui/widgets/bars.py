@@ -9,7 +9,7 @@ from textual.content import Content
 
 from rig.campaign.events import Stage
 from rig.tui.actions import BY_NAME, shown_key
-from rig.tui.model import alarm
+from rig.tui.model import UNDER_WAY, alarm
 from rig.tui.next_step import next_step
 from rig.tui.widgets.text import Words, plain, pressed
 
@@ -185,17 +185,6 @@ def _answer(model: Model) -> str:
 
 
 def _doing(model: Model) -> str:
-    words = {
-        Stage.TESTING: "RELEASE TEST; any key stops",
-        Stage.SETTLING: "waiting for rest; any key stops",
-        Stage.ARMING: "arming; any key stops",
-        Stage.COUNTDOWN: f"ARMED: release in {max(0.0, model.flow.left_s):.1f} s; any key stops"
-        if model.driving
-        else "ARMED by another client",
-        Stage.FIRING: "releasing",
-        Stage.LIVE: "FALLING, recording",
-        Stage.JUDGING: "reading and analysing the drop",
-    }
     if model.offline:
         return "no rig is connected: this shows a file"
     if model.idle:
@@ -207,4 +196,5 @@ def _doing(model: Model) -> str:
         return answer
     holder = model.state.holder
     watching = "" if model.driving or holder is None else f" · watching {holder[:24]}"
-    return words.get(model.stage, model.state.phase) + watching + " · " * bool(answer) + answer
+    doing = next_step(model).text if model.stage in UNDER_WAY else model.state.phase
+    return doing + watching + " · " * bool(answer) + answer

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
 from textual.widgets import Digits
 
 from rig.tui.scale import painted
@@ -32,6 +33,8 @@ class Page(Vertical):
     Page #top { height: auto; max-height: 50%; }
     Page #menu { width: 38; border-right: solid $border; }
     Page #drawing, Page #plots, Page #tables { width: 1fr; height: 1fr; }
+    Page #plots { grid-size: 1; }
+    Page #plots.-pairs { grid-size: 2; }
     Page Figure { width: 1fr; height: 1fr; min-height: 6; }
     Page Horizontal { height: 1fr; }
     Page #foot { height: auto; }
@@ -47,11 +50,8 @@ class Page(Vertical):
             with VerticalScroll(id="menu", can_focus=False):
                 yield Words(id="list")
             yield SpanView(id="drawing")
-            with Vertical(id="plots"):
-                for row in range(_FIGURES // 2):
-                    with Horizontal(id=f"row{row}"):
-                        yield Figure()
-                        yield Figure()
+            with Grid(id="plots"):
+                yield from (Figure() for _ in range(_FIGURES))
             with VerticalScroll(id="tables", can_focus=False):
                 yield Words(id="words")
         yield Words(id="foot")
@@ -94,17 +94,12 @@ class Page(Vertical):
             view.take(painted(face.drawing, view.size.width or 38, view.size.height or 16))
         most = face.beside * (2 if columns >= _WIDE and lines >= 40 else 1) if room > 1 else 1
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
-        pictures = [*face.pictures[turn:], *face.pictures[:turn]][:most]
-        if "plots" not in shown:
-            pictures = []
-        # One below the other, but for pairs.
-        places = (0, 1, 2, 3) if face.beside > 1 else (0, 2, 1, 3)
-        figures = [*self.query(Figure)]
-        for at, place in enumerate(places):
-            figures[place].show(pictures[at] if at < len(pictures) else None)
-            if at < len(pictures) and face.cursor is not None:
-                figures[place].point_at(face.cursor)
-        self.query_one("#row1").display = any(places[at] > 1 for at in range(len(pictures)))
+        pictures = [*face.pictures[turn:], *face.pictures[:turn]][: most * ("plots" in shown)]
+        self.query_one("#plots").set_class(face.beside > 1 and room > 1, "-pairs")
+        for figure, picture in zip_longest(self.query(Figure), pictures):
+            figure.show(picture)
+            if picture is not None and face.cursor is not None:
+                figure.point_at(face.cursor)
 
     def scroll_tables(self, by: int) -> None:
         """Scroll what is longer than its place."""
