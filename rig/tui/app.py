@@ -30,7 +30,7 @@ from rig.tui.widgets.dialogs import Ask, Confirm, Dialog
 from rig.tui.widgets.page import Page
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
+    from collections.abc import Callable, Coroutine, Hashable, Iterator, Mapping, Sequence
 
     from textual.filter import LineFilter
 
@@ -60,28 +60,32 @@ _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
 )
 
-_COLOURS: Mapping[str, Sequence[Any]] = {  # dark, light, and the two extremes only
-    "primary": ("#5aa9e6", "#0b5cad", "#00ffff"),
-    "secondary": ("#f2a65a", "#a8480c", "#ffff00"),
-    "accent": ("#c3a6ff", "#6a3fb5", "#ffffff"),
-    "success": ("#6fcf97", "#1b6e3c", "#00ff00"),
-    "warning": ("#f2c94c", "#7a5900", "#ffff00"),
-    "error": ("#ff6b6b", "#b3161d", "#ff9d9d"),
-    "foreground": ("#dfe6ee", "#1b232c", "#ffffff"),
-    "background": ("#10151c", "#fbfaf7", "#000000"),
-    "surface": ("#161d27", "#f3f1ec", "#000000"),
-    "panel": ("#1e2733", "#e6e3dc", "#000000"),
-}
-_BORDERS = ("#33465c", "#9aa5b1", "#ffffff")
-THEMES = tuple(
-    Theme(
-        name=f"rig-{name}",
-        dark=name != "light",
-        variables={"border": _BORDERS[at], "border-blurred": _BORDERS[at]},
-        **{part: colours[at] for part, colours in _COLOURS.items()},
-    )
-    for at, name in enumerate(("dark", "light", "contrast"))
-)
+_COLOURS = """\
+            dark    light   contrast
+primary    #5aa9e6 #0b5cad #00ffff
+secondary  #f2a65a #a8480c #ffff00
+accent     #c3a6ff #6a3fb5 #ffffff
+success    #6fcf97 #1b6e3c #00ff00
+warning    #f2c94c #7a5900 #ffff00
+error      #ff6b6b #b3161d #ff9d9d
+foreground #dfe6ee #1b232c #ffffff
+background #10151c #fbfaf7 #000000
+surface    #161d27 #f3f1ec #000000
+panel      #1e2733 #e6e3dc #000000
+border     #33465c #9aa5b1 #ffffff
+"""
+
+
+def _themes() -> Iterator[Theme]:
+    names, *rows = (row.split() for row in _COLOURS.splitlines())
+    for at, name in enumerate(names):
+        colours: dict[str, Any] = {part: values[at] for part, *values in rows}
+        border = colours.pop("border")
+        edges = {"border": border, "border-blurred": border}
+        yield Theme(name=f"rig-{name}", dark=name != "light", variables=edges, **colours)
+
+
+THEMES = tuple(_themes())
 
 
 class RigApp(App[None], inherit_bindings=False):
@@ -357,8 +361,7 @@ class RigApp(App[None], inherit_bindings=False):
     def next_theme(self) -> None:
         """Change the colours."""
         names = [theme.name for theme in THEMES]
-        at = names.index(self.theme) if self.theme in names else -1
-        self.theme = names[(at + 1) % len(names)]
+        self.theme = names[(names.index(self.theme) + 1) % len(names)]
 
     # ------------------------------------------------------------------ keys and mouse
 

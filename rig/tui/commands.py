@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import sys
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -20,14 +21,13 @@ from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
 from rig.tui.actions import ACTIONS, help_text, shown_key
-from rig.tui.choosing import condition, labels
+from rig.tui.desk import condition
+from rig.tui.drop_words import LOOKS
 from rig.tui.follow import open_live
-from rig.tui.looks import LOOKS
 from rig.tui.replay import Player
 from rig.tui.survey import session_list
 from rig.tui.widgets.dialogs import Ask, Confirm, Reader
 from rig.tui.widgets.text import plain
-from rig.tui.writing import write
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
@@ -110,14 +110,14 @@ def _connect(app: RigApp, row: Row) -> None:
 def _flash(app: RigApp, row: Row) -> None:
     question = f"{row.title}. What was on it is replaced."
     _confirm(app, "Write the firmware?", question, "flash",
-             lambda: app.begin(write(app, "flash", *row.value.split())))  # fmt: skip
+             lambda: app.begin(_run(app, "flash", *row.value.split())))  # fmt: skip
 
 
 def _new(app: RigApp, row: Row) -> None:
     """Have a protocol drafted, under a name that is free."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
     name = next(name for name in names if not Path(name).exists())
-    app.begin(write(app, "new", name, "--scene", row.value, "--yes"))
+    app.begin(_run(app, "new", name, "--scene", row.value, "--yes"))
 
 
 def _end_other(app: RigApp, row: Row) -> None:
@@ -218,21 +218,6 @@ def _note(app: RigApp) -> None:
 # ------------------------------------------------------------------ history
 
 
-def _filter(app: RigApp) -> None:
-    """Ask which drops are looked at."""
-    app.turn("history")
-    view = app.desk.view(app.model)
-    words = dict.fromkeys(word for drop in labels(view).values() for word in drop) if view else ()
-    question = f"Show drops with all of these words: {plain(' '.join(words))}"
-    app.ask(Ask(question, app.desk.words), lambda words: app.desk.sift(words.strip()))
-
-
-def _compare(app: RigApp) -> None:
-    """Lay drops over each other, or show one alone."""
-    app.turn("history")
-    app.desk.comparing = not app.desk.comparing
-
-
 async def _sessions(app: RigApp) -> None:
     """Let one session of the folder be chosen, and play it."""
     view = app.desk.other or app.model.view
@@ -279,21 +264,18 @@ def _same(path: Path, second: Path) -> bool:
 
 def _drops(app: RigApp) -> None:
     """Let one drop of the session that is played be chosen."""
-    model, desk = app.model, app.desk
-    view, jobs = desk.view(model), desk.jobs(model)
+    view, desk = app.desk.view(app.model), app.desk
     if view is None:
         return
-    counts = labels(view)
+    counting = {(drop.run.number, drop.attempt) for drop in view.analysis.runs
+                if drop.verdict in GOOD}  # fmt: skip
     lines = []
-    for job in jobs:
+    for job in view.jobs:
         verdict = view.results[job].verdict
-        symbol, color = LOOKS.get(verdict, ("?", "$foreground"))
-        lines.append(
-            Content.assemble(
-                f"run {job.run:3}, attempt {job.attempt}   {condition(view.plan[job.run]):28}",
-                (f"{symbol} {verdict:10}", color), "counts" if "counts" in counts[job] else "")
-        )  # fmt: skip
-    at = desk.tape.at % max(1, len(lines))
+        name = f"run {job.run:3}, attempt {job.attempt}   {condition(view.plan[job.run]):28}"
+        mark = f"{LOOKS[verdict][0]} {verdict:10}", LOOKS[verdict][1]
+        lines.append(Content.assemble(name, mark, "counts" if job in counting else ""))
+    at = desk.tape.at % len(lines)
     question = Ask("Drops of this session", choices=lines, free=False, yes="play", chosen=at)
     app.turn("history")
     app.ask(question, lambda number: desk.choose(app.model, number))
@@ -334,7 +316,30 @@ def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
         return
     target = str(view.path.with_suffix(suffix))
     _confirm(app, "Write files?", f"{target} will be replaced if it exists.", "write",
-             lambda: app.begin(write(app, command, str(view.path), option, target)))  # fmt: skip
+             lambda: app.begin(_run(app, command, str(view.path), option, target)))  # fmt: skip
+
+
+async def _run(app: RigApp, *command: str) -> None:
+    """Run a command, and say where its files are or what went wrong.
+
+    A process of its own: what it computes takes nothing from STOP.
+    """
+    app.tell(f"rig {command[0]}: working …")
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "rig", *command,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+    )  # fmt: skip
+    try:
+        output, _ = await process.communicate()
+    except asyncio.CancelledError:  # the screen is left
+        process.kill()
+        await process.wait()
+        raise
+    lines = [line for line in output.decode("utf-8", "replace").splitlines() if line.strip()]
+    last_lines = lines[-1:] if process.returncode == 0 else lines[-2:]
+    app.tell("; ".join(last_lines) or f"rig {command[0]} ended with {process.returncode}")
 
 
 def _reject(app: RigApp) -> None:
@@ -426,8 +431,6 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "turn_round": _change(lambda player, _: replace(player, back=not player.back)),
     "earlier": lambda app: _step(app, -1),
     "later": lambda app: _step(app, 1),
-    "filter": _filter,
-    "compare": _compare,
     "report": lambda app: _write(app, "report", "-o", ".html"),
     "export": lambda app: _write(app, "export", "--csv", ".csv"),
     "slower": _change(lambda player, _: player.turned(0.5)),

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from textual.content import Content
 
-from rig.tui.choosing import chosen
 from rig.tui.replay import Player, end_of
 from rig.tui.survey import Survey, first_row, read_file, rows_of
+from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from rig.protocol.protocol import Run
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.context import Options
@@ -72,10 +72,6 @@ class Desk:
         Of the history page, and of the latest drop after its fall.
     other
         Another session than the one in hand, on the history page.
-    words
-        Which drops are looked at, as `rig.tui.choosing` reads them.
-    comparing
-        Whether all drops that are looked at lie over each other.
     replayed
         The latest drop whose slow motion was begun.
     chart, part, row
@@ -87,8 +83,6 @@ class Desk:
         self.tape = Player()
         self.replay = Player()
         self.other: SessionView | None = None
-        self.words = ""
-        self.comparing = False
         self.chart = self.part = 0
         self.row = -1  # none yet
         self.rows: list[Row] = []
@@ -134,18 +128,10 @@ class Desk:
         view = self.other or model.view
         return view if view and view.jobs else None
 
-    def jobs(self, model: Model) -> tuple[Job, ...]:
-        """The drops that are looked at."""
-        view = self.view(model)
-        if view is None:
-            return ()
-        return self.latest("jobs", (view.path, view.reading, self.words),
-                           lambda: chosen(view, self.words))  # fmt: skip
-
     def job(self, model: Model) -> Job | None:
         """The drop of the history page."""
-        jobs = self.jobs(model)
-        return jobs[self.tape.at % len(jobs)] if jobs else None
+        view = self.view(model)
+        return view.jobs[self.tape.at % len(view.jobs)] if view else None
 
     def drop(self, model: Model) -> tuple[SessionView | None, Job | None]:
         """The drop of the page that is shown, where it was analysed."""
@@ -179,11 +165,14 @@ class Desk:
         if self.player(model.page).playing:
             self.change(model, lambda player, end_s: player.ticked(seconds, end_s))
 
-    def sift(self, words: str) -> None:
-        """Look at some drops only."""
-        self.words = words
-        self.tape = replace(self.tape, at=0, time_s=0.0)
-
     def choose(self, model: Model, at: int) -> None:
-        """Take one drop of the list."""
-        self.tape = self.tape.other(at - self.tape.at, len(self.jobs(model)))
+        """Take one drop of the list, from its beginning."""
+        view = self.view(model)
+        self.tape = self.tape.other(at - self.tape.at, len(view.jobs) if view else 0)
+
+
+def condition(run: Run) -> str:
+    """Name what a run drops and, where it strikes, at which incline."""
+    if run.impact is None:
+        return plain(run.free, 20)
+    return f"{run.incline_deg:g}° impact {plain(run.impact, 20)}"

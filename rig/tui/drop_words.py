@@ -1,4 +1,4 @@
-"""A drop in words: what it measured, beside the model and free fall."""
+"""A drop in words: its verdict, and what it measured, beside the model and free fall."""
 
 from __future__ import annotations
 
@@ -7,23 +7,37 @@ from typing import TYPE_CHECKING
 import numpy as np
 from textual.content import Content
 
-from rig.analysis.comparison import compare
 from rig.analysis.result import GOOD, Measured
-from rig.measurands import RELEASE_SKEW, SEPARATION, averaged, listed
+from rig.measurands import SEPARATION, averaged
 from rig.predictions import predicted_run
-from rig.report.numbers import fixed, plus_minus
-from rig.tui.looks import LOOKS
+from rig.reasons import remedies
+from rig.report.numbers import plus_minus
+from rig.report.parts import run_parts
+from rig.text_table import text_table
 from rig.tui.motion import model_fall
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
     from rig.results.live import SessionView
+    from rig.tui.model import Model
     from rig.units import Quantity
+
+
+LOOKS = {
+    "accepted": ("✓", "$success"),
+    "marginal": ("~", "$warning"),
+    "void": ("✗", "$error"),
+    "rejected": ("⊘", "$error"),
+    "recorded": ("…", "$primary"),
+    "armed": ("!", "$warning"),
+    "fired": ("↓", "$primary"),
+    "interrupted": ("■", "$warning"),
+    "planned": ("·", "$foreground 70%"),
+}
+_REMEDIES = 2
+"""Things to do that are shown: what else is wrong shows when these are mended."""
 
 
 def stated(model: Quantity) -> Measured | float:
@@ -81,45 +95,52 @@ def past_runs(view: SessionView, job: Job, width: int) -> Content:
     return Content.assemble(("past runs", "$foreground 70%"), *parts)
 
 
-def number_table(view: SessionView, job: Job, width: int) -> Content:
-    """Write the numbers with U95, one a line, in as many columns as there is room for.
+def number_table(view: SessionView, job: Job) -> Content:
+    """Write what a drop measured, one number a line, beside what it says with all others.
 
     Alone is what the drop says by itself, together what it says in the joint fit of the session.
     """
-    result = view.results[job]
-    joint = next((drop for drop in view.analysis.runs if (drop.run.number, drop.attempt) == job),
-                 None)  # fmt: skip
-    joint = joint if view.fitted and joint is not None and joint.verdict in GOOD else None
-    head = ["± U95", "alone", *(["together"] if joint else []), "model", "Eₙ"]
-    table = [head, *_rows(view, job, joint)]
-    widths = [max(len(row[at]) for row in table if at < len(row)) for at in range(len(head))]
-    while len(widths) > 2 and sum(widths) + 2 * len(widths) > width:
-        widths.pop()
-    lines = ["  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]).rstrip()
-             for row in table]  # fmt: skip
-    for gate in result.gates:
+    alone, run = view.results[job], view.plan[job.run]
+    joint = (
+        drop
+        for drop in view.analysis.runs
+        if view.fitted and (drop.run.number, drop.attempt) == job
+    )
+    results = {"alone": alone} | dict(zip(("together",), joint, strict=False))
+    lines = []
+    for part in run_parts(results.values()):
+        names = [name for name, _ in part.head]
+        lines += text_table([["", *results], *zip(names, *part.rows, strict=True)], left={0})
+        lines += part.sentences
+    expected = expected_words(view.protocol, run)
+    lines += [f"model  {expected}"] if expected else []
+    for gate in alone.gates:
         interval = "" if gate.interval is None else f", {plus_minus(gate.interval, 1e3)} ms later"
         lines.append(f"gate {gate.channel}: {plus_minus(gate.speed, 1.0)} m/s{interval}")
-    counts = " · ".join(f"{count} {kind}" for kind, count in result.audit.json().items())
-    bold = Content.styled(lines[0], "bold")
-    return Content("\n").join([bold, *map(Content, lines[1:]), Content(f"edges: {counts}")])
+    return Content("\n".join(lines))
 
 
-def _rows(view: SessionView, job: Job, joint: DropResult | None) -> Iterator[list[str]]:
-    """Cells of each number: label, alone, together where there is a joint fit, model, Eₙ."""
-    result = view.results[job]
-    expected = predicted_run(view.protocol, view.plan[job.run])
-    errors = {row.quantity: row.differences[0].normalized_error
-              for row in compare(view.protocol, [[result]])}  # fmt: skip
-    for row in listed():
-        if row.name not in result.quantities:
-            continue
-        model = expected.get(row.name)
-        beside = "" if model is None else plus_minus(stated(model), row.scale)
-        if row == RELEASE_SKEW:
-            beside = f"limit ±{view.protocol.accept.release_skew * row.scale:g}"
-        results = [result, *([joint] if joint else [])]
-        values = [plus_minus(drop.quantities[row.name], row.scale) for drop in results
-                  if row.name in drop.quantities]  # fmt: skip
-        error = fixed(errors.get(row.name), 2) if model is not None else ""
-        yield [f"{row.label} ({row.unit})", *values, beside, error]
+def verdict_words(model: Model) -> Content:
+    """Write the verdict and its reasons."""
+    if model.job is None:
+        return Content(model.loading or "No drop yet.")
+    verdict, reasons = model.verdict
+    if not verdict:
+        return Content(model.loading or "no verdict yet")
+    symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
+    lines = [Content.styled(f" {symbol} {verdict.upper()} ", f"bold $background on {colour}")]
+    lines += [Content.assemble("  ", (plain(reason, 200), "")) for reason in reasons[:4]]
+    if len(reasons) > 4:
+        lines.append(Content(f"  and {len(reasons) - 4} more reasons, in the session file"))
+    replaced = model.replaced
+    if verdict not in GOOD and replaced is not None:
+        lines += [
+            Content(f"  Only the latest attempt counts: attempt {replaced.attempt} was good, "
+                    f"but run {model.job.run} has no result now."),
+            Content("  → press a to repeat it before you change anything at the rig"),
+        ]  # fmt: skip
+    if model.blind:
+        lines.append(Content("  BLIND: results are hidden until you unblind the session"))
+    if verdict == "void":
+        lines += [Content(f"  → {remedy}") for remedy in remedies(reasons)[:_REMEDIES]]
+    return Content("\n").join(lines)

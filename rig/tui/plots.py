@@ -11,7 +11,7 @@ from rig.report.looks import MODEL, MUTED, SECOND
 from rig.tui.plotting import Picture, Series
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from rig.analysis.session import Analysis
     from rig.records import Job
@@ -34,7 +34,6 @@ _GRAVITY = (
 )
 _BEFORE_S = 0.02
 _MOST = 300  # marks of a chain: more would stand on each other
-_LAID = 12  # drops over each other
 
 
 def pictures_of(*charts: Chart | None) -> list[Picture]:
@@ -94,26 +93,6 @@ def drop_figures(view: SessionView, job: Job) -> list[Chart]:
     """Return the report's figures of a drop; none where it does not count."""
     drop, hz = view.drops[job], view.scales[job].hz
     return [*fall_figures(view.protocol, drop, hz, view.results[job])]
-
-
-def laid_over(view: SessionView, jobs: Sequence[Job], job: Job) -> Picture | None:
-    """Draw the falls of several drops over each other, one above the others.
-
-    `None` where nothing of it was measured. Of very many drops some are left out.
-    """
-    rest = [other for other in jobs[:: 1 + len(jobs) // _LAID] if other != job]
-    pictures = {drop: pictures_of(*drop_figures(view, drop)) for drop in (*rest, job)}
-    if not pictures[job]:
-        return None
-    own = pictures[job][0]
-    dots = [
-        curve._replace(color="foreground", marker="·", label="")
-        for drop in rest
-        for curve in (pictures[drop][0].series if pictures[drop] else ())
-        if curve.kind == "dots"
-    ]
-    dots[:1] = [curve._replace(label=f"{len(rest)} others") for curve in dots[:1]]
-    return own._replace(series=(*dots, *own.series), residuals=())
 
 
 def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:

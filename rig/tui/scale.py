@@ -1,6 +1,6 @@
 """A rig to scale at one moment of a drop, as strokes in metres: what falls, board, posts, Δz.
 
-Heights are above the contact point, as those of falls and films are.
+Heights are above the contact point, as those of falls are.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from rig.films import Film
     from rig.protocol.protocol import Protocol, Run, Side
     from rig.tui.indicators import Indicators
     from rig.tui.motion import ChainFall
@@ -64,7 +63,6 @@ def drawing(
     falls: Sequence[ChainFall],
     indicators: Indicators,
     time_s: float,
-    film: Film | None = None,
 ) -> Drawing:
     """Draw what falls as measured, over where the model has it, between the posts of its gates.
 
@@ -76,8 +74,6 @@ def drawing(
         Of the gates at that moment: those that are blocked light.
     time_s
         Since the release fired.
-    film
-        Of the striking chain, where a simulation knows how each rod moved: shown as measured.
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
@@ -111,12 +107,9 @@ def drawing(
             strokes += _rods(protocol, name, side, middle, model, "accent", top - bottom)
         if fall.times.size:
             color = "primary" if side == "impact" else "secondary"
-            if film is not None and side == "impact":
-                strokes += _filmed(film, middle, time_s - fall.delay_s, color)
-            else:
-                hangs = model is not None and time_s < fall.times[0]
-                height = model if hangs and model is not None else _measured(fall, time_s)
-                strokes += _rods(protocol, name, side, middle, height, color, top - bottom)
+            hangs = model is not None and time_s < fall.times[0]
+            height = model if hangs and model is not None else _measured(fall, time_s)
+            strokes += _rods(protocol, name, side, middle, height, color, top - bottom)
         if side == "impact":
             fallen = half * math.tan(math.radians(run.incline_deg))
             strokes.append(Stroke(middle - half, fallen, middle + half, -fallen, "foreground"))
@@ -209,15 +202,3 @@ def _rods(
             z, tilt = 0.0, 0.0
         across, up = half * math.cos(tilt), half * math.sin(tilt)
         yield Stroke(x - across, z - up, x + across, z + up, color)
-
-
-def _filmed(film: Film, x: float, time_s: float, color: str) -> Iterator[Stroke]:
-    """Rods with their tilt, in the pile too, and the strings that are slack."""
-    moment = film.nearest(time_s)
-    both = film.left[moment], film.right[moment]
-    for start, end in zip(*both, strict=True):
-        yield Stroke(x + start[0], start[2], x + end[0], end[2], color)
-    for ends, slack in zip(both, film.slack(moment), strict=True):
-        for low, high, loose in zip(ends, ends[1:], slack, strict=False):
-            if loose:
-                yield Stroke(x + low[0], low[2], x + high[0], high[2], "foreground")

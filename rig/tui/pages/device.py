@@ -21,13 +21,12 @@ if TYPE_CHECKING:
 
 def face(model: Model, desk: Desk, width: int) -> Face:
     """Show what is connected, and what its gates see."""
-    del width
     protocol, run = model.protocol, model.run
     picture = None
     if protocol is not None and run is not None:
         falls = desk.latest("hanging", (protocol, run), lambda: motions(protocol, run, ()))
         picture = drawing(protocol, run, falls, model.indicators, 0.0)
-    gates = board(protocol, model.indicators, model.now_s)
+    gates = board(protocol, model.indicators, model.now_s, width)
     words = [*gates, Content(""), _gate_check(model), _release(model)]
     return Face(_facts(model), picture, words=Content("\n").join(words), top=True)
 

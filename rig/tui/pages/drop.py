@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from statistics import mean, stdev
 from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from rig.campaign.events import Stage
-from rig.films import read_films
-from rig.measurands import listed
 from rig.reasons import notes_in
-from rig.report.numbers import fixed
-from rig.tui.choosing import condition
-from rig.tui.desk import Face
-from rig.tui.drop_words import expected_words, number_table, past_runs, sentence
-from rig.tui.looks import LOOKS, verdict_words
+from rig.tui.desk import Face, condition
+from rig.tui.drop_words import (
+    LOOKS,
+    expected_words,
+    number_table,
+    past_runs,
+    sentence,
+    verdict_words,
+)
 from rig.tui.motion import as_table, motions
 from rig.tui.next_step import hand, next_step
-from rig.tui.plots import drop_figures, fall_pictures, laid_over, pictures_of
+from rig.tui.plots import drop_figures, fall_pictures, pictures_of
 from rig.tui.replay import indicators_at, until
 from rig.tui.scale import drawing
 from rig.tui.widgets.gates import board
@@ -64,7 +65,11 @@ def face(model: Model, desk: Desk, width: int) -> Face:
         drawing(protocol, run, falls, model.indicators, time_s),
         desk.latest("pictures", key, lambda: fall_pictures(falls)),
         words=Content("\n").join(
-            [*map(Content, facts), Content(""), *board(protocol, model.indicators, model.now_s)]
+            [
+                *map(Content, facts),
+                Content(""),
+                *board(protocol, model.indicators, model.now_s, width),
+            ]
         ),
         digits=f"{max(0.0, model.flow.left_s):.1f}" if counting else "",
     )
@@ -114,69 +119,43 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
         parts = [steps(model), *parts, _action(model)]
     if view is None or job is None:
         missing = model.loading or "No drop recorded yet. Press o to choose another session."
-        if desk.jobs(model) == () and desk.words:
-            missing = f"No drop matches {plain(desk.words, 40)}. Press f to change this."
         return Face(Content("\n").join(parts or [Content(missing)]))
-    player, jobs, hz = desk.player(model.page), desk.jobs(model), view.scales[job].hz
+    player, hz = desk.player(model.page), view.scales[job].hz
     drop, edges = view.drops[job], view.drops[job].edges
     begun = player.playing or player.time_s > 0.0 or not own
     seen = until(edges, hz, player.time_s) if begun else edges
     indicators = indicators_at(view.channels, drop, seen)
     run, matches = view.plan[job.run], view.results[job].matches or None
-    falls, film = desk.latest(
-        "moment", (view.path, job, hz),
-        lambda: (motions(view.protocol, run, edges, hz, matches), read_films(view.path).get(job)),
-    )  # fmt: skip
+    falls = desk.latest("moment", (view.path, job, hz),
+                        lambda: motions(view.protocol, run, edges, hz, matches))  # fmt: skip
     key = view.path, view.reading, job, width
-    if desk.comparing and not own:
-        laid = desk.latest("laid", (key, jobs), lambda: laid_over(view, jobs, job))
-        pictures = [] if laid is None else [laid]
-        words = desk.latest("compared", (key, jobs), lambda: comparison(view, jobs))
-    else:
-        pictures = desk.latest(
-            "figures",
-            key[:3],
-            lambda: pictures_of(*drop_figures(view, job)) or fall_pictures(falls),
-        )
-        words = desk.latest("words", key, lambda: number_table(view, job, width))
+    pictures = desk.latest(
+        "figures", key[:3], lambda: pictures_of(*drop_figures(view, job)) or fall_pictures(falls)
+    )
+    words = desk.latest("words", key, lambda: number_table(view, job))
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
     said = sentence(view, job) if not (own and player.playing) else "slow motion …"
     foot = [Content.styled(said, "bold $success"), past_runs(view, job, width)]
     return Face(
-        Content("\n").join(parts or _which(view, job, desk, jobs)),
-        drawing(view.protocol, run, falls, indicators, time_s, film),
+        Content("\n").join(parts or _which(view, job, desk)),
+        drawing(view.protocol, run, falls, indicators, time_s),
         pictures,
-        player.time_s * 1e3 if begun and not desk.comparing else None,
-        Content("\n").join([words, Content(""), *board(view.protocol, indicators, 0.0)]),
+        player.time_s * 1e3 if begun else None,
+        Content("\n").join([words, Content(""), *board(view.protocol, indicators, 0.0, width)]),
         Content("\n").join([line for line in foot if line.plain]),
     )
 
 
-def comparison(view: SessionView, jobs: Sequence[Job]) -> Content:
-    """Write mean and standard deviation of what some drops measured."""
-    lines = [Content.styled(f"{'':20}{'n':>4}{'mean':>9}{'SD':>9}", "bold")]
-    for row in listed():
-        measured = [view.results[job].quantities.get(row.name) for job in jobs]
-        values = [quantity.value * row.scale for quantity in measured if quantity is not None]
-        if values:
-            scatter = fixed(stdev(values), 3) if len(values) > 1 else "–"
-            label = f"{row.label} ({row.unit})"
-            line = f"{label:20}{len(values):4}{fixed(mean(values), 3):>9}{scatter:>9}"
-            lines.append(Content(line))
-    return Content("\n").join(lines)
-
-
-def _which(view: SessionView, job: Job, desk: Desk, jobs: Sequence[Job]) -> list[Content]:
+def _which(view: SessionView, job: Job, desk: Desk) -> list[Content]:
     """Name the drop that is played, and say how."""
     player, verdict = desk.tape, view.results[job].verdict
-    only = f" ({plain(desk.words, 40)})" if desk.words else ""
     reasons = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
     arrow = "◀" if player.back else "▶"
     state = f"{arrow} playing" if player.playing else f"‖ paused {arrow}"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} ×"
     return [
         Content.assemble(
-            (f"drop {jobs.index(job) + 1} of {len(jobs)}{only}", "bold $primary"),
+            (f"drop {view.jobs.index(job) + 1} of {len(view.jobs)}", "bold $primary"),
             f"  run {job.run}, attempt {job.attempt} · {condition(view.plan[job.run])} · ",
             (f"{LOOKS[verdict][0]} {verdict}", LOOKS[verdict][1]),
         ),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,20 +9,16 @@ from textual.content import Content
 
 from rig.analysis.joint_fit import FEWEST
 from rig.campaign.plan import done
-from rig.measurands import averaged
-from rig.protocol.protocol import Condition
-from rig.report.numbers import fixed, plus_minus
-from rig.report.parts import main_error
+from rig.report.parts import means_parts, run_parts, scatter_parts, value_parts
 from rig.tui.desk import Face
-from rig.tui.looks import LOOKS
+from rig.tui.drop_words import LOOKS
 from rig.tui.plots import session_pictures
 from rig.tui.widgets.text import duration, plain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator
 
-    from rig.analysis.summary import Incline
-    from rig.campaign.plan import RunLine
+    from rig.report.columns import Part
     from rig.tui.desk import Desk
     from rig.tui.model import Model
 
@@ -31,15 +26,20 @@ if TYPE_CHECKING:
 def face(model: Model, desk: Desk, width: int) -> Face:
     """Show the plan, results against incline, and control charts."""
     del width
-    head = Content("\n").join([_progress(model), _plan(model)])
     view = model.view
     if view is None:
-        return Face(head)
+        return Face(_progress(model))
+    means, drops = desk.latest(
+        "tables", (view.path, view.reading), lambda: (_table(value_parts(view.analysis.summary)),
+        _table([*means_parts(view.analysis.summary), *scatter_parts(view.analysis.summary), *run_parts(view.analysis.runs)]))
+    )  # fmt: skip
+    head = Content("\n").join([_progress(model), Content(means)])
     shown = desk.latest("charts", (view.path, view.reading), lambda: [*session_pictures(view)])
     turned = desk.chart % max(1, len(shown))
     pictures = [*shown[turned:], *shown[:turned]]
     foot = pictures[0][1] if pictures else ""
-    return Face(head, pictures=[picture for picture, _ in pictures], foot=Content(foot), beside=2)
+    return Face(head, pictures=[picture for picture, _ in pictures], foot=Content(foot), beside=2,
+                words=Content(drops))  # fmt: skip
 
 
 def _progress(model: Model) -> Content:
@@ -60,33 +60,12 @@ def _progress(model: Model) -> Content:
     return Content.assemble(
         ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
         (f"  {over} of {len(runs)} runs", "bold"), f"{remaining}  ", (session, "$foreground 70%"),
-        _fit_words(model),
+        _fit_words(model), "\n", *_marks(model),
     )  # fmt: skip
 
 
-def _plan(model: Model) -> Content:
-    """One line an incline and, of unlike chains, striker: a symbol a run, and the means so far."""
-    unlike = model.protocol is not None and model.protocol.unlike_chains
-
-    def condition(line: RunLine) -> Condition:
-        return Condition(line.incline_deg, line.impact if unlike else None)
-
-    summary = {}
-    if model.view is not None:
-        summary = {line.condition: line for line in model.view.analysis.summary}
-    ordered = sorted(model.state.runs, key=condition)
-    groups = [list(group) for _, group in groupby(ordered, key=condition)]
-    means = [_means(summary.get(condition(group[0]))) for group in groups]
-    longest = max(map(len, groups), default=0)
-    widths = [max(map(len, column)) for column in zip_longest(*means, fillvalue="")]
-    lines = []
-    for group, parts in zip(groups, means, strict=True):
-        padded = [part.ljust(width) for part, width in zip(parts, widths, strict=False)]
-        marks = [*_marks(group, model), (" " * (longest - len(group) + 2), "")]
-        head = f"{group[0].incline_deg:5g}° " if group[0].impact is not None else "drops  "
-        head += f"{plain(group[0].impact, 12)} " if unlike and group[0].impact else ""
-        lines.append(Content.assemble((head, "bold"), *marks, "  ".join(padded).rstrip()))
-    return Content("\n").join(lines)
+def _table(parts: Iterable[Part]) -> str:
+    return "\n".join(line for part in parts for line in part.lines if line)
 
 
 def _fit_words(model: Model) -> tuple[str, str]:
@@ -101,22 +80,9 @@ def _fit_words(model: Model) -> tuple[str, str]:
     return f"\neach drop fitted alone{joint}{suffix}", "$foreground 70%"
 
 
-def _marks(runs: Sequence[RunLine], model: Model) -> Iterator[tuple[str, str]]:
-    """A symbol a run; the one that is on turns its colours round."""
-    for line in runs:
+def _marks(model: Model) -> Iterator[tuple[str, str]]:
+    """A symbol a run, in order; the one that is on turns its colours round."""
+    for line in model.state.runs:
         is_now = model.job is not None and line.run == model.job.run
         symbol, colour = LOOKS.get(line.state, ("?", "$foreground"))
         yield symbol, f"{colour} reverse" if is_now else colour
-
-
-def _means(line: Incline | None) -> list[str]:
-    """What is known of an incline so far."""
-    if line is None:
-        return []
-    parts = [
-        f"{row.symbol} {plus_minus(line.means[row.name], row.scale)} {row.unit}"
-        for row in averaged()
-        if row.name in line.means
-    ]
-    error = main_error(line)
-    return parts if error is None else [*parts, f"Eₙ {fixed(error, 2)}"]

@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 _WIDE = 39
 
 
-def board(protocol: Protocol | None, indicators: Indicators, now_s: float) -> list[Content]:
-    """Write what the gates do now, one side beside the other, the highest first."""
+def board(
+    protocol: Protocol | None, indicators: Indicators, now_s: float, width: int
+) -> list[Content]:
+    """Write what the gates do now, the highest first; side beside side where there is room."""
     if protocol is None or protocol.gates is None:
         return [Content("no gates in this scene")]
     sides = [sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
@@ -27,6 +29,8 @@ def board(protocol: Protocol | None, indicators: Indicators, now_s: float) -> li
          *(_line(gate, indicators, now_s) for gate in gates)]
         for title, gates in zip(titles, sides, strict=True) if gates
     ]  # fmt: skip
+    if width < _WIDE * len(columns):
+        return [line for column in columns for line in column]
     blank = Content(" " * _WIDE)
     return [Content.assemble(*row) for row in zip_longest(*columns, fillvalue=blank)]
 
