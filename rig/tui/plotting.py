@@ -1,4 +1,4 @@
-"""One way to plot: curves, bands, marks, error bars and residuals, all on the same dots of braille.
+"""One way to plot: panels of the report's figures, in dots of braille.
 
 An axis is a number of units a character: its ticks stand in the middle of the characters that name
 them, and what is drawn lies where the tick says, to the dot.
@@ -7,21 +7,28 @@ them, and what is drawn lies where the tick says, to the dot.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.report.looks import MODEL, MUTED, SECOND
 from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from rig.arrays import Array
+    from rig.report.figure import Panel, Trace
 
     Numbers = Sequence[float] | Array
 
 _COLORS = ("border", "foreground", "accent", "warning", "secondary", "primary", "success", "error")
-"""Of series, the last above the others."""
+"""Of traces, the last above the others."""
+_COLOR_OF = {MODEL: "accent", SECOND: "secondary", MUTED: "foreground"}
+_ROLES = {"band": "⣿", "line": "⠒", "dash": "⠒", "thick": "⠒", "level": "⠒", "limit": "⠒",
+          "shade": "⠒", "points": "+", "cross": "×", "mean": "●", "ring": "○",
+          "square": "●"}  # fmt: skip
+"""Marks of the roles that are drawn: of a shade its edges; of gaps, maps and words nothing."""
 _TICK_COLUMNS, _TICK_ROWS = 9, 2
 """Characters from one number at an axis to the next, at least."""
 _ROOM = 0.04  # of an axis, above and below what is drawn
@@ -33,59 +40,16 @@ _SHAPES = {
     "+": [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)],
     "×": [(0, 0), (-1, -1), (1, -1), (-1, 1), (1, 1)],
     "○": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y],
-    "·": [(0, 0)],
 }
 """Dots of each marker around its place."""
-_MARK = {"line": "⠒⠒", "band": "⣿⣿"}
 _CAP = np.array([[-1.0, 0.0], [1.0, 0.0]])  # of an error bar
 
 
-class Series(NamedTuple):
-    """Something to be drawn.
-
-    Attributes
-    ----------
-    kind
-        Line, band as wide as the errors, markers, or markers with error bars.
-    color
-        Name of a theme's colour.
-    marker
-        ``●``, ``○``, ``+``, ``×`` or ``·``; of lines and bands unused.
-    label
-        In the legend; empty for none.
-    """
-
-    kind: Literal["line", "band", "dots", "bars"]
-    x: Numbers
-    y: Numbers
-    color: str = "foreground"
-    marker: str = "●"
-    label: str = ""
-    errors: Numbers = ()
-
-
 class Picture(NamedTuple):
-    """Everything a figure shows.
+    """A panel, and the one of residuals below it, if there is one."""
 
-    Attributes
-    ----------
-    y_label, x_label
-        What is drawn, with its unit.
-    counts
-        Whether the horizontal axis counts something, so that its numbers are whole.
-    residuals
-        What is drawn in a strip below, if anything.
-    residual_label
-        What that is, with its unit.
-    """
-
-    y_label: str
-    x_label: str
-    series: tuple[Series, ...]
-    x_limits: tuple[float | None, float | None] = (None, None)
-    counts: bool = False
-    residuals: tuple[Series, ...] = ()
-    residual_label: str = ""
+    panel: Panel
+    residuals: Panel | None = None
 
 
 class Axis(NamedTuple):
@@ -189,41 +153,48 @@ def plotted(picture: Picture, width: int, height: int, cursor: float | None = No
     cursor
         Where on the horizontal axis values are read off; `None` for nowhere.
     """
-    strip = _strip(picture, height)
+    panel, residuals = picture
+    if residuals is None or height < _STRIP_FROM:
+        residuals, strip = None, 0
+    else:
+        strip = max(_STRIP_LEAST, height // _STRIP_OF)
     rows = max(1, height - 3 - strip)
-    upright = axis_over(*_roomy(picture.series), rows, min(_TICK_ROWS, max(1, rows // 3)))
-    lower = axis_over(*_roomy(picture.residuals, level=0.0), max(1, strip - 1), 1)
+    upright = axis_over(*_roomy(panel), rows, min(_TICK_ROWS, max(1, rows // 3)))
+    lower = axis_over(*_roomy(residuals or panel), max(1, strip - 1), 1)
     numbers = [*upright.ticks.values(), *(lower.ticks.values() if strip else ())]
     margin = 1 + max((len(_number(value)) for value in numbers), default=0)
     columns = max(1, width - margin - 1)
-    x = axis_over(*spread(picture), columns, _TICK_COLUMNS, whole=picture.counts)
-    out = [_legend(picture, cursor, width), *_panel(picture.series, x, upright, cursor, margin)]
-    if strip:
-        head = f" {picture.residual_label} "[:columns]
+    x = axis_over(*spread(picture), columns, _TICK_COLUMNS, whole=panel.x.whole)
+    out = [_legend(picture, cursor, width), *_drawn(panel, x, upright, cursor, margin)]
+    if residuals is not None:
+        head = f" {_one_line(residuals.y.label)} "[:columns]
         out.append([Span(" " * margin + "├" + head + "╌" * (columns - len(head)))])
-        out += _panel(picture.residuals, x, lower, cursor, margin)
-    return Plot([*out, *_foot(picture.x_label, x, margin)], margin + 1, x)
+        out += _drawn(residuals, x, lower, cursor, margin)
+    return Plot([*out, *_foot(panel.x.label, x, margin)], margin + 1, x)
 
 
 def spread(picture: Picture) -> tuple[float, float]:
     """Take the horizontal ends that are given, or those of the data."""
-    given_low, given_high = picture.x_limits
-    values = [float(value) for series in picture.series for value in series.x]
-    low = min(values, default=0.0) if given_low is None else given_low
-    high = max(values, default=1.0) if given_high is None else given_high
+    x = picture.panel.x
+    places = [place for trace in picture.panel.series for place in trace.x] or [0.0]
+    low, high = x.limits or (min(places) - 0.5 * x.whole, max(places) + 0.5 * x.whole)
     return (low, high) if low < high else (low - 0.5, low + 0.5)
+
+
+def _one_line(label: str) -> str:
+    return label.replace("\n", " ")
 
 
 def _legend(picture: Picture, cursor: float | None, width: int) -> list[Span]:
     """Say what is drawn, and what it is at the cursor."""
     low, high = spread(picture)
-    at = "" if cursor is None else f"  {picture.x_label} {_number(cursor)}"
-    parts = [Span(picture.y_label, bold=True), Span(at)]
-    for curve in picture.series:
-        if curve.label and len(curve.x):
-            mark = Span(f"  {_MARK.get(curve.kind, curve.marker)}", curve.color, bold=True)
-            value = "" if cursor is None else _read(curve, cursor, _NEAR * (high - low))
-            parts += [mark, Span(f" {curve.label}"), Span(f" {value}" * bool(value), curve.color)]
+    at = "" if cursor is None else f"  {picture.panel.x.label} {_number(cursor)}"
+    parts = [Span(_one_line(picture.panel.y.label), bold=True), Span(at)]
+    for trace in picture.panel.series:
+        if trace.label and trace.role in _ROLES and len(trace.y):
+            mark = Span(f"  {_ROLES[trace.role]}", _color(trace), bold=True)
+            value = "" if cursor is None else _read(trace, cursor, _NEAR * (high - low))
+            parts += [mark, Span(f" {trace.label}"), Span(f" {value}" * bool(value), _color(trace))]
     spans = []
     for part in parts:
         spans.append(part._replace(text=part.text[: max(0, width)]))
@@ -231,51 +202,55 @@ def _legend(picture: Picture, cursor: float | None, width: int) -> list[Span]:
     return spans
 
 
+def _color(trace: Trace) -> str:
+    if trace.role in {"band", "shade", "cross"}:
+        return "error" if trace.role == "cross" else "border"
+    return _COLOR_OF.get(trace.color, "primary")
+
+
 def _number(value: float) -> str:
     return f"{value:.4g}".replace("-", "−")
 
 
-def _panel(
-    series: Sequence[Series], x: Axis, y: Axis, cursor: float | None, margin: int
+def _drawn(
+    panel: Panel, x: Axis, y: Axis, cursor: float | None, margin: int
 ) -> Iterator[list[Span]]:
-    """Draw series on one pair of axes, behind the upright one."""
+    """Draw traces on one pair of axes, behind the upright one."""
     sheet = Sheet(x.cells, y.cells, _COLORS)
     if cursor is not None:
         down = np.arange(0, ROWS * y.cells, 2.0)
         across = np.full(down.size, float(x.at([cursor], COLUMNS)[0]))
         sheet.dots(np.column_stack([across, down]), 1)
-    for curve in series:
-        if len(curve.x):
-            _draw(sheet, curve, x, y)
+    for trace in panel.series:
+        if trace.role in _ROLES and len(trace.y):
+            _draw(sheet, trace, x, y)
     for row, line in enumerate(sheet.rows()):
         value = y.ticks.get(y.cells - 1 - row)
         number = "" if value is None else _number(value)
         yield [Span(f"{number:>{margin}}{'┤' if number else '│'}"), *line]
 
 
-def _places(x: Axis, y: Axis, across: Numbers, up: Numbers) -> Array:
-    """Where points are on a sheet, in dots from the top left."""
-    down = ROWS * y.cells - 1.0 - y.at(up, ROWS)
-    return np.column_stack([x.at(across, COLUMNS), down])
-
-
-def _draw(sheet: Sheet, curve: Series, x: Axis, y: Axis) -> None:
-    ink = _COLORS.index(curve.color)
-    places = _places(x, y, curve.x, curve.y)
-    if curve.kind == "line":
-        sheet.strokes(np.stack([places[:-1], places[1:]], axis=1), ink)
+def _draw(sheet: Sheet, trace: Trace, x: Axis, y: Axis) -> None:
+    ink = _COLORS.index(_color(trace))
+    values, off = np.asarray(trace.y, dtype=np.float64), np.asarray(trace.u, dtype=np.float64)
+    down = ROWS * y.cells - 1.0 - y.at(values, ROWS)
+    if trace.role in {"level", "limit", "shade"}:
+        ends = np.array([[0.0, 0.0], [COLUMNS * x.cells - 1.0, 0.0]])
+        sheet.strokes(ends + np.column_stack([0.0 * down, down])[:, None], ink)
         return
-    if curve.kind in {"band", "bars"}:
-        values, off = np.asarray(curve.y), np.asarray(curve.errors, dtype=np.float64)
-        tips = [_places(x, y, curve.x, values + sign * off) for sign in (-1.0, 1.0)]
+    places = np.column_stack([x.at(trace.x, COLUMNS), down])
+    if len(off):
+        ways = np.column_stack([0.0 * down, off / y.unit * ROWS])
+        tips = [places - ways, places + ways]
         sheet.strokes(np.stack(tips, axis=1), ink)
-        if curve.kind == "band":
-            return
-        for tip in tips:
+        for tip in tips if trace.role != "band" else ():
             sheet.strokes(tip[:, None] + _CAP, ink)
-    places = np.rint(places[np.isfinite(places).all(axis=1)])
-    shape = np.array(_SHAPES[curve.marker], dtype=np.float64)
-    sheet.dots((places[:, None] + shape).reshape(-1, 2), ink)
+    shape = _SHAPES.get(_ROLES[trace.role])
+    if shape is not None:
+        places = np.rint(places[np.isfinite(places).all(axis=1)])
+        sheet.dots((places[:, None] + np.array(shape, dtype=np.float64)).reshape(-1, 2), ink)
+    elif not len(off):
+        sheet.strokes(np.stack([places[:-1], places[1:]], axis=1), ink)
 
 
 def _foot(label: str, axis: Axis, margin: int) -> Iterator[list[Span]]:
@@ -292,32 +267,25 @@ def _foot(label: str, axis: Axis, margin: int) -> Iterator[list[Span]]:
     yield [Span(("".join(below[: max(0, free)]) + f" {label}")[: len(below)])]
 
 
-def _read(curve: Series, at: float, near: float) -> str:
-    """Say what a series is at the cursor."""
-    x, y = np.asarray(curve.x, dtype=np.float64), np.asarray(curve.y, dtype=np.float64)
-    if curve.kind in {"line", "band"}:
+def _read(trace: Trace, at: float, near: float) -> str:
+    """Say what a trace is at the cursor."""
+    x, y = np.asarray(trace.x, dtype=np.float64), np.asarray(trace.y, dtype=np.float64)
+    if not x.size or _ROLES[trace.role] in "⣿⠒":
         inside = x.size > 0 and x.min() <= at <= x.max()
-        return _number(float(np.interp(at, x, y))) if inside else "–"
+        return _number(float(np.interp(at, x, y))) if inside else ""
     point = int(np.argmin(np.abs(x - at)))
     if abs(x[point] - at) > near:
         return "–"
-    bar = f" ± {curve.errors[point]:.2g}" if curve.kind == "bars" else ""
-    return f"{_number(float(y[point]))}{bar}"
+    return _number(float(y[point])) + (f" ± {trace.u[point]:.2g}" if len(trace.u) else "")
 
 
-def _strip(picture: Picture, height: int) -> int:
-    """Lines for the residuals, with what names them."""
-    has_points = any(len(curve.x) for curve in picture.residuals)
-    return max(_STRIP_LEAST, height // _STRIP_OF) if has_points and height >= _STRIP_FROM else 0
-
-
-def _roomy(series: Sequence[Series], level: float | None = None) -> tuple[float, float]:
+def _roomy(panel: Panel) -> tuple[float, float]:
     """Give the upright axis room, and a span where all values are alike."""
-    ends = [np.empty(0) if level is None else np.array([level])]
-    for curve in series:
-        values = np.asarray(curve.y, dtype=np.float64)
-        off = np.asarray(curve.errors, dtype=np.float64) if len(curve.errors) else 0.0
-        ends += [values - off, values + off]
+    ends = [np.asarray(panel.y.limits or (), dtype=np.float64)]
+    for trace in panel.series if not panel.y.limits else ():
+        values = np.asarray(trace.y, dtype=np.float64)
+        off = np.asarray(trace.u, dtype=np.float64) if len(trace.u) else 0.0
+        ends += [values - off, values + off] if trace.role in _ROLES else []
     values = np.concatenate(ends)
     values = values[np.isfinite(values)]
     if not values.size:

@@ -88,7 +88,7 @@ def drawing(
     lowest = min((gate.height - length for gate in gates), default=0.0)
     bottom = -0.35 * length if protocol.surface else lowest - _MARGIN_M
     for column, fall in enumerate(falls):
-        side: Side = "impact" if fall.role == "impact" else "free"
+        side = fall.role
         name = names[side] or run.impact
         assert name is not None
         middle = pitch * (2.0 * column + 1.2)

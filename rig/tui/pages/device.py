@@ -24,7 +24,7 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     protocol, run = model.protocol, model.run
     picture = None
     if protocol is not None and run is not None:
-        falls = desk.latest("hanging", (protocol, run), lambda: motions(protocol, run, ()))
+        falls = desk.latest("hanging", (protocol, run), lambda: motions(protocol, run))
         picture = drawing(protocol, run, falls, model.indicators, 0.0)
     gates = board(protocol, model.indicators, model.now_s, width)
     words = [*gates, Content(""), _gate_check(model), _release(model)]

@@ -17,17 +17,15 @@ from rig.tui.drop_words import (
     sentence,
     verdict_words,
 )
-from rig.tui.motion import as_table, motions
+from rig.tui.motion import motions
 from rig.tui.next_step import hand, next_step
-from rig.tui.plots import drop_figures, fall_pictures, pictures_of
+from rig.tui.plots import drop_pictures, fall_pictures
 from rig.tui.replay import indicators_at, until
 from rig.tui.scale import drawing
 from rig.tui.widgets.gates import board
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rig.protocol.protocol import Run
     from rig.records import Job
     from rig.results.live import SessionView
@@ -47,23 +45,15 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     protocol, run = model.protocol, model.run
     if model.loading or protocol is None or run is None:
         return Face(Content(model.loading or next_step(model).text))
-    hz = float(model.state.section("drop").get("tick_hz") or 1e6)
-    live = model.stage in _FALLING
-    edges = model.state.edges if live else ()
-    # Only what is new is taken over: there may be thousands, and they come every tick.
-    rows: list[Sequence[int]] = desk.latest("edges", (model.job, live), list)
-    rows += edges[len(rows) :]
-    key = (protocol, model.job, run, len(edges), live)
-    falls = desk.latest("falls", key, lambda: motions(protocol, run, as_table(rows), hz))
-    time_s = float(edges[-1][0]) / hz if edges else 0.0  # where the latest edge has them
+    falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
     counting = model.stage is Stage.COUNTDOWN and model.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
     facts = [f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}"]
     facts += [f"model  {expected}"] if expected else []
     return Face(
         Content("\n").join([steps(model), _headline(model, run), _action(model)]),
-        drawing(protocol, run, falls, model.indicators, time_s),
-        desk.latest("pictures", key, lambda: fall_pictures(falls)),
+        drawing(protocol, run, falls, model.indicators, 0.0),
+        desk.latest("pictures", (protocol, run), lambda: fall_pictures(falls)),
         words=Content("\n").join(
             [
                 *map(Content, facts),
@@ -125,12 +115,12 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     begun = player.playing or player.time_s > 0.0 or not own
     seen = until(edges, hz, player.time_s) if begun else edges
     indicators = indicators_at(view.channels, drop, seen)
-    run, matches = view.plan[job.run], view.results[job].matches or None
+    run, recorded = view.plan[job.run], (drop, hz, view.results[job])
     falls = desk.latest("moment", (view.path, job, hz),
-                        lambda: motions(view.protocol, run, edges, hz, matches))  # fmt: skip
+                        lambda: motions(view.protocol, run, recorded))  # fmt: skip
     key = view.path, view.reading, job, width
     pictures = desk.latest(
-        "figures", key[:3], lambda: pictures_of(*drop_figures(view, job)) or fall_pictures(falls)
+        "figures", key[:3], lambda: drop_pictures(view, job) or fall_pictures(falls)
     )
     words = desk.latest("words", key, lambda: number_table(view, job))
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
@@ -140,7 +130,7 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
         Content("\n").join(parts or _which(view, job, desk)),
         drawing(view.protocol, run, falls, indicators, time_s),
         pictures,
-        player.time_s * 1e3 if begun else None,
+        player.time_s - (falls[0].delay_s if falls else 0.0) if begun else None,
         Content("\n").join([words, Content(""), *board(view.protocol, indicators, 0.0, width)]),
         Content("\n").join([line for line in foot if line.plain]),
     )

@@ -90,7 +90,7 @@ def _picture(desk: Desk, protocol: Protocol) -> Drawing | None:
 
     def draw() -> Drawing | None:
         run = runs(protocol)[0]
-        falls = motions(protocol, run, ())
+        falls = motions(protocol, run)
         end = max((fall.end_s for fall in falls), default=0.0)
         return drawing(protocol, run, falls, Indicators(), _FALLEN * end) if falls else None
 

@@ -29,9 +29,12 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     view = model.view
     if view is None:
         return Face(_progress(model))
-    means, drops = desk.latest(
-        "tables", (view.path, view.reading), lambda: (_table(value_parts(view.analysis.summary)),
-        _table([*means_parts(view.analysis.summary), *scatter_parts(view.analysis.summary), *run_parts(view.analysis.runs)]))
+    key, summary = (view.path, view.reading), view.analysis.summary
+    means = desk.latest("means", key, lambda: _table(value_parts(summary)))
+    drops = desk.latest(
+        "drops", key,
+        lambda: _table([*means_parts(summary), *scatter_parts(summary),
+                        *run_parts(view.analysis.runs)]),
     )  # fmt: skip
     head = Content("\n").join([_progress(model), Content(means)])
     shown = desk.latest("charts", (view.path, view.reading), lambda: [*session_pictures(view)])

@@ -42,7 +42,11 @@ class Figure(SpanView):
         self._put(0.5 if self._share is None else self._share + by / _STEPS)
 
     def point_at(self, value: float) -> None:
-        """Put the cursor at a value of the horizontal axis."""
+        """Put the cursor at a moment, where time is what the horizontal axis shows."""
+        if self._picture is not None and "time" in self._picture.panel.x.label:
+            self._put_at(value)
+
+    def _put_at(self, value: float) -> None:
         if self._picture is not None:
             low, high = spread(self._picture)
             self._put((value - low) / (high - low))
@@ -62,7 +66,7 @@ class Figure(SpanView):
         """Put the cursor there."""
         offset = event.get_content_offset(self)
         if offset is not None:
-            self.point_at(self._low + self._unit * (offset.x - self._margin))
+            self._put_at(self._low + self._unit * (offset.x - self._margin))
 
     def _draw(self) -> None:
         if self._picture is None or not self.size:
