@@ -56,6 +56,9 @@ _PAGE_OF = {
 }
 
 
+_MODULES = {"protocol": "home", "device": "device", "run": "drop", "result": "drop",
+            "session": "session", "history": "drop"}  # fmt: skip
+"""Where each page is made."""
 _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
 )
@@ -105,7 +108,6 @@ class RigApp(App[None], inherit_bindings=False):
 
     TITLE = "chainrig"
     ENABLE_COMMAND_PALETTE = False  # there is one that knows what can be done now
-    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-normal"), (160, "-wide")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
 
     def __init__(
@@ -129,7 +131,7 @@ class RigApp(App[None], inherit_bindings=False):
         flow = Flow(stage=start, countdown_s=options.countdown_s)
         self.driver: Driver = Driver(flow, self.client, self.follower, self.begin)
         self.desk = Desk(options)
-        self._faces: Mapping[str, Callable[[Model, Desk, int], Face]] = {}
+        self._faces: dict[str, Callable[[Model, Desk, int], Face]] = {}
         self._drawn = ""
         self._looked_s = 0.0
         self._stillness = Stillness(options.still_s)
@@ -217,7 +219,7 @@ class RigApp(App[None], inherit_bindings=False):
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
-        if self._faces and self.page:
+        if self.page in self._faces:
             face = self._faces[self.page](model, self.desk, self.sheet.tables_width())
             self.sheet.show(face, self.desk, fresh=self.page != self._drawn)
             self._drawn = self.page
@@ -298,9 +300,10 @@ class RigApp(App[None], inherit_bindings=False):
 
     async def _load_pages(self) -> None:
         """Have ready what was not needed for the first paint."""
-        pages = await asyncio.to_thread(import_module, "rig.tui.pages")
-        self._faces = pages.FACES
-        self.draw()
+        for page, module in _MODULES.items():
+            loaded = await asyncio.to_thread(import_module, f"rig.tui.pages.{module}")
+            self._faces[page] = loaded.face
+            self.draw()
         await asyncio.to_thread(import_module, "rig.results.live")
         if self._loaded is not None:
             self._loaded()

@@ -83,16 +83,6 @@ class Sheet:
         np.bitwise_or.at(self._bits, at, _BITS[y % ROWS, x % COLUMNS])
         np.maximum.at(self._inks, at, inks[inside])
 
-    def free(self, row: int, column: int, length: int) -> bool:
-        """Whether nothing is drawn or written in these characters, all of them on the sheet."""
-        inside = 0 <= row < self.height and column >= 0 and column + length <= self.width
-        if not inside or self._bits[row, column : column + length].any():
-            return False
-        return all(
-            column + length <= begin or begin + len(span.text) <= column
-            for begin, span in self._words.get(row, ())
-        )
-
     def write(self, row: int, column: int, span: Span) -> None:
         """Write over what is drawn there."""
         self._words.setdefault(row, []).append((column, span))

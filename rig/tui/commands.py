@@ -292,15 +292,6 @@ def _move(app: RigApp, by: int) -> None:
         app.sheet.scroll_tables(by)
 
 
-def _step(app: RigApp, by: int) -> None:
-    """Go a step in time, or with the cursor where nothing is played."""
-    view, _ = app.desk.drop(app.model)
-    if app.page in {"history", "result"} and view is not None:
-        app.desk.change(app.model, lambda player, end_s: player.moved(by, end_s))
-    else:
-        app.sheet.point(by)
-
-
 def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], None]:
     return lambda app: app.desk.change(app.model, work)
 
@@ -429,8 +420,8 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "drops": _drops,
     "play": _change(Player.started),
     "turn_round": _change(lambda player, _: replace(player, back=not player.back)),
-    "earlier": lambda app: _step(app, -1),
-    "later": lambda app: _step(app, 1),
+    "earlier": _change(lambda player, end_s: player.moved(-1, end_s)),
+    "later": _change(lambda player, end_s: player.moved(1, end_s)),
     "report": lambda app: _write(app, "report", "-o", ".html"),
     "export": lambda app: _write(app, "export", "--csv", ".csv"),
     "slower": _change(lambda player, _: player.turned(0.5)),

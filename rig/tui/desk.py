@@ -39,8 +39,8 @@ class Face(NamedTuple):
         The rig to scale.
     pictures
         Plots, the most wanted first; `beside` of them at once on a screen of 120 columns.
-    cursor
-        Where the plots are read off; `None` where the operator has put the cursor.
+    moment
+        Where a drop that is played stands, s; `None` for none.
     words
         Tables. Where there is no room for drawing, plots and tables, Tab turns to the others.
     digits
@@ -54,7 +54,7 @@ class Face(NamedTuple):
     head: Content
     drawing: Drawing | None = None
     pictures: Sequence[Picture] = ()
-    cursor: float | None = None
+    moment: float | None = None
     words: Content = Content("")
     foot: Content = Content("")
     digits: str = ""

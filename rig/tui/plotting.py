@@ -33,7 +33,6 @@ _TICK_COLUMNS, _TICK_ROWS = 9, 2
 """Characters from one number at an axis to the next, at least."""
 _ROOM = 0.04  # of an axis, above and below what is drawn
 _STRIP_OF, _STRIP_LEAST, _STRIP_FROM = 4, 4, 12  # lines for one of residuals, and from how many on
-_NEAR = 0.03  # of the axis: as near as the cursor must be to a mark for its value
 _OUTSIDE = 4  # sheets: what is drawn farther away is drawn there
 _SHAPES = {
     "●": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)],
@@ -125,33 +124,17 @@ def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = 
     return min(many, key=lambda axis: axis.unit, default=fallback)
 
 
-class Plot(NamedTuple):
-    """A picture as characters.
-
-    Attributes
-    ----------
-    rows
-        Legend, plot, strip of residuals and horizontal axis, a list of spans a line.
-    margin
-        Characters left of what is drawn.
-    axis
-        The horizontal one.
-    """
-
-    rows: list[list[Span]]
-    margin: int
-    axis: Axis
-
-
-def plotted(picture: Picture, width: int, height: int, cursor: float | None = None) -> Plot:
+def plotted(
+    picture: Picture, width: int, height: int, moment: float | None = None
+) -> list[list[Span]]:
     """Draw a picture.
 
     Parameters
     ----------
     width, height
         In characters.
-    cursor
-        Where on the horizontal axis values are read off; `None` for nowhere.
+    moment
+        Where on a horizontal axis of time a line stands; `None` for nowhere.
     """
     panel, residuals = picture
     if residuals is None or height < _STRIP_FROM:
@@ -164,19 +147,19 @@ def plotted(picture: Picture, width: int, height: int, cursor: float | None = No
     numbers = [*upright.ticks.values(), *(lower.ticks.values() if strip else ())]
     margin = 1 + max((len(_number(value)) for value in numbers), default=0)
     columns = max(1, width - margin - 1)
-    x = axis_over(*spread(picture), columns, _TICK_COLUMNS, whole=panel.x.whole)
-    out = [_legend(picture, cursor, width), *_drawn(panel, x, upright, cursor, margin)]
+    x = axis_over(*_spread(panel), columns, _TICK_COLUMNS, whole=panel.x.whole)
+    out = [_legend(panel, width), *_drawn(panel, x, upright, moment, margin)]
     if residuals is not None:
         head = f" {_one_line(residuals.y.label)} "[:columns]
         out.append([Span(" " * margin + "├" + head + "╌" * (columns - len(head)))])
-        out += _drawn(residuals, x, lower, cursor, margin)
-    return Plot([*out, *_foot(panel.x.label, x, margin)], margin + 1, x)
+        out += _drawn(residuals, x, lower, moment, margin)
+    return [*out, *_foot(panel.x.label, x, margin)]
 
 
-def spread(picture: Picture) -> tuple[float, float]:
+def _spread(panel: Panel) -> tuple[float, float]:
     """Take the horizontal ends that are given, or those of the data."""
-    x = picture.panel.x
-    places = [place for trace in picture.panel.series for place in trace.x] or [0.0]
+    x = panel.x
+    places = [place for trace in panel.series for place in trace.x] or [0.0]
     low, high = x.limits or (min(places) - 0.5 * x.whole, max(places) + 0.5 * x.whole)
     return (low, high) if low < high else (low - 0.5, low + 0.5)
 
@@ -185,21 +168,15 @@ def _one_line(label: str) -> str:
     return label.replace("\n", " ")
 
 
-def _legend(picture: Picture, cursor: float | None, width: int) -> list[Span]:
-    """Say what is drawn, and what it is at the cursor."""
-    low, high = spread(picture)
-    at = "" if cursor is None else f"  {picture.panel.x.label} {_number(cursor)}"
-    parts = [Span(_one_line(picture.panel.y.label), bold=True), Span(at)]
-    for trace in picture.panel.series:
+def _legend(panel: Panel, width: int) -> list[Span]:
+    """Say what is drawn."""
+    spans = [Span(_one_line(panel.y.label), bold=True)]
+    for trace in panel.series:
         if trace.label and trace.role in _ROLES and len(trace.y):
             mark = Span(f"  {_ROLES[trace.role]}", _color(trace), bold=True)
-            value = "" if cursor is None else _read(trace, cursor, _NEAR * (high - low))
-            parts += [mark, Span(f" {trace.label}"), Span(f" {value}" * bool(value), _color(trace))]
-    spans = []
-    for part in parts:
-        spans.append(part._replace(text=part.text[: max(0, width)]))
-        width -= len(part.text)
-    return spans
+            spans += [mark, Span(f" {trace.label}")]
+    ends = [sum(len(span.text) for span in spans[: at + 1]) for at in range(len(spans))]
+    return [span for span, end in zip(spans, ends, strict=True) if end <= width] or spans[:1]
 
 
 def _color(trace: Trace) -> str:
@@ -213,13 +190,13 @@ def _number(value: float) -> str:
 
 
 def _drawn(
-    panel: Panel, x: Axis, y: Axis, cursor: float | None, margin: int
+    panel: Panel, x: Axis, y: Axis, moment: float | None, margin: int
 ) -> Iterator[list[Span]]:
     """Draw traces on one pair of axes, behind the upright one."""
     sheet = Sheet(x.cells, y.cells, _COLORS)
-    if cursor is not None:
+    if moment is not None and "time" in panel.x.label:
         down = np.arange(0, ROWS * y.cells, 2.0)
-        across = np.full(down.size, float(x.at([cursor], COLUMNS)[0]))
+        across = np.full(down.size, float(x.at([moment], COLUMNS)[0]))
         sheet.dots(np.column_stack([across, down]), 1)
     for trace in panel.series:
         if trace.role in _ROLES and len(trace.y):
@@ -254,29 +231,17 @@ def _draw(sheet: Sheet, trace: Trace, x: Axis, y: Axis) -> None:
 
 
 def _foot(label: str, axis: Axis, margin: int) -> Iterator[list[Span]]:
-    """Write the horizontal axis with its numbers, as far as its name at the end leaves room."""
-    line, below = ["─"] * axis.cells, [" "] * (margin + 1 + axis.cells)
-    free = len(below) - len(label) - 1
+    """Write the horizontal axis with its name in it, and its numbers below."""
+    line, below = ["─"] * axis.cells, [" "] * (margin + 2 + axis.cells)
     for column, value in axis.ticks.items():
         text = _number(value)
         line[column] = "┴"
         begin = margin + 1 + column - len(text) // 2
-        if begin + len(text) <= free:
-            below[begin : begin + len(text)] = text
+        below[begin : begin + len(text)] = text
+    name = f" {label} "[: axis.cells]
+    line[axis.cells - len(name) :] = name
     yield [Span(" " * margin + "└" + "".join(line))]
-    yield [Span(("".join(below[: max(0, free)]) + f" {label}")[: len(below)])]
-
-
-def _read(trace: Trace, at: float, near: float) -> str:
-    """Say what a trace is at the cursor."""
-    x, y = np.asarray(trace.x, dtype=np.float64), np.asarray(trace.y, dtype=np.float64)
-    if not x.size or _ROLES[trace.role] in "⣿⠒":
-        inside = x.size > 0 and x.min() <= at <= x.max()
-        return _number(float(np.interp(at, x, y))) if inside else ""
-    point = int(np.argmin(np.abs(x - at)))
-    if abs(x[point] - at) > near:
-        return "–"
-    return _number(float(y[point])) + (f" ± {trace.u[point]:.2g}" if len(trace.u) else "")
+    yield [Span("".join(below))]
 
 
 def _roomy(panel: Panel) -> tuple[float, float]:

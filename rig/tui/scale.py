@@ -148,10 +148,9 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
         rows_named.setdefault(place, []).append(lamp)
     for (row, column), lamps in rows_named.items():
         lit = any(lamp.lit for lamp in lamps)
-        text = ",".join(str(lamp.channel) for lamp in sorted(lamps)) + " ○●"[1 + lit]
-        if sheet.free(row, column - len(text), len(text)):
-            color = "warning" if lit else "foreground"
-            sheet.write(row, column - len(text), Span(text, color, bold=lit))
+        text = ",".join(str(lamp.channel) for lamp in sorted(lamps)) + "○●"[lit]
+        color = "warning" if lit else "foreground"
+        sheet.write(row, max(0, column - len(text)), Span(text, color, bold=lit))
     ends = np.array(
         [[(s.x + left, top - s.z), (s.to_x + left, top - s.to_z)] for s in drawing.strokes]
     )

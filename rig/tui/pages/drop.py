@@ -26,11 +26,15 @@ from rig.tui.widgets.gates import board
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.protocol.protocol import Run
+    from rig.reasons import Reason
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.desk import Desk
     from rig.tui.model import Model
+    from rig.tui.replay import Player
 
 _FALLING = (Stage.LIVE, Stage.JUDGING)
 _DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
@@ -123,11 +127,13 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
         "figures", key[:3], lambda: drop_pictures(view, job) or fall_pictures(falls)
     )
     words = desk.latest("words", key, lambda: number_table(view, job))
+    logged = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
+    reasons = next(logged, ())
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
     said = sentence(view, job) if not (own and player.playing) else "slow motion …"
     foot = [Content.styled(said, "bold $success"), past_runs(view, job, width)]
     return Face(
-        Content("\n").join(parts or _which(view, job, desk)),
+        Content("\n").join(parts or _which(view, job, player, reasons)),
         drawing(view.protocol, run, falls, indicators, time_s),
         pictures,
         player.time_s - (falls[0].delay_s if falls else 0.0) if begun else None,
@@ -136,10 +142,9 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     )
 
 
-def _which(view: SessionView, job: Job, desk: Desk) -> list[Content]:
+def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason]) -> list[Content]:
     """Name the drop that is played, and say how."""
-    player, verdict = desk.tape, view.results[job].verdict
-    reasons = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
+    verdict = view.results[job].verdict
     arrow = "◀" if player.back else "▶"
     state = f"{arrow} playing" if player.playing else f"‖ paused {arrow}"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} ×"
@@ -149,11 +154,7 @@ def _which(view: SessionView, job: Job, desk: Desk) -> list[Content]:
             f"  run {job.run}, attempt {job.attempt} · {condition(view.plan[job.run])} · ",
             (f"{LOOKS[verdict][0]} {verdict}", LOOKS[verdict][1]),
         ),
-        Content.assemble(
-            f"{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · ",
-            (plain(view.path.name, 60), "$foreground 70%"),
-            ("  ▲ SIMULATED" if view.simulated else "", "bold $warning"),
-        ),
-        *(Content.styled(f"note: {plain(text, 160)}", "bold")
-          for text in notes_in(next(reasons, ()))),
+        Content(f"{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · "
+                f"{plain(view.path.name, 60)}{'  ▲ SIMULATED' * view.simulated}"),
+        *(Content(f"note: {plain(text, 160)}") for text in notes_in(reasons)),
     ]  # fmt: skip

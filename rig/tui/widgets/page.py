@@ -81,6 +81,7 @@ class Page(Vertical):
         """Show as many parts as there is room for, beginning with the one that was turned to."""
         columns, lines = self.app.size
         room = 3 if columns >= _WIDE else 2 if columns >= _NORMAL else 1
+        room = max(1, room + 1 - face.beside)
         there = {"drawing": face.drawing is not None, "plots": bool(face.pictures),
                  "tables": bool(face.words.plain)}  # fmt: skip
         order = ("tables", "drawing", "plots") if face.top else tuple(there)
@@ -92,14 +93,16 @@ class Page(Vertical):
         if face.drawing is not None and "drawing" in shown:
             view = self.query_one("#drawing", SpanView)
             view.take(painted(face.drawing, view.size.width or 38, view.size.height or 16))
-        most = face.beside * (2 if columns >= _WIDE and lines >= 40 else 1) if room > 1 else 1
+        most = (
+            face.beside * (2 if columns >= _WIDE and lines >= 40 else 1)
+            if columns >= _NORMAL
+            else 1
+        )
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
         pictures = [*face.pictures[turn:], *face.pictures[:turn]][: most * ("plots" in shown)]
-        self.query_one("#plots").set_class(face.beside > 1 and room > 1, "-pairs")
+        self.query_one("#plots").set_class(most > 1 and face.beside > 1, "-pairs")
         for figure, picture in zip_longest(self.query(Figure), pictures):
-            figure.show(picture)
-            if picture is not None and face.cursor is not None:
-                figure.point_at(face.cursor)
+            figure.show(picture, face.moment)
 
     def scroll_tables(self, by: int) -> None:
         """Scroll what is longer than its place."""
@@ -111,8 +114,3 @@ class Page(Vertical):
         """Scroll the list so that a line of it is seen."""
         menu = self.query_one("#menu", VerticalScroll)
         menu.scroll_to(y=line - menu.size.height // 2, animate=False)
-
-    def point(self, by: int) -> None:
-        """Move the cursor of every plot."""
-        for figure in self.query(Figure):
-            figure.step(by)
