@@ -63,17 +63,6 @@ ACTIONS = tuple(_read_row(row) for row in _TABLE if not row.startswith("#"))
 BY_NAME = {action.name: action for action in ACTIONS}
 NEEDS_RIG = {"stop", "control", "wave"}
 """What makes no sense with a file and no rig, beside all that needs control."""
-_NOT = {
-    Stage.PROTOCOL: "before a session is open",
-    Stage.DEVICE: "before the first run",
-    Stage.TESTING: "during the test of the release",
-    Stage.PREPARE: "before the drop",
-    Stage.LIVE: "during the fall",
-    Stage.JUDGING: "while the drop is analysed",
-    Stage.RESULT: "before this drop is finished",
-    Stage.HALTED: "while the plan is halted",
-    Stage.DONE: "after the plan is complete",
-}
 _KEYS = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
          "left": "←", "right": "→", "up": "↑", "down": "↓", "space": "Space",
          "tab": "Tab"}  # fmt: skip
@@ -84,11 +73,9 @@ To change keys, write ~/.config/chainrig/keys.toml: reject = "r"
 ↑ ↓ scroll; any other key closes this page."""
 
 
-def hindrance(action: Action, stage: Stage, *, driving: bool) -> str:
-    """Say why an action makes no sense now; empty where it does."""
-    if stage not in action.stages:
-        return f"not {_NOT.get(stage, 'with the release armed')}"
-    return "this screen only watches" if action.driving and not driving else ""
+def possible(action: Action, stage: Stage, *, driving: bool) -> bool:
+    """Say whether an action makes sense now."""
+    return stage in action.stages and (driving or not action.driving)
 
 
 def shown_key(keys: str) -> str:

@@ -16,7 +16,7 @@ from textual.widgets import Input
 from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands
-from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, hindrance
+from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, possible
 from rig.tui.client import ReconnectingClient
 from rig.tui.desk import Desk
 from rig.tui.driver import Driver
@@ -59,6 +59,7 @@ _PAGE_OF = {
 _MODULES = {"protocol": "home", "device": "device", "run": "drop", "result": "drop",
             "session": "session", "history": "drop"}  # fmt: skip
 """Where each page is made."""
+_WATCHING = "this screen only watches\npress c to take control when it is free"
 _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
 )
@@ -215,7 +216,7 @@ class RigApp(App[None], inherit_bindings=False):
             return  # on its way in, or out
         message = self._told if model.now_s - self._told_s < _TOLD_S else ""
         base.query_one(StatusBar).show(model, self.keys, size.width, message)
-        base.query_one(StopBar).show(model, self.keys, size.width, self.hindrance)
+        base.query_one(StopBar).show(model, self.keys, size.width, self.possible)
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
@@ -340,9 +341,9 @@ class RigApp(App[None], inherit_bindings=False):
     async def _survey(self) -> None:
         client = self.client
         assert client is not None
-        self.desk.survey = await asyncio.to_thread(look_around, self.options)
-        other = client.in_the_way[0] if client.in_the_way else ""
-        self.desk.begin_with("" if client.idle else client.port, other)
+        port, other = client.port if not client.idle else "", client.in_the_way
+        rows = await asyncio.to_thread(look_around, self.options, port, other[0] if other else "")
+        self.desk.begin_with(rows)
         self.draw()
 
     def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None:
@@ -449,20 +450,18 @@ class RigApp(App[None], inherit_bindings=False):
     def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
         action = BY_NAME[name]
-        if not self.hindrance(action):
+        if self.possible(action):
             commands.do(self, name)
         elif self.client is not None and action.driving and not self.driving:
-            self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
-                               "press c to take control when it is free"))  # fmt: skip
+            self.driver.take(EffectFailed(self.flow.ticket, _WATCHING))
 
-    def hindrance(self, action: Action) -> str:
-        """Say why an action makes no sense now; empty where it does."""
+    def possible(self, action: Action) -> bool:
+        """Say whether an action makes sense now."""
         if self.client is None and (action.driving or action.name in NEEDS_RIG):
-            return "no rig is connected"
-        stage, driving = self.flow.stage, self.driving
+            return False
         # Whoever has no rig yet may begin with one.
-        driving |= action.name == "go_on" and stage is Stage.PROTOCOL
-        return hindrance(action, stage, driving=driving)
+        begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
+        return possible(action, self.flow.stage, driving=self.driving or begins)
 
     def action_choose(self, at: int) -> None:
         """Choose a row of the home page."""

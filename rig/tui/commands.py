@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from rig.tui.app import RigApp
-    from rig.tui.client import ReconnectingClient
     from rig.tui.survey import Row, SessionEntry
 
 
@@ -57,6 +56,10 @@ def do(app: RigApp, name: str) -> None:
         app.turn(name.removeprefix("page_"))
     else:
         _DO[name](app)
+
+
+async def _nothing() -> None:
+    """Do nothing more."""
 
 
 def _go_on(app: RigApp) -> None:
@@ -89,10 +92,9 @@ def _open(app: RigApp, row: Row) -> None:
         session = Path(f"{row.file.stem}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session")
     app.desk.opened = row.file
     files = str(row.file.resolve()), str(session.resolve())
-    begun_in_simulation = row.value.partition("?")[0]
-    if row.kind == "try" or client.idle or (begun_in_simulation and not client.up):
+    if row.kind == "try" or client.idle or (row.value and not client.up):
         app.driver.asked = files
-        app.begin(client.go_to(begun_in_simulation or "sim://", trial=True))
+        app.begin(client.go_to("sim://", trial=True))
     else:
         app.begin(app.driver.open_session(*files, app.options.seed))
 
@@ -154,23 +156,22 @@ def _control(app: RigApp) -> None:
     if client.driving:
         question = "Another screen can then take it; this screen keeps watching."
         _confirm(app, "Give control back?", question, "give it back",
-                 lambda: app.begin(_quietly(client.release_control())))  # fmt: skip
+                 lambda: app.begin(_tried(app, client.release_control())))  # fmt: skip
     else:
         app.begin(_tried(app, client.take_control()))
 
 
-async def _tried(app: RigApp, work: Coroutine[Any, Any, Any]) -> None:
-    """Wait for what the daemon does, and say what is wrong when it fails."""
+async def _tried(
+    app: RigApp,
+    work: Coroutine[Any, Any, Any],
+    after: Callable[[], Coroutine[Any, Any, Any]] = _nothing,
+) -> None:
+    """Wait for what the daemon does, then for what comes after; say what is wrong when it fails."""
     try:
         await work
+        await after()
     except RigError as error:
         app.driver.refuse(error)
-
-
-async def _quietly(work: Coroutine[Any, Any, Any]) -> None:
-    """Wait for what the daemon itself says when it fails."""
-    with suppress(RigError):
-        await work
 
 
 def _close(app: RigApp) -> None:
@@ -180,7 +181,7 @@ def _close(app: RigApp) -> None:
 
     def close() -> None:
         app.driver.asked = None
-        app.begin(_quietly(client.call("close_session")))
+        app.begin(_tried(app, client.call("close_session")))
 
     question = "Everything recorded stays in its file. You can continue it later."
     _confirm(app, "Close the session?", question, "close", close)
@@ -225,7 +226,7 @@ async def _sessions(app: RigApp) -> None:
     folder = own.parent if own else Path()
     entries = await asyncio.to_thread(session_list, folder)
     app.turn("history")
-    same = [at for at, entry in enumerate(entries) if own and _same(entry.path, own)]
+    same = [at for at, entry in enumerate(entries) if own and entry.path.name == own.name]
     question = Ask(
         f"Sessions in {plain(folder.resolve(), 80)}, newest first",
         choices=[_session_line(entry) for entry in entries],
@@ -235,16 +236,13 @@ async def _sessions(app: RigApp) -> None:
 
 
 async def _look_at(app: RigApp, entry: SessionEntry) -> None:
-    live, desk = app.model.view, app.desk
-    if live is not None and _same(live.path, entry.path):
-        desk.other = None
-    else:
-        try:
-            desk.other = await asyncio.to_thread(open_live(entry.path).read)
-        except RigError as error:
-            app.driver.refuse(error)
-            return
-    desk.tape = Player(speed=desk.tape.speed)
+    desk, live = app.desk, app.model.view
+    try:
+        own = live is not None and live.path.resolve() == entry.path.resolve()
+        desk.other = None if own else await asyncio.to_thread(open_live(entry.path).read)
+        desk.tape = Player(speed=desk.tape.speed)
+    except RigError as error:
+        app.driver.refuse(error)
 
 
 def _session_line(entry: SessionEntry) -> Content:
@@ -256,10 +254,6 @@ def _session_line(entry: SessionEntry) -> Content:
         name, f"{entry.created[:16].replace('T', ' '):18}{entry.drops:4} drops  ",
         (f"{stamp:13}", "bold $warning"), (plain(entry.title, 60), "$foreground 70%"),
     )  # fmt: skip
-
-
-def _same(path: Path, second: Path) -> bool:
-    return path.resolve() == second.resolve()
 
 
 def _drops(app: RigApp) -> None:
@@ -375,12 +369,7 @@ def _unblind(app: RigApp) -> None:
         return
     question = "This shows all results. It is recorded and cannot be undone."
     _confirm(app, "Unblind the session?", question, "show results",
-             lambda: app.begin(_tried(app, _unblinded(app, client))))  # fmt: skip
-
-
-async def _unblinded(app: RigApp, client: ReconnectingClient) -> None:
-    await client.call("unblind")
-    await app.follower.read()
+             lambda: app.begin(_tried(app, client.call("unblind"), app.follower.read)))  # fmt: skip
 
 
 def _begin_check(app: RigApp) -> None:
@@ -390,7 +379,7 @@ def _begin_check(app: RigApp) -> None:
 def _palette(app: RigApp) -> None:
     """Search what can be done now."""
     actions = [action for action in ACTIONS
-               if action.name != "palette" and not app.hindrance(action)]  # fmt: skip
+               if action.name != "palette" and app.possible(action)]  # fmt: skip
     lines = [Content.assemble((f"{shown_key(app.keys[action.name]):8}", "bold $primary"),
                               action.text) for action in actions]  # fmt: skip
     question = Ask("Search commands", choices=lines, free=False, yes="run", chosen=0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from textual.content import Content
 
 from rig.tui.replay import Player, end_of
-from rig.tui.survey import Survey, first_row, read_file, rows_of
+from rig.tui.survey import first_row, read_file
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
@@ -87,7 +87,6 @@ class Desk:
         self.row = -1  # none yet
         self.rows: list[Row] = []
         self.opened: Path | None = None  # the protocol that was opened here last
-        self.survey = Survey()
         self.replayed: Job | None = None
         self._latest: dict[str, tuple[object, Any]] = {}
 
@@ -114,14 +113,10 @@ class Desk:
             changed_ns = -1
         return self.latest("reading", (file, changed_ns), lambda: read_file(file))
 
-    def begin_with(self, port: str, other: str) -> None:
+    def begin_with(self, rows: list[Row]) -> None:
         """List what can be begun, and keep the row that was chosen."""
-        before = self.chosen
-        self.rows = rows_of(self.survey, port, other)
-        if before in self.rows:
-            self.row = self.rows.index(before)
-        elif self.survey.ready:
-            self.row = first_row(self.rows, self.options)
+        before, self.rows = self.chosen, rows
+        self.row = rows.index(before) if before in rows else first_row(rows, self.options)
 
     def view(self, model: Model) -> SessionView | None:
         """The session of the history page; `None` without a drop."""

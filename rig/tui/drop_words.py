@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from textual.content import Content
 
 from rig.analysis.result import GOOD, Measured
@@ -14,7 +13,6 @@ from rig.reasons import remedies
 from rig.report.numbers import plus_minus
 from rig.report.parts import run_parts
 from rig.text_table import text_table
-from rig.tui.motion import model_fall
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
@@ -65,17 +63,11 @@ def sentence(view: SessionView, job: Job) -> str:
     measured = result.quantities[row.name]
     expected = predicted_run(view.protocol, run).get(row.name)
     beside = "" if expected is None else f"; model {plus_minus(stated(expected), row.scale)}"
-    fall = model_fall(view.protocol, run, "free")
-    if row != SEPARATION or run.impact is None or run.free is None or fall is None:
+    if row != SEPARATION or run.impact is None:
         return f"{row.symbol} = {plus_minus(measured, row.scale)} {row.unit}{beside}"
     size = Measured(abs(measured.value), measured.u)
-    length = view.protocol.chains[run.free].chain.length
-    lead = np.diff(fall.times(np.array([measured.value - length, -length])))[0]
-    wins = f"{plain(run.impact, 20)} {'wins' if lead > 0.0 else 'loses'}"
-    return (
-        f"{wins} by {plus_minus(size, row.scale)} {row.unit}{beside}. "
-        f"That is {abs(lead) * 1e3:.0f} ms of free fall."
-    )
+    wins = f"{plain(run.impact, 20)} {'wins' if measured.value > 0.0 else 'loses'}"
+    return f"{wins} by {plus_minus(size, row.scale)} {row.unit}{beside}"
 
 
 def past_runs(view: SessionView, job: Job, width: int) -> Content:

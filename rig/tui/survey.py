@@ -11,21 +11,26 @@ from rig.protocol.measurable import check_gates, check_recordable
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from rig.protocol.protocol import Protocol
     from rig.tui.context import Options
 
 _MOST = 200
 """Session files that are listed, the newest."""
+_GOING = 3
+"""Unfinished sessions that are offered."""
 _FLASHED_AS = {"Arduino Mega 2560": "mega", "Arduino Uno": "uno"}
-TRIALS = {"falling-ball": "a ball: g within seconds", "inclined-uniform": "two chains on a board"}
-SCENES = {
-    "object": ("falling-ball", "an object past gates"),
-    "track": ("glider", "a glider on a track"),
-    "picket-fence": ("picket-fence", "a picket fence"),
-    "one-chain": ("single-chain", "one chain on a board"),
-    "two-chains": ("inclined-uniform", "two chains, one strikes"),
-}
-"""What ``rig new`` drafts: the ready protocol that looks like it, and what it is."""
+_SCENES = """\
+Try it         | try | falling-ball     |              | a ball: g within seconds
+Try it         | try | inclined-uniform |              | two chains on a board
+New experiment | new | falling-ball     | object       | an object past gates
+New experiment | new | glider           | track        | a glider on a track
+New experiment | new | picket-fence     | picket-fence | a picket fence
+New experiment | new | single-chain     | one-chain    | one chain on a board
+New experiment | new | inclined-uniform | two-chains   | two chains, one strikes
+"""
+"""Section, what is done, the ready protocol that looks like it, its scene for `rig new`, title."""
 
 
 class SessionEntry(NamedTuple):
@@ -33,24 +38,21 @@ class SessionEntry(NamedTuple):
 
     Attributes
     ----------
-    drops, runs
-        Recorded, and planned; `over` of these runs have a drop.
+    drops, over, runs
+        How many were recorded, of how many of the planned runs.
     source
-        Its protocol as text.
-    origin
-        The port it was recorded from.
+        Name of its protocol's file.
     """
 
     path: Path
     title: str = ""
     created: str = ""
     drops: int = 0
-    simulated: bool = False
-    trouble: str = ""
     over: int = 0
     runs: int = 0
     source: str = ""
-    origin: str = ""
+    simulated: bool = False
+    trouble: str = ""
 
 
 class Reading(NamedTuple):
@@ -67,62 +69,24 @@ class Row(NamedTuple):
     ----------
     kind
         What is done: ``try``, ``open``, ``board``, ``flash``, ``new``, ``results`` or ``end``.
-    value
-        Of a board its port, of a scene or a board to be flashed its name.
     file
         The protocol that is opened, or whose picture stands beside it.
+    value
+        Of a board its port, of a scene or a board to be flashed its name.
     session
         The file that is continued.
     """
 
     section: str
-    title: str
     kind: str
+    title: str
     file: Path | None = None
     value: str = ""
     session: Path | None = None
-    note: str = ""
 
 
-class Survey(NamedTuple):
-    """What was seen at one look."""
-
-    sessions: tuple[SessionEntry, ...] = ()
-    boards: tuple[Row, ...] = ()
-    files: tuple[Path, ...] = ()
-    ready: tuple[Path, ...] = ()
-
-
-def look_around(options: Options) -> Survey:
-    """Look at the folder, at the ready protocols, and at what USB lists."""
-    from rig.ready import ready_protocol  # noqa: PLC0415 - not needed to paint
-
-    ready = tuple(sorted(ready_protocol("falling-ball").parent.glob("*.yaml")))
-    own = [*options.files, *sorted(Path().glob("[!.]*.yaml"))]
-    files = {path.resolve(): path for path in own if path.resolve() not in ready}
-    return Survey(tuple(session_list(Path())), _boards(), tuple(files.values()), ready)
-
-
-def _boards() -> tuple[Row, ...]:
-    from rig.flash.drive import waiting_drives  # noqa: PLC0415 - not needed to paint
-    from rig.usb.listing import serial_ports  # noqa: PLC0415 - nor is this
-
-    section = "Connect a board"
-    rows = [Row(section, "Raspberry Pi Pico: put the firmware on it", "flash", value="pico")
-            for _ in waiting_drives()]  # fmt: skip
-    for port in serial_ports():
-        if not port.candidate:
-            continue
-        rows.append(Row(section, f"{port.kind} at {port.path}", "board", value=port.path))
-        name = _FLASHED_AS.get(port.kind)
-        if name is not None:
-            title = f"{port.kind}: put the firmware on it"
-            rows.append(Row(section, title, "flash", value=f"{name} --port {port.path}"))
-    return tuple(rows)
-
-
-def rows_of(survey: Survey, port: str, other: str) -> list[Row]:
-    """List what can be begun.
+def look_around(options: Options, port: str, other: str) -> list[Row]:
+    """List what can be begun, from the folder, the ready protocols, and what USB lists.
 
     Parameters
     ----------
@@ -131,38 +95,62 @@ def rows_of(survey: Survey, port: str, other: str) -> list[Row]:
     other
         The port of a daemon that stands in the way of the wanted one; empty for none.
     """
-    ready = {path.stem: path for path in survey.ready}
-    rows = [Row("Try it", title, "try", ready.get(name), note="simulated")
-            for name, title in TRIALS.items()]  # fmt: skip
+    from rig.ready import ready_protocol  # noqa: PLC0415 - not needed to paint
+
+    ready = sorted(ready_protocol("falling-ball").parent.glob("*.yaml"))
+    own = [*options.files, *sorted(Path().glob("[!.]*.yaml"))]
+    files = [*{path.resolve(): path for path in own if path.resolve() not in ready}.values()]
+    named = {path.name: path for path in (*ready, *files)}
+    scenes = [
+        Row(section, kind, title, named.get(f"{name}.yaml"), value)
+        for row in _SCENES.splitlines()
+        for section, kind, name, value, title in [map(str.strip, row.split("|"))]
+    ]
+    boards = [*_boards()]
     if other:
-        rows.append(Row("Connect a board", f"end {other}, which runs already", "end"))
-    none_there = Row("Connect a board", "none is plugged in", "board", note="USB is watched")
-    rows += survey.boards or ([] if port else [none_there])
-    files = {file.read_text("utf-8", "replace"): file
-             for file in (*survey.files, *survey.ready) if file.is_file()}  # fmt: skip
-    rows += [
-        Row("Continue", f"{entry.path.stem}, {entry.over} of {entry.runs}", "open",
-            files[entry.source], entry.origin if entry.simulated else "", entry.path)
-        for entry in survey.sessions
-        if not entry.trouble and entry.over < entry.runs and entry.source in files
-    ][:3]  # fmt: skip
-    rows += [Row("Experiments here", plain(path.stem, 25), "open", path) for path in survey.files]
-    rows += [Row("New experiment", title, "new", ready.get(name), scene)
-             for scene, (name, title) in SCENES.items()]  # fmt: skip
-    if survey.sessions:
-        newest = plain(survey.sessions[0].path.stem, 24)
-        rows.append(Row("Open results", newest, "results", note=f"of {len(survey.sessions)}"))
-    return [*rows, *(Row("Ready experiments", path.stem, "open", path) for path in survey.ready)]
+        boards.append(Row("Connect a board", "end", f"end {other}, which runs already"))
+    if not boards and not port:
+        boards.append(Row("Connect a board", "board", "none is plugged in"))
+    sessions = session_list(Path())
+    going = [
+        Row("Continue", "open", f"{entry.path.stem}, {entry.over} of {entry.runs}",
+            named[entry.source], "sim://" * entry.simulated, entry.path)
+        for entry in sessions if entry.over < entry.runs and entry.source in named
+    ]  # fmt: skip
+    return [
+        *(row for row in scenes if row.kind == "try"),
+        *boards,
+        *going[:_GOING],
+        *(Row("Experiments here", "open", path.stem, path) for path in files),
+        *(row for row in scenes if row.kind == "new"),
+        *(Row("Open results", "results", f"of {entry.path.stem}") for entry in sessions[:1]),
+        *(Row("Ready experiments", "open", path.stem, path) for path in ready),
+    ]
 
 
 def first_row(rows: list[Row], options: Options) -> int:
-    """Choose the row to begin with: what was asked for, what is unfinished, or a trial."""
-    usable = [at for at, row in enumerate(rows) if row.kind == "open" and row.file is not None
-              and row.file in options.files and not read_file(row.file).problem]  # fmt: skip
-    asked = [at for at in usable if rows[at].section == "Experiments here" or options.port]
-    going = [at for at, row in enumerate(rows) if row.session is not None]
-    wanted = [*asked, *going] if options.port else [*going, *asked]
-    return next(iter(wanted), 0)
+    """Choose the row to begin with: what is unfinished, what can be used here, or a trial."""
+    for section in ("Continue" * (not options.port), "Experiments here", "Ready experiments"):
+        for at, row in enumerate(rows):
+            mine = row.file is not None and (row.session or row.file in options.files)
+            if row.section == section and row.file and mine and not read_file(row.file).problem:
+                return at
+    return 0
+
+
+def _boards() -> Iterator[Row]:
+    from rig.flash.drive import waiting_drives  # noqa: PLC0415 - not needed to paint
+    from rig.usb.listing import serial_ports  # noqa: PLC0415 - nor is this
+
+    section, firmware = "Connect a board", "put the firmware on it"
+    for _ in waiting_drives():
+        yield Row(section, "flash", f"Raspberry Pi Pico: {firmware}", value="pico")
+    for port in serial_ports():
+        if port.candidate:
+            yield Row(section, "board", f"{port.kind} at {port.path}", value=port.path)
+        if port.candidate and port.kind in _FLASHED_AS:
+            value = f"{_FLASHED_AS[port.kind]} --port {port.path}"
+            yield Row(section, "flash", f"{port.kind}: {firmware}", value=value)
 
 
 def read_file(file: Path) -> Reading:
@@ -196,12 +184,10 @@ def _look(path: Path) -> SessionEntry:
 
     try:
         with Session.open(path, readonly=True) as session:
-            protocol = protocol_of(session)
+            protocol, source = protocol_of(session), Path(session.protocol_source).name
             recorded = {entry[:2] for entry in session.states() if entry.state == "recorded"}
-            return SessionEntry(
-                path, protocol.title, session.meta["created"], len(recorded), session.simulated,
-                "", len({run for run, _ in recorded}), len(runs(protocol)), session.protocol_text,
-                session.meta["origin"],
-            )  # fmt: skip
+            counts = len(recorded), len({run for run, _ in recorded}), len(runs(protocol))
+            created = session.meta["created"]
+            return SessionEntry(path, protocol.title, created, *counts, source, session.simulated)
     except RigError as error:
         return SessionEntry(path, trouble=error.message)

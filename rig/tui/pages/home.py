@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from rig.tui.scale import Drawing
     from rig.tui.survey import Row
 
-_FIRST = "Plan and limits"
-"""The section that is read first here: a screen has no room for all of them."""
 _FALLEN = 0.7  # of the way down, in the small pictures
 _DOES = {
     "try": "Enter simulates it, with no board.\n",
@@ -79,7 +77,6 @@ def _menu(desk: Desk) -> Content:
             text = Content.assemble(
                 (f"{'▸' if chosen else ' '} {plain(row.title, 30)}",
                  "bold $primary" if chosen else ""),
-                (f" {row.note}" if row.note else "", "$foreground 70%"),
             )  # fmt: skip
             lines.append(pressed(text, f"app.choose({at})"))
     return Content("\n").join(lines)
@@ -102,12 +99,9 @@ def _description(desk: Desk, protocol: Protocol) -> Content:
 
 
 def _described(protocol: Protocol) -> Content:
-    lines = [plain(line, 200) for line in describe(protocol, notes(protocol)).splitlines()]
-    title, *rest = lines
-    begins = [at for at, line in enumerate(rest) if line and not line.startswith(" ")]
-    sections = [rest[at:end] for at, end in zip(begins, [*begins[1:], len(rest)], strict=True)]
-    sections.sort(key=lambda section: section[0] != _FIRST)
-    parts = [Content.styled(title, "bold"), Content("")]
-    for head, *facts in sections:
-        parts += [Content.styled(head, "bold $primary"), *map(Content, facts)]
+    title, *lines = describe(protocol, notes(protocol)).splitlines()
+    parts = [Content.styled(plain(title, 200), "bold")]
+    for line in lines:
+        style = "" if line.startswith(" ") else "bold $primary"
+        parts.append(Content.styled(plain(line, 200), style))
     return Content("\n").join(parts)

@@ -135,14 +135,14 @@ class StopBar(Vertical):
         yield StopLine()
 
     def show(
-        self, model: Model, keys: Mapping[str, str], width: int, hindrance: Callable[[Action], str]
+        self, model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
     ) -> None:
         """Draw what holds now."""
-        self.query_one("#hints", Words).say(hints(model, keys, width - 2, hindrance))
+        self.query_one("#hints", Words).say(hints(model, keys, width - 2, possible))
 
 
 def hints(
-    model: Model, keys: Mapping[str, str], width: int, hindrance: Callable[[Action], str]
+    model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
 ) -> Content:
     """Write the keys that are wanted most now; all others are in the palette."""
     page = _OF_PAGE.get(model.page, _OF_STAGE.get(model.stage, ()))
@@ -151,7 +151,7 @@ def hints(
     for name in (*dict.fromkeys((*page, *_ANYWHERE)), "palette"):
         label = _label(name, model)
         full = len(parts) == 2 * (KEYS_SHOWN - 1) and name != "palette"
-        if full or not label or hindrance(BY_NAME[name]) or (name == "unblind" and not model.blind):
+        if full or not label or not possible(BY_NAME[name]):
             continue
         hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {label}")
         used += len(hint) + 2
@@ -166,6 +166,8 @@ def _label(name: str, model: Model) -> str:
         return next_step(model).enter
     if name == "reject" and model.flow.verdict == "rejected":
         return "undo rejection"
+    if name == "unblind" and not model.blind:
+        return ""
     if name == "control":
         return "" if model.driving else "take control"
     return BY_NAME[name].label
