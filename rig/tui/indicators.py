@@ -24,6 +24,11 @@ class Indicator:
         """Whether it has been quiet for `STEADY_S`."""
         return not self.recent_s or now_s - self.recent_s[-1] >= STEADY_S
 
+    def struck(self, count: int, now_s: float) -> Indicator:
+        """Count so many edges."""
+        recent = (*self.recent_s, *(now_s,) * count)[-FLICKERS:]
+        return replace(self, edges=self.edges + count, recent_s=recent)
+
     def flickers(self, now_s: float) -> bool:
         """Whether it changes too often for a hand or a chain at rest."""
         return sum(now_s - at <= FLICKER_S for at in self.recent_s) >= FLICKERS
@@ -64,7 +69,11 @@ class Indicators:
         """Look at the gates' mask; `None` means that nobody knows."""
         if mask is None:
             return replace(self, known=False, alone=None)
-        gates = tuple(_looked(gate, mask, now_s, first=not self.known) for gate in self.gates)
+        gates = tuple(
+            replace(gate, blocked=dark).struck(int(self.known and dark != gate.blocked), now_s)
+            for gate in self.gates
+            for dark in [bool(mask >> gate.channel & 1)]
+        )
         blocked = tuple(gate.channel for gate in gates if gate.blocked)
         checked = self.checked
         if self.alone is not None and not blocked:
@@ -73,27 +82,9 @@ class Indicators:
 
     def counted(self, channels: tuple[int, ...], now_s: float) -> Indicators:
         """Count edges of a drop, one entry of `channels` an edge."""
-        return replace(
-            self,
-            gates=tuple(
-                _struck(gate, count, now_s) if (count := channels.count(gate.channel)) else gate
-                for gate in self.gates
-            ),
-        )
+        gates = (gate.struck(channels.count(gate.channel), now_s) for gate in self.gates)
+        return replace(self, gates=tuple(gates))
 
     def reset(self) -> Indicators:
         """Count from zero and begin the gate check again."""
         return Indicators.of(tuple(gate.channel for gate in self.gates))
-
-
-def _looked(gate: Indicator, mask: int, now_s: float, *, first: bool) -> Indicator:
-    blocked = bool(mask >> gate.channel & 1)
-    if blocked == gate.blocked:
-        return gate
-    gate = replace(gate, blocked=blocked)
-    return gate if first else _struck(gate, 1, now_s)
-
-
-def _struck(gate: Indicator, count: int, now_s: float) -> Indicator:
-    recent = (*gate.recent_s, *(now_s,) * count)[-FLICKERS:]
-    return replace(gate, edges=gate.edges + count, recent_s=recent)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rig.analysis.result import DropResult
     from rig.analysis.trajectory import Trajectory
     from rig.arrays import Array
-    from rig.protocol.protocol import Protocol, Run, Side
+    from rig.protocol.protocol import Protocol, RodChain, Run, Side
     from rig.records import Drop
 
 _POINTS = 120  # of a curve: two a column of a wide terminal
@@ -33,6 +33,8 @@ class ChainFall:
     ----------
     role
         ``impact`` or ``free``.
+    rods
+        What falls.
     times, heights
         Of each rod's passage of a beam: seconds since the release fired, and the height of the
         bottom rod's middle above the contact point that follows, m; in order of time.
@@ -45,11 +47,30 @@ class ChainFall:
     """
 
     role: Side
+    rods: RodChain
     times: Array
     heights: Array
     model: Trajectory | None
     delay_s: float
     end_s: float
+
+    @property
+    def length(self) -> float:
+        """From the bottom rod's middle to the top one's, m."""
+        return self.rods.chain.length
+
+    def measured(self, time_s: float) -> float | None:
+        """Height as the gates saw it, at their last word after that; `None` before their first."""
+        if not self.times.size or time_s < self.times[0]:
+            return None
+        return float(np.interp(time_s, self.times, self.heights))
+
+    def expected(self, time_s: float) -> float | None:
+        """Height by the model, which ends with the impact of the top rod."""
+        if self.model is None:
+            return None
+        last = float(self.model.time[-1]) if self.model.hits is not None else np.inf
+        return float(self.model.heights(np.clip([time_s - self.delay_s], 0.0, last))[0][0])
 
     def curve(self, end_s: float) -> tuple[Array, Array]:
         """Model's heights from the fire stamp to a time; empty without a model.
@@ -86,18 +107,20 @@ def motions(
     for role, name in sides:
         if name is None or gates is None or not gates.on(role):
             continue
-        chain, model = protocol.chains[name].chain, model_fall(protocol, run, role)
+        rods, model = protocol.chains[name], model_fall(protocol, run, role)
         times, heights, delay, end = np.empty(0), np.empty(0), 0.0, 0.0
         if recorded is not None:
             seen = passages(protocol, *recorded, role)
-            times, heights = seen.time, seen.height - chain.length
+            times, heights = seen.time, seen.height - rods.chain.length
         if model is not None and times.size:
             delay = float(np.median(times - model.times(heights)))
         if model is not None:
-            lowest = min(gate.height for gate in gates.on(role)) - chain.length
+            lowest = min(gate.height for gate in gates.on(role)) - rods.chain.length
             struck = float(model.time[-1]) if model.hits is not None else 0.0
             end = delay + (struck or float(model.times(np.array([lowest]))[0]))
-        falls.append(ChainFall(role, times, heights, model, delay, max([end, *times.tolist()])))
+        falls.append(
+            ChainFall(role, rods, times, heights, model, delay, max([end, *times.tolist()]))
+        )
     return tuple(falls)
 
 
@@ -108,6 +131,8 @@ def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
     ----------
     role
         ``impact`` or ``free``.
+    rods
+        What falls.
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     start, gravity = protocol.drop.value, protocol.gravity.value
