@@ -246,7 +246,7 @@ async def _looks(
             assert app.view is not None
             first = app.view.jobs[0]
             end = end_of(app.view.drops[first], app.view.scales[first].hz)
-            app.desk.tape = Player(0, 0.8 * end)
+            app.desk.players["history"] = Player(0, 0.8 * end)
             app.turn("history")
         await until(lambda: app.page == shot.page)
         await until(lambda: shot.page != "protocol" or app.desk.rows)

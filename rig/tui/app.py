@@ -108,6 +108,7 @@ class RigApp(App[None], inherit_bindings=False):
     """
 
     TITLE = "chainrig"
+    CSS_PATH = "rig.tcss"
     ENABLE_COMMAND_PALETTE = False  # there is one that knows what can be done now
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
 

@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 from contextlib import suppress
-from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -56,10 +55,6 @@ def do(app: RigApp, name: str) -> None:
         app.turn(name.removeprefix("page_"))
     else:
         _DO[name](app)
-
-
-async def _nothing() -> None:
-    """Do nothing more."""
 
 
 def _go_on(app: RigApp) -> None:
@@ -161,15 +156,10 @@ def _control(app: RigApp) -> None:
         app.begin(_tried(app, client.take_control()))
 
 
-async def _tried(
-    app: RigApp,
-    work: Coroutine[Any, Any, Any],
-    after: Callable[[], Coroutine[Any, Any, Any]] = _nothing,
-) -> None:
-    """Wait for what the daemon does, then for what comes after; say what is wrong when it fails."""
+async def _tried(app: RigApp, work: Coroutine[Any, Any, Any]) -> None:
+    """Wait for what the daemon does, and say what is wrong when it fails."""
     try:
         await work
-        await after()
     except RigError as error:
         app.driver.refuse(error)
 
@@ -240,7 +230,7 @@ async def _look_at(app: RigApp, entry: SessionEntry) -> None:
     try:
         own = live is not None and live.path.resolve() == entry.path.resolve()
         desk.other = None if own else await asyncio.to_thread(open_live(entry.path).read)
-        desk.tape = Player(speed=desk.tape.speed)
+        desk.players["history"] = Player(speed=desk.players["history"].speed)
     except RigError as error:
         app.driver.refuse(error)
 
@@ -269,7 +259,7 @@ def _drops(app: RigApp) -> None:
         name = f"run {job.run:3}, attempt {job.attempt}   {condition(view.plan[job.run]):28}"
         mark = f"{LOOKS[verdict][0]} {verdict:10}", LOOKS[verdict][1]
         lines.append(Content.assemble(name, mark, "counts" if job in counting else ""))
-    at = desk.tape.at % len(lines)
+    at = desk.players["history"].at % len(lines)
     question = Ask("Drops of this session", choices=lines, free=False, yes="play", chosen=at)
     app.turn("history")
     app.ask(question, lambda number: desk.choose(app.model, number))
@@ -279,7 +269,7 @@ def _move(app: RigApp, by: int) -> None:
     """Go to the previous or next of what a page lists, or scroll."""
     desk = app.desk
     if app.page == "history":
-        desk.choose(app.model, desk.tape.at + by)
+        desk.choose(app.model, desk.players["history"].at + by)
     elif app.page == "protocol" and app.flow.stage is Stage.PROTOCOL and desk.rows:
         app.action_choose((desk.row + by) % len(desk.rows))
     else:
@@ -369,7 +359,7 @@ def _unblind(app: RigApp) -> None:
         return
     question = "This shows all results. It is recorded and cannot be undone."
     _confirm(app, "Unblind the session?", question, "show results",
-             lambda: app.begin(_tried(app, client.call("unblind"), app.follower.read)))  # fmt: skip
+             lambda: app.begin(_tried(app, client.call("unblind"))))  # fmt: skip
 
 
 def _begin_check(app: RigApp) -> None:
@@ -408,7 +398,6 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "sessions": lambda app: app.begin(_sessions(app)),
     "drops": _drops,
     "play": _change(Player.started),
-    "turn_round": _change(lambda player, _: replace(player, back=not player.back)),
     "earlier": _change(lambda player, end_s: player.moved(-1, end_s)),
     "later": _change(lambda player, end_s: player.moved(1, end_s)),
     "report": lambda app: _write(app, "report", "-o", ".html"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from textual.content import Content
@@ -68,8 +69,8 @@ class Desk:
 
     Attributes
     ----------
-    tape, replay
-        Of the history page, and of the latest drop after its fall.
+    players
+        How the drop of each page is played.
     other
         Another session than the one in hand, on the history page.
     replayed
@@ -80,8 +81,7 @@ class Desk:
 
     def __init__(self, options: Options) -> None:
         self.options = options
-        self.tape = Player()
-        self.replay = Player()
+        self.players: defaultdict[str, Player] = defaultdict(Player)
         self.other: SessionView | None = None
         self.chart = self.part = 0
         self.row = -1  # none yet
@@ -126,7 +126,7 @@ class Desk:
     def job(self, model: Model) -> Job | None:
         """The drop of the history page."""
         view = self.view(model)
-        return view.jobs[self.tape.at % len(view.jobs)] if view else None
+        return view.jobs[self.players["history"].at % len(view.jobs)] if view else None
 
     def drop(self, model: Model) -> tuple[SessionView | None, Job | None]:
         """The drop of the page that is shown, where it was analysed."""
@@ -135,35 +135,26 @@ class Desk:
         view, job = model.view, model.job
         return (view, job) if view is not None and job in view.results else (None, None)
 
-    def player(self, page: str) -> Player:
-        """How the drop of a page is played."""
-        return self.tape if page == "history" else self.replay
-
     def change(self, model: Model, change: Callable[[Player, float], Player]) -> None:
         """Change how the drop of the page is played, knowing when it ends (s)."""
         view, job = self.drop(model)
         end_s = end_of(view.drops[job], view.scales[job].hz) if view and job else 0.0
-        player = change(self.player(model.page), end_s)
-        if model.page == "history":
-            self.tape = player
-        else:
-            self.replay = player
+        self.players[model.page] = change(self.players[model.page], end_s)
 
     def tick(self, model: Model, seconds: float) -> None:
         """Let time pass, and begin the slow motion of a drop that has just been analysed."""
-        view, job = model.view, model.flow.job
-        fresh = model.page == "result" and view is not None and job in view.results
-        if fresh and view is not None and job is not None and job != self.replayed:
+        _, job = self.drop(model)
+        if model.page == "result" and job == model.flow.job and job not in {None, self.replayed}:
             self.replayed = job
-            end_s = end_of(view.drops[job], view.scales[job].hz)
-            self.replay = Player(speed=end_s / REPLAY_S, playing=True)
-        if self.player(model.page).playing:
+            self.change(model, lambda _, end_s: Player(speed=end_s / REPLAY_S, playing=True))
+        if self.players[model.page].playing:
             self.change(model, lambda player, end_s: player.ticked(seconds, end_s))
 
     def choose(self, model: Model, at: int) -> None:
         """Take one drop of the list, from its beginning."""
         view = self.view(model)
-        self.tape = self.tape.other(at - self.tape.at, len(view.jobs) if view else 0)
+        tape, count = self.players["history"], len(view.jobs) if view else 0
+        self.players["history"] = tape.other(at - tape.at, count)
 
 
 def condition(run: Run) -> str:

@@ -53,10 +53,8 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         reason, _, at = str(error).partition(" (at ")
-        line, column = re.findall(r"\d+", at) or (
-            text.count("\n") + 1,
-            len(text.split("\n")[-1]) + 1,
-        )
+        *before, last = text.split("\n")
+        line, column = re.findall(r"\d+", at) or (len(before) + 1, len(last) + 1)
         raise InputError(f"{place}:{line}:{column}: {reason}", _HOW) from None
     lines = {line.partition("=")[0].strip(): n for n, line in enumerate(text.splitlines(), start=1)}
     return combined(table, str(place), lines)

@@ -170,13 +170,13 @@ def _one_line(label: str) -> str:
 
 def _legend(panel: Panel, width: int) -> list[Span]:
     """Say what is drawn."""
-    spans = [Span(_one_line(panel.y.label), bold=True)]
+    spans, used = [Span(_one_line(panel.y.label)[:width], bold=True)], len(panel.y.label)
     for trace in panel.series:
-        if trace.label and trace.role in _ROLES and len(trace.y):
+        used += len(trace.label) + 4
+        if trace.label and trace.role in _ROLES and len(trace.y) and used <= width:
             mark = Span(f"  {_ROLES[trace.role]}", _color(trace), bold=True)
             spans += [mark, Span(f" {trace.label}")]
-    ends = [sum(len(span.text) for span in spans[: at + 1]) for at in range(len(spans))]
-    return [span for span, end in zip(spans, ends, strict=True) if end <= width] or spans[:1]
+    return spans
 
 
 def _color(trace: Trace) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from rig.campaign.events import Stage
-from rig.report.numbers import decimals_for, fixed
+from rig.report.remarks import clock_lines
 from rig.tui.desk import Face
 from rig.tui.motion import motions
 from rig.tui.scale import drawing
@@ -17,6 +18,10 @@ from rig.tui.widgets.text import checked, plain
 if TYPE_CHECKING:
     from rig.tui.desk import Desk
     from rig.tui.model import Model
+
+
+_LINKS = {"up": "● up", "down": "✗ down: reconnecting", "opening": "◌ opening",
+          "closed": "○ opens with the session"}  # fmt: skip
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
@@ -32,29 +37,28 @@ def face(model: Model, desk: Desk, width: int) -> Face:
 
 
 def _facts(model: Model) -> Content:
-    device, link = model.state.section("device"), model.state.section("link")
+    device, link = model.state.section("device"), str(model.state.section("link").get("state"))
     statistics = model.state.section("statistics")
-    lines: list[tuple[str, str]] = []
-    state = {"up": "● up", "down": "✗ down: reconnecting", "opening": "◌ opening",
-             "closed": "○ opens with the session"}  # fmt: skip
-    lines.append(("connection", state.get(str(link.get("state")), "unknown")))
+    facts = {"connection": _LINKS.get(link, "unknown")}
     if device:
-        who = [f"{name.replace('_', ' ')} {plain(value, 40)}" for name, value in device.items()
-               if name in {"board", "firmware", "version", "unique_id"}]  # fmt: skip
-        lines.append(("board", " · ".join(who) or "connected"))
-        if device.get("tick_hz"):
-            lines.append(("tick", f"{1e9 / float(device['tick_hz']):g} ns nominal"))
-    lines.append(("clock", _clock(model)))
+        names = [name for name in ("board", "firmware", "version", "unique_id") if name in device]
+        who = [f"{name.replace('_', ' ')} {plain(device[name], 40)}" for name in names]
+        facts["board"] = " · ".join(who) or "connected"
+    if device.get("tick_hz"):
+        facts["tick"] = f"{1e9 / float(device['tick_hz']):g} ns nominal"
+    clock = model.view.clock.details if model.view else {}
+    compared = bool(clock.get("samples")) and "error_ppm" in clock
+    waiting = "not compared yet; this takes a few seconds"
+    facts["clock"] = clock_lines({**clock, "notes": ()})[0] if compared else waiting
     if statistics:
-        trip = statistics.get("round_trip_s")
-        answer = "–" if trip is None else f"{float(trip) * 1e3:.1f} ms"
-        bad = int(statistics.get("rx_bad", 0)) + int(statistics.get("rx_unreadable", 0))
-        lines.append(
-            ("traffic", f"answers in {answer} · {statistics.get('rx_frames', 0)} frames, {bad} bad"
-                        f" · {statistics.get('repeats', 0)} requests repeated")
-        )  # fmt: skip
+        numbers = defaultdict(int, statistics)
+        facts["traffic"] = (
+            f"answers in {(numbers['round_trip_s'] or 0.0) * 1e3:.1f} ms · "
+            f"{numbers['rx_frames']} frames, {numbers['rx_bad'] + numbers['rx_unreadable']} bad · "
+            f"{numbers['repeats']} requests repeated"
+        )
     return Content("\n").join(
-        Content.assemble((f"{name:11}", "bold $primary"), text) for name, text in lines
+        Content.assemble((f"{name:11}", "bold $primary"), text) for name, text in facts.items()
     )
 
 
@@ -73,19 +77,6 @@ def _release(model: Model) -> Content:
     where = ", ".join(named(model, channel) for channel in seen["gates"][:2])
     why = "Something fell, or the release disturbs the gates."
     return checked(False, f"{pulse}; {seen['edges']} edges at {where}. {why}")
-
-
-def _clock(model: Model) -> str:
-    details = model.view.clock.details if model.view else {}
-    if "error_ppm" not in details or not details.get("samples"):
-        return "not compared yet; this takes a few seconds"
-    u = 2.0 * details["u_ppm"]
-    digits = decimals_for(u)
-    return (
-        f"{fixed(abs(details['error_ppm']), digits)} ± {fixed(u, digits)} ppm "
-        f"{'slow' if details['error_ppm'] < 0.0 else 'fast'}, corrected "
-        f"({details['samples']} comparisons)"
-    )
 
 
 def _gate_check(model: Model) -> Content:

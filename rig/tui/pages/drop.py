@@ -114,7 +114,7 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     if view is None or job is None:
         missing = model.loading or "No drop recorded yet. Press o to choose another session."
         return Face(Content("\n").join(parts or [Content(missing)]))
-    player, hz = desk.player(model.page), view.scales[job].hz
+    player, hz = desk.players[model.page], view.scales[job].hz
     drop, edges = view.drops[job], view.drops[job].edges
     begun = player.playing or player.time_s > 0.0 or not own
     seen = until(edges, hz, player.time_s) if begun else edges
@@ -145,8 +145,7 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
 def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason]) -> list[Content]:
     """Name the drop that is played, and say how."""
     verdict = view.results[job].verdict
-    arrow = "◀" if player.back else "▶"
-    state = f"{arrow} playing" if player.playing else f"‖ paused {arrow}"
+    state = "▶ playing" if player.playing else "‖ paused"
     speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} ×"
     return [
         Content.assemble(

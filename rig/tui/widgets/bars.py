@@ -44,14 +44,6 @@ _UNANSWERED_S = 0.5
 class StatusBar(Vertical):
     """Headline and pages, and below them what is wrong with what to do."""
 
-    DEFAULT_CSS = """
-    StatusBar { dock: top; height: auto; }
-    StatusBar #tabs, StatusBar #headline { height: 1; padding: 0 1; background: $panel; }
-    StatusBar #alarm { height: auto; max-height: 3; padding: 0 1; display: none;
-                    background: $error 20%; color: $foreground; }
-    StatusBar #alarm.-told { background: $primary 20%; }
-    """
-
     def compose(self) -> ComposeResult:
         yield Words(id="headline")
         yield Words(id="tabs")
@@ -108,12 +100,6 @@ def headline(model: Model, width: int) -> Content:
 class StopLine(Words):
     """The bar that stops everything, also by mouse, and what there is to be stopped."""
 
-    DEFAULT_CSS = """
-    StopLine { dock: bottom; height: 1; padding: 0 1; background: $error 25%; color: $foreground; }
-    StopLine.-hot { background: $error; color: $background; text-style: bold; }
-    StopLine.-idle { background: $panel; }
-    """
-
     def show(self, model: Model, keys: Mapping[str, str]) -> None:
         """Draw what holds now."""
         self.set_class(model.hot, "-hot")
@@ -124,11 +110,6 @@ class StopLine(Words):
 
 class StopBar(Vertical):
     """Keys of this page, and the bar that stops everything, also by mouse."""
-
-    DEFAULT_CSS = """
-    StopBar { dock: bottom; height: 2; }
-    StopBar #hints { height: 1; padding: 0 1; background: $panel; color: $foreground; }
-    """
 
     def compose(self) -> ComposeResult:
         yield Words(id="hints")

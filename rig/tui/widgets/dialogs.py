@@ -36,18 +36,6 @@ class Dialog(ModalScreen[Any]):
         What its keys do: key, words, and what a click on them does if anything.
     """
 
-    DEFAULT_CSS = """
-    Dialog { align: center middle; background: $background 60%; }
-    Dialog > Vertical { width: 64; max-width: 96%; height: auto; max-height: 90%;
-        border: heavy $primary; background: $surface; padding: 0 1; }
-    Dialog > Vertical.-large { width: 100; }
-    Dialog > Vertical Words { height: auto; }
-    Dialog VerticalScroll { height: auto; max-height: 100%; }
-    Dialog #how { margin: 1 0 0 0; }
-    Dialog Input { margin: 1 0 0 0; }
-    Dialog OptionList { height: auto; max-height: 20; border: none; padding: 0;
-        background: $surface; text-overflow: ellipsis; }
-    """
     LEAVE = ""
     """The key that cancels; empty: any that means nothing else."""
 
@@ -96,8 +84,6 @@ class Confirm(Dialog):
 
     A click never confirms: it is the second step of something, and the first may have been one.
     """
-
-    DEFAULT_CSS = "Confirm > Vertical { border: heavy $warning; }"
 
     def __init__(self, title: str, question: str, yes: str) -> None:
         words = Words((f"{title}\n", "bold $warning"), question, id="question")

@@ -26,23 +26,6 @@ _WIDE, _NORMAL = 160, 100
 class Page(Vertical):
     """Head, then drawing, plots and tables beside each other, then foot."""
 
-    SCOPED_CSS = False
-    DEFAULT_CSS = """
-    Page { height: 1fr; layers: below above; }
-    Page Words { padding: 0 1; }
-    Page #top { height: auto; max-height: 50%; }
-    Page #menu { width: 38; border-right: solid $border; }
-    Page #drawing, Page #plots, Page #tables { width: 1fr; height: 1fr; }
-    Page #plots { grid-size: 1; }
-    Page #plots.-pairs { grid-size: 2; }
-    Page Figure { width: 1fr; height: 1fr; min-height: 6; }
-    Page Horizontal { height: 1fr; }
-    Page #foot { height: auto; }
-    Page Digits { layer: above; offset: 2 5; width: auto; height: 3; color: $warning;
-        background: $surface; padding: 0 1; position: absolute; }
-    .-high Page #top { margin: 0 0 1 0; }
-    """
-
     def compose(self) -> ComposeResult:
         with VerticalScroll(id="top", can_focus=False):
             yield Words(id="head")
