@@ -12,16 +12,12 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from textual.content import Content
-
 from rig.analysis.result import GOOD
 from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopped, Try, Warned
 from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
 from rig.tui.actions import ACTIONS, help_text, shown_key
-from rig.tui.desk import condition
-from rig.tui.drop_words import LOOKS
 from rig.tui.follow import open_live
 from rig.tui.replay import Player
 from rig.tui.survey import session_list
@@ -235,34 +231,11 @@ async def _look_at(app: RigApp, entry: SessionEntry) -> None:
         app.driver.refuse(error)
 
 
-def _session_line(entry: SessionEntry) -> Content:
-    name = f"{plain(entry.path.name, 26):28}"
-    if entry.trouble:
-        return Content.assemble(name, ("✗ ", "bold $error"), plain(entry.trouble, 60))
-    stamp = "▲ SIMULATED" if entry.simulated else ""
-    return Content.assemble(
-        name, f"{entry.created[:16].replace('T', ' '):18}{entry.drops:4} drops  ",
-        (f"{stamp:13}", "bold $warning"), (plain(entry.title, 60), "$foreground 70%"),
-    )  # fmt: skip
-
-
-def _drops(app: RigApp) -> None:
-    """Let one drop of the session that is played be chosen."""
-    view, desk = app.desk.view(app.model), app.desk
-    if view is None:
-        return
-    counting = {(drop.run.number, drop.attempt) for drop in view.analysis.runs
-                if drop.verdict in GOOD}  # fmt: skip
-    lines = []
-    for job in view.jobs:
-        verdict = view.results[job].verdict
-        name = f"run {job.run:3}, attempt {job.attempt}   {condition(view.plan[job.run]):28}"
-        mark = f"{LOOKS[verdict][0]} {verdict:10}", LOOKS[verdict][1]
-        lines.append(Content.assemble(name, mark, "counts" if job in counting else ""))
-    at = desk.players["history"].at % len(lines)
-    question = Ask("Drops of this session", choices=lines, free=False, yes="play", chosen=at)
-    app.turn("history")
-    app.ask(question, lambda number: desk.choose(app.model, number))
+def _session_line(entry: SessionEntry) -> str:
+    what = f"{entry.created[:16].replace('T', ' ')}  {entry.drops:4} drops  "
+    what += f"{'▲ SIMULATED  ' * entry.simulated}{plain(entry.title, 60)}"
+    trouble = f"✗ {plain(entry.trouble, 60)}"
+    return f"{plain(entry.path.name, 26):28}{trouble if entry.trouble else what}"
 
 
 def _move(app: RigApp, by: int) -> None:
@@ -333,8 +306,7 @@ def _reject(app: RigApp) -> None:
             f" Only the latest attempt of a run counts: attempt {model.replaced.attempt} was good, "
             "but the run will have no result until you repeat it."
         )
-    reasons = [*map(Content, REASONS)]
-    app.ask(Ask(question, choices=reasons, yes="reject"), lambda why: app.driver.take(Reject(why)))
+    app.ask(Ask(question, choices=REASONS, yes="reject"), lambda why: app.driver.take(Reject(why)))
 
 
 def _repeat(app: RigApp) -> None:
@@ -370,8 +342,7 @@ def _palette(app: RigApp) -> None:
     """Search what can be done now."""
     actions = [action for action in ACTIONS
                if action.name != "palette" and app.possible(action)]  # fmt: skip
-    lines = [Content.assemble((f"{shown_key(app.keys[action.name]):8}", "bold $primary"),
-                              action.text) for action in actions]  # fmt: skip
+    lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
     question = Ask("Search commands", choices=lines, free=False, yes="run", chosen=0)
     app.ask(question, lambda number: app.action_do(actions[number].name))
 
@@ -396,7 +367,6 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "close": _close,
     "release_test": _try_release,
     "sessions": lambda app: app.begin(_sessions(app)),
-    "drops": _drops,
     "play": _change(Player.started),
     "earlier": _change(lambda player, end_s: player.moved(-1, end_s)),
     "later": _change(lambda player, end_s: player.moved(1, end_s)),

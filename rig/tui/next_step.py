@@ -29,6 +29,18 @@ _PASSING = {
 }
 
 
+_ONWARD = {
+    Stage.PREPARE: ("to the run", "Enter goes to the run."),
+    Stage.RESULT: ("next run", "Enter prepares the next run."),
+    Stage.DONE: ("next run", "Enter prepares the next run."),
+    Stage.HALTED: ("try again", "Mend the cause, then Enter prepares the run again."),
+    Stage.DEVICE: (
+        "to the first run",
+        "Wave a hand through each beam. Enter goes to the first run.",
+    ),
+}
+
+
 def hand(model: Model) -> str:
     """Name what is done by hand before a drop, in the scene's verb."""
     return _HANDS.get(model.words.reset.split()[0], "Set up")
@@ -57,25 +69,15 @@ def next_step(model: Model) -> NextStep:
         return NextStep("", _PASSING[stage], "$warning")
     if not model.driving and model.connected and stage is not Stage.PROTOCOL:
         return NextStep("", "Watching. Press c to take control when it is free.")
-    if stage is Stage.PREPARE:
-        return _prepare(model) if model.page == "run" else NextStep(
-            "to the run", "Enter goes to the run.")  # fmt: skip
-    if stage is Stage.RESULT:
-        if not model.flow.logged:  # what comes next depends on it
-            return NextStep("after the verdict is saved", "Saving the verdict …")
-        end = ("next run", "Enter prepares the next run.") if left else (
-            "end", "That was the last run. Enter shows the session.")  # fmt: skip
-        return NextStep(*end)
-    if stage is Stage.HALTED:
-        return NextStep("try again", "Mend the cause, then Enter prepares the run again.")
-    if stage is Stage.DEVICE:
-        check = "Wave a hand through each beam. Enter goes to the first run."
-        return NextStep("to the first run", check)
-    if stage is Stage.DONE:
-        return NextStep("next run", "Enter prepares the next run.") if left else NextStep(
-            "", "All runs of the plan are complete.")  # fmt: skip
-    return NextStep("open", "") if model.page == "protocol" else NextStep(
-        "home", "No session is open. Enter goes to the home page.")  # fmt: skip
+    if stage is Stage.PREPARE and model.page == "run":
+        return _prepare(model)
+    if stage is Stage.RESULT and not model.flow.logged:  # what comes next depends on it
+        return NextStep("after the verdict is saved", "Saving the verdict …")
+    if stage is Stage.PROTOCOL:
+        return NextStep("open" if model.page == "protocol" else "home", "No session is open.")
+    if stage in {Stage.RESULT, Stage.DONE} and not left:
+        return NextStep("end" * (stage is Stage.RESULT), "All runs of the plan are complete.")
+    return NextStep(*_ONWARD[stage])
 
 
 def _prepare(model: Model) -> NextStep:
@@ -93,12 +95,10 @@ def _prepare(model: Model) -> NextStep:
         moving = f"A beam keeps changing. Let everything {at_rest(model)}, then Enter arms."
         return NextStep("arm", moving, "$warning")
     run = model.run
-    names = [name for name in (run.impact, run.free) if name is not None] if run else []
-    body = " and ".join(plain(name, 20) for name in names)
-    sides = " (free side)" if len(names) > 1 else ""
-    body = body.replace(" and ", " (impact side) and ") + sides
+    body = model.words.body
     if run is not None and run.impact is not None:
-        body += f", board at {run.incline_deg:g}°"
+        beside = f" on the impact side, {plain(run.free, 20)} on the free side" * bool(run.free)
+        body = f"{plain(run.impact, 20)}{beside}, board at {run.incline_deg:g}°"
     settle = duration(model.settle_s)
     return NextStep(
         "arm",

@@ -107,21 +107,18 @@ def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = 
     whole
         Whether ticks are whole numbers only.
     """
-    power = math.floor(math.log10((high - low) / cells))
+    span = high - low
+    power = math.floor(math.log10(span / cells))
     steps = [share * 10.0**exponent for exponent in range(power, power + 4) for share in (1, 2, 5)]
-    axes = []
-    for step in steps if not whole else [step for step in steps if step >= 1.0] or [1.0]:
-        most = min(cells, math.floor(step * (cells - 1) / (high - low)))
-        for every in range(most, max(0, most - 3), -1):
-            unit = step / every
-            first = math.floor(low / unit + 0.5)
-            axis = Axis(unit, first, cells, every)
-            if every >= least and high <= axis.value(cells - 0.5) and len(axis.ticks) > 1:
-                axes.append(axis)
-                break
-    fallback = Axis((high - low) / max(1, cells - 1), 0, cells, max(1, cells))
-    many = [axis for axis in axes if len(axis.ticks) > 2] or axes
-    return min(many, key=lambda axis: axis.unit, default=fallback)
+    axes = [
+        Axis(step / every, math.floor(low * every / step + 0.5), cells, every)
+        for step in steps
+        if step >= 1.0 or not whole
+        for every in range(least, 1 + min(cells, int(step * cells / span)))
+    ]
+    fitting = [axis for axis in axes if axis.value(cells - 0.5) >= high and len(axis.ticks) > 1]
+    bare = Axis(span / max(1, cells - 1), 0, cells, cells)
+    return min(fitting, key=lambda axis: (len(axis.ticks) < 3, axis.unit), default=bare)
 
 
 def plotted(

@@ -20,7 +20,6 @@ _MOST = 200
 """Session files that are listed, the newest."""
 _GOING = 3
 """Unfinished sessions that are offered."""
-_FLASHED_AS = {"Arduino Mega 2560": "mega", "Arduino Uno": "uno"}
 _SCENES = """\
 Try it         | try | falling-ball     |              | a ball: g within seconds
 Try it         | try | inclined-uniform |              | two chains on a board
@@ -142,15 +141,13 @@ def _boards() -> Iterator[Row]:
     from rig.flash.drive import waiting_drives  # noqa: PLC0415 - not needed to paint
     from rig.usb.listing import serial_ports  # noqa: PLC0415 - nor is this
 
-    section, firmware = "Connect a board", "put the firmware on it"
     for _ in waiting_drives():
-        yield Row(section, "flash", f"Raspberry Pi Pico: {firmware}", value="pico")
+        title = "Raspberry Pi Pico: put the firmware on it"
+        yield Row("Connect a board", "flash", title, value="pico")
     for port in serial_ports():
         if port.candidate:
-            yield Row(section, "board", f"{port.kind} at {port.path}", value=port.path)
-        if port.candidate and port.kind in _FLASHED_AS:
-            value = f"{_FLASHED_AS[port.kind]} --port {port.path}"
-            yield Row(section, "flash", f"{port.kind}: {firmware}", value=value)
+            title = f"{port.kind} at {port.path}"
+            yield Row("Connect a board", "board", title, value=port.path)
 
 
 def read_file(file: Path) -> Reading:

@@ -10,8 +10,6 @@ from textual.content import Content
 from rig.campaign.events import Stage
 from rig.report.remarks import clock_lines
 from rig.tui.desk import Face
-from rig.tui.motion import motions
-from rig.tui.scale import drawing
 from rig.tui.widgets.gates import board, named
 from rig.tui.widgets.text import checked, plain
 
@@ -26,14 +24,10 @@ _LINKS = {"up": "● up", "down": "✗ down: reconnecting", "opening": "◌ open
 
 def face(model: Model, desk: Desk, width: int) -> Face:
     """Show what is connected, and what its gates see."""
-    protocol, run = model.protocol, model.run
-    picture = None
-    if protocol is not None and run is not None:
-        falls = desk.latest("hanging", (protocol, run), lambda: motions(protocol, run))
-        picture = drawing(protocol, run, falls, model.indicators, 0.0)
-    gates = board(protocol, model.indicators, model.now_s, width)
+    del desk
+    gates = board(model.protocol, model.indicators, model.now_s, width)
     words = [*gates, Content(""), _gate_check(model), _release(model)]
-    return Face(_facts(model), picture, words=Content("\n").join(words), top=True)
+    return Face(_facts(model), words=Content("\n").join(words))
 
 
 def _facts(model: Model) -> Content:

@@ -52,19 +52,13 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
     counting = model.stage is Stage.COUNTDOWN and model.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
-    facts = [f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}"]
-    facts += [f"model  {expected}"] if expected else []
+    facts = f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}\nmodel  {expected}\n"
+    gates = board(protocol, model.indicators, model.now_s, width)
     return Face(
         Content("\n").join([steps(model), _headline(model, run), _action(model)]),
         drawing(protocol, run, falls, model.indicators, 0.0),
         desk.latest("pictures", (protocol, run), lambda: fall_pictures(falls)),
-        words=Content("\n").join(
-            [
-                *map(Content, facts),
-                Content(""),
-                *board(protocol, model.indicators, model.now_s, width),
-            ]
-        ),
+        words=Content("\n").join([Content(facts), *gates]),
         digits=f"{max(0.0, model.flow.left_s):.1f}" if counting else "",
     )
 
@@ -76,25 +70,20 @@ def steps(model: Model) -> Content:
     clear = indicators.known and not indicators.blocked
     still = clear and not indicators.restless(model.now_s)
     good = [behind > 0, behind > 1 or clear, behind > 2 or still, behind > 3, behind > 4]
-    parts: list[Content] = []
-    for at, (name, is_good) in enumerate(
-        zip((hand(model), "Clear", "Still", "Drop", "Result"), good, strict=True)
-    ):
-        on = not is_good and at <= max(behind, 2)
-        mark, color = ("✓", "$success") if is_good else ("◌", "$warning") if on else (" ", "")
-        parts.append(Content.assemble((name, "bold" if on else ""), " ", (mark, color)))
+    names = hand(model), "Clear", "Still", "Drop", "Result"
+    parts = []
+    for at, name in enumerate(names):
+        mark = ("✓", "bold $success") if good[at] else ("◌" * (at <= max(behind, 2)), "$warning")
+        parts.append(Content.assemble(f"{name} ", mark))
     return Content(" · ").join(parts)
 
 
 def _headline(model: Model, run: Run) -> Content:
-    job = model.job
-    attempt = f" · attempt {job.attempt}" if job and job.attempt > 1 else ""
-    what = ""
-    if run.impact is not None:
-        strikes = f" · chain {plain(run.impact, 20)} strikes"
-        what = f" · {run.incline_deg:g}°{strikes}"
-    text = f"Run {run.number} of {len(model.state.runs) or 1}{attempt}{what}"
-    return Content.styled(text, "bold $primary")
+    attempt = f" · attempt {model.job.attempt}" if model.job and model.job.attempt > 1 else ""
+    strikes = f" · {run.incline_deg:g}° · chain {plain(run.impact, 20)} strikes"
+    what = strikes if run.impact is not None else ""
+    total = len(model.state.runs) or 1
+    return Content.styled(f"Run {run.number} of {total}{attempt}{what}", "bold $primary")
 
 
 def _action(model: Model) -> Content:

@@ -30,7 +30,7 @@ _OF_PAGE = {
     "protocol": ("go_on", "next", "previous"),
     "device": ("go_on", "wave", "release_test"),
     "session": ("go_on", "control_chart", "report"),
-    "history": ("play", "drops", "part", "sessions"),
+    "history": ("play", "next", "part", "sessions"),
 }
 _OF_STAGE = {
     Stage.RESULT: ("go_on", "reject", "unblind", "part"),
@@ -83,15 +83,11 @@ def headline(model: Model, width: int) -> Content:
     stamp = " ▲ SIMULATED " if model.simulated else ""
     blind = " BLIND " if model.blind else ""
     name = PAGES.get(model.page, model.page).upper()
-    title = plain(model.state.section("session").get("title") or
-                  (model.protocol.title if model.protocol else "chainrig"))  # fmt: skip
-    taken = len(right_side) + len(stamp) + len(blind) + 4
-    room = max(0, width - taken - len(name))
-    if len(title) > room:
-        title = title[: max(0, room - 1)] + "…" if room else ""
-    gap = " " * max(1, width - taken + 1 - len(name) - len(title))
+    title = model.state.section("session").get("title") or (
+        model.protocol.title if model.protocol else "chainrig")  # fmt: skip
+    room = width - len(name) - len(stamp) - len(blind) - len(right_side) - 3
     return Content.assemble(
-        (name, "bold $primary"), "  ", title, gap,
+        (name, "bold $primary"), "  ", plain(title, max(1, room)).ljust(room),
         (stamp, "bold $background on $warning"), (blind, "bold $background on $accent"),
         " ", right_side,
     )  # fmt: skip

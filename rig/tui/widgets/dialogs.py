@@ -131,7 +131,7 @@ class Ask(Dialog):
         self,
         question: str,
         text: str = "",
-        choices: Sequence[Content] = (),
+        choices: Sequence[str] = (),
         *,
         free: bool = True,
         yes: str = "save",
@@ -158,7 +158,7 @@ class Ask(Dialog):
         self._list.add_options(
             Option(choice, str(at))
             for at, choice in enumerate(self._choices)
-            if not query or matcher.match(choice.plain)
+            if not query or matcher.match(choice)
         )
 
     @on(Input.Changed)
@@ -173,12 +173,12 @@ class Ask(Dialog):
             super().move(by)
             option = self._list.highlighted_option
             if self._free and option is not None and option.id is not None:
-                self.query_one(Input).value = self._choices[int(option.id)].plain
+                self.query_one(Input).value = self._choices[int(option.id)]
 
     @on(OptionList.OptionSelected)
     def _clicked(self, event: OptionList.OptionSelected) -> None:
         if self._free:
-            self.query_one(Input).value = self._choices[event.option_index].plain
+            self.query_one(Input).value = self._choices[event.option_index]
         else:
             self.action_say()
 
