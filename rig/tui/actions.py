@@ -64,8 +64,7 @@ BY_NAME = {action.name: action for action in ACTIONS}
 NEEDS_RIG = {"stop", "control", "wave"}
 """What makes no sense with a file and no rig, beside all that needs control."""
 _KEYS = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
-         "left": "←", "right": "→", "up": "↑", "down": "↓", "space": "Space",
-         "tab": "Tab"}  # fmt: skip
+         "left": "←", "right": "→", "up": "↑", "down": "↓", "tab": "Tab"}  # fmt: skip
 _HELP = """\
 STOP works on every screen: its key, Esc outside text fields, or the red bar.
 {table}

@@ -321,14 +321,10 @@ class RigApp(App[None], inherit_bindings=False):
         self.desk.part = self.desk.chart = 0
         self.draw()
 
-    def next_part(self) -> None:
-        """Turn to the part of the page that comes after the first that is shown."""
-        self.desk.part += 1
-        self.draw()
-
-    def next_chart(self) -> None:
-        """Show another plot first."""
-        self.desk.chart += 1
+    def turn_on(self, part: int = 0, chart: int = 0) -> None:
+        """Show another part of the page, or another plot, first."""
+        self.desk.part += part
+        self.desk.chart += chart
         self.draw()
 
     def _look_around(self, now_s: float) -> None:

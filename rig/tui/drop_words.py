@@ -34,6 +34,8 @@ LOOKS = {
     "interrupted": ("■", "$warning"),
     "planned": ("·", "$foreground 70%"),
 }
+_PAST = 6
+"""Drops in the strip of past runs: as many as fit 80 columns."""
 _REMEDIES = 2
 """Things to do that are shown: what else is wrong shows when these are mended."""
 
@@ -70,21 +72,15 @@ def sentence(view: SessionView, job: Job) -> str:
     return f"{wins} by {plus_minus(size, row.scale)} {row.unit}{beside}"
 
 
-def past_runs(view: SessionView, job: Job, width: int) -> Content:
+def past_runs(view: SessionView, job: Job) -> str:
     """Write the latest drops up to one in a line: run, verdict and main result of each."""
-    parts: list[Content] = []
-    used = len("past runs")
-    for drop in reversed(view.jobs[: view.jobs.index(job) + 1]):
+    parts = []
+    for drop in view.jobs[: view.jobs.index(job) + 1][-_PAST:]:
         result = view.results[drop]
         row = next((row for row in averaged() if row.name in result.quantities), None)
         value = "" if row is None else f" {result.quantities[row.name].value * row.scale:.4g}"
-        symbol, color = LOOKS.get(result.verdict, ("?", "$foreground"))
-        part = Content.assemble(f"  {drop.run}", (symbol, color), value)
-        used += len(part)
-        if used > width:
-            break
-        parts.insert(0, part)
-    return Content.assemble(("past runs", "$foreground 70%"), *parts)
+        parts.append(f"{drop.run} {LOOKS[result.verdict][0]}{value}")
+    return "past runs  " + " · ".join(parts)
 
 
 def number_table(view: SessionView, job: Job) -> Content:
@@ -106,9 +102,6 @@ def number_table(view: SessionView, job: Job) -> Content:
         lines += part.sentences
     expected = expected_words(view.protocol, run)
     lines += [f"model  {expected}"] if expected else []
-    for gate in alone.gates:
-        interval = "" if gate.interval is None else f", {plus_minus(gate.interval, 1e3)} ms later"
-        lines.append(f"gate {gate.channel}: {plus_minus(gate.speed, 1.0)} m/s{interval}")
     return Content("\n".join(lines))
 
 

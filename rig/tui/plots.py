@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rig.report.falls import fall_figures
-from rig.report.figure import Chart, Panel, PlotAxis, measured, series
+from rig.report.figure import Panel, PlotAxis, series
 from rig.report.figures import result_figure, runs_figure
-from rig.report.looks import INK, MODEL, SECOND
+from rig.report.looks import MODEL, SECOND
 from rig.tui.plotting import Picture
 
 if TYPE_CHECKING:
@@ -15,12 +15,9 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.records import Job
+    from rig.report.figure import Chart
     from rig.results.live import SessionView
     from rig.tui.motion import ChainFall
-
-_GRAVITY = (
-    "g: gravity from each free fall; if the bars miss the protocol's value, check heights and clock"
-)
 
 
 def pictures_of(*charts: Chart | None) -> list[Picture]:
@@ -35,18 +32,15 @@ def pictures_of(*charts: Chart | None) -> list[Picture]:
 
 
 def fall_pictures(falls: tuple[ChainFall, ...]) -> list[Picture]:
-    """Draw z(t) by the model, of a drop that is to come or does not count, beside its points."""
+    """Draw z(t) by the model, of a drop that is to come or does not count."""
     end_s = max((fall.end_s for fall in falls), default=0.0)
-    traces = []
-    for fall in falls:
-        side = f", {fall.role} side" * (len(falls) > 1)
-        color = SECOND if fall.role == "free" else INK
-        traces += [
-            series(f"model{side}", *fall.curve(end_s), "line", MODEL, scale=100.0),
-            series(f"measured{side}", fall.times, fall.heights, "points", color, scale=100.0),
-        ]
+    traces = [
+        series(f"{fall.role} side" * (len(falls) > 1) or "model", *fall.curve(end_s), "line",
+               SECOND if fall.role == "free" else MODEL, scale=100.0)
+        for fall in falls
+    ]  # fmt: skip
     time = PlotAxis("time since the release fired (s)", limits=(0.0, end_s))
-    return [Picture(Panel(time, PlotAxis("z as it fell (cm)"), traces))] * bool(traces)
+    return [Picture(Panel(time, PlotAxis("z by the model (cm)"), traces))] * bool(traces)
 
 
 def drop_pictures(view: SessionView, job: Job) -> list[Picture]:
@@ -72,9 +66,3 @@ def session_pictures(view: SessionView) -> Iterator[tuple[Picture, str]]:
     for chart in (result_figure(analysis, view.curves, site_m_s2=gravity),
                   runs_figure(analysis, view.protocol.accept.release_skew)):  # fmt: skip
         yield from ((picture, chart.caption) for picture in pictures_of(chart) if chart)
-    falls = [(run.run.number, run.gravity) for run in analysis.runs if run.gravity]
-    if falls:
-        traces = [measured("counts ± U", falls, "mean"),
-                  series("protocol", (), (gravity,), "limit", SECOND)]  # fmt: skip
-        axes = PlotAxis("run", whole=True), PlotAxis("g in free fall (m/s²)")
-        yield Picture(Panel(*axes, traces)), _GRAVITY

@@ -129,12 +129,14 @@ def look_around(options: Options, port: str, other: str) -> list[Row]:
 
 def first_row(rows: list[Row], options: Options) -> int:
     """Choose the row to begin with: what is unfinished, what can be used here, or a trial."""
-    for section in ("Continue" * (not options.port), "Experiments here", "Ready experiments"):
-        for at, row in enumerate(rows):
-            mine = row.file is not None and (row.session or row.file in options.files)
-            if row.section == section and row.file and mine and not read_file(row.file).problem:
-                return at
-    return 0
+    sections = "Continue" * (not options.port), "Experiments here", "Ready experiments"
+    usable = [
+        (sections.index(row.section), at)
+        for at, row in enumerate(rows)
+        if row.section in sections and row.file and (row.session or row.file in options.files)
+        and not read_file(row.file).problem
+    ]  # fmt: skip
+    return min(usable, default=(0, 0))[1]
 
 
 def _boards() -> Iterator[Row]:

@@ -44,7 +44,6 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab):
             for opens, dialog, key in (
                 ("l", Confirm, "f9"), ("l", Confirm, "escape"),
                 ("question_mark", Reader, "f9"), ("question_mark", Reader, "escape"),
-                ("o", Ask, "f9"), ("o", Ask, "escape"),
             ):  # fmt: skip
                 await op.press(opens)
                 await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
     from rig.tui.replay import Player
 
-_FALLING = (Stage.LIVE, Stage.JUDGING)
 _DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
          Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}  # fmt: skip
 """Steps that are behind, by stage."""
@@ -120,14 +119,14 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     reasons = next(logged, ())
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
     said = sentence(view, job) if not (own and player.playing) else "slow motion …"
-    foot = [Content.styled(said, "bold $success"), past_runs(view, job, width)]
+    foot = Content.assemble((said, "bold $success"), "\n" * bool(said), past_runs(view, job))
     return Face(
         Content("\n").join(parts or _which(view, job, player, reasons)),
         drawing(view.protocol, run, falls, indicators, time_s),
         pictures,
         player.time_s - (falls[0].delay_s if falls else 0.0) if begun else None,
         Content("\n").join([words, Content(""), *board(view.protocol, indicators, 0.0, width)]),
-        Content("\n").join([line for line in foot if line.plain]),
+        foot,
     )
 
 
@@ -135,14 +134,13 @@ def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason
     """Name the drop that is played, and say how."""
     verdict = view.results[job].verdict
     state = "▶ playing" if player.playing else "‖ paused"
-    speed = f"{player.speed:g} ×" if player.speed >= 1 else f"1/{1 / player.speed:g} ×"
     return [
         Content.assemble(
             (f"drop {view.jobs.index(job) + 1} of {len(view.jobs)}", "bold $primary"),
             f"  run {job.run}, attempt {job.attempt} · {condition(view.plan[job.run])} · ",
             (f"{LOOKS[verdict][0]} {verdict}", LOOKS[verdict][1]),
         ),
-        Content(f"{state} at {speed} real speed, t = {player.time_s * 1e3:.0f} ms · "
+        Content(f"{state} at {player.speed:.3g} × real speed, t = {player.time_s * 1e3:.0f} ms · "
                 f"{plain(view.path.name, 60)}{'  ▲ SIMULATED' * view.simulated}"),
         *(Content(f"note: {plain(text, 160)}") for text in notes_in(reasons)),
     ]  # fmt: skip

@@ -56,9 +56,8 @@ def _progress(model: Model) -> Content:
     width = 24
     filled = round(width * over / len(runs))
     pace = model.view.pace_s if model.view else None
-    remaining = (
-        f" · about {duration(pace * (len(runs) - over))} left" if pace and over < len(runs) else ""
-    )
+    left_s = (pace or 0.0) * (len(runs) - over)
+    remaining = f" · about {duration(left_s)} left" * bool(left_s)
     session = plain(Path(str(model.state.section("session").get("path", ""))).name, 60)
     return Content.assemble(
         ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
@@ -76,11 +75,9 @@ def _fit_words(model: Model) -> tuple[str, str]:
     view = model.view
     if view is None or not view.analysis.summary:
         return "", ""
-    suffix = " · adding the newest …" if view.lagging else ""
-    if view.fitted:
-        return f"\njoint fit of {view.fitted} runs{suffix}", "$foreground 70%"
-    joint = f"; joint fit from {FEWEST} good drops on" if not suffix else ""
-    return f"\neach drop fitted alone{joint}{suffix}", "$foreground 70%"
+    alone = f"each drop fitted alone; joint fit from {FEWEST} good drops on"
+    fit = f"joint fit of {view.fitted} runs" if view.fitted else alone
+    return f"\n{fit}{' · adding the newest …' * view.lagging}", "$foreground 70%"
 
 
 def _marks(model: Model) -> Iterator[tuple[str, str]]:

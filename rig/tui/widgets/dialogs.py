@@ -7,22 +7,20 @@ from typing import TYPE_CHECKING, Any
 from textual import events, on
 from textual.await_complete import AwaitComplete
 from textual.containers import Vertical, VerticalScroll
-from textual.content import Content
 from textual.fuzzy import Matcher
 from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList
 from textual.widgets.option_list import Option
 
 from rig.tui.widgets.bars import StopLine
-from rig.tui.widgets.text import Words, pressed
+from rig.tui.widgets.text import Words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from textual.app import ComposeResult
+    from textual.content import Content
     from textual.widget import Widget
-
-_CANCEL = ("Esc", "cancel", "screen.leave")
 
 
 class Dialog(ModalScreen[Any]):
@@ -33,17 +31,15 @@ class Dialog(ModalScreen[Any]):
     parts
         What stands in it.
     keys
-        What its keys do: key, words, and what a click on them does if anything.
+        What its keys do.
     """
 
     LEAVE = ""
     """The key that cancels; empty: any that means nothing else."""
 
-    def __init__(
-        self, *parts: Widget, keys: Sequence[tuple[str, str, str]] = (), large: bool = False
-    ) -> None:
+    def __init__(self, *parts: Widget, keys: str = "", large: bool = False) -> None:
         super().__init__()
-        self._parts = [*parts, Words(_how(*keys), id="how")] if keys else parts
+        self._parts = [*parts, Words((keys, "bold $primary"), id="how")]
         self._large = large
 
     def compose(self) -> ComposeResult:
@@ -65,19 +61,6 @@ class Dialog(ModalScreen[Any]):
         """Give an answer, once: keys that follow each other quickly may ask for it again."""
         return super().dismiss(result) if self.is_active else AwaitComplete()
 
-    def action_leave(self) -> None:
-        """Give nothing."""
-        self.dismiss(None)
-
-
-def _how(*ways: tuple[str, str, str]) -> Content:
-    """Write what a dialog's keys do."""
-    parts: list[Content] = []
-    for key, text, action in ways:
-        label = Content.assemble((key, "bold $primary"), f" {text}")
-        parts += [pressed(label, action) if action else label, Content("   ")]
-    return Content.assemble(*parts)
-
 
 class Confirm(Dialog):
     """Ask for confirmation: Enter confirms, any other key cancels.
@@ -87,8 +70,7 @@ class Confirm(Dialog):
 
     def __init__(self, title: str, question: str, yes: str) -> None:
         words = Words((f"{title}\n", "bold $warning"), question, id="question")
-        keys = (("Enter", yes, ""), ("any other key", "stay", "screen.leave"))
-        super().__init__(words, keys=keys)
+        super().__init__(words, keys=f"Enter: {yes}   any other key: stay")
 
 
 class Reader(Dialog):
@@ -142,7 +124,7 @@ class Ask(Dialog):
         self._choices, self._free, self._first = choices, free, chosen
         self._list = _Choices(markup=False)
         parts = [Words((question, "bold"), id="question"), line, *([self._list] * bool(choices))]
-        keys = (("↑ ↓ Enter" if choices else "Enter", yes, "screen.say"), _CANCEL)
+        keys = f"{'↑ ↓ ' * bool(choices)}Enter: {yes}   Esc: cancel"
         super().__init__(*parts, keys=keys, large=bool(choices))
 
     def on_mount(self) -> None:
@@ -191,5 +173,4 @@ class Ask(Dialog):
         elif typed.strip() or not self._choices:
             self.dismiss(typed)
         else:
-            again = ("✗", "type or choose a reason first", "screen.say")
-            self.query_one("#how", Words).say(_how(again, _CANCEL))
+            self.query_one("#how", Words).say("✗ type or choose a reason first")
