@@ -212,11 +212,10 @@ async def _sessions(app: RigApp) -> None:
     folder = own.parent if own else Path()
     entries = await asyncio.to_thread(session_list, folder)
     app.turn("history")
-    same = [at for at, entry in enumerate(entries) if own and entry.path.name == own.name]
     question = Ask(
         f"Sessions in {plain(folder.resolve(), 80)}, newest first",
         choices=[_session_line(entry) for entry in entries],
-        free=False, yes="play", chosen=same[0] if same else 0,
+        free=False, yes="play", chosen=0,
     )  # fmt: skip
     app.ask(question, lambda number: app.begin(_look_at(app, entries[number])))
 

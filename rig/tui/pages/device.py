@@ -79,14 +79,10 @@ def _gate_check(model: Model) -> Content:
     if not indicators.known:
         return Content("Waiting for the gates.")
     if indicators.alone is not None:
-        return Content.assemble(
-            ("☞ ", "bold $warning"), "blocked: ", (named(model, indicators.alone), "bold")
-        )
+        return Content.styled(f"☞ blocked: {named(model, indicators.alone)}", "bold $warning")
     if indicators.blocked:
-        return Content.assemble(
-            ("● ", "bold $warning"),
-            f"{len(indicators.blocked)} beams are blocked. Clear or align them."
-        )  # fmt: skip
+        many = f"● {len(indicators.blocked)} beams are blocked. Clear or align them."
+        return Content.styled(many, "bold $warning")
     left = [gate.channel for gate in gates if gate.channel not in indicators.checked]
     if not left:
         return checked(True, "every gate works")

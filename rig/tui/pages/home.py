@@ -47,17 +47,14 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     row = desk.chosen
     if row is None:
         return Face(Content("looking around …"))
-    parts = [Content(_DOES.get(row.kind, ""))]
-    picture = None
-    reading = None if row.file is None else desk.reading(row.file)
-    if reading is not None and (reading.protocol is None or reading.problem):
-        problem = Content.assemble((f"✗ {plain(row.file)}\n\n", "bold $error"), reading.problem)
-        parts = [*parts, problem]
-    elif reading is not None and reading.protocol is not None:
-        if row.kind == "open":
-            parts = [Content(_into(model, desk, row))]
-        parts.append(_description(desk, reading.protocol))
-        picture = _picture(desk, reading.protocol)
+    does, picture = _DOES.get(row.kind) or _into(model, desk, row), None
+    parts = [Content(does)]
+    protocol, problem = desk.reading(row.file) if row.file else (None, "")
+    if problem:
+        parts.append(Content.assemble((f"✗ {plain(row.file)}\n\n", "bold $error"), problem))
+    elif protocol is not None:
+        parts.append(_description(desk, protocol))
+        picture = _picture(desk, protocol)
     return Face(Content(""), picture, words=Content("\n").join(parts), menu=_menu(desk), top=True)
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from textual.containers import Vertical
 from textual.content import Content
 
-from rig.campaign.events import Stage
 from rig.tui.actions import BY_NAME, shown_key
 from rig.tui.model import UNDER_WAY, alarm
 from rig.tui.next_step import next_step
@@ -29,12 +28,9 @@ KEYS_SHOWN = 4
 _OF_PAGE = {
     "protocol": ("go_on", "next", "previous"),
     "device": ("go_on", "wave", "release_test"),
+    "result": ("go_on", "reject", "unblind", "part"),
     "session": ("go_on", "control_chart", "report"),
     "history": ("play", "next", "part", "sessions"),
-}
-_OF_STAGE = {
-    Stage.RESULT: ("go_on", "reject", "unblind", "part"),
-    Stage.HALTED: ("go_on", "again", "part"),
 }
 _ANYWHERE = ("go_on", "control", "part", "help")
 _TOLD_S = 4.0
@@ -122,7 +118,7 @@ def hints(
     model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
 ) -> Content:
     """Write the keys that are wanted most now; all others are in the palette."""
-    page = _OF_PAGE.get(model.page, _OF_STAGE.get(model.stage, ()))
+    page = _OF_PAGE.get(model.page, ())
     parts: list[Content] = []
     used = 0
     for name in (*dict.fromkeys((*page, *_ANYWHERE)), "palette"):
