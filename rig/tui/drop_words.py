@@ -65,11 +65,11 @@ def sentence(view: SessionView, job: Job) -> str:
     measured = result.quantities[row.name]
     expected = predicted_run(view.protocol, run).get(row.name)
     beside = "" if expected is None else f"; model {plus_minus(stated(expected), row.scale)}"
-    if row != SEPARATION or run.impact is None:
-        return f"{row.symbol} = {plus_minus(measured, row.scale)} {row.unit}{beside}"
-    size = Measured(abs(measured.value), measured.u)
-    wins = f"{plain(run.impact, 20)} {'wins' if measured.value > 0.0 else 'loses'}"
-    return f"{wins} by {plus_minus(size, row.scale)} {row.unit}{beside}"
+    size = plus_minus(Measured(abs(measured.value), measured.u), row.scale)
+    if row == SEPARATION and run.impact is not None:
+        wins = "wins" if measured.value > 0.0 else "loses"
+        return f"{plain(run.impact, 20)} {wins} by {size} {row.unit}{beside}"
+    return f"{row.symbol} = {size} {row.unit}{beside}"
 
 
 def past_runs(view: SessionView, job: Job) -> str:

@@ -42,13 +42,10 @@ class Indicators:
     ----------
     checked
         Channels that were seen blocked alone and clear again: the gate check.
-    alone
-        The one channel that is blocked now; `None` for none or several.
     """
 
     gates: tuple[Indicator, ...] = ()
     checked: frozenset[int] = frozenset()
-    alone: int | None = None
     known: bool = False
 
     @classmethod
@@ -61,6 +58,11 @@ class Indicators:
         """Channels that are blocked."""
         return tuple(gate.channel for gate in self.gates if gate.blocked)
 
+    @property
+    def alone(self) -> int | None:
+        """The one channel that is blocked now; `None` for none or several."""
+        return self.blocked[0] if len(self.blocked) == 1 and self.known else None
+
     def restless(self, now_s: float) -> tuple[int, ...]:
         """Channels that are not steady."""
         return tuple(gate.channel for gate in self.gates if not gate.steady(now_s))
@@ -68,17 +70,16 @@ class Indicators:
     def seen(self, mask: int | None, now_s: float) -> Indicators:
         """Look at the gates' mask; `None` means that nobody knows."""
         if mask is None:
-            return replace(self, known=False, alone=None)
+            return replace(self, known=False)
         gates = tuple(
             replace(gate, blocked=dark).struck(int(self.known and dark != gate.blocked), now_s)
             for gate in self.gates
             for dark in [bool(mask >> gate.channel & 1)]
         )
-        blocked = tuple(gate.channel for gate in gates if gate.blocked)
-        checked = self.checked
-        if self.alone is not None and not blocked:
-            checked |= {self.alone}
-        return Indicators(gates, checked, blocked[0] if len(blocked) == 1 else None, known=True)
+        looked = Indicators(gates, self.checked, known=True)
+        if self.alone is None or looked.blocked:
+            return looked
+        return replace(looked, checked=self.checked | {self.alone})
 
     def counted(self, channels: tuple[int, ...], now_s: float) -> Indicators:
         """Count edges of a drop, one entry of `channels` an edge."""

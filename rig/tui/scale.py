@@ -154,8 +154,8 @@ def _rods(
     half = 0.5 * _rod_m(rods)
     if protocol.vocabulary.part == "object":
         radius = max(0.5 * rods.widths[0], _BALL * shown_m)
-        turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 13))
-        around = [(x + radius * at.real, height + radius * at.imag) for at in turn.tolist()]
+        corners = ((-1, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
+        around = [(x + radius * across, height + radius * up) for across, up in corners]
         yield from (Stroke(*start, *end, color) for start, end in pairwise(around))
         return
     lies = fall.role == "impact" and protocol.surface is not None
