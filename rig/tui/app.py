@@ -190,7 +190,10 @@ class RigApp(App[None], inherit_bindings=False):
         if self.flow.stage is Stage.COUNTDOWN:
             self.driver.take(Tick(min(passed, _COUNTED_S)))
         self.desk.tick(self.model, passed)
-        self._look_around(now)
+        begins = self.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S
+        if begins and self.client is not None:
+            self._looked_s = now
+            self.begin(self._look_around(self.client))
         if self.client is not None and self.client.changed:
             self.client.changed = False
             reopens = self.driver.asked is not None
@@ -327,17 +330,8 @@ class RigApp(App[None], inherit_bindings=False):
         self.desk.chart += chart
         self.draw()
 
-    def _look_around(self, now_s: float) -> None:
-        """See again and again what there is to begin with, while nothing is begun."""
-        if self.client is None or self.flow.stage is not Stage.PROTOCOL:
-            return
-        if now_s - self._looked_s >= _LOOK_S:
-            self._looked_s = now_s
-            self.begin(self._survey())
-
-    async def _survey(self) -> None:
-        client = self.client
-        assert client is not None
+    async def _look_around(self, client: ReconnectingClient) -> None:
+        """See what there is to begin with."""
         port, other = client.port if not client.idle else "", client.in_the_way
         rows = await asyncio.to_thread(look_around, self.options, port, other[0] if other else "")
         self.desk.begin_with(rows)

@@ -231,10 +231,11 @@ async def _look_at(app: RigApp, entry: SessionEntry) -> None:
 
 
 def _session_line(entry: SessionEntry) -> str:
-    what = f"{entry.created[:16].replace('T', ' ')}  {entry.drops:4} drops  "
-    what += f"{'▲ SIMULATED  ' * entry.simulated}{plain(entry.title, 60)}"
-    trouble = f"✗ {plain(entry.trouble, 60)}"
-    return f"{plain(entry.path.name, 26):28}{trouble if entry.trouble else what}"
+    name, created = plain(entry.path.name, 26), entry.created[:16].replace("T", " ")
+    if entry.trouble:
+        return f"{name:28}✗ {plain(entry.trouble, 60)}"
+    stamp = "▲ SIMULATED  " * entry.simulated
+    return f"{name:28}{created}  {entry.drops:4} drops  {stamp}{plain(entry.title, 60)}"
 
 
 def _move(app: RigApp, by: int) -> None:

@@ -9,13 +9,11 @@ from textual.content import Content
 
 from rig.tui.replay import Player, end_of
 from rig.tui.survey import first_row, read_file
-from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from rig.protocol.protocol import Run
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.context import Options
@@ -144,7 +142,8 @@ class Desk:
     def tick(self, model: Model, seconds: float) -> None:
         """Let time pass, and begin the slow motion of a drop that has just been analysed."""
         _, job = self.drop(model)
-        if model.page == "result" and job == model.flow.job and job not in {None, self.replayed}:
+        fresh = model.page == "result" and job == model.flow.job and not model.blind
+        if fresh and job not in {None, self.replayed}:
             self.replayed = job
             self.change(model, lambda _, end_s: Player(speed=end_s / REPLAY_S, playing=True))
         if self.players[model.page].playing:
@@ -155,10 +154,3 @@ class Desk:
         view = self.view(model)
         tape, count = self.players["history"], len(view.jobs) if view else 0
         self.players["history"] = tape.other(at - tape.at, count)
-
-
-def condition(run: Run) -> str:
-    """Name what a run drops and, where it strikes, at which incline."""
-    if run.impact is None:
-        return plain(run.free, 20)
-    return f"{run.incline_deg:g}° impact {plain(run.impact, 20)}"

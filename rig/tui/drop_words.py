@@ -107,14 +107,12 @@ def number_table(view: SessionView, job: Job) -> Content:
 
 def verdict_words(model: Model) -> Content:
     """Write the verdict and its reasons."""
-    if model.job is None:
-        return Content(model.loading or "No drop yet.")
     verdict, reasons = model.verdict
-    if not verdict:
-        return Content(model.loading or "no verdict yet")
+    if model.job is None or not verdict:
+        return Content(model.loading or "No verdict yet.")
     symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
     lines = [Content.styled(f" {symbol} {verdict.upper()} ", f"bold $background on {colour}")]
-    lines += [Content.assemble("  ", (plain(reason, 200), "")) for reason in reasons[:4]]
+    lines += [Content(f"  {plain(reason, 200)}") for reason in reasons[:4]]
     if len(reasons) > 4:
         lines.append(Content(f"  and {len(reasons) - 4} more reasons, in the session file"))
     replaced = model.replaced

@@ -130,13 +130,12 @@ def look_around(options: Options, port: str, other: str) -> list[Row]:
 def first_row(rows: list[Row], options: Options) -> int:
     """Choose the row to begin with: what is unfinished, what can be used here, or a trial."""
     sections = "Continue" * (not options.port), "Experiments here", "Ready experiments"
-    usable = [
-        (sections.index(row.section), at)
+    places = [
+        (bool(read_file(row.file).problem), sections.index(row.section), at)
         for at, row in enumerate(rows)
         if row.section in sections and row.file and (row.session or row.file in options.files)
-        and not read_file(row.file).problem
-    ]  # fmt: skip
-    return min(usable, default=(0, 0))[1]
+    ]
+    return min(places, default=(False, 0, 0))[2]
 
 
 def _boards() -> Iterator[Row]:

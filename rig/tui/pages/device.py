@@ -37,9 +37,8 @@ def _facts(model: Model) -> Content:
     if device:
         names = [name for name in ("board", "firmware", "version", "unique_id") if name in device]
         who = [f"{name.replace('_', ' ')} {plain(device[name], 40)}" for name in names]
-        facts["board"] = " · ".join(who) or "connected"
-    if device.get("tick_hz"):
-        facts["tick"] = f"{1e9 / float(device['tick_hz']):g} ns nominal"
+        tick = f"tick {1e9 / float(device.get('tick_hz') or 1e9):g} ns nominal"
+        facts["board"] = " · ".join([*who, tick])
     clock = model.view.clock.details if model.view else {}
     compared = bool(clock.get("samples")) and "error_ppm" in clock
     waiting = "not compared yet; this takes a few seconds"

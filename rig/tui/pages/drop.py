@@ -8,7 +8,7 @@ from textual.content import Content
 
 from rig.campaign.events import Stage
 from rig.reasons import notes_in
-from rig.tui.desk import Face, condition
+from rig.tui.desk import Face
 from rig.tui.drop_words import (
     LOOKS,
     expected_words,
@@ -87,7 +87,7 @@ def _headline(model: Model, run: Run) -> Content:
 
 def _action(model: Model) -> Content:
     step = next_step(model)
-    return Content.assemble(("→ ", f"bold {step.color}"), (step.text, f"bold {step.color}"))
+    return Content.styled(f"→ {step.text}", f"bold {step.color}")
 
 
 def _result(model: Model, desk: Desk, width: int) -> Face:
@@ -132,12 +132,13 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
 
 def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason]) -> list[Content]:
     """Name the drop that is played, and say how."""
-    verdict = view.results[job].verdict
+    verdict, run = view.results[job].verdict, view.plan[job.run]
+    what = f"{run.incline_deg:g}° impact {run.impact}" if run.impact else run.free
     state = "▶ playing" if player.playing else "‖ paused"
     return [
         Content.assemble(
             (f"drop {view.jobs.index(job) + 1} of {len(view.jobs)}", "bold $primary"),
-            f"  run {job.run}, attempt {job.attempt} · {condition(view.plan[job.run])} · ",
+            f"  run {job.run}, attempt {job.attempt} · {plain(what, 40)} · ",
             (f"{LOOKS[verdict][0]} {verdict}", LOOKS[verdict][1]),
         ),
         Content(f"{state} at {player.speed:.3g} × real speed, t = {player.time_s * 1e3:.0f} ms · "

@@ -53,15 +53,12 @@ def _progress(model: Model) -> Content:
     over = sum(done(line, voids.get(line.run, 0)) for line in runs)
     if not runs:
         return Content("No session is open.")
-    width = 24
-    filled = round(width * over / len(runs))
     pace = model.view.pace_s if model.view else None
     left_s = (pace or 0.0) * (len(runs) - over)
     remaining = f" · about {duration(left_s)} left" * bool(left_s)
     session = plain(Path(str(model.state.section("session").get("path", ""))).name, 60)
     return Content.assemble(
-        ("━" * filled, "$success"), ("─" * (width - filled), "$foreground 40%"),
-        (f"  {over} of {len(runs)} runs", "bold"), f"{remaining}  ", (session, "$foreground 70%"),
+        (f"{over} of {len(runs)} runs", "bold"), f"{remaining}  ", (session, "$foreground 70%"),
         _fit_words(model), "\n", *_marks(model),
     )  # fmt: skip
 

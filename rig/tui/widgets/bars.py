@@ -95,7 +95,6 @@ class StopLine(Words):
     def show(self, model: Model, keys: Mapping[str, str]) -> None:
         """Draw what holds now."""
         self.set_class(model.hot, "-hot")
-        self.set_class(model.idle, "-idle")
         stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
         self.say(pressed(stop, "app.do('stop')"), f"  {_doing(model)}")
 
