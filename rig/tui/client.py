@@ -183,9 +183,9 @@ class ReconnectingClient:
                 self.changed = True
                 await asyncio.sleep(_AGAIN_S)
         finally:
+            self._end_trial()
             if self._client is not None:
                 await self._client.close()
-            self._end_trial()
 
     async def _once(self) -> None:
         """Stay connected as long as it goes."""

@@ -114,7 +114,7 @@ def verdict_words(model: Model) -> Content:
     lines = [Content.styled(f" {symbol} {verdict.upper()} ", f"bold $background on {colour}")]
     lines += [Content(f"  {plain(reason, 200)}") for reason in reasons[:4]]
     if len(reasons) > 4:
-        lines.append(Content(f"  and {len(reasons) - 4} more reasons, in the session file"))
+        lines.append(Content("  and more reasons, in the session file"))
     replaced = model.replaced
     if verdict not in GOOD and replaced is not None:
         lines += [

@@ -88,8 +88,8 @@ def _prepare(model: Model) -> NextStep:
     if not indicators.known:
         return NextStep("arm", "Waiting for the gates; Enter arms when they answer.", "$warning")
     if indicators.blocked:
-        more = f" and {len(indicators.blocked) - 1} more" * (len(indicators.blocked) > 1)
-        blocked = f"Clear the beam of {named(model, indicators.blocked[0])}{more}"
+        first, *more = indicators.blocked
+        blocked = f"Clear the beam of {named(model, first)}{f' and {len(more)} more' * bool(more)}"
         return NextStep("arm", f"{blocked}; Enter arms when it is clear.", "$warning")
     if indicators.restless(model.now_s):
         moving = f"A beam keeps changing. Let everything {at_rest(model)}, then Enter arms."

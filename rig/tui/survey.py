@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 _MOST = 200
 """Session files that are listed, the newest."""
-_GOING = 3
-"""Unfinished sessions that are offered."""
 _SCENES = """\
 Try it         | try | falling-ball     |              | a ball: g within seconds
 Try it         | try | inclined-uniform |              | two chains on a board
@@ -119,7 +117,7 @@ def look_around(options: Options, port: str, other: str) -> list[Row]:
     return [
         *(row for row in scenes if row.kind == "try"),
         *boards,
-        *going[:_GOING],
+        *going[:3],
         *(Row("Experiments here", "open", path.stem, path) for path in files),
         *(row for row in scenes if row.kind == "new"),
         *(Row("Open results", "results", f"of {entry.path.stem}") for entry in sessions[:1]),

@@ -38,6 +38,7 @@ def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
             await press("enter")
             await op.at(Stage.PREPARE)
             await op.sees("Run 1 of 10", "Enter arms")
+            await pilot.pause(0.7)  # it stands there to be read
             await press("enter")
             await op.at(Stage.RESULT)
             await op.sees("g = 9.")

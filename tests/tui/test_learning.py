@@ -102,7 +102,7 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
             await op.sees("No drop recorded yet")
             await op.press("o")
             await op.sees("abba.session", "4 drops", "broken.session")
-            await op.press("down", "enter")
+            await op.press(*"abba", "enter")
             await op.sees("drop 1 of 4", "abba.session")
             await op.press("6", "up")
             await op.sees("drop 4 of 4")

@@ -10,16 +10,13 @@ from textual.content import Content
 from rig.campaign.events import Stage
 from rig.report.remarks import clock_lines
 from rig.tui.desk import Face
+from rig.tui.widgets.bars import LINKS
 from rig.tui.widgets.gates import board, named
 from rig.tui.widgets.text import checked, plain
 
 if TYPE_CHECKING:
     from rig.tui.desk import Desk
     from rig.tui.model import Model
-
-
-_LINKS = {"up": "● up", "down": "✗ down: reconnecting", "opening": "◌ opening",
-          "closed": "○ opens with the session"}  # fmt: skip
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
@@ -33,7 +30,7 @@ def face(model: Model, desk: Desk, width: int) -> Face:
 def _facts(model: Model) -> Content:
     device, link = model.state.section("device"), str(model.state.section("link").get("state"))
     statistics = model.state.section("statistics")
-    facts = {"connection": _LINKS.get(link, "unknown")}
+    facts = {"connection": LINKS.get(link, "unknown")}
     if device:
         names = [name for name in ("board", "firmware", "version", "unique_id") if name in device]
         who = [f"{name.replace('_', ' ')} {plain(device[name], 40)}" for name in names]

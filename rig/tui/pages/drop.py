@@ -118,7 +118,7 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     logged = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
     reasons = next(logged, ())
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
-    said = sentence(view, job) if not (own and player.playing) else "slow motion …"
+    said = "slow motion …" if own and player.playing else sentence(view, job)
     foot = Content.assemble((said, "bold $success"), "\n" * bool(said), past_runs(view, job))
     return Face(
         Content("\n").join(parts or _which(view, job, player, reasons)),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.tui.actions import Action
     from rig.tui.model import Model
 
-_LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
+LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
 PAGES = {"protocol": "home", "device": "device", "run": "run", "result": "result",
          "session": "session", "history": "history"}  # fmt: skip
 """Pages by name, and what stands on their tabs."""
@@ -72,7 +72,7 @@ def _tabs(page: str, keys: Mapping[str, str]) -> Content:
 
 def headline(model: Model, width: int) -> Content:
     """One line of exactly `width`: page and title left, stamp and link right."""
-    link = _LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
+    link = LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
     if model.offline or model.idle:
         link = "file only" if model.offline else "no rig yet"
     right_side = f"{plain(model.port, 24)}  {link}" if model.port else link
@@ -159,9 +159,7 @@ def _answer(model: Model) -> str:
 
 
 def _doing(model: Model) -> str:
-    if model.offline:
-        return "no rig is connected: this shows a file"
-    if model.idle:
+    if model.offline or model.idle:
         return "no rig is connected: nothing can fall"
     if not model.connected:
         return _answer(model) or "no daemon: nothing can be stopped from here"
