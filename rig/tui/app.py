@@ -171,6 +171,10 @@ class RigApp(App[None], inherit_bindings=False):
         self.draw()
         self.call_after_refresh(lambda: self.begin(self._load_pages()))
 
+    def on_unmount(self) -> None:
+        if self.client is not None:
+            self.client.end_trial()
+
     def begin(self, work: Coroutine[Any, Any, None]) -> None:
         """Do something beside the screens."""
         self.run_worker(work, group="beside")

@@ -155,7 +155,7 @@ class ReconnectingClient:
         trial
             Whether it is a simulation for this screen alone, which ends with it.
         """
-        await asyncio.to_thread(self._end_trial)
+        await asyncio.to_thread(self.end_trial)
         usual = self._usual_path
         self.path = usual.with_name(f"trial-{os.getpid()}.sock") if trial else usual
         self.url, self._is_trial, self._started_at = url, trial, -_START_S
@@ -164,7 +164,7 @@ class ReconnectingClient:
             await self._client.close()
         self._client, self._port, self.changed = None, "", True
 
-    def _end_trial(self) -> None:
+    def end_trial(self) -> None:
         """End the simulation that was begun for this screen alone."""
         if self._is_trial and self.daemon is not None:
             self.daemon.terminate()
@@ -173,7 +173,7 @@ class ReconnectingClient:
             self.daemon, self._is_trial = None, False
 
     async def keep(self) -> None:
-        """Connect, and connect again, until cancelled; then end what was a trial."""
+        """Connect, and connect again, until cancelled."""
         try:
             while True:
                 try:
@@ -183,7 +183,6 @@ class ReconnectingClient:
                 self.changed = True
                 await asyncio.sleep(_AGAIN_S)
         finally:
-            self._end_trial()
             if self._client is not None:
                 await self._client.close()
 

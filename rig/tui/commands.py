@@ -95,13 +95,13 @@ def _connect(app: RigApp, row: Row) -> None:
     if app.client is not None and row.value:
         app.driver.asked = None
         app.begin(app.client.go_to(row.value))
-        app.tell(f"{row.title}: choose an experiment; then each gate is checked by hand")
+        app.tell("choose an experiment; then each gate is checked by hand")
     else:
         app.tell("plug the board in by USB; it appears here by itself")
 
 
 def _flash(app: RigApp, row: Row) -> None:
-    question = f"{row.title}. What was on it is replaced."
+    question = "What was on the board is replaced."
     _confirm(app, "Write the firmware?", question, "flash",
              lambda: app.begin(_run(app, "flash", *row.value.split())))  # fmt: skip
 
