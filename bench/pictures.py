@@ -20,7 +20,7 @@ from rig.tui.braille import COLUMNS, ROWS, dots_of
 from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
 from rig.tui.keys import read_keys
-from rig.tui.replay import Player, end_of
+from rig.tui.replay import Player
 from rig.tui.state import DaemonState, state_of
 from rig.tui.widgets.figure import PAUSE_S
 
@@ -37,6 +37,7 @@ SIZES = ((80, 24), (120, 36), (200, 60))
 """Columns and lines of the terminals that are drawn."""
 THEMES_DRAWN = ("dark", "light")
 _LIVE_SHARE = 0.9
+_REPLAYED_S = 0.4
 _FONT = '"DejaVu Sans Mono", "Liberation Mono", Menlo, Consolas, monospace'
 
 
@@ -243,12 +244,10 @@ async def _looks(
         if shot.state.section("session"):
             await until(lambda: app.view is not None and app.indicators.known)
         if shot.page == "history":
-            assert app.view is not None
-            first = app.view.jobs[0]
-            end = end_of(app.view.drops[first], app.view.scales[first].hz)
-            app.history.player = Player(0, 0.8 * end)
+            app.desk.players["history"] = Player(0, _REPLAYED_S)
             app.turn("history")
-        await until(lambda: app.page == shot.page)
+        app.desk.replayed = shot.flow.job  # its slow motion is over
+        await until(lambda: app.page == shot.page and (app.view or app.desk.rows))
         # All edges came at once, which looks like flicker for a while.
         await until(lambda: _all_counted(app, shot) and _quiet(app))
         for size in sizes:

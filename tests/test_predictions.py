@@ -8,7 +8,7 @@ from rig.measurands import MEASURANDS
 from rig.predictions import predicted_run, predictions
 from rig.protocol import reader
 from rig.protocol.plan import runs
-from rig.tui.motion import motions, separation
+from rig.tui.motion import motions
 from tests.cli.lab import PROTOCOLS, short
 
 AIR = "drag: {terminal_speed: 12 m/s ± 1 m/s}\n"
@@ -53,12 +53,13 @@ def test_all_who_predict_say_the_same(name):
         assert curves["speed_m_s"][at] == line["speed_m_s"]
         if struck == "A":  # the picture's line is the first chain's
             assert curves["free_fall_speed_m_s"] == line["free_fall_speed_m_s"]
-        both = motions(scene, run, [], 1e6)
+        both = motions(scene, run)
         assert both[0].model.time[-1] == pytest.approx(line["fall_time_s"], rel=1e-12)
         assert both[0].model.arrival == pytest.approx(line["speed_m_s"], rel=1e-12)
         if scene.two_chains:
             assert curves["separation_m"][at] == line["separation_m"]
-            gaps = separation(both, 9.0).model
+            when, heights = both[0].curve(9.0)
+            gaps = both[1].model.heights(when[-1:])[0] - heights[-1:]
             longer = np.subtract(*(scene.chains[one].chain.length for one in (run.free, struck)))
             assert gaps[-1] + longer == pytest.approx(line["separation_m"], rel=1e-9)
 

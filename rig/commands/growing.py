@@ -89,7 +89,7 @@ class Growing:
         lines = [
             "".join(map(_ink, row))
             for picture in pictures
-            for row in plotted(picture, width, _ROWS).rows
+            for row in plotted(picture, width, _ROWS)
         ]
         self._write([*lines, self._last[:width]])
 

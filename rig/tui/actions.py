@@ -1,18 +1,21 @@
-"""Everything an operator can do, in one table: key, palette text, and the equivalent command.
+"""Everything an operator can do, from the table ``actions.txt``: keys, palette and help.
 
-Keys, palette and help are made from it, and nothing else binds a key.
+Nothing else binds a key.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from itertools import groupby
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from textual.content import Content
 
 from rig.campaign.events import Stage
-from rig.campaign.machine import BEFORE_RELEASE
 
-ANY = frozenset(Stage)
-_JUDGED = frozenset({Stage.RESULT})
-_AT_REST = frozenset({Stage.DEVICE, Stage.PREPARE, Stage.RESULT, Stage.HALTED, Stage.DONE})
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 class Action(NamedTuple):
@@ -32,120 +35,62 @@ class Action(NamedTuple):
         The `rig` command that does the same; empty where only a screen can.
     stages
         Where it makes sense.
+    group
+        Its heading in the help.
     driving
         Whether it needs control of the rig.
-    two_chains
-        Whether it is about what only a scene of two chains has.
     """
 
     name: str
     keys: str
     label: str
     text: str
-    command: str = ""
-    stages: frozenset[Stage] = ANY
-    driving: bool = False
-    two_chains: bool = False
+    command: str
+    stages: frozenset[Stage]
+    group: str
+    driving: bool
 
 
-ACTIONS: tuple[Action, ...] = (
-    Action("stop", "f9", "STOP", "Stop: switch everything off", "Ctrl-C in rig run"),
-    Action("go_on", "enter", "continue", "Continue: open, next run; on the run page, arm",
-           "rig run PROTOCOL --port URL --session FILE",
-           ANY - {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}, driving=True),
-    Action("reject", "x", "reject", "Reject this drop with a reason, or undo that", "",
-           _JUDGED, driving=True),
-    Action("note", "n", "note", "Write or change a note on this drop", "", _JUDGED,
-           driving=True),
-    Action("again", "a", "repeat", "Repeat this run", "",
-           frozenset({Stage.RESULT, Stage.HALTED, Stage.DONE}), driving=True),
-    Action("unblind", "b", "unblind", "Show a blind session's numbers; cannot be undone",
-           "rig unblind SESSION", _AT_REST, driving=True),
-    Action("control", "c", "control", "Take control of the rig, or give it back", "", _AT_REST),
-    Action("close", "z", "close", "Close the session and choose another protocol", "",
-           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.HALTED, Stage.DONE}), driving=True),
-    Action("release_test", "l", "test release", "Test the release with nothing attached",
-           "rig selftest --port PORT --release",
-           frozenset({Stage.DEVICE, Stage.PREPARE, Stage.DONE}), driving=True),
-    Action("wave", "w", "wave", "Restart the hand test of the gates and their counters"),
-    Action("page_protocol", "1,p", "protocol", "Page: protocol, its scene and plan",
-           "rig check PROTOCOL"),
-    Action("page_device", "2,d", "device", "Page: device, clock and gates", "rig selftest"),
-    Action("page_run", "3,u", "run", "Page: the current run"),
-    Action("page_result", "4,v", "result", "Page: result and verdict of the latest drop",
-           "rig analyze SESSION"),
-    Action("page_session", "5,s", "session", "Page: plan, means and control charts",
-           "rig report SESSION -o FILE.html"),
-    Action("page_history", "6,h", "history", "Page: replay any drop, forwards or backwards",
-           "rig replay SESSION"),
-    Action("earlier", "left", "earlier", "History: back in time; other pages: plot cursor left"),
-    Action("later", "right", "later", "History: forward in time; other pages: plot cursor right"),
-    Action("slower", "minus", "slower", "History: half the speed"),
-    Action("faster", "plus", "faster", "History: twice the speed"),
-    Action("play", "full_stop", "play", "History: play or pause"),
-    Action("turn_round", "i", "reverse", "History: play in the other direction"),
-    Action("sessions", "o", "sessions", "History: choose another session"),
-    Action("drops", "g", "drops", "History: choose another drop"),
-    Action("filter", "f", "filter", "History: show only some drops, such as accepted"),
-    Action("compare", "k", "compare", "History: all these drops in one picture, or only one"),
-    Action("report", "m", "report", "Write the session's report beside it",
-           "rig report SESSION -o FILE.html"),
-    Action("export", "e", "export", "Write the session's CSV files beside it",
-           "rig export SESSION --csv DIR"),
-    Action("control_chart", "y", "skew/g", "Session: other quantity in the control chart",
-           two_chains=True),
-    Action("previous", "up", "previous", "Previous drop, protocol or line"),
-    Action("next", "down", "next", "Next drop, protocol or line"),
-    Action("theme", "t", "theme", "Change colours: dark, light, high contrast"),
-    Action("help", "question_mark,f1", "help", "Show all keys", "rig --help"),
-    Action("palette", "ctrl+p", "commands", "Search commands"),
-    Action("quit", "q,ctrl+q", "quit", "Quit; the rig keeps running"),
-)  # fmt: skip
+def _read_row(row: str) -> Action:
+    name, keys, label, text, command, stages, group = (cell.strip() for cell in row.split("|"))
+    possible = frozenset(Stage if stages == "any" else map(Stage, stages.split()))
+    bare = name.removesuffix("*")
+    return Action(bare, keys, label, text, command, possible, group, bare != name)
 
+
+_TABLE = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
+ACTIONS = tuple(_read_row(row) for row in _TABLE if not row.startswith("#"))
 BY_NAME = {action.name: action for action in ACTIONS}
-
-OFFLINE = tuple(
-    action.name
-    for action in ACTIONS
-    if not action.driving and action.name not in {"stop", "control", "wave"}
-)
-"""What can be done with a file and no rig."""
-
-
-_NOT = {
-    Stage.PROTOCOL: "before a session is open",
-    Stage.DEVICE: "before the first run",
-    Stage.TESTING: "during the test of the release",
-    Stage.PREPARE: "before the drop",
-    Stage.LIVE: "during the fall",
-    Stage.JUDGING: "while the drop is analysed",
-    Stage.RESULT: "before this drop is finished",
-    Stage.HALTED: "while the plan is halted",
-    Stage.DONE: "after the plan is complete",
-}
+NEEDS_RIG = {"stop", "control", "wave"}
+"""What makes no sense with a file and no rig, beside all that needs control."""
+_KEYS = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
+         "left": "←", "right": "→", "up": "↑", "down": "↓", "tab": "Tab"}  # fmt: skip
+_HELP = """\
+STOP works on every screen: its key, Esc outside text fields, or the red bar.
+{table}
+To change keys, write ~/.config/chainrig/keys.toml: reject = "r"
+↑ ↓ scroll; any other key closes this page."""
 
 
-def hindrance(
-    action: Action, stage: Stage, *, driving: bool, two_chains: bool | None = None
-) -> str:
-    """Say why an action makes no sense now; empty where it does.
-
-    Which scene it is may not be known yet.
-    """
-    if stage not in action.stages:
-        return f"not {_NOT.get(stage, 'with the release armed')}"
-    if action.driving and not driving:
-        return "this screen only watches"
-    return "not in this scene" if action.two_chains and two_chains is False else ""
+def possible(action: Action, stage: Stage, *, driving: bool) -> bool:
+    """Say whether an action makes sense now."""
+    return stage in action.stages and (driving or not action.driving)
 
 
 def shown_key(keys: str) -> str:
     """Write the first of an action's keys as it stands on a keyboard."""
     first = keys.partition(",")[0]
-    names = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
-             "left": "←", "right": "→", "up": "↑", "down": "↓", "space": "Space"}  # fmt: skip
-    if first in names:
-        return names[first]
     if first.startswith("ctrl+"):
         return "Ctrl-" + first[5:].upper()
-    return first.upper()[:12] if len(first) > 1 else first
+    return _KEYS.get(first, first.upper()[:12] if len(first) > 1 else first)
+
+
+def help_text(keys: Mapping[str, str], *, wide: bool) -> Content:
+    """Write what can be done, one action a line, with the command that does it too."""
+    lines: list[str] = []
+    for head, actions in groupby(ACTIONS, attrgetter("group")):
+        lines += ["", head]
+        for action in actions:
+            line = f"  {shown_key(keys[action.name]):8}{action.text:62}"
+            lines.append(line + action.command * wide)
+    return Content(_HELP.format(table="\n".join(map(str.rstrip, lines))))

@@ -5,43 +5,43 @@ from __future__ import annotations
 import asyncio
 from importlib import import_module
 from time import monotonic, process_time
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from textual import events
 from textual.app import App, ComposeResult
 from textual.css.query import NoMatches
 from textual.theme import Theme
-from textual.widgets import ContentSwitcher, Input, Label
+from textual.widgets import Input
 
 from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
 from rig.campaign.machine import BEFORE_RELEASE, Flow
 from rig.tui import commands
-from rig.tui.actions import BY_NAME, OFFLINE, Action, hindrance
+from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, possible
 from rig.tui.client import ReconnectingClient
+from rig.tui.desk import Desk
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
 from rig.tui.model import Model
-from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Dialog, Palette, Pick
 from rig.tui.stillness import Stillness
+from rig.tui.survey import look_around
 from rig.tui.terminal import Terminal
-from rig.tui.widgets.status import PAGES, StatusBar
-from rig.tui.widgets.stopbar import StopBar, StopLine
+from rig.tui.widgets.bars import StatusBar, StopBar, StopLine
+from rig.tui.widgets.dialogs import Ask, Confirm, Dialog
+from rig.tui.widgets.page import Page
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Hashable, Mapping, Sequence
+    from collections.abc import Callable, Coroutine, Hashable, Iterator, Mapping, Sequence
 
     from textual.filter import LineFilter
 
     from rig.results.live import SessionView
     from rig.tui.context import Options
+    from rig.tui.desk import Face
     from rig.tui.indicators import Indicators
-    from rig.tui.screens.history import HistoryPage
-    from rig.tui.screens.page import Page
-    from rig.tui.screens.protocol import ProtocolPage
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # between ticks, when one was late
-_TYPED_IN = (Ask, AskReason, Palette)
+_LOOK_S = 2.0  # between two looks at folder and USB
 _COUNTED_S = 0.3
 """Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
 _TOLD_S = 15.0
@@ -56,39 +56,40 @@ _PAGE_OF = {
 }
 
 
+_MODULES = {"protocol": "home", "device": "device", "run": "drop", "result": "drop",
+            "session": "session", "history": "drop"}  # fmt: skip
+"""Where each page is made."""
+_WATCHING = "this screen only watches\npress c to take control when it is free"
 _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
 )
 
-_COLOURS: Mapping[str, Sequence[Any]] = {  # dark, light, and the two extremes only
-    "primary": ("#5aa9e6", "#0b5cad", "#00ffff"),
-    "secondary": ("#f2a65a", "#a8480c", "#ffff00"),
-    "accent": ("#c3a6ff", "#6a3fb5", "#ffffff"),
-    "success": ("#6fcf97", "#1b6e3c", "#00ff00"),
-    "warning": ("#f2c94c", "#7a5900", "#ffff00"),
-    "error": ("#ff6b6b", "#b3161d", "#ff9d9d"),
-    "foreground": ("#dfe6ee", "#1b232c", "#ffffff"),
-    "background": ("#10151c", "#fbfaf7", "#000000"),
-    "surface": ("#161d27", "#f3f1ec", "#000000"),
-    "panel": ("#1e2733", "#e6e3dc", "#000000"),
-}
-_BORDERS = ("#33465c", "#9aa5b1", "#ffffff")
-THEMES = tuple(
-    Theme(
-        name=f"rig-{name}",
-        dark=name != "light",
-        variables={"border": _BORDERS[at], "border-blurred": _BORDERS[at]},
-        **{part: colours[at] for part, colours in _COLOURS.items()},
-    )
-    for at, name in enumerate(("dark", "light", "contrast"))
-)
+_COLOURS = """\
+            dark    light   contrast
+primary    #5aa9e6 #0b5cad #00ffff
+secondary  #f2a65a #a8480c #ffff00
+accent     #c3a6ff #6a3fb5 #ffffff
+success    #6fcf97 #1b6e3c #00ff00
+warning    #f2c94c #7a5900 #ffff00
+error      #ff6b6b #b3161d #ff9d9d
+foreground #dfe6ee #1b232c #ffffff
+background #10151c #fbfaf7 #000000
+surface    #161d27 #f3f1ec #000000
+panel      #1e2733 #e6e3dc #000000
+border     #33465c #9aa5b1 #ffffff
+"""
 
 
-def _page(name: str) -> Callable[..., Page]:
-    """Load a page, which the first paint does not need; safe in any thread."""
-    module = import_module(f"rig.tui.screens.{name}")
-    kind: Callable[..., Page] = getattr(module, f"{name.title()}Page")
-    return kind
+def _themes() -> Iterator[Theme]:
+    names, *rows = (row.split() for row in _COLOURS.splitlines())
+    for at, name in enumerate(names):
+        colours: dict[str, Any] = {part: values[at] for part, *values in rows}
+        border = colours.pop("border")
+        edges = {"border": border, "border-blurred": border}
+        yield Theme(name=f"rig-{name}", dark=name != "light", variables=edges, **colours)
+
+
+THEMES = tuple(_themes())
 
 
 class RigApp(App[None], inherit_bindings=False):
@@ -107,12 +108,8 @@ class RigApp(App[None], inherit_bindings=False):
     """
 
     TITLE = "chainrig"
+    CSS_PATH = "rig.tcss"
     ENABLE_COMMAND_PALETTE = False  # there is one that knows what can be done now
-    CSS = """
-    #pages { height: 1fr; }
-    .-high #pages { padding: 1 1 0 1; }
-    """
-    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (100, "-normal"), (160, "-wide")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
 
     def __init__(
@@ -135,9 +132,10 @@ class RigApp(App[None], inherit_bindings=False):
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
         self.driver: Driver = Driver(flow, self.client, self.follower, self.begin)
-        self.pages: dict[str, Page] = {}
-        self._turning = asyncio.Lock()
-        self._turned_to = ""
+        self.desk = Desk(options)
+        self._faces: dict[str, Callable[[Model, Desk, int], Face]] = {}
+        self._drawn = ""
+        self._looked_s = 0.0
         self._stillness = Stillness(options.still_s)
         self._last = self._due = monotonic()
         self._spent, self._saved_s = process_time(), _SAVED_S
@@ -160,8 +158,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def compose(self) -> ComposeResult:
         yield StatusBar()
-        with ContentSwitcher(initial="loading", id="pages"):
-            yield Label("loading …", id="loading")
+        yield Page()
         yield StopBar()
 
     async def on_mount(self) -> None:
@@ -173,6 +170,10 @@ class RigApp(App[None], inherit_bindings=False):
         self.set_timer(TICK_S, self._tick)
         self.draw()
         self.call_after_refresh(lambda: self.begin(self._load_pages()))
+
+    def on_unmount(self) -> None:
+        if self.client is not None:
+            self.client.end_trial()
 
     def begin(self, work: Coroutine[Any, Any, None]) -> None:
         """Do something beside the screens."""
@@ -192,8 +193,11 @@ class RigApp(App[None], inherit_bindings=False):
         self._stillness.alive(now)
         if self.flow.stage is Stage.COUNTDOWN:
             self.driver.take(Tick(min(passed, _COUNTED_S)))
-        if "history" in self.pages:
-            self.history.tick(passed)
+        self.desk.tick(self.model, passed)
+        begins = self.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S
+        if begins and self.client is not None:
+            self._looked_s = now
+            self.begin(self._look_around(self.client))
         if self.client is not None and self.client.changed:
             self.client.changed = False
             reopens = self.driver.asked is not None
@@ -219,14 +223,15 @@ class RigApp(App[None], inherit_bindings=False):
         except NoMatches:
             return  # on its way in, or out
         message = self._told if model.now_s - self._told_s < _TOLD_S else ""
-        base.query_one(StatusBar).show(model, self.page, self.keys, size, message)
-        base.query_one(StopBar).show(model, self.page, self.keys, size.width)
+        base.query_one(StatusBar).show(model, self.keys, size.width, message)
+        base.query_one(StopBar).show(model, self.keys, size.width, self.possible)
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
-        page = self.pages.get(self.page)
-        if page is not None and page.is_mounted:
-            page.show(model)
+        if self.page in self._faces:
+            face = self._faces[self.page](model, self.desk, self.sheet.tables_width())
+            self.sheet.show(face, self.desk, fresh=self.page != self._drawn)
+            self._drawn = self.page
         # What is drawn is seen when it is painted.
         self.call_after_refresh(self._stillness.shown, self._face)
 
@@ -279,6 +284,7 @@ class RigApp(App[None], inherit_bindings=False):
             unreadable=follower.unreadable,
             read=follower.done,
             page=self.page,
+            idle=client is not None and client.idle,
         )
 
     # ------------------------------------------------------------------ flow and pages
@@ -303,50 +309,36 @@ class RigApp(App[None], inherit_bindings=False):
 
     async def _load_pages(self) -> None:
         """Have ready what was not needed for the first paint."""
-        for name in PAGES:
-            await asyncio.to_thread(_page, name)
+        for page, module in _MODULES.items():
+            loaded = await asyncio.to_thread(import_module, f"rig.tui.pages.{module}")
+            self._faces[page] = loaded.face
+            self.draw()
         await asyncio.to_thread(import_module, "rig.results.live")
         if self._loaded is not None:
             self._loaded()
 
     @property
-    def history(self) -> HistoryPage:
-        """The page with the tape."""
-        return cast("HistoryPage", self._made("history"))
-
-    @property
-    def protocols(self) -> ProtocolPage:
-        """The page with the files."""
-        return cast("ProtocolPage", self._made("protocol"))
-
-    def _made(self, name: str) -> Page:
-        if name not in self.pages:
-            self.pages[name] = _page(name)(self.options)
-        return self.pages[name]
+    def sheet(self) -> Page:
+        """What the pages are drawn on."""
+        return self.screen_stack[0].query_one(Page)
 
     def turn(self, page: str) -> None:
-        """Show a page: at once where it was shown before."""
-        self._turned_to = page
-        if page in self.pages and self.pages[page].is_mounted:
-            self._show(page)
-        else:
-            self.begin(self._make(page))
-
-    async def _make(self, page: str) -> None:
-        """Make a page and show it, if it is still wanted then."""
-        async with self._turning:  # it may have been asked for twice
-            await asyncio.to_thread(_page, page)
-            if not self._open():
-                return
-            switcher = self.screen_stack[0].query_one("#pages", ContentSwitcher)
-            if not self._made(page).is_mounted:
-                await switcher.add_content(self._made(page), id=page)
-        if self._open() and page == self._turned_to:
-            self._show(page)
-
-    def _show(self, page: str) -> None:
-        self.screen_stack[0].query_one("#pages", ContentSwitcher).current = page
+        """Show a page, from its first part on."""
         self.page = page
+        self.desk.part = self.desk.chart = 0
+        self.draw()
+
+    def turn_on(self, part: int = 0, chart: int = 0) -> None:
+        """Show another part of the page, or another plot, first."""
+        self.desk.part += part
+        self.desk.chart += chart
+        self.draw()
+
+    async def _look_around(self, client: ReconnectingClient) -> None:
+        """See what there is to begin with."""
+        port, other = client.port if not client.idle else "", client.in_the_way
+        rows = await asyncio.to_thread(look_around, self.options, port, other[0] if other else "")
+        self.desk.begin_with(rows)
         self.draw()
 
     def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None:
@@ -368,8 +360,7 @@ class RigApp(App[None], inherit_bindings=False):
     def next_theme(self) -> None:
         """Change the colours."""
         names = [theme.name for theme in THEMES]
-        at = names.index(self.theme) if self.theme in names else -1
-        self.theme = names[(at + 1) % len(names)]
+        self.theme = names[(names.index(self.theme) + 1) % len(names)]
 
     # ------------------------------------------------------------------ keys and mouse
 
@@ -399,7 +390,7 @@ class RigApp(App[None], inherit_bindings=False):
         if name == "stop" or (key == "escape" and not isinstance(self.focused, Input)):
             self.action_do("stop")
             if isinstance(screen, Dialog) and (
-                not isinstance(screen, _TYPED_IN)
+                not isinstance(screen, Ask)
                 or (key == "escape" and screen.is_mounted)  # a click has left its field
             ):
                 screen.dismiss(None)
@@ -424,13 +415,13 @@ class RigApp(App[None], inherit_bindings=False):
     def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
         """Let a key answer a dialog; say whether it did."""
         by = {"up": -1, "down": 1}.get(key, 0)
-        if by and not isinstance(dialog, (Confirm, Pick)):
+        if by and not isinstance(dialog, Confirm):
             if dialog.is_mounted:
                 dialog.move(by)
         elif key == "enter" and isinstance(dialog, Confirm):
             if self._stillness.meant(self._face, at_s):
                 dialog.dismiss(True)
-        elif key == "enter" and isinstance(dialog, _TYPED_IN):
+        elif key == "enter" and isinstance(dialog, Ask):
             return not self._stillness.read(self._face, at_s)  # pasted with what opened it
         elif dialog.LEAVE in {"", key}:
             dialog.dismiss(None)
@@ -454,20 +445,22 @@ class RigApp(App[None], inherit_bindings=False):
     def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
         action = BY_NAME[name]
-        if not self.hindrance(action):
+        if self.possible(action):
             commands.do(self, name)
         elif self.client is not None and action.driving and not self.driving:
-            self.driver.take(EffectFailed(self.flow.ticket, "this screen only watches\n"
-                               "press c to take control when it is free"))  # fmt: skip
+            self.driver.take(EffectFailed(self.flow.ticket, _WATCHING))
 
-    def hindrance(self, action: Action) -> str:
-        """Say why an action makes no sense now; empty where it does."""
-        if self.client is None and action.name not in OFFLINE:
-            return "no rig is connected"
-        two = self.model.two_chains
-        return hindrance(action, self.flow.stage, driving=self.driving, two_chains=two)
+    def possible(self, action: Action) -> bool:
+        """Say whether an action makes sense now."""
+        if self.client is None and (action.driving or action.name in NEEDS_RIG):
+            return False
+        # Whoever has no rig yet may begin with one.
+        begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
+        return possible(action, self.flow.stage, driving=self.driving or begins)
 
-    def action_choose(self, page: str, at: int) -> None:
-        """Choose a line of a page's list by mouse."""
-        self.pages[page].choose(at)
+    def action_choose(self, at: int) -> None:
+        """Choose a row of the home page."""
+        self.desk.row = at
+        sections = {row.section for row in self.desk.rows[: at + 1]}
+        self.sheet.show_row(at + len(sections))
         self.draw()

@@ -44,7 +44,7 @@ class Sheet:
         self._colors = colors
         self._bits = np.zeros((height, width), dtype=np.int64)
         self._inks = np.full((height, width), -1)  # none
-        self._words: dict[int, list[tuple[int, Span]]] = {}
+        self._letters: dict[tuple[int, int], Span] = {}
 
     def strokes(self, ends: NDArray[np.float64], inks: ArrayLike) -> None:
         """Draw straight lines.
@@ -83,45 +83,24 @@ class Sheet:
         np.bitwise_or.at(self._bits, at, _BITS[y % ROWS, x % COLUMNS])
         np.maximum.at(self._inks, at, inks[inside])
 
-    def free(self, row: int, column: int, length: int) -> bool:
-        """Whether nothing is drawn or written in these characters, all of them on the sheet."""
-        inside = 0 <= row < self.height and column >= 0 and column + length <= self.width
-        if not inside or self._bits[row, column : column + length].any():
-            return False
-        return all(
-            column + length <= begin or begin + len(span.text) <= column
-            for begin, span in self._words.get(row, ())
-        )
-
     def write(self, row: int, column: int, span: Span) -> None:
         """Write over what is drawn there."""
-        self._words.setdefault(row, []).append((column, span))
+        for place, letter in enumerate(span.text, start=column):
+            self._letters[row, place] = span._replace(text=letter)
 
     def rows(self) -> list[list[Span]]:
         """Everything, a list of spans a line of characters."""
         return [self._row(number) for number in range(self.height)]
 
-    def _row(self, number: int) -> list[Span]:
-        spans, begin = [], 0
-        for column, span in sorted(self._words.get(number, ())):
-            spans += [*self._drawn(number, begin, column), span]
-            begin = column + len(span.text)
-        return [*spans, *self._drawn(number, begin, self.width)]
-
-    def _drawn(self, number: int, begin: int, end: int) -> list[Span]:
-        cells = zip(
-            self._inks[number, begin:end].tolist(),
-            self._bits[number, begin:end].tolist(),
-            strict=True,
-        )
-        return [
-            Span("".join(_character(bits) for _, bits in run), (*self._colors, "")[ink])
-            for ink, run in groupby(cells, key=itemgetter(0))
-        ]
-
-
-def _character(bits: int) -> str:
-    return chr(BLANK + bits) if bits else " "  # which every font has
+    def _row(self, row: int) -> list[Span]:
+        cells = zip(self._bits[row].tolist(), self._inks[row].tolist(), strict=True)
+        # A blank is what every font has.
+        letters = [Span(chr(BLANK + bits) if bits else " ", (*self._colors, "")[ink])
+                   for bits, ink in cells]  # fmt: skip
+        for (line, column), letter in self._letters.items():
+            letters[column : column + (line == row)] = [letter] * (line == row)
+        return [Span("".join(letter.text for letter in run), *look)
+                for look, run in groupby(letters, key=itemgetter(1, 2))]  # fmt: skip
 
 
 def dots_of(letter: str) -> list[tuple[int, int]]:

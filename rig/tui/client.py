@@ -55,17 +55,20 @@ class ReconnectingClient:
         How long the daemon may take to answer a sign of life.
     lost
         Why the port was lost last, for who says so when it is back, which may be a moment later.
+    in_the_way
+        Port and process of a daemon that has another port than the wanted one; empty for none.
     """
 
     def __init__(
         self, url: str, socket: Path | None, connected: Callable[[], Coroutine[Any, Any, None]]
     ) -> None:
         self.url = url
-        self.path = default_socket() if socket is None else socket
+        self.path = self._usual_path = default_socket() if socket is None else socket
         self.name = f"rig tui {os.getpid()}"
         self.silence = "connecting"
         self.changed = True
         self.lost: Mapping[str, Any] = {}
+        self.in_the_way: tuple[str, int] | None = None
         self.disk_s = 0.0
         self.patience_s = _SILENT_S
         self._hangs = False
@@ -76,6 +79,12 @@ class ReconnectingClient:
         self._wants_control = True
         self._started_at = -_START_S
         self._port = ""
+        self._is_trial = False
+
+    @property
+    def idle(self) -> bool:
+        """Whether no rig was asked for, and none was ever there."""
+        return not self.url and self._client is None
 
     @property
     def up(self) -> bool:
@@ -136,6 +145,33 @@ class ReconnectingClient:
         self._wants_control = self._had_control = False
         await self.call("release_control")
 
+    async def go_to(self, url: str, *, trial: bool = False) -> None:
+        """Leave the daemon for that of another port.
+
+        Parameters
+        ----------
+        url
+            The port.
+        trial
+            Whether it is a simulation for this screen alone, which ends with it.
+        """
+        await asyncio.to_thread(self.end_trial)
+        usual = self._usual_path
+        self.path = usual.with_name(f"trial-{os.getpid()}.sock") if trial else usual
+        self.url, self._is_trial, self._started_at = url, trial, -_START_S
+        self._wants_control, self.in_the_way, self.silence = True, None, "connecting"
+        if self._client is not None:
+            await self._client.close()
+        self._client, self._port, self.changed = None, "", True
+
+    def end_trial(self) -> None:
+        """End the simulation that was begun for this screen alone."""
+        if self._is_trial and self.daemon is not None:
+            self.daemon.terminate()
+            self.daemon.wait()
+            self.path.with_suffix(".log").unlink(missing_ok=True)
+            self.daemon, self._is_trial = None, False
+
     async def keep(self) -> None:
         """Connect, and connect again, until cancelled."""
         try:
@@ -155,6 +191,7 @@ class ReconnectingClient:
         try:
             client = await AsyncClient.connect(self.path, self.name)
         except DeviceError as error:
+            self.in_the_way = None
             self._start(error)
             return
         reached = None
@@ -208,6 +245,7 @@ class ReconnectingClient:
         await client.subscribe()
         self._port = str(client.replica.state["port"]["url"])
         if self.url and self._port != self.url:
+            self.in_the_way = self._port, int(client.replica.state["daemon"]["pid"])
             raise make_error(DeviceError, "daemon_port", port=self._port, wanted=self.url)
 
     def _start(self, error: DeviceError) -> None:

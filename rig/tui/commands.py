@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
+import signal
+import sys
 from contextlib import suppress
-from dataclasses import replace
+from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
@@ -11,19 +17,18 @@ from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopp
 from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
-from rig.tui import picking
-from rig.tui.choosing import labels
+from rig.tui.actions import ACTIONS, help_text, shown_key
+from rig.tui.follow import open_live
 from rig.tui.replay import Player
-from rig.tui.screens.dialogs import Ask, AskReason, Confirm, Palette
-from rig.tui.screens.help import Help
+from rig.tui.survey import session_list
+from rig.tui.widgets.dialogs import Ask, Confirm, Reader
 from rig.tui.widgets.text import plain
-from rig.tui.writing import write
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from rig.tui.app import RigApp
-    from rig.tui.client import ReconnectingClient
+    from rig.tui.survey import Row, SessionEntry
 
 
 REASONS = (
@@ -58,11 +63,81 @@ def _go_on(app: RigApp) -> None:
         app.turn("run")
     elif stage is not Stage.PROTOCOL:
         app.driver.take(GoOn(app.model.next_job))
+    elif app.page != "protocol":
+        app.turn("protocol")
+    elif app.desk.chosen is not None:
+        _BEGIN[app.desk.chosen.kind](app, app.desk.chosen)
+
+
+# ------------------------------------------------------------------ home
+
+
+def _open(app: RigApp, row: Row) -> None:
+    """Open an experiment with the rig that is there, or in simulation where there is none."""
+    client = app.client
+    if client is None or row.file is None or app.desk.reading(row.file).problem:
+        return
+    session = row.session or app.options.session
+    others = app.desk.opened not in {None, row.file}
+    if session is None or (row.session is None and (others or row.kind == "try")):
+        session = Path(f"{row.file.stem}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session")
+    app.desk.opened = row.file
+    files = str(row.file.resolve()), str(session.resolve())
+    if row.kind == "try" or client.idle or (row.value and not client.up):
+        app.driver.asked = files
+        app.begin(client.go_to("sim://", trial=True))
     else:
-        page = app.protocols
-        if page.file is not None and page.usable and app.options.session is not None:
-            files = str(page.file.resolve()), str(app.options.session.resolve())
-            app.begin(app.driver.open_session(*files, app.options.seed))
+        app.begin(app.driver.open_session(*files, app.options.seed))
+
+
+def _connect(app: RigApp, row: Row) -> None:
+    """Go to a board; what was a trial ends."""
+    if app.client is not None and row.value:
+        app.driver.asked = None
+        app.begin(app.client.go_to(row.value))
+        app.tell("choose an experiment; then each gate is checked by hand")
+    else:
+        app.tell("plug the board in by USB; it appears here by itself")
+
+
+def _flash(app: RigApp, row: Row) -> None:
+    question = "What was on the board is replaced."
+    _confirm(app, "Write the firmware?", question, "flash",
+             lambda: app.begin(_run(app, "flash", *row.value.split())))  # fmt: skip
+
+
+def _new(app: RigApp, row: Row) -> None:
+    """Have a protocol drafted, under a name that is free."""
+    names = (f"my-{row.value}{number or ''}.yaml" for number in count())
+    name = next(name for name in names if not Path(name).exists())
+    app.begin(_run(app, "new", name, "--scene", row.value, "--yes"))
+
+
+def _end_other(app: RigApp, row: Row) -> None:
+    """Ask, then end the daemon that stands in the way."""
+    client = app.client
+    if client is None or client.in_the_way is None:
+        return
+    port, process = client.in_the_way
+
+    def end() -> None:
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGTERM)
+
+    del row
+    question = f"The daemon of {plain(port, 40)} ends. What it has recorded stays in its file."
+    _confirm(app, "End it?", question, "end it", end)
+
+
+_BEGIN: dict[str, Callable[[RigApp, Row], object]] = {
+    "try": _open,
+    "open": _open,
+    "board": _connect,
+    "flash": _flash,
+    "new": _new,
+    "end": _end_other,
+    "results": lambda app, _: app.begin(_sessions(app)),
+}
 
 
 def _control(app: RigApp) -> None:
@@ -72,7 +147,7 @@ def _control(app: RigApp) -> None:
     if client.driving:
         question = "Another screen can then take it; this screen keeps watching."
         _confirm(app, "Give control back?", question, "give it back",
-                 lambda: app.begin(_quietly(client.release_control())))  # fmt: skip
+                 lambda: app.begin(_tried(app, client.release_control())))  # fmt: skip
     else:
         app.begin(_tried(app, client.take_control()))
 
@@ -85,12 +160,6 @@ async def _tried(app: RigApp, work: Coroutine[Any, Any, Any]) -> None:
         app.driver.refuse(error)
 
 
-async def _quietly(work: Coroutine[Any, Any, Any]) -> None:
-    """Wait for what the daemon itself says when it fails."""
-    with suppress(RigError):
-        await work
-
-
 def _close(app: RigApp) -> None:
     """Ask, then close the session, so that another can be chosen."""
     client = app.client
@@ -98,7 +167,7 @@ def _close(app: RigApp) -> None:
 
     def close() -> None:
         app.driver.asked = None
-        app.begin(_quietly(client.call("close_session")))
+        app.begin(_tried(app, client.call("close_session")))
 
     question = "Everything recorded stays in its file. You can continue it later."
     _confirm(app, "Close the session?", question, "close", close)
@@ -133,38 +202,92 @@ def _note(app: RigApp) -> None:
     app.ask(Ask("Note on this drop:", text), lambda text: app.driver.take(Note(text)))
 
 
-def _filter(app: RigApp) -> None:
-    """Ask which drops are looked at."""
-    app.turn("history")
-    view = app.history.view
-    words = dict.fromkeys(word for drop in labels(view).values() for word in drop) if view else ()
-    question = f"Show drops with all of these words: {plain(' '.join(words))}"
-    app.ask(Ask(question, app.history.words), lambda words: app.history.sift(words.strip()))
+# ------------------------------------------------------------------ history
 
 
-def _compare(app: RigApp) -> None:
-    """Lay drops over each other, or show one alone."""
+async def _sessions(app: RigApp) -> None:
+    """Let one session of the folder be chosen, and play it."""
+    view = app.desk.other or app.model.view
+    own = view.path if view else app.options.session
+    folder = own.parent if own else Path()
+    entries = await asyncio.to_thread(session_list, folder)
     app.turn("history")
-    app.history.comparing = not app.history.comparing
+    question = Ask(
+        f"Sessions in {plain(folder.resolve(), 80)}, newest first",
+        choices=[_session_line(entry) for entry in entries],
+        free=False, yes="play", chosen=0,
+    )  # fmt: skip
+    app.ask(question, lambda number: app.begin(_look_at(app, entries[number])))
+
+
+async def _look_at(app: RigApp, entry: SessionEntry) -> None:
+    desk, live = app.desk, app.model.view
+    try:
+        own = live is not None and live.path.resolve() == entry.path.resolve()
+        desk.other = None if own else await asyncio.to_thread(open_live(entry.path).read)
+        desk.players["history"] = Player(speed=desk.players["history"].speed)
+    except RigError as error:
+        app.driver.refuse(error)
+
+
+def _session_line(entry: SessionEntry) -> str:
+    name, created = plain(entry.path.name, 26), entry.created[:16].replace("T", " ")
+    if entry.trouble:
+        return f"{name:28}✗ {plain(entry.trouble, 60)}"
+    stamp = "▲ SIMULATED  " * entry.simulated
+    return f"{name:28}{created}  {entry.drops:4} drops  {stamp}{plain(entry.title, 60)}"
+
+
+def _move(app: RigApp, by: int) -> None:
+    """Go to the previous or next of what a page lists, or scroll."""
+    desk = app.desk
+    if app.page == "history":
+        desk.choose(app.model, desk.players["history"].at + by)
+    elif app.page == "protocol" and app.flow.stage is Stage.PROTOCOL and desk.rows:
+        app.action_choose((desk.row + by) % len(desk.rows))
+    else:
+        app.sheet.scroll_tables(by)
+
+
+def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], None]:
+    return lambda app: app.desk.change(app.model, work)
+
+
+# ------------------------------------------------------------------ a drop, files
 
 
 def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
     """Ask, then have a command write files of the session that is looked at, beside it."""
-    view = (app.history.view if app.page == "history" else None) or app.model.view
+    view = (app.desk.view(app.model) if app.page == "history" else None) or app.model.view
     if view is None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
         return
     target = str(view.path.with_suffix(suffix))
     _confirm(app, "Write files?", f"{target} will be replaced if it exists.", "write",
-             lambda: app.begin(write(app, command, str(view.path), option, target)))  # fmt: skip
+             lambda: app.begin(_run(app, command, str(view.path), option, target)))  # fmt: skip
 
 
-def _step(app: RigApp, by: int) -> None:
-    """Go a step in time, or with the cursor where nothing is played."""
-    if app.page == "history":
-        app.history.change(lambda tape, end_s: tape.moved(by, end_s))
-    else:
-        app.pages[app.page].point(by)
+async def _run(app: RigApp, *command: str) -> None:
+    """Run a command, and say where its files are or what went wrong.
+
+    A process of its own: what it computes takes nothing from STOP.
+    """
+    app.tell(f"rig {command[0]}: working …")
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "rig", *command,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+    )  # fmt: skip
+    try:
+        output, _ = await process.communicate()
+    except asyncio.CancelledError:  # the screen is left
+        process.kill()
+        await process.wait()
+        raise
+    lines = [line for line in output.decode("utf-8", "replace").splitlines() if line.strip()]
+    last_lines = lines[-1:] if process.returncode == 0 else lines[-2:]
+    app.tell("; ".join(last_lines) or f"rig {command[0]} ended with {process.returncode}")
 
 
 def _reject(app: RigApp) -> None:
@@ -183,7 +306,7 @@ def _reject(app: RigApp) -> None:
             f" Only the latest attempt of a run counts: attempt {model.replaced.attempt} was good, "
             "but the run will have no result until you repeat it."
         )
-    app.ask(AskReason(question, REASONS), lambda reason: app.driver.take(Reject(reason)))
+    app.ask(Ask(question, choices=REASONS, yes="reject"), lambda why: app.driver.take(Reject(why)))
 
 
 def _repeat(app: RigApp) -> None:
@@ -208,16 +331,20 @@ def _unblind(app: RigApp) -> None:
         return
     question = "This shows all results. It is recorded and cannot be undone."
     _confirm(app, "Unblind the session?", question, "show results",
-             lambda: app.begin(_tried(app, _unblinded(app, client))))  # fmt: skip
-
-
-async def _unblinded(app: RigApp, client: ReconnectingClient) -> None:
-    await client.call("unblind")
-    await app.follower.read()
+             lambda: app.begin(_tried(app, client.call("unblind"))))  # fmt: skip
 
 
 def _begin_check(app: RigApp) -> None:
     app.follower.indicators = app.follower.indicators.reset()
+
+
+def _palette(app: RigApp) -> None:
+    """Search what can be done now."""
+    actions = [action for action in ACTIONS
+               if action.name != "palette" and app.possible(action)]  # fmt: skip
+    lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
+    question = Ask("Search commands", choices=lines, free=False, yes="run", chosen=0)
+    app.ask(question, lambda number: app.action_do(actions[number].name))
 
 
 _DO: dict[str, Callable[[RigApp], object]] = {
@@ -227,27 +354,24 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "again": _repeat,
     "unblind": _unblind,
     "wave": _begin_check,
-    "control_chart": lambda app: app.pages[app.page].other_chart(),
-    "previous": lambda app: app.pages[app.page].move(-1),
-    "next": lambda app: app.pages[app.page].move(1),
+    "part": lambda app: app.turn_on(part=1),
+    "control_chart": lambda app: app.turn_on(chart=1),
+    "previous": lambda app: _move(app, -1),
+    "next": lambda app: _move(app, 1),
     "theme": lambda app: app.next_theme(),
-    "help": lambda app: app.ask(Help(app.page, app.keys)),
-    "palette": lambda app: app.ask(Palette(app.keys, app.hindrance), app.action_do),
+    "help": lambda app: app.ask(Reader(help_text(app.keys, wide=app.size.width >= 120))),
+    "palette": _palette,
     "quit": _quit,
     "go_on": _go_on,
     "control": _control,
     "close": _close,
     "release_test": _try_release,
-    "sessions": lambda app: app.begin(picking.sessions(app)),
-    "drops": picking.drops,
-    "play": lambda app: app.history.change(Player.started),
-    "turn_round": lambda app: app.history.change(lambda tape, _: replace(tape, back=not tape.back)),
-    "earlier": lambda app: _step(app, -1),
-    "later": lambda app: _step(app, 1),
-    "filter": _filter,
-    "compare": _compare,
+    "sessions": lambda app: app.begin(_sessions(app)),
+    "play": _change(Player.started),
+    "earlier": _change(lambda player, end_s: player.moved(-1, end_s)),
+    "later": _change(lambda player, end_s: player.moved(1, end_s)),
     "report": lambda app: _write(app, "report", "-o", ".html"),
     "export": lambda app: _write(app, "export", "--csv", ".csv"),
-    "slower": lambda app: app.history.change(lambda tape, _: tape.turned(0.5)),
-    "faster": lambda app: app.history.change(lambda tape, _: tape.turned(2.0)),
+    "slower": _change(lambda player, _: player.turned(0.5)),
+    "faster": _change(lambda player, _: player.turned(2.0)),
 }

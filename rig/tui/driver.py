@@ -77,6 +77,8 @@ class Driver:
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
             self._follower.judged.add(self.flow.job)
         for effect in effects:
+            if isinstance(effect, Stop) and (self._client is None or self._client.idle):
+                continue  # nothing is there that could fall
             if isinstance(effect, Stop):
                 self.stop = StopAnswer(monotonic())
             self._begin(self._carry_out(effect, self.flow.ticket))

@@ -154,7 +154,7 @@ class Follower:
         path = Path(str(session["path"]))
         if self._path != path:
             self._path, self._live, self.indicators = path, None, Indicators()
-        self._wanted = (path, state.runs, int(now / _CLOCK_S))
+        self._wanted = (path, state.runs, session.get("blind"), int(now / _CLOCK_S))
         if self._wanted != self._read and not self._reading:
             self._reading = True
             self._begin(self._read_quietly())

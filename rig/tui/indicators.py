@@ -24,6 +24,11 @@ class Indicator:
         """Whether it has been quiet for `STEADY_S`."""
         return not self.recent_s or now_s - self.recent_s[-1] >= STEADY_S
 
+    def struck(self, count: int, now_s: float) -> Indicator:
+        """Count so many edges."""
+        recent = (*self.recent_s, *(now_s,) * count)[-FLICKERS:]
+        return replace(self, edges=self.edges + count, recent_s=recent)
+
     def flickers(self, now_s: float) -> bool:
         """Whether it changes too often for a hand or a chain at rest."""
         return sum(now_s - at <= FLICKER_S for at in self.recent_s) >= FLICKERS
@@ -37,13 +42,10 @@ class Indicators:
     ----------
     checked
         Channels that were seen blocked alone and clear again: the gate check.
-    alone
-        The one channel that is blocked now; `None` for none or several.
     """
 
     gates: tuple[Indicator, ...] = ()
     checked: frozenset[int] = frozenset()
-    alone: int | None = None
     known: bool = False
 
     @classmethod
@@ -56,6 +58,11 @@ class Indicators:
         """Channels that are blocked."""
         return tuple(gate.channel for gate in self.gates if gate.blocked)
 
+    @property
+    def alone(self) -> int | None:
+        """The one channel that is blocked now; `None` for none or several."""
+        return self.blocked[0] if len(self.blocked) == 1 and self.known else None
+
     def restless(self, now_s: float) -> tuple[int, ...]:
         """Channels that are not steady."""
         return tuple(gate.channel for gate in self.gates if not gate.steady(now_s))
@@ -63,37 +70,22 @@ class Indicators:
     def seen(self, mask: int | None, now_s: float) -> Indicators:
         """Look at the gates' mask; `None` means that nobody knows."""
         if mask is None:
-            return replace(self, known=False, alone=None)
-        gates = tuple(_looked(gate, mask, now_s, first=not self.known) for gate in self.gates)
-        blocked = tuple(gate.channel for gate in gates if gate.blocked)
-        checked = self.checked
-        if self.alone is not None and not blocked:
-            checked |= {self.alone}
-        return Indicators(gates, checked, blocked[0] if len(blocked) == 1 else None, known=True)
+            return replace(self, known=False)
+        gates = tuple(
+            replace(gate, blocked=dark).struck(int(self.known and dark != gate.blocked), now_s)
+            for gate in self.gates
+            for dark in [bool(mask >> gate.channel & 1)]
+        )
+        looked = Indicators(gates, self.checked, known=True)
+        if self.alone is None or looked.blocked:
+            return looked
+        return replace(looked, checked=self.checked | {self.alone})
 
     def counted(self, channels: tuple[int, ...], now_s: float) -> Indicators:
         """Count edges of a drop, one entry of `channels` an edge."""
-        return replace(
-            self,
-            gates=tuple(
-                _struck(gate, count, now_s) if (count := channels.count(gate.channel)) else gate
-                for gate in self.gates
-            ),
-        )
+        gates = (gate.struck(channels.count(gate.channel), now_s) for gate in self.gates)
+        return replace(self, gates=tuple(gates))
 
     def reset(self) -> Indicators:
         """Count from zero and begin the gate check again."""
         return Indicators.of(tuple(gate.channel for gate in self.gates))
-
-
-def _looked(gate: Indicator, mask: int, now_s: float, *, first: bool) -> Indicator:
-    blocked = bool(mask >> gate.channel & 1)
-    if blocked == gate.blocked:
-        return gate
-    gate = replace(gate, blocked=blocked)
-    return gate if first else _struck(gate, 1, now_s)
-
-
-def _struck(gate: Indicator, count: int, now_s: float) -> Indicator:
-    recent = (*gate.recent_s, *(now_s,) * count)[-FLICKERS:]
-    return replace(gate, edges=gate.edges + count, recent_s=recent)

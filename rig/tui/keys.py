@@ -53,10 +53,8 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         reason, _, at = str(error).partition(" (at ")
-        line, column = re.findall(r"\d+", at) or (
-            text.count("\n") + 1,
-            len(text.split("\n")[-1]) + 1,
-        )
+        *before, last = text.split("\n")
+        line, column = re.findall(r"\d+", at) or (len(before) + 1, len(last) + 1)
         raise InputError(f"{place}:{line}:{column}: {reason}", _HOW) from None
     lines = {line.partition("=")[0].strip(): n for n, line in enumerate(text.splitlines(), start=1)}
     return combined(table, str(place), lines)
@@ -83,41 +81,34 @@ def combined(
     InputError
         With every problem.
     """
-    faults = []
-    places = {name: f"{source}:{line}" for name, line in (lines or {}).items()}
-    chosen: dict[str, list[str]] = {}
+    faults: list[str] = []
+    given: dict[str, list[str]] = {}
     owner = {key: name for name, key in ALWAYS.items()}
     for name, value in table.items():
-        at = places.get(name, source)
+        at = f"{source}:{(lines or {})[name]}" if lines else source
         if name not in BY_NAME:
             faults.append(f"{at}: unknown action {name}; accepted: {', '.join(BY_NAME)}")
             continue
-        if not isinstance(value, str) or not value.strip():
+        keys = [key.strip() for key in str(value).split(",") if key.strip()]
+        if not isinstance(value, str) or not keys:
             faults.append(f'{at}: {name}: give a key or several, such as "r" or "r,f5"')
             continue
-        keys = [key.strip() for key in value.split(",") if key.strip()]
-        faults += [
-            f"{at}: {name}: unknown key {key}; examples: r, f5, ctrl+r, enter, question_mark"
-            for key in keys
-            if not _is_key(key)
-        ]
-        if name in ALWAYS and ALWAYS[name] not in keys:
-            keys.append(ALWAYS[name])
-        for key in keys:
+        given[name] = [*keys, *{ALWAYS.get(name, keys[0])}.difference(keys)]
+        for key in given[name]:
             if key in RESERVED:
                 faults.append(f"{at}: {name}: {key} always means STOP")
+            elif not _is_key(key):
+                examples = "r, f5, ctrl+r, enter, question_mark"
+                faults.append(f"{at}: {name}: unknown key {key}; examples: {examples}")
             elif owner.setdefault(key, name) != name:
                 faults.append(f"{at}: {name}: {key} already belongs to {owner[key]}")
-        chosen[name] = keys
     for action in ACTIONS:
-        if action.name not in chosen:
-            own = action.keys.split(",")
-            chosen[action.name] = [key for key in own if owner.get(key, action.name) == action.name]
-            if not chosen[action.name]:
-                faults.append(f"{source}: {action.name} has no key left; give it a key")
+        own = [key for key in action.keys.split(",") if owner.get(key, action.name) == action.name]
+        if not given.setdefault(action.name, own):
+            faults.append(f"{source}: {action.name} has no key left; give it a key")
     if faults:
         raise InputError("\n".join(faults))
-    return {action.name: ",".join(chosen[action.name]) for action in ACTIONS}
+    return {action.name: ",".join(given[action.name]) for action in ACTIONS}
 
 
 def _is_key(key: str) -> bool:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SLOW_DISK_S = 0.5
 """A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
 HOT = frozenset({*BEFORE_RELEASE, Stage.LIVE})
+UNDER_WAY = HOT | {Stage.JUDGING}
 _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
 """Where a watcher is, by the state of the drop."""
@@ -73,6 +74,8 @@ class Model:
         How long the disk has been at one write.
     page
         The page that is shown.
+    idle
+        Whether no rig was ever asked for or heard: nothing is wrong with that.
     """
 
     state: DaemonState
@@ -91,6 +94,7 @@ class Model:
     stop: StopAnswer | None = None
     disk_s: float = 0.0
     page: str = ""
+    idle: bool = False
 
     @property
     def protocol(self) -> Protocol | None:
@@ -158,11 +162,6 @@ class Model:
         return self.stage in HOT
 
     @property
-    def two_chains(self) -> bool | None:
-        """Whether a free chain falls beside the one that strikes; `None` before that is known."""
-        return None if self.protocol is None else self.protocol.two_chains
-
-    @property
     def words(self) -> Vocabulary:
         """The words of the scene."""
         return ANY_SCENE if self.protocol is None else self.protocol.vocabulary
@@ -210,7 +209,7 @@ class Model:
 
 def alarm(model: Model) -> Alarm | None:
     """Name what is most wrong now; `None` when all is well."""
-    if not model.connected:
+    if not model.connected and not model.idle:
         silence, _, hint = model.silence.partition("\n")
         return Alarm(
             f"no daemon: {silence or 'connecting'}",

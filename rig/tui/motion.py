@@ -1,57 +1,76 @@
-"""Where both chains were during a drop, from its edges, beside where the model has them."""
+"""Where what fell was during a drop, from its edges, beside where the model has it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.chain_records import EdgeArrays, edge_trains
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.model.fall import kicks
 from rig.predictions import air_of, predict_incline
 from rig.protocol.contact import at_contact
+from rig.report.falls import passages
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from fractions import Fraction
 
-    from numpy.typing import NDArray
-
-    from rig.analysis.chain_records import EdgeTrain
+    from rig.analysis.result import DropResult
     from rig.analysis.trajectory import Trajectory
     from rig.arrays import Array
-    from rig.protocol.protocol import Protocol, Run
+    from rig.protocol.protocol import Protocol, RodChain, Run, Side
+    from rig.records import Drop
 
-    Table = Iterable[Sequence[int]] | NDArray[np.int64]
-
-_FIRST = 4
-_MOST = 1200  # edges of a drop that is still falling
 _POINTS = 120  # of a curve: two a column of a wide terminal
 
 
 @dataclass(frozen=True, slots=True)
 class ChainFall:
-    """One chain's way down.
+    """One chain's way down, or an object's.
 
     Attributes
     ----------
     role
         ``impact`` or ``free``.
+    rods
+        What falls.
     times, heights
-        Of each rod's edge in a beam: seconds since the release fired, and the height of the bottom
-        rod's middle above the contact point that follows, m; in order of time.
+        Of each rod's passage of a beam: seconds since the release fired, and the height of the
+        bottom rod's middle above the contact point that follows, m; in order of time.
     model
         `None` outside the model's domain.
     delay_s
         By how much the model's release is later than the fire stamp, so that it meets the points.
+    end_s
+        When all of it has struck or passed the last gate, by the model and by the points.
     """
 
-    role: str
+    role: Side
+    rods: RodChain
     times: Array
     heights: Array
     model: Trajectory | None
     delay_s: float
+    end_s: float
+
+    @property
+    def length(self) -> float:
+        """From the bottom rod's middle to the top one's, m."""
+        return self.rods.chain.length
+
+    def measured(self, time_s: float) -> float | None:
+        """Height as the gates saw it, at their last word after that; `None` before their first."""
+        if not self.times.size or time_s < self.times[0]:
+            return None
+        return float(np.interp(time_s, self.times, self.heights))
+
+    def expected(self, time_s: float) -> float | None:
+        """Height by the model, which ends with the impact of the top rod."""
+        if self.model is None:
+            return None
+        last = float(self.model.time[-1]) if self.model.hits is not None else np.inf
+        return float(self.model.heights(np.clip([time_s - self.delay_s], 0.0, last))[0][0])
 
     def curve(self, end_s: float) -> tuple[Array, Array]:
         """Model's heights from the fire stamp to a time; empty without a model.
@@ -69,9 +88,7 @@ class ChainFall:
 def motions(
     protocol: Protocol,
     run: Run,
-    edges: Table,
-    hz: float,
-    matches: Mapping[int, int] | None = None,
+    recorded: tuple[Drop, float | Fraction, DropResult] | None = None,
 ) -> tuple[ChainFall, ...]:
     """Turn a drop's edges into heights.
 
@@ -79,151 +96,32 @@ def motions(
     ----------
     run
         What hung where.
-    edges
-        Tick, channel and state of each, as they come or as a table of them.
-    hz
-        Tick rate.
-    matches
-        Rod of each edge by its number, as the analysis found; without it each edge is taken for the
-        rod that the model has nearest the beam then.
+    recorded
+        The drop, calibrated ticks per second, and which edge is of which rod; `None` before it
+        fell, when there are only the model's curves.
     """
-    if protocol.gates is None:
-        return ()
     protocol = at_contact(protocol, run.incline_deg, run.impact)
-    table = edges if isinstance(edges, np.ndarray) else as_table(edges)
-    if matches is None:
-        table = _thinned(table)
+    gates = protocol.gates
+    sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
     falls = []
-    for role, _, parts in edge_trains(protocol, run, EdgeArrays.of(table, hz)):
-        model = model_fall(protocol, run, role)
-        if matches is not None:
-            pairs = [_matched(part, matches) for part in parts]
-        else:
-            pairs = _nearest(parts, model)
-        times = np.concatenate([times for times, _ in pairs])
-        heights = np.concatenate([heights for _, heights in pairs])
-        order = np.argsort(times, kind="stable")
-        times, heights = times[order], heights[order]
-        delay = 0.0
+    for role, name in sides:
+        if name is None or gates is None or not gates.on(role):
+            continue
+        rods, model = protocol.chains[name], model_fall(protocol, run, role)
+        times, heights, delay, end = np.empty(0), np.empty(0), 0.0, 0.0
+        if recorded is not None:
+            seen = passages(protocol, *recorded, role)
+            times, heights = seen.time, seen.height - rods.chain.length
         if model is not None and times.size:
             delay = float(np.median(times - model.times(heights)))
-        falls.append(ChainFall(role, times, heights, model, delay))
+        if model is not None:
+            lowest = min(gate.height for gate in gates.on(role)) - rods.chain.length
+            struck = float(model.time[-1]) if model.hits is not None else 0.0
+            end = delay + (struck or float(model.times(np.array([lowest]))[0]))
+        falls.append(
+            ChainFall(role, rods, times, heights, model, delay, max([end, *times.tolist()]))
+        )
     return tuple(falls)
-
-
-def as_table(edges: Iterable[Sequence[int]]) -> NDArray[np.int64]:
-    """Take edges as numbers, shape ``(edges, 3)``: tick, channel and state of each."""
-    return np.array([tuple(edge) for edge in edges], dtype=np.int64).reshape(-1, 3)
-
-
-def _thinned(table: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Take of very many edges only as many as a picture can show."""
-    if len(table) <= _MOST:
-        return table
-    taken = np.arange(len(table)) % (1 + len(table) // _MOST) == 0
-    for channel in np.unique(table[:, 1]):  # where counting has to begin
-        taken[np.flatnonzero(table[:, 1] == channel)[:_FIRST]] = True
-    thinned: NDArray[np.int64] = table[taken]
-    return thinned
-
-
-class Separation(NamedTuple):
-    """Δz against time: m and s since the release fired, measured and by the model.
-
-    Attributes
-    ----------
-    times, gaps
-        At the impact side's edges, the free chain's height read between its neighbours.
-    curve, model
-        The same times as far as the model goes, and its Δz.
-    expected
-        The model's at `times`; empty without one.
-    """
-
-    times: Array
-    gaps: Array
-    curve: Array
-    model: Array
-    expected: Array
-
-
-def separation(
-    pair: tuple[ChainFall, ...], end_s: float, skew_s: float | None = None
-) -> Separation:
-    """Find Δz against time.
-
-    Parameters
-    ----------
-    pair
-        The chain that strikes, then the free one.
-    end_s
-        Where the model's curve ends.
-    skew_s
-        By how much the free chain left later: then Δz is what it would have been had both been let
-        go together, measured and by the model. `None` for Δz as it fell, measured and by the model.
-    """
-    nothing = np.empty(0)
-    impact, free = pair
-    times, gaps = nothing, nothing
-    if free.times.size > 1 and impact.times.size:
-        at = impact.times + (skew_s or 0.0)
-        inside = (at >= free.times[0]) & (at <= free.times[-1])
-        times = impact.times[inside]
-        gaps = np.interp(at[inside], free.times, free.heights) - impact.heights[inside]
-    if impact.model is None or free.model is None:
-        return Separation(times, gaps, nothing, nothing, nothing)
-    delay = free.delay_s if skew_s is None else impact.delay_s
-    expected = impact.model.heights(times - impact.delay_s)[0]
-    curve, heights = impact.curve(end_s)
-    return Separation(
-        times,
-        gaps,
-        curve,
-        free.model.heights(curve - delay)[0] - heights,
-        free.model.heights(times - delay)[0] - expected,
-    )
-
-
-def _nearest(parts: Sequence[EdgeTrain], model: Trajectory | None) -> list[tuple[Array, Array]]:
-    """Times and heights of each gate's edges before anybody has matched them."""
-    counted = [_counted(part, part.times.size) for part in parts]
-    if model is None:
-        return counted
-    # Flicker and missed rods have not shifted the count of the first few yet.
-    first = [_counted(part, _FIRST) for part in parts]
-    lags = [times - model.times(levels) for times, levels in first if times.size]
-    if not lags:
-        return counted
-    delay = float(np.median(np.concatenate(lags)))
-    pairs = []
-    for part in parts:
-        if not part.levels.size:
-            pairs.append(_counted(part, 0))
-            continue
-        expected = model.heights(part.times - delay)[0]
-        off = np.abs(part.levels[None, :] - expected[:, None])
-        off[part.blocks[None, :] != part.blocked[:, None]] = np.inf
-        pairs.append((part.times, part.levels[off.argmin(axis=1)]))
-    return pairs
-
-
-def _counted(part: EdgeTrain, limit: int) -> tuple[Array, Array]:
-    """Take a gate's edges for its rods in order."""
-    count = min(part.times.size, part.levels.size, limit)
-    return part.times[:count], part.levels[:count]
-
-
-def _matched(part: EdgeTrain, matches: Mapping[int, int]) -> tuple[Array, Array]:
-    """Times and heights of one gate's edges, each with the rod it was matched to."""
-    levels = dict(zip(zip(part.rods.tolist(), part.blocks.tolist(), strict=True),
-                      part.levels.tolist(), strict=True))  # fmt: skip
-    edges = zip(part.edge.tolist(), part.blocked.tolist(), strict=True)
-    heights = np.array(
-        [levels.get((matches.get(edge, -1), blocked), np.nan) for edge, blocked in edges],
-        dtype=np.float64,
-    )
-    matched = ~np.isnan(heights)
-    return part.times[matched], heights[matched]
 
 
 def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
@@ -233,6 +131,8 @@ def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
     ----------
     role
         ``impact`` or ``free``.
+    rods
+        What falls.
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     start, gravity = protocol.drop.value, protocol.gravity.value

@@ -29,15 +29,12 @@ class Player:
         Since the release fired.
     speed
         Seconds of the drop in a second.
-    back
-        Whether time goes back.
     """
 
     at: int = 0
     time_s: float = 0.0
     speed: float = 2.0**-4
     playing: bool = False
-    back: bool = False
 
     def turned(self, factor: float) -> Player:
         """Change the speed."""
@@ -52,18 +49,14 @@ class Player:
         return replace(self, at=(self.at + by) % max(1, count), time_s=0.0)
 
     def started(self, end_s: float) -> Player:
-        """Play, or stand still; at the end, from the other one."""
-        if self.playing:
-            return replace(self, playing=False)
-        first, last = (end_s, 0.0) if self.back else (0.0, end_s)
-        return replace(self, time_s=first if self.time_s == last else self.time_s, playing=True)
+        """Play, or stand still; at the end, from the beginning."""
+        time_s = 0.0 if self.time_s == end_s else self.time_s
+        return replace(self, playing=not self.playing, time_s=time_s)
 
     def ticked(self, seconds: float, end_s: float) -> Player:
         """Let time pass; it stops at the end."""
-        if not self.playing:
-            return self
-        time = self._within(seconds * self.speed * (-1.0 if self.back else 1.0), end_s)
-        return replace(self, time_s=time, playing=time != (0.0 if self.back else end_s))
+        time_s = self._within(seconds * self.speed, end_s)
+        return replace(self, time_s=time_s, playing=time_s != end_s) if self.playing else self
 
     def _within(self, seconds: float, end_s: float) -> float:
         return min(end_s, max(0.0, self.time_s + seconds))

@@ -1,27 +1,30 @@
-"""Both chains to scale at one moment of a drop, as strokes in metres: rods, board, gates, Δz.
+"""A rig to scale at one moment of a drop, as strokes in metres: what falls, board, posts, Δz.
 
-Heights are above the contact point, as those of falls and films are.
+Heights are above the contact point, as those of falls are.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rig.protocol.contact import at_contact
+from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from rig.films import Film
-    from rig.protocol.protocol import Protocol, Run, Side
+    from rig.protocol.protocol import Protocol, RodChain, Run
     from rig.tui.indicators import Indicators
     from rig.tui.motion import ChainFall
 
 _WIDTH_M = 0.1  # of a rod whose length nobody stated
 _MARGIN_M = 0.04
+_BALL = 0.012  # of the height that is shown: a smaller ball would not be seen
+_COLORS = ("border", "foreground", "accent", "primary", "secondary", "success", "warning")
 
 
 class Stroke(NamedTuple):
@@ -34,6 +37,15 @@ class Stroke(NamedTuple):
     color: str
 
 
+class Lamp(NamedTuple):
+    """Channel of a gate, and where its beam begins, m."""
+
+    channel: int
+    x: float
+    z: float
+    lit: bool
+
+
 class Drawing(NamedTuple):
     """Strokes, and what of the world they show, m; `apart_m` is Δz as far as it was measured."""
 
@@ -41,7 +53,8 @@ class Drawing(NamedTuple):
     width_m: float
     bottom_m: float
     top_m: float
-    apart_m: float | None
+    apart_m: float | None = None
+    lamps: tuple[Lamp, ...] = ()
 
 
 def drawing(
@@ -50,9 +63,8 @@ def drawing(
     falls: Sequence[ChainFall],
     indicators: Indicators,
     time_s: float,
-    film: Film | None = None,
 ) -> Drawing:
-    """Draw each chain as measured, and beside it where the model has it.
+    """Draw what falls as measured, over where the model has it, between the posts of its gates.
 
     Parameters
     ----------
@@ -62,81 +74,91 @@ def drawing(
         Of the gates at that moment: those that are blocked light.
     time_s
         Since the release fired.
-    film
-        Of the striking chain, where a simulation knows how each rod moved: shown as measured.
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
-    names = {"impact": run.impact, "free": run.free}
-    pitch = 2.4 * max(_rod_m(protocol, name) for name in names.values())
-    half = 0.5 * pitch
-    length = max(rods.chain.length for rods in protocol.chains.values())
-    for column, fall in enumerate(falls):
-        side: Side = "impact" if fall.role == "impact" else "free"
-        name = names[side]
-        assert name is not None
-        left, right = pitch * (2 * column + 0.5), pitch * (2 * column + 1.5)
-        model = _model(fall, time_s)
-        if model is not None:
-            strokes += _rods(protocol, name, side, right, model, "accent")
-        if fall.times.size:
-            color = "primary" if side == "impact" else "secondary"
-            if film is not None and side == "impact":
-                strokes += _filmed(film, left, time_s - fall.delay_s, color)
-            else:
-                hangs = model is not None and time_s < fall.times[0]
-                height = model if hangs and model is not None else _measured(fall, time_s)
-                strokes += _rods(protocol, name, side, left, height, color)
-        for gate in protocol.gates.on(side) if protocol.gates else ():
-            lit = gate.channel in indicators.blocked
-            end, color = (left + half, "warning") if lit else (left - 0.7 * half, "foreground")
-            strokes.append(Stroke(left - half, gate.height, end, gate.height, color))
-        if side == "impact":
-            fallen = half * math.tan(math.radians(run.incline_deg))
-            strokes.append(Stroke(left - half, fallen, left + half, -fallen, "foreground"))
-    width = 2.0 * pitch * max(1, len(falls))
-    apart = None
-    begun = [fall for fall in falls if fall.times.size and fall.times[0] <= time_s]
-    if len(begun) == 2:
-        until_s = min(time_s, *(float(fall.times[-1]) for fall in begun))
-        low, high = (
-            _measured(fall, until_s) + protocol.chains[name].chain.length
-            for fall, name in zip(begun, names.values(), strict=True)
-            if name is not None
-        )
-        apart, at = high - low, 0.5 * width
-        strokes.append(Stroke(at, low, at, high, "success"))
-        strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in (low, high)]
-    top = protocol.drop.value + length + _MARGIN_M
+    lamps: list[Lamp] = []
+    pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
+    half, length = 0.5 * pitch, max((fall.length for fall in falls), default=0.0)
+    heights = [gate.height for gate in protocol.gates.gates] if protocol.gates else [0.0]
+    low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
     # A free chain that passes the contact point is shown as far down as one that struck it lies.
-    return Drawing(tuple(strokes), width, -0.35 * length, top, apart)
+    bottom = -0.35 * length if protocol.surface else low - length
+    top = protocol.drop.value + length + _MARGIN_M
+    for column, fall in enumerate(falls):
+        middle = pitch * (2.0 * column + 1.2)
+        left, right = middle - half, middle + half
+        strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
+        for gate in protocol.gates.on(fall.role) if protocol.gates else ():
+            lit = gate.channel in indicators.blocked
+            lamps.append(Lamp(gate.channel, left, gate.height, lit))
+            end, color = (right, "warning") if lit else (left + 0.2 * half, "foreground")
+            strokes.append(Stroke(left, gate.height, end, gate.height, color))
+        expected, measured = fall.expected(time_s), fall.measured(time_s)
+        seen = expected if measured is None and fall.times.size else measured
+        own = "primary" if fall.role == "impact" else "secondary"
+        for height, color in ((expected, "accent"), (seen, own)):
+            if height is not None:
+                strokes += _rods(protocol, fall, middle, height, color, top - bottom)
+        if fall.role == "impact":
+            fallen = half * math.tan(math.radians(run.incline_deg))
+            strokes.append(Stroke(left, fallen, right, -fallen, "foreground"))
+    width = pitch * (2.0 * max(1, len(falls)) + 0.4)
+    # Δz is known as long as both chains are seen.
+    until_s = min([time_s, *(float(fall.times[-1]) for fall in falls if fall.times.size)])
+    tops = [z + fall.length for fall in falls if (z := fall.measured(until_s)) is not None]
+    if len(tops) < 2:
+        return Drawing(tuple(strokes), width, bottom, top, None, tuple(lamps))
+    at = 2.2 * pitch
+    strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
+    strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
+    return Drawing(tuple(strokes), width, bottom, top, tops[1] - tops[0], tuple(lamps))
 
 
-def _rod_m(protocol: Protocol, name: str | None) -> float:
-    return _WIDTH_M if name is None else protocol.chains[name].rod_length or _WIDTH_M
+def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
+    """Draw into so many columns and lines of characters, the last line in words.
+
+    A dot is as high as it is wide.
+    """
+    strokes, width_m, bottom, top, apart_m, lamps = drawing
+    rows, dots = max(1, height - 1), COLUMNS * width - 1
+    scale = min((ROWS * rows - 1) / (top - bottom), dots / width_m)
+    left = 0.5 * (dots / scale - width_m)
+    sheet = Sheet(width, rows, _COLORS)
+    shared: dict[tuple[int, int], list[Lamp]] = {}
+    for lamp in sorted(lamps):
+        place = round(scale * (top - lamp.z)) // ROWS, round(scale * (left + lamp.x)) // COLUMNS
+        shared.setdefault(place, []).append(lamp)
+    for (row, column), near in shared.items():
+        lit = any(lamp.lit for lamp in near)
+        text = ",".join(str(lamp.channel) for lamp in near) + "○●"[lit]
+        color = "warning" if lit else "foreground"
+        sheet.write(row, max(0, column - len(text)), Span(text, color, bold=lit))
+    ends = np.array([[(s.x, s.z), (s.to_x, s.to_z)] for s in strokes]).reshape(-1, 2, 2)
+    inks = [_COLORS.index(stroke.color) for stroke in strokes]
+    sheet.strokes(scale * (np.array([left, top]) + ends * [1.0, -1.0]), inks)
+    apart = "" if apart_m is None else f"  Δz {apart_m * 1e2:.1f} cm as it falls"
+    words = [Span("model", "accent"), Span(" behind measured"), Span(apart, "success", bold=True)]
+    return [*sheet.rows(), words]
 
 
-def _measured(fall: ChainFall, time_s: float) -> float:
-    """Height of the bottom rod as the gates saw it, at their last word after that."""
-    return float(np.interp(time_s, fall.times, fall.heights))
-
-
-def _model(fall: ChainFall, time_s: float) -> float | None:
-    if fall.model is None:
-        return None
-    at = np.array([max(0.0, time_s - fall.delay_s)])
-    if fall.model.hits is not None:
-        at = np.minimum(at, fall.model.time[-1])
-    return float(fall.model.heights(at)[0][0])
+def _rod_m(rods: RodChain) -> float:
+    return rods.rod_length or _WIDTH_M
 
 
 def _rods(
-    protocol: Protocol, name: str, side: Side, x: float, height: float, color: str
+    protocol: Protocol, fall: ChainFall, x: float, height: float, color: str, shown_m: float
 ) -> Iterator[Stroke]:
-    """Rods on their strings; those that struck lie at the contact point."""
-    rods = protocol.chains[name]
-    half = 0.5 * _rod_m(protocol, name)
-    lies = side == "impact" and protocol.surface is not None
+    """Rods on their strings; those that struck lie at the contact point. An object is round."""
+    rods = fall.rods
+    half = 0.5 * _rod_m(rods)
+    if protocol.vocabulary.part == "object":
+        radius = max(0.5 * rods.widths[0], _BALL * shown_m)
+        corners = ((-1, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
+        around = [(x + radius * across, height + radius * up) for across, up in corners]
+        yield from (Stroke(*start, *end, color) for start, end in pairwise(around))
+        return
+    lies = fall.role == "impact" and protocol.surface is not None
     for number, place in enumerate(rods.chain.heights):
         z = height + place
         tilt = math.radians(rods.tilt_deg if number % 2 else -rods.tilt_deg)
@@ -144,15 +166,3 @@ def _rods(
             z, tilt = 0.0, 0.0
         across, up = half * math.cos(tilt), half * math.sin(tilt)
         yield Stroke(x - across, z - up, x + across, z + up, color)
-
-
-def _filmed(film: Film, x: float, time_s: float, color: str) -> Iterator[Stroke]:
-    """Rods with their tilt, in the pile too, and the strings that are slack."""
-    moment = film.nearest(time_s)
-    both = film.left[moment], film.right[moment]
-    for start, end in zip(*both, strict=True):
-        yield Stroke(x + start[0], start[2], x + end[0], end[2], color)
-    for ends, slack in zip(both, film.slack(moment), strict=True):
-        for low, high, loose in zip(ends, ends[1:], slack, strict=False):
-            if loose:
-                yield Stroke(x + low[0], low[2], x + high[0], high[2], "foreground")

@@ -113,12 +113,14 @@ def state_of(view: SessionView) -> DaemonState:
     last = {entry.run: entry for entry in view.states}
     runs = []
     for run in view.plan.values():
-        entry = last.get(run.number)
         line = RunLine(run.number, run.incline_deg, run.impact, run.free)
-        if entry is not None:
-            line = line._replace(
-                attempt=entry.attempt, state=str(entry.state), reasons=entry.reasons
-            )
+        if (entry := last.get(run.number)) is not None:
+            state: dict[str, Any] = {
+                "attempt": entry.attempt,
+                "state": str(entry.state),
+                "reasons": entry.reasons,
+            }
+            line = line._replace(**state)
         runs.append(line)
     session = {"path": str(view.path), "title": view.protocol.title, "simulated": view.simulated}
     return DaemonState(0, {"session": session}, tuple(runs))

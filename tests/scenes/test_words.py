@@ -44,7 +44,7 @@ SCENES = {
 NAMES = r"\b(?:chains|rods)(?=:)|(?m:^  hang\b)|--rods"
 """Keys and options that are the same in every scene."""
 SIZES = ((120, 36),)
-DIALOGS = ("help", "palette", "reject", "again", "filter", "release_test", "note", "quit")
+DIALOGS = ("help", "palette", "reject", "again", "release_test", "note", "quit")
 
 
 @pytest.fixture(scope="module", params=FOREIGN)

@@ -6,9 +6,8 @@ import pytest
 
 from rig.campaign.machine import Stage
 from rig.errors import InputError
-from rig.tui.actions import ACTIONS, BY_NAME, hindrance, shown_key
+from rig.tui.actions import ACTIONS, BY_NAME, help_text, possible, shown_key
 from rig.tui.keys import combined, read_keys
-from rig.tui.screens.help import GROUPS
 from rig.tui.widgets.text import LONGEST, duration, plain
 
 
@@ -19,20 +18,23 @@ def test_every_key_has_one_meaning():
 
 
 def test_help_has_every_action_under_one_heading():
-    named = [name for names in GROUPS.values() for name in names]
-    assert sorted(named) == sorted(BY_NAME)
+    text = help_text({action.name: action.keys for action in ACTIONS}, wide=True).plain
+    for action in ACTIONS:
+        assert text.count(f"  {shown_key(action.keys):8}{action.text}") == 1
+        assert text.count(f"\n{action.group}\n") == 1
 
 
 def test_stop_is_possible_always():
     for stage in Stage:
         for driving in (True, False):
-            assert not hindrance(BY_NAME["stop"], stage, driving=driving)
+            assert possible(BY_NAME["stop"], stage, driving=driving)
 
 
-def test_of_one_chart_there_is_no_other():
-    for two_chains in (True, False, None):
-        why = hindrance(BY_NAME["control_chart"], Stage.DONE, driving=True, two_chains=two_chains)
-        assert why == ("not in this scene" if two_chains is False else "")
+def test_what_drives_the_rig_needs_control_and_its_stage():
+    arms = BY_NAME["go_on"]
+    assert possible(arms, Stage.PREPARE, driving=True)
+    assert not possible(arms, Stage.PREPARE, driving=False)
+    assert not possible(arms, Stage.COUNTDOWN, driving=True)
 
 
 def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):

@@ -7,8 +7,7 @@ from textual.widgets import Input
 
 from rig.campaign.events import Stage
 from rig.session.store import Session
-from rig.tui.screens.dialogs import Ask, Confirm, Pick
-from rig.tui.screens.help import Help
+from rig.tui.widgets.dialogs import Ask, Confirm, Reader
 from tests.tui.lab import DAEMON, run
 
 
@@ -44,8 +43,7 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab):
             await op.press("3")
             for opens, dialog, key in (
                 ("l", Confirm, "f9"), ("l", Confirm, "escape"),
-                ("question_mark", Help, "f9"), ("question_mark", Help, "escape"),
-                ("o", Pick, "f9"), ("o", Pick, "escape"),
+                ("question_mark", Reader, "f9"), ("question_mark", Reader, "escape"),
             ):  # fmt: skip
                 await op.press(opens)
                 await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))
@@ -148,7 +146,7 @@ def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
             await op.sees("Release driven for 80 ms", "no gate saw an edge")
             assert op.app.page == "device"
             await op.press("3")
-            await op.sees("RUN 1 of 3", "Enter arms")
+            await op.sees("Run 1 of 3", "Enter arms")
             assert {line.state for line in op.app.follower.state.runs} == {"planned"}
 
     run(work())

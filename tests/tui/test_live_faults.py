@@ -42,7 +42,7 @@ def test_a_pulled_cable_is_said_on_every_screen(cabled):
         async with lab.operator(countdown_s=0.1) as op:
             await op.until(lambda: op.app.follower.state.link == "up")
             pull(processes, lab)  # before there is a session
-            await op.sees(*PULLED, "PROTOCOL")
+            await op.sees(*PULLED, "HOME")
             plug(processes)
             await session_on(op)
             pull(processes, lab)

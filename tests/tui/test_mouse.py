@@ -1,7 +1,5 @@
 """Whatever looks as if it could be clicked can be."""
 
-from dataclasses import replace
-
 from rig.tui.widgets.text import Words
 from tests.tui.lab import flat, run
 
@@ -46,14 +44,13 @@ def test_a_protocol_and_stop_are_clicked(lab, fence):
 
     async def work():
         async with lab.operator(files=(broken, lab.protocol, other)) as op:
-            options = replace(op.app.options, last=lab.folder / "older.session")
-            op.app.protocols.options = options
             # What can be used, and not the first of the list.
-            await op.sees("A short fence", "Plan and limits", "last session:", "o older")
+            await op.sees("A short fence", "Ready experiments")
             await op.until(lambda: op.app.client and op.app.client.driving)
 
             async def chosen():  # again, should the list have been laid out anew under the pointer
-                await click(op, "app.choose('protocol', 2)")
+                rows = [row.title for row in op.app.desk.rows]
+                await click(op, f"app.choose({rows.index('other')})")
                 return "The other one" in flat(op.app)
 
             await op.until(chosen)

@@ -1,4 +1,4 @@
-"""Plots: curves, marks, bars and cursor on the same dots, and numbers at both axes."""
+"""Plots: traces of panels on the dots that their axes name."""
 
 from itertools import pairwise
 
@@ -6,20 +6,29 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.report.figure import Panel, PlotAxis, Trace
+from rig.report.looks import MODEL
 from rig.tui.braille import dots_of
-from rig.tui.plotting import Picture, Series, plotted, ticks
+from rig.tui.plotting import Picture, axis_over, plotted
 
-_LINE = [0.0, 4.0, 10.0], [0.0, 1.0, 3.0]
+_LINE = Trace("model", [0.0, 4.0, 10.0], [0.0, 1.0, 3.0], "line", MODEL)
+WIDTH, HEIGHT = 44, 20
 
 
-def drawn(series, cursor=None, **more):
-    return plotted(Picture("z (cm)", "t (ms)", series, **more), 44, 20, cursor)
+def drawn(*traces, moment=None, residuals=None, limits=None):
+    panel = Panel(PlotAxis("time (s)", limits=limits), PlotAxis("z\n(cm)"), traces)
+    below = residuals and Panel(PlotAxis("time (s)"), PlotAxis("residual\n/ U"), residuals)
+    return plotted(Picture(panel, below), WIDTH, HEIGHT, moment)
+
+
+def texts(plot):
+    return ["".join(span.text for span in row) for row in plot]
 
 
 def drawn_dots(plot, color=None):
     """Dots in one colour, or in any: columns and rows from the top left."""
     found = set()
-    for y, row in enumerate(plot.rows):
+    for y, row in enumerate(plot):
         x = 0
         for span in row:
             for letter in span.text:
@@ -32,58 +41,51 @@ def drawn_dots(plot, color=None):
 @pytest.mark.parametrize("at", [0.0, 3.3, 4.0, 7.1, 10.0])
 def test_a_mark_lies_on_the_very_dot_of_the_curve_it_belongs_to(at):
     height = (0.25 * at) if at <= 4.0 else 1.0 + (at - 4.0) / 3.0
-    line = Series("line", *_LINE, "accent")
-    point = Series("dots", [at], [height], "success", "·")
-    alone = drawn_dots(drawn((point,), x_limits=(0.0, 10.0)), "success")
-    assert len(alone) == 1
-    # Both on one sheet: the mark sets no dot that the curve has not, or its neighbour.
-    both, curve = (drawn_dots(drawn(what)) for what in ((line, point), (line,)))
-    more = both - curve
-    assert all(max(abs(x - to_x), abs(y - to_y)) <= 1 for x, y in more for to_x, to_y in
-               [min(curve, key=lambda to: abs(to[0] - x))])  # fmt: skip
-    point = point._replace(kind="bars", errors=[0.5])
-    bars = drawn_dots(drawn((line, point), x_limits=(-1.0, 11.0)), "success")
-    middle = sorted(bars)[len(bars) // 2][0]
-    upright = [row for column, row in bars if column == middle]
-    assert max(upright) - min(upright) + 1 == len(set(upright)) > 5
+    point = Trace("", [at], [height], "mean")
+    marks = drawn_dots(drawn(_LINE, point), "primary")
+    curve = drawn_dots(drawn(_LINE))
+    columns = {x for x, _ in marks}
+    middle = sum(columns) / len(columns), sum(y for _, y in marks) / len(marks)
+    assert min(abs(x - middle[0]) + abs(y - middle[1]) for x, y in curve) <= 2
+    bars = drawn_dots(drawn(_LINE, Trace("", [at], [height], "mean", 0, [0.5])), "primary")
+    assert max(y for _, y in bars) - min(y for _, y in bars) > 8
 
 
-def test_a_curve_is_named_where_it_is_drawn_or_else_in_the_legend():
-    line = Series("line", *_LINE, "accent", label="model")
-    legend, *plot = ["".join(span.text for span in row) for row in drawn((line,)).rows]
-    assert "model" not in legend
-    assert "model" in "\n".join(plot)
-    full = Series(
-        "dots", [n / 20 for n in range(200)] * 9, [n / 600 for n in range(1800)], "primary"
-    )
-    legend, *_ = ["".join(span.text for span in row) for row in drawn((full, line)).rows]
-    assert "⠒⠒ model" in legend
+@pytest.mark.parametrize("level", [0.0, 1.0, 2.0, 3.0])
+def test_a_level_lies_in_the_row_whose_number_names_it(level):
+    plot = drawn(_LINE, Trace("", (), (level,), "level"), limits=(0.0, 10.0))
+    rows = {y // 4 for _, y in drawn_dots(plot, "primary")}
+    named = [n for n, row in enumerate(texts(plot)) if row.strip().startswith(f"{level:g}┤")]
+    assert named
+    assert rows == set(named)
 
 
-def test_the_cursor_says_what_is_there():
-    series = (
-        Series("line", *_LINE, "accent", label="model"),
-        Series("bars", [4.0], [1.5], "primary", label="mean ± U", errors=[0.25]),
-    )
-    said = ["".join(span.text for span in drawn(series, at).rows[1]) for at in (4.0, 7.0)]
-    assert said == ["t (ms) 4  model 1  mean ± U 1.5 ± 0.25", "t (ms) 7  model 2  mean ± U –"]
+def test_all_that_is_drawn_is_named_above():
+    legend, *_ = texts(drawn(_LINE, Trace("rods", [4.0], [1.0], "points")))
+    assert legend == "z (cm)  ⠒ model  + rods"
+
+
+def test_a_moment_is_an_upright_line():
+    with_line, without = (drawn_dots(drawn(_LINE, moment=at)) for at in (5.0, None))
+    columns = {x for x, _ in with_line - without}
+    assert len(columns) == 1
 
 
 def test_residuals_stand_in_a_strip_of_their_own_below():
-    line = Series("line", *_LINE, "accent")
-    off = Series("dots", [4.0], [-0.3], "primary")
-    plot = drawn((line,), residuals=(off,), residual_label="off (mm)")
-    text = ["".join(span.text for span in row) for row in plot.rows]
-    at = next(n for n, row in enumerate(text) if "off (mm)" in row)
-    assert len(text) == 20
-    assert any(row.strip().startswith("0┤") for row in text[at:])
-    assert "t (ms)" in text[-1]
+    off = Trace("", [4.0], [-0.3], "points")
+    text = texts(drawn(_LINE, residuals=[off]))
+    at = next(n for n, row in enumerate(text) if "residual / U" in row)
+    assert len(text) == HEIGHT
+    assert at < HEIGHT - 4
+    assert "time (s)" in text[-2]
 
 
-@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(0, 12))
-def test_numbers_at_an_axis_are_round_inside_and_three_at_least(low, span, most):
-    found = ticks(low, low + span, most)
-    assert 3 <= len(found) <= max(6, most)
-    assert all(low - 1e-6 * span <= one <= low + span * (1 + 1e-6) for one in found)
-    gaps = {f"{b - a:.6g}" for a, b in pairwise(found)}
-    assert {gap.lstrip("0.")[:1] for gap in gaps} <= {"1", "2", "5"}
+@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(12, 180), st.integers(1, 9))
+def test_numbers_at_an_axis_are_round_and_the_range_is_inside(low, span, cells, least):
+    axis = axis_over(low, low + span, cells, least)
+    assert axis.value(-0.5) <= low + 1e-9 * abs(low)
+    assert axis.value(cells - 0.5) >= (low + span) * (1 - 1e-9)
+    values = list(axis.ticks.values())
+    gaps = {f"{b - a:.6g}" for a, b in pairwise(values)}
+    assert {gap.lstrip("0.")[:1] for gap in gaps} <= {"1", "2", "5", "9", "4"}
+    assert all(b - a >= least for a, b in pairwise(axis.ticks))

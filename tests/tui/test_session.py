@@ -7,8 +7,8 @@ from rig.predictions import notes
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.commands import REASONS
-from rig.tui.screens import protocol as screen
-from rig.tui.screens.dialogs import AskReason
+from rig.tui.pages import home as screen
+from rig.tui.widgets.dialogs import Ask
 from tests.cli.lab import log_of, short
 from tests.tui.lab import flat, run
 from tests.tui.screen import text_of
@@ -42,7 +42,7 @@ def test_any_key_before_the_release_stops_and_nothing_falls(lab):
                                    or "Any key stops" in flat(op.app))  # fmt: skip
                     await op.press(key)
                     await op.at(Stage.PREPARE)
-                    await op.sees(f"RUN 1 of 3 · attempt {attempt + 1}")
+                    await op.sees(f"Run 1 of 3 · attempt {attempt + 1}")
                     stopped = "stopped: nothing fell" in flat(op.app)
                 await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
 
@@ -70,7 +70,7 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
             await op.press("x", "escape")
             assert op.app.flow.verdict == "accepted"
             await op.press("x")
-            await op.until(lambda: isinstance(op.app.screen, AskReason))
+            await op.until(lambda: isinstance(op.app.screen, Ask))
             await op.until(pressed_and_seen(op, "enter", "type or choose a reason first"))
             await op.press(*"draught", "enter")
             await op.sees("REJECTED", "draught", "note: [/b] hm")
@@ -99,7 +99,7 @@ def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
             await op.until(lambda: op.app.flow.logged)
             await op.press("enter")
             await op.at(Stage.PREPARE)
-            await op.sees("RUN 2 of 3")
+            await op.sees("Run 2 of 3")
             await op.press("z")
             await op.means()
             await op.at(Stage.PROTOCOL)

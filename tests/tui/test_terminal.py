@@ -51,7 +51,7 @@ class Terminal:
             sys.executable, "-m", "rig", "tui", str(protocol), "--port", url, "--session",
             str(session), "--socket", str(self.folder / "rig.sock"),
         )  # fmt: skip
-        self.sees("PROTOCOL", "Enter open session", "SIMULATED")
+        self.sees("HOME", "Enter open", "SIMULATED")
         self.press("Enter")
         self.sees("DEVICE", "Enter to the first run", "clear")
         self.press("Enter")
@@ -85,7 +85,7 @@ class Terminal:
             screen = self.screen()
             if "nothing fell" in screen and "Enter arm" in screen:
                 self.enters("Enter arm")
-            return all(text in screen for text in (f"run {number}, attempt ", "release skew"))
+            return all(text in screen for text in (f"Run {number} of 4", " wins by "))
 
         self.enters("Enter arm")
         until(fell, lambda: self.tmux("capture-pane", "-p"))
@@ -115,14 +115,13 @@ def test_an_abba_session_by_keys_alone(terminal, url):
         pytest.importorskip("rig_emulator.stand")
     session = terminal.begins(url)
     for number, chain in enumerate("ABBA", start=1):
-        terminal.sees(f"RUN {number} of 4", f"impact side {chain}", "✓ gates steady", "Enter arm")
+        terminal.sees(f"Run {number} of 4", f"chain {chain} strikes", "Still ✓", "Enter arm")
         if number == 2:  # typed and pasted: neither words nor the Enter behind them arm
             terminal.press("-l", "hm u\r\r\r")
             terminal.sees("not armed: Enter came too soon after another key")
-            terminal.sees("RUN 2 of 4", "Enter arm")
+            terminal.sees("Run 2 of 4", "Enter arm")
         terminal.drops(number)
-        terminal.sees("Enter next run")
-        terminal.press("Enter")
+        terminal.enters("RESULT")
     terminal.sees("4 of 4 runs", "✓✓✓✓")
     pid = _daemon_of(terminal.folder)
     terminal.press("q")

@@ -8,12 +8,11 @@ from rig.campaign.events import GoOn, Stage
 from rig.campaign.machine import Flow, step
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.records import Job
+from rig.tui.drop_words import verdict_words
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model
 from rig.tui.state import typed
-from rig.tui.widgets.banner import verdict_words
-from rig.tui.widgets.status import headline
-from rig.tui.widgets.stopbar import hints
+from rig.tui.widgets.bars import headline, hints
 from tests.tui.lab import KEYS
 
 NASTY = ["[red]x[/", "[/]", "\x1b[2J\x07\x9b31m", "x" * 10_000, "[@click=app.exit]a", "a\nb\u202ec"]
@@ -28,7 +27,7 @@ def model(text):
 
 @pytest.mark.parametrize("text", NASTY, ids=range(len(NASTY)))
 def test_what_comes_from_outside_is_shown_as_text(text):
-    shown = [headline(model(text), "run", 78), verdict_words(model(text))]
+    shown = [headline(replace(model(text), page="run"), 78), verdict_words(model(text))]
     for content in shown:
         assert not any(ord(letter) < 32 and letter != "\n" for letter in content.plain)
         assert not any("\x7f" <= letter <= "\x9f" for letter in content.plain)
@@ -53,11 +52,16 @@ def test_enter_is_not_offered_before_the_verdict_is_kept():
     kept, job = replace(waits, flow=replace(waits.flow, logged=True)), Job(2, 1)
     waits = replace(waits, flow=replace(waits.flow, logged=False))
     assert step(waits.flow, GoOn(job, 0.0)) == (waits.flow, ())
-    assert "Enter after the verdict is saved" in hints(waits, "result", KEYS, 80).plain
+    assert (
+        "Enter after the verdict is saved"
+        in hints(replace(waits, page="result"), KEYS, 80, lambda _: True).plain
+    )
     assert step(kept.flow, GoOn(job, 0.0))[0].job == job
-    assert "Enter next run" in hints(kept, "result", KEYS, 80).plain
+    assert "Enter end" in hints(replace(kept, page="result"), KEYS, 80, lambda _: True).plain
 
 
 @pytest.mark.parametrize("width", [20, 40, 78, 198])
 def test_keys_fit_their_line(width):
-    assert len(hints(model("x"), "result", KEYS, width).plain) <= width
+    assert (
+        len(hints(replace(model("x"), page="result"), KEYS, width, lambda _: True).plain) <= width
+    )

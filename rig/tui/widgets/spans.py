@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 from rich.segment import Segment
 from rich.style import Style
-from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from textual.geometry import Size
+    from textual.geometry import Region
 
     from rig.tui.braille import Span
 
@@ -29,17 +28,9 @@ class SpanView(Widget):
 
     def take(self, rows: Sequence[Sequence[Span]]) -> None:
         """Show these instead."""
-        before, self._rows = self._rows, rows
-        if len(rows) != len(before):
-            self._layout_updates += 1  # or a height is kept that was found since the last wish
-            self.refresh(layout=bool(self.styles.is_auto_height))
-        elif changed_rows := [y for y, row in enumerate(rows) if row != before[y]]:
-            self.refresh(*(Region(0, y, self.size.width, 1) for y in changed_rows))
-
-    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """As many lines as there are."""
-        del container, viewport, width
-        return len(self._rows)
+        if rows != self._rows:
+            self._rows = rows
+            self.refresh()
 
     def render_lines(self, crop: Region) -> list[Strip]:
         """Render lines, in the widget's own style, which is sought once for all of them."""

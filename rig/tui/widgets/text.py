@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from typing import TypeAlias
 
 from textual.content import Content
 from textual.style import Style
 from textual.widgets import Static
 
-from rig.printable import is_hidden
+from rig.printable import one_line
 
+_BREAKS = re.compile(r"[\n\r\t]")
 LONGEST = 400
 """Characters of one text from outside that are shown; nobody reads more on a screen."""
 
@@ -26,17 +28,8 @@ def plain(text: object, limit: int = LONGEST) -> str:
     """
     raw = str(text)
     # Cut first: a megabyte of note costs no more than what is shown of it.
-    cut = raw[: limit + 1]
-    text_shown = "".join(_shown(character) for character in cut)
-    return text_shown if len(raw) <= limit else text_shown[: limit - 1] + "…"
-
-
-def _shown(character: str) -> str:
-    if character in "\n\r\t":
-        return " "
-    if is_hidden(character):
-        return "\N{REPLACEMENT CHARACTER}"
-    return character
+    shown = one_line(_BREAKS.sub(" ", raw[: limit + 1]), limit + 1)
+    return shown if len(raw) <= limit else shown[: limit - 1] + "…"
 
 
 def duration(seconds: float) -> str:

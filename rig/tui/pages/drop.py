@@ -1,0 +1,147 @@
+"""A drop, from the first look at its gates to its result and any later look: steps, rig, plot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from rig.campaign.events import Stage
+from rig.reasons import notes_in
+from rig.tui.desk import Face
+from rig.tui.drop_words import (
+    LOOKS,
+    expected_words,
+    number_table,
+    past_runs,
+    sentence,
+    verdict_words,
+)
+from rig.tui.motion import motions
+from rig.tui.next_step import hand, next_step
+from rig.tui.plots import drop_pictures, fall_pictures
+from rig.tui.replay import indicators_at, until
+from rig.tui.scale import drawing
+from rig.tui.widgets.gates import board
+from rig.tui.widgets.text import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.protocol.protocol import Run
+    from rig.reasons import Reason
+    from rig.records import Job
+    from rig.results.live import SessionView
+    from rig.tui.desk import Desk
+    from rig.tui.model import Model
+    from rig.tui.replay import Player
+
+_DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
+         Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}  # fmt: skip
+"""Steps that are behind, by stage."""
+
+
+def face(model: Model, desk: Desk, width: int) -> Face:
+    """Show the run in hand: before the drop, during it, or what it said."""
+    if model.page in {"result", "history"} or model.stage in {Stage.RESULT, Stage.HALTED}:
+        return _result(model, desk, width)
+    protocol, run = model.protocol, model.run
+    if model.loading or protocol is None or run is None:
+        return Face(Content(model.loading or next_step(model).text))
+    falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
+    counting = model.stage is Stage.COUNTDOWN and model.driving
+    expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
+    facts = f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}\nmodel  {expected}\n"
+    gates = board(protocol, model.indicators, model.now_s, width)
+    return Face(
+        Content("\n").join([steps(model), _headline(model, run), _action(model)]),
+        drawing(protocol, run, falls, model.indicators, 0.0),
+        desk.latest("pictures", (protocol, run), lambda: fall_pictures(falls)),
+        words=Content("\n").join([Content(facts), *gates]),
+        digits=f"{max(0.0, model.flow.left_s):.1f}" if counting else "",
+    )
+
+
+def steps(model: Model) -> Content:
+    """Write the steps of a run: behind, on, and to come."""
+    indicators = model.indicators
+    behind = _DONE.get(model.stage, 0)
+    clear = indicators.known and not indicators.blocked
+    still = clear and not indicators.restless(model.now_s)
+    good = [behind > 0, behind > 1 or clear, behind > 2 or still, behind > 3, behind > 4]
+    names = hand(model), "Clear", "Still", "Drop", "Result"
+    parts = []
+    for at, name in enumerate(names):
+        mark = ("✓", "bold $success") if good[at] else ("◌" * (at <= max(behind, 2)), "$warning")
+        parts.append(Content.assemble(f"{name} ", mark))
+    return Content(" · ").join(parts)
+
+
+def _headline(model: Model, run: Run) -> Content:
+    attempt = f" · attempt {model.job.attempt}" if model.job and model.job.attempt > 1 else ""
+    strikes = f" · {run.incline_deg:g}° · chain {plain(run.impact, 20)} strikes"
+    what = strikes if run.impact is not None else ""
+    total = len(model.state.runs) or 1
+    return Content.styled(f"Run {run.number} of {total}{attempt}{what}", "bold $primary")
+
+
+def _action(model: Model) -> Content:
+    step = next_step(model)
+    return Content.styled(f"→ {step.text}", f"bold {step.color}")
+
+
+def _result(model: Model, desk: Desk, width: int) -> Face:
+    """Show what a drop said: the latest, in slow motion first, or any on the history page."""
+    view, job = desk.drop(model)
+    own = model.page != "history"
+    parts = [verdict_words(model)] if own else []
+    if own and model.run is not None:
+        parts.insert(0, _headline(model, model.run))
+    if own and model.stage in {Stage.RESULT, Stage.HALTED}:
+        parts = [steps(model), *parts, _action(model)]
+    if view is None or job is None:
+        missing = model.loading or "No drop recorded yet. Press o to choose another session."
+        return Face(Content("\n").join(parts or [Content(missing)]))
+    player, hz = desk.players[model.page], view.scales[job].hz
+    drop, edges = view.drops[job], view.drops[job].edges
+    begun = player.playing or player.time_s > 0.0 or not own
+    seen = until(edges, hz, player.time_s) if begun else edges
+    indicators = indicators_at(view.channels, drop, seen)
+    run, recorded = view.plan[job.run], (drop, hz, view.results[job])
+    falls = desk.latest("moment", (view.path, job, hz),
+                        lambda: motions(view.protocol, run, recorded))  # fmt: skip
+    key = view.path, view.reading, job, width
+    pictures = desk.latest(
+        "figures", key[:3], lambda: drop_pictures(view, job) or fall_pictures(falls)
+    )
+    words = desk.latest("words", key, lambda: number_table(view, job))
+    logged = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
+    reasons = next(logged, ())
+    time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
+    said = "slow motion …" if own and player.playing else sentence(view, job)
+    foot = Content.assemble((said, "bold $success"), "\n" * bool(said), past_runs(view, job))
+    return Face(
+        Content("\n").join(parts or _which(view, job, player, reasons)),
+        drawing(view.protocol, run, falls, indicators, time_s),
+        pictures,
+        player.time_s - (falls[0].delay_s if falls else 0.0) if begun else None,
+        Content("\n").join([words, Content(""), *board(view.protocol, indicators, 0.0, width)]),
+        foot,
+    )
+
+
+def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason]) -> list[Content]:
+    """Name the drop that is played, and say how."""
+    verdict, run = view.results[job].verdict, view.plan[job.run]
+    what = f"{run.incline_deg:g}° impact {run.impact}" if run.impact else run.free
+    state = "▶ playing" if player.playing else "‖ paused"
+    return [
+        Content.assemble(
+            (f"drop {view.jobs.index(job) + 1} of {len(view.jobs)}", "bold $primary"),
+            f"  run {job.run}, attempt {job.attempt} · {plain(what, 40)} · ",
+            (f"{LOOKS[verdict][0]} {verdict}", LOOKS[verdict][1]),
+        ),
+        Content(f"{state} at {player.speed:.3g} × real speed, t = {player.time_s * 1e3:.0f} ms · "
+                f"{plain(view.path.name, 60)}{'  ▲ SIMULATED' * view.simulated}"),
+        *(Content(f"note: {plain(text, 160)}") for text in notes_in(reasons)),
+    ]  # fmt: skip

@@ -1,0 +1,104 @@
+"""Home: try it, connect a board, continue, begin something new, or look at results."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from rig.campaign.events import Stage
+from rig.predictions import notes
+from rig.protocol.describe import describe
+from rig.protocol.plan import runs
+from rig.tui.desk import Face
+from rig.tui.indicators import Indicators
+from rig.tui.motion import motions
+from rig.tui.scale import drawing
+from rig.tui.widgets.text import plain, pressed
+
+if TYPE_CHECKING:
+    from rig.protocol.protocol import Protocol
+    from rig.tui.desk import Desk
+    from rig.tui.model import Model
+    from rig.tui.scale import Drawing
+    from rig.tui.survey import Row
+
+_FALLEN = 0.7  # of the way down, in the small pictures
+_DOES = {
+    "try": "Enter simulates it, with no board.\n",
+    "board": "Plug the board in by USB; then choose it here with Enter. Then choose an\n"
+    "experiment: its first page checks each gate with a wave of the hand.",
+    "flash": "Enter puts the firmware on it. A Pico waits for that when its BOOTSEL button was\n"
+    "held while it was plugged in.",
+    "new": "Enter writes its protocol into this folder, with four simulated drops;\n"
+    "then change what differs in your rig. It is like this:\n",
+    "results": "Enter lists the sessions of this folder.",
+    "end": "Enter ends that daemon, so that yours can begin.",
+}
+
+
+def face(model: Model, desk: Desk, width: int) -> Face:
+    """Show what can be begun, or the protocol of the session that is open."""
+    del width
+    if model.flow.stage is not Stage.PROTOCOL and model.protocol is not None:
+        return Face(Content(""), _picture(desk, model.protocol),
+                    words=_description(desk, model.protocol), top=True)  # fmt: skip
+    row = desk.chosen
+    if row is None:
+        return Face(Content("looking around …"))
+    does, picture = _DOES.get(row.kind) or _into(model, desk, row), None
+    parts = [Content(does)]
+    protocol, problem = desk.reading(row.file) if row.file else (None, "")
+    if problem:
+        parts.append(Content.assemble((f"✗ {plain(row.file)}\n\n", "bold $error"), problem))
+    elif protocol is not None:
+        parts.append(_description(desk, protocol))
+        picture = _picture(desk, protocol)
+    return Face(Content(""), picture, words=Content("\n").join(parts), menu=_menu(desk), top=True)
+
+
+def _into(model: Model, desk: Desk, row: Row) -> str:
+    """Say where the experiment is carried out, and which file it makes."""
+    session = plain(row.session or desk.options.session or "")
+    rig = model.port or "a simulation: no board is connected"
+    return f"→ Enter opens it with {rig}\n→ session file: {session or 'a new one'}\n"
+
+
+def _menu(desk: Desk) -> Content:
+    lines: list[Content] = []
+    for section, group in groupby(enumerate(desk.rows), key=lambda row: row[1].section):
+        lines.append(Content.styled(section, "bold $foreground 70%"))
+        for at, row in group:
+            chosen = row is desk.chosen
+            text = Content.assemble(
+                (f"{'▸' if chosen else ' '} {plain(row.title, 30)}",
+                 "bold $primary" if chosen else ""),
+            )  # fmt: skip
+            lines.append(pressed(text, f"app.choose({at})"))
+    return Content("\n").join(lines)
+
+
+def _picture(desk: Desk, protocol: Protocol) -> Drawing | None:
+    """Draw the model's own fall, on its way."""
+
+    def draw() -> Drawing | None:
+        run = runs(protocol)[0]
+        falls = motions(protocol, run)
+        end = max((fall.end_s for fall in falls), default=0.0)
+        return drawing(protocol, run, falls, Indicators(), _FALLEN * end) if falls else None
+
+    return desk.latest("picture", protocol, draw)
+
+
+def _description(desk: Desk, protocol: Protocol) -> Content:
+    return desk.latest("description", protocol, lambda: _described(protocol))
+
+
+def _described(protocol: Protocol) -> Content:
+    title, *lines = describe(protocol, notes(protocol)).splitlines()
+    parts = [Content.styled(plain(title, 200), "bold")]
+    for line in lines:
+        style = "" if line.startswith(" ") else "bold $primary"
+        parts.append(Content.styled(plain(line, 200), style))
+    return Content("\n").join(parts)

@@ -1,0 +1,85 @@
+"""The session so far: the plan with its states, results against incline, the control chart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from rig.analysis.joint_fit import FEWEST
+from rig.campaign.plan import done
+from rig.report.parts import means_parts, scatter_parts, tables
+from rig.tui.desk import Face
+from rig.tui.drop_words import LOOKS
+from rig.tui.plots import session_pictures
+from rig.tui.widgets.text import duration, plain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from rig.report.columns import Part
+    from rig.tui.desk import Desk
+    from rig.tui.model import Model
+
+
+def face(model: Model, desk: Desk, width: int) -> Face:
+    """Show the plan, results against incline, and control charts."""
+    del width
+    view = model.view
+    if view is None:
+        return Face(_progress(model))
+    key, summary = (view.path, view.reading), view.analysis.summary
+    means = desk.latest("means", key, lambda: _table(tables("means", summary)))
+    drops = desk.latest(
+        "drops", key,
+        lambda: _table([*means_parts(summary), *scatter_parts(summary),
+                        *tables("runs", view.analysis.runs)]),
+    )  # fmt: skip
+    head = Content("\n").join([_progress(model), Content(means)])
+    shown = desk.latest("charts", (view.path, view.reading), lambda: [*session_pictures(view)])
+    turned = desk.chart % max(1, len(shown))
+    pictures = [*shown[turned:], *shown[:turned]]
+    foot = pictures[0][1] if pictures else ""
+    return Face(head, pictures=[picture for picture, _ in pictures], foot=Content(foot), beside=2,
+                words=Content(drops))  # fmt: skip
+
+
+def _progress(model: Model) -> Content:
+    if model.loading:
+        return Content(model.loading)
+    runs = model.state.runs
+    voids = model.voids.counts(runs)
+    over = sum(done(line, voids.get(line.run, 0)) for line in runs)
+    if not runs:
+        return Content("No session is open.")
+    pace = model.view.pace_s if model.view else None
+    left_s = (pace or 0.0) * (len(runs) - over)
+    remaining = f" · about {duration(left_s)} left" * bool(left_s)
+    session = plain(Path(str(model.state.section("session").get("path", ""))).name, 60)
+    return Content.assemble(
+        (f"{over} of {len(runs)} runs", "bold"), f"{remaining}  ", (session, "$foreground 70%"),
+        _fit_words(model), "\n", *_marks(model),
+    )  # fmt: skip
+
+
+def _table(parts: Iterable[Part]) -> str:
+    return "\n".join(line for part in parts for line in part.lines if line)
+
+
+def _fit_words(model: Model) -> tuple[str, str]:
+    """Say whether the means come from a joint fit."""
+    view = model.view
+    if view is None or not view.analysis.summary:
+        return "", ""
+    alone = f"each drop fitted alone; joint fit from {FEWEST} good drops on"
+    fit = f"joint fit of {view.fitted} runs" if view.fitted else alone
+    return f"\n{fit}{' · adding the newest …' * view.lagging}", "$foreground 70%"
+
+
+def _marks(model: Model) -> Iterator[tuple[str, str]]:
+    """A symbol a run, in order; the one that is on turns its colours round."""
+    for line in model.state.runs:
+        is_now = model.job is not None and line.run == model.job.run
+        symbol, colour = LOOKS.get(line.state, ("?", "$foreground"))
+        yield symbol, f"{colour} reverse" if is_now else colour

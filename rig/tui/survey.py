@@ -1,0 +1,189 @@
+"""What there is to begin with: sessions and experiments of the folder, ready ones, boards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from rig.errors import InputError, RigError
+from rig.protocol import reader
+from rig.protocol.measurable import check_gates, check_recordable
+from rig.tui.widgets.text import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rig.protocol.protocol import Protocol
+    from rig.tui.context import Options
+
+_MOST = 200
+"""Session files that are listed, the newest."""
+_SCENES = """\
+Try it         | try | falling-ball     |              | a ball: g within seconds
+Try it         | try | inclined-uniform |              | two chains on a board
+New experiment | new | falling-ball     | object       | an object past gates
+New experiment | new | glider           | track        | a glider on a track
+New experiment | new | picket-fence     | picket-fence | a picket fence
+New experiment | new | single-chain     | one-chain    | one chain on a board
+New experiment | new | inclined-uniform | two-chains   | two chains, one strikes
+"""
+"""Section, what is done, the ready protocol that looks like it, its scene for `rig new`, title."""
+
+
+class SessionEntry(NamedTuple):
+    """One session file; `trouble` says why it cannot be read.
+
+    Attributes
+    ----------
+    drops, over, runs
+        How many were recorded, of how many of the planned runs.
+    source
+        Name of its protocol's file.
+    """
+
+    path: Path
+    title: str = ""
+    created: str = ""
+    drops: int = 0
+    over: int = 0
+    runs: int = 0
+    source: str = ""
+    simulated: bool = False
+    trouble: str = ""
+
+
+class Reading(NamedTuple):
+    """A protocol, and what is wrong with its file; empty where it can be used."""
+
+    protocol: Protocol | None
+    problem: str = ""
+
+
+class Row(NamedTuple):
+    """One thing to begin with.
+
+    Attributes
+    ----------
+    kind
+        What is done: ``try``, ``open``, ``board``, ``flash``, ``new``, ``results`` or ``end``.
+    file
+        The protocol that is opened, or whose picture stands beside it.
+    value
+        Of a board its port, of a scene or a board to be flashed its name.
+    session
+        The file that is continued.
+    """
+
+    section: str
+    kind: str
+    title: str
+    file: Path | None = None
+    value: str = ""
+    session: Path | None = None
+
+
+def look_around(options: Options, port: str, other: str) -> list[Row]:
+    """List what can be begun, from the folder, the ready protocols, and what USB lists.
+
+    Parameters
+    ----------
+    port
+        Of the rig that is there; empty for none.
+    other
+        The port of a daemon that stands in the way of the wanted one; empty for none.
+    """
+    from rig.ready import ready_protocol  # noqa: PLC0415 - not needed to paint
+
+    ready = sorted(ready_protocol("falling-ball").parent.glob("*.yaml"))
+    own = [*options.files, *sorted(Path().glob("[!.]*.yaml"))]
+    files = [*{path.resolve(): path for path in own if path.resolve() not in ready}.values()]
+    named = {path.name: path for path in (*ready, *files)}
+    scenes = [
+        Row(section, kind, title, named.get(f"{name}.yaml"), value)
+        for row in _SCENES.splitlines()
+        for section, kind, name, value, title in [map(str.strip, row.split("|"))]
+    ]
+    boards = [*_boards()]
+    if other:
+        boards.append(Row("Connect a board", "end", f"end {other}, which runs already"))
+    if not boards and not port:
+        boards.append(Row("Connect a board", "board", "none is plugged in"))
+    sessions = session_list(Path())
+    going = [
+        Row("Continue", "open", f"{entry.path.stem}, {entry.over} of {entry.runs}",
+            named[entry.source], "sim://" * entry.simulated, entry.path)
+        for entry in sessions if entry.over < entry.runs and entry.source in named
+    ]  # fmt: skip
+    return [
+        *(row for row in scenes if row.kind == "try"),
+        *boards,
+        *going[:3],
+        *(Row("Experiments here", "open", path.stem, path) for path in files),
+        *(row for row in scenes if row.kind == "new"),
+        *(Row("Open results", "results", f"of {entry.path.stem}") for entry in sessions[:1]),
+        *(Row("Ready experiments", "open", path.stem, path) for path in ready),
+    ]
+
+
+def first_row(rows: list[Row], options: Options) -> int:
+    """Choose the row to begin with: what is unfinished, what can be used here, or a trial."""
+    sections = "Continue" * (not options.port), "Experiments here", "Ready experiments"
+    places = [
+        (bool(read_file(row.file).problem), sections.index(row.section), at)
+        for at, row in enumerate(rows)
+        if row.section in sections and row.file and (row.session or row.file in options.files)
+    ]
+    return min(places, default=(False, 0, 0))[2]
+
+
+def _boards() -> Iterator[Row]:
+    from rig.flash.drive import waiting_drives  # noqa: PLC0415 - not needed to paint
+    from rig.usb.listing import serial_ports  # noqa: PLC0415 - nor is this
+
+    for _ in waiting_drives():
+        title = "Raspberry Pi Pico: put the firmware on it"
+        yield Row("Connect a board", "flash", title, value="pico")
+    for port in serial_ports():
+        if port.candidate:
+            title = f"{port.kind} at {port.path}"
+            yield Row("Connect a board", "board", title, value=port.path)
+
+
+def read_file(file: Path) -> Reading:
+    """Read a protocol, and say what is wrong with it at which line."""
+    protocol = None
+    try:
+        protocol = reader.read(file)
+        check_gates(protocol)
+        check_recordable(protocol)
+    except InputError as error:
+        lines = [plain(problem, 300) for problem in error.problems]
+        return Reading(protocol, "\n".join(lines or [plain(error.message), plain(error.hint)]))
+    return Reading(protocol)
+
+
+def session_list(folder: Path) -> list[SessionEntry]:
+    """List the sessions of a folder, the newest first."""
+    dated = []
+    for path in folder.glob("*.session"):
+        try:
+            dated.append((path.stat().st_mtime_ns, path))
+        except OSError:
+            continue  # gone meanwhile
+    return [_look(path) for _, path in sorted(dated, reverse=True)[:_MOST]]
+
+
+def _look(path: Path) -> SessionEntry:
+    from rig.protocol.plan import runs  # noqa: PLC0415 - not needed to paint
+    from rig.results import protocol_of  # noqa: PLC0415 - nor is this
+    from rig.session.store import Session  # noqa: PLC0415 - nor is this
+
+    try:
+        with Session.open(path, readonly=True) as session:
+            protocol, source = protocol_of(session), Path(session.protocol_source).name
+            recorded = {entry[:2] for entry in session.states() if entry.state == "recorded"}
+            counts = len(recorded), len({run for run, _ in recorded}), len(runs(protocol))
+            created = session.meta["created"]
+            return SessionEntry(path, protocol.title, created, *counts, source, session.simulated)
+    except RigError as error:
+        return SessionEntry(path, trouble=error.message)

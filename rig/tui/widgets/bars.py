@@ -1,0 +1,172 @@
+"""Top and bottom of every screen: what this is, what is wrong, what can be done now, and STOP."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import Vertical
+from textual.content import Content
+
+from rig.tui.actions import BY_NAME, shown_key
+from rig.tui.model import UNDER_WAY, alarm
+from rig.tui.next_step import next_step
+from rig.tui.widgets.text import Words, plain, pressed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from textual.app import ComposeResult
+
+    from rig.tui.actions import Action
+    from rig.tui.model import Model
+
+LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
+PAGES = {"protocol": "home", "device": "device", "run": "run", "result": "result",
+         "session": "session", "history": "history"}  # fmt: skip
+"""Pages by name, and what stands on their tabs."""
+KEYS_SHOWN = 4
+_OF_PAGE = {
+    "protocol": ("go_on", "next", "previous"),
+    "device": ("go_on", "wave", "release_test"),
+    "result": ("go_on", "reject", "unblind", "part"),
+    "session": ("go_on", "control_chart", "report"),
+    "history": ("play", "next", "part", "sessions"),
+}
+_ANYWHERE = ("go_on", "control", "part", "help")
+_TOLD_S = 4.0
+_UNANSWERED_S = 0.5
+
+
+class StatusBar(Vertical):
+    """Headline and pages, and below them what is wrong with what to do."""
+
+    def compose(self) -> ComposeResult:
+        yield Words(id="headline")
+        yield Words(id="tabs")
+        yield Words(id="alarm")
+
+    def show(self, model: Model, keys: Mapping[str, str], width: int, message: str) -> None:
+        """Draw what holds now; what was `message` only while nothing is wrong."""
+        self.query_one("#headline", Words).say(headline(model, width - 2))
+        self.query_one("#tabs", Words).say(_tabs(model.page, keys))
+        wrong = alarm(model)
+        box = self.query_one("#alarm", Words)
+        box.display = wrong is not None or bool(message)
+        box.set_class(wrong is None, "-told")
+        if wrong is None:
+            box.say(plain(message, 240))
+        else:
+            hint = f"\n  → {plain(wrong.hint, 240)}" if wrong.hint else ""
+            box.say(("✗ ", "bold $error"), (plain(wrong.message, 160), "bold"), hint)
+
+
+def _tabs(page: str, keys: Mapping[str, str]) -> Content:
+    """Name every page with its key; each can be clicked."""
+    parts: list[Content] = []
+    for name, title in PAGES.items():
+        text = f" {shown_key(keys[f'page_{name}'])} {title} "
+        look = "bold $background on $primary" if name == page else "$foreground 80%"
+        parts += [pressed(Content.styled(text, look), f"app.do('page_{name}')"), Content(" ")]
+    return Content.assemble(*parts)
+
+
+def headline(model: Model, width: int) -> Content:
+    """One line of exactly `width`: page and title left, stamp and link right."""
+    link = LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
+    if model.offline or model.idle:
+        link = "file only" if model.offline else "no rig yet"
+    right_side = f"{plain(model.port, 24)}  {link}" if model.port else link
+    stamp = " ▲ SIMULATED " if model.simulated else ""
+    blind = " BLIND " if model.blind else ""
+    name = PAGES.get(model.page, model.page).upper()
+    title = model.state.section("session").get("title") or (
+        model.protocol.title if model.protocol else "chainrig")  # fmt: skip
+    room = width - len(name) - len(stamp) - len(blind) - len(right_side) - 3
+    return Content.assemble(
+        (name, "bold $primary"), "  ", plain(title, max(1, room)).ljust(room),
+        (stamp, "bold $background on $warning"), (blind, "bold $background on $accent"),
+        " ", right_side,
+    )  # fmt: skip
+
+
+class StopLine(Words):
+    """The bar that stops everything, also by mouse, and what there is to be stopped."""
+
+    def show(self, model: Model, keys: Mapping[str, str]) -> None:
+        """Draw what holds now."""
+        self.set_class(model.hot, "-hot")
+        stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
+        self.say(pressed(stop, "app.do('stop')"), f"  {_doing(model)}")
+
+
+class StopBar(Vertical):
+    """Keys of this page, and the bar that stops everything, also by mouse."""
+
+    def compose(self) -> ComposeResult:
+        yield Words(id="hints")
+        yield StopLine()
+
+    def show(
+        self, model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
+    ) -> None:
+        """Draw what holds now."""
+        self.query_one("#hints", Words).say(hints(model, keys, width - 2, possible))
+
+
+def hints(
+    model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
+) -> Content:
+    """Write the keys that are wanted most now; all others are in the palette."""
+    page = _OF_PAGE.get(model.page, ())
+    parts: list[Content] = []
+    used = 0
+    for name in (*dict.fromkeys((*page, *_ANYWHERE)), "palette"):
+        label = _label(name, model)
+        full = len(parts) == 2 * (KEYS_SHOWN - 1) and name != "palette"
+        if full or not label or not possible(BY_NAME[name]):
+            continue
+        hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {label}")
+        used += len(hint) + 2
+        if used > width:
+            break
+        parts += [pressed(hint, f"app.do('{name}')"), Content("  ")]
+    return Content.assemble(*parts)
+
+
+def _label(name: str, model: Model) -> str:
+    if name == "go_on":
+        return next_step(model).enter
+    if name == "reject" and model.flow.verdict == "rejected":
+        return "undo rejection"
+    if name == "unblind" and not model.blind:
+        return ""
+    if name == "control":
+        return "" if model.driving else "take control"
+    return BY_NAME[name].label
+
+
+def _answer(model: Model) -> str:
+    """Say what became of a STOP that was pressed just now."""
+    if model.stop is None:
+        return ""
+    waited = model.now_s - model.stop.at_s
+    unheard = model.stop.heard is False or (model.stop.heard is None and waited > _UNANSWERED_S)
+    if waited > _TOLD_S and (model.connected or not unheard):
+        return ""
+    if unheard:
+        return "STOP NOT CONFIRMED: switch the release's supply off"
+    return "STOP: everything is off" if model.stop.heard else "STOP …"
+
+
+def _doing(model: Model) -> str:
+    if model.offline or model.idle:
+        return "no rig is connected: nothing can fall"
+    if not model.connected:
+        return _answer(model) or "no daemon: nothing can be stopped from here"
+    answer = _answer(model)
+    if answer and not model.hot:
+        return answer
+    holder = model.state.holder
+    watching = "" if model.driving or holder is None else f" · watching {holder[:24]}"
+    doing = next_step(model).text if model.stage in UNDER_WAY else model.state.phase
+    return doing + watching + " · " * bool(answer) + answer

@@ -1,0 +1,176 @@
+"""What is asked over a page. Below every dialog STOP goes on to be seen, and to work."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from textual import events, on
+from textual.await_complete import AwaitComplete
+from textual.containers import Vertical, VerticalScroll
+from textual.fuzzy import Matcher
+from textual.screen import ModalScreen
+from textual.widgets import Input, OptionList
+from textual.widgets.option_list import Option
+
+from rig.tui.widgets.bars import StopLine
+from rig.tui.widgets.text import Words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from textual.app import ComposeResult
+    from textual.content import Content
+    from textual.widget import Widget
+
+
+class Dialog(ModalScreen[Any]):
+    """Something to be answered, or to be read, before the page goes on.
+
+    Parameters
+    ----------
+    parts
+        What stands in it.
+    keys
+        What its keys do.
+    """
+
+    LEAVE = ""
+    """The key that cancels; empty: any that means nothing else."""
+
+    def __init__(self, *parts: Widget, keys: str = "", large: bool = False) -> None:
+        super().__init__()
+        self._parts = [*parts, Words((keys, "bold $primary"), id="how")]
+        self._large = large
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="-large" * self._large):
+            yield from self._parts
+        yield StopLine()
+
+    def on_mount(self) -> None:
+        self.query("Input").focus()
+
+    def move(self, by: int) -> None:
+        """Go to the previous or next of the list, or scroll."""
+        for options in self.query(OptionList):
+            (options.action_cursor_down if by > 0 else options.action_cursor_up)()
+        for text in self.query(VerticalScroll):
+            text.scroll_relative(y=3 * by, animate=False)
+
+    def dismiss(self, result: Any = None) -> AwaitComplete:
+        """Give an answer, once: keys that follow each other quickly may ask for it again."""
+        return super().dismiss(result) if self.is_active else AwaitComplete()
+
+
+class Confirm(Dialog):
+    """Ask for confirmation: Enter confirms, any other key cancels.
+
+    A click never confirms: it is the second step of something, and the first may have been one.
+    """
+
+    def __init__(self, title: str, question: str, yes: str) -> None:
+        words = Words((f"{title}\n", "bold $warning"), question, id="question")
+        super().__init__(words, keys=f"Enter: {yes}   any other key: stay")
+
+
+class Reader(Dialog):
+    """Something long to be read; any key but the arrows closes it."""
+
+    def __init__(self, text: Content) -> None:
+        super().__init__(VerticalScroll(Words(text, id="table"), can_focus=False), large=True)
+
+
+class _Choices(OptionList):
+    """A list that changes as one types: what is clicked may be gone by the time it is heard of."""
+
+    can_focus = False
+
+    async def _on_click(self, event: events.Click) -> None:
+        at = event.style.meta.get("option")
+        if at is not None and at >= self.option_count:
+            event.prevent_default()
+
+
+class Ask(Dialog):
+    """Ask for a line; Enter gives it, Escape leaves it.
+
+    Parameters
+    ----------
+    text
+        What stands there already.
+    choices
+        What may be chosen instead of typing.
+    free
+        Whether something else may be typed, but not nothing; otherwise what is typed searches the
+        choices, and the answer is the number of one.
+    chosen
+        The choice that is highlighted at first; `None` for none.
+    """
+
+    LEAVE = "escape"
+
+    def __init__(
+        self,
+        question: str,
+        text: str = "",
+        choices: Sequence[str] = (),
+        *,
+        free: bool = True,
+        yes: str = "save",
+        chosen: int | None = None,
+    ) -> None:
+        hint = "type to search" if not free else "type, or choose below with ↑ ↓" if choices else ""
+        line = Input(text, max_length=200, select_on_focus=False, placeholder=hint)
+        self._choices, self._free, self._first = choices, free, chosen
+        self._list = _Choices(markup=False)
+        parts = [Words((question, "bold"), id="question"), line, *([self._list] * bool(choices))]
+        keys = f"{'↑ ↓ ' * bool(choices)}Enter: {yes}   Esc: cancel"
+        super().__init__(*parts, keys=keys, large=bool(choices))
+
+    def on_mount(self) -> None:
+        super().on_mount()
+        self._fill("")
+        if self._choices:
+            self._list.highlighted = self._first
+
+    def _fill(self, query: str) -> None:
+        """List the choices that fit."""
+        matcher = Matcher(query)
+        self._list.clear_options()
+        self._list.add_options(
+            Option(choice, str(at))
+            for at, choice in enumerate(self._choices)
+            if not query or matcher.match(choice)
+        )
+
+    @on(Input.Changed)
+    def _typed(self, event: Input.Changed) -> None:
+        if not self._free and self._list.is_mounted:
+            self._fill(event.value)
+            self._list.action_first()
+
+    def move(self, by: int) -> None:
+        """Take the previous or next of the list."""
+        if self._choices:
+            super().move(by)
+            option = self._list.highlighted_option
+            if self._free and option is not None and option.id is not None:
+                self.query_one(Input).value = self._choices[int(option.id)]
+
+    @on(OptionList.OptionSelected)
+    def _clicked(self, event: OptionList.OptionSelected) -> None:
+        if self._free:
+            self.query_one(Input).value = self._choices[event.option_index]
+        else:
+            self.action_say()
+
+    @on(Input.Submitted)
+    def action_say(self) -> None:
+        """Give the line, or the number of the choice."""
+        typed, option = self.query_one(Input).value, self._list.highlighted_option
+        if not self._free:
+            self.dismiss(int(option.id) if option is not None and option.id else None)
+        elif typed.strip() or not self._choices:
+            self.dismiss(typed)
+        else:
+            self.query_one("#how", Words).say("✗ type or choose a reason first")

@@ -1,0 +1,99 @@
+"""The page: whatever face it is given, as many parts of it as the screen has room for."""
+
+from __future__ import annotations
+
+from itertools import zip_longest
+from typing import TYPE_CHECKING
+
+from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
+from textual.widgets import Digits
+
+from rig.tui.scale import painted
+from rig.tui.widgets.figure import Figure
+from rig.tui.widgets.spans import SpanView
+from rig.tui.widgets.text import Words
+
+if TYPE_CHECKING:
+    from textual.app import ComposeResult
+
+    from rig.tui.desk import Desk, Face
+
+_FIGURES = 4
+_WIDE, _NORMAL = 160, 100
+"""Columns for three parts beside each other, and for two; on fewer there is room for one."""
+
+
+class Page(Vertical):
+    """Head, then drawing, plots and tables beside each other, then foot."""
+
+    def compose(self) -> ComposeResult:
+        with VerticalScroll(id="top", can_focus=False):
+            yield Words(id="head")
+        with Horizontal(id="parts"):
+            with VerticalScroll(id="menu", can_focus=False):
+                yield Words(id="list")
+            yield SpanView(id="drawing")
+            with Grid(id="plots"):
+                yield from (Figure() for _ in range(_FIGURES))
+            with VerticalScroll(id="tables", can_focus=False):
+                yield Words(id="words")
+        yield Words(id="foot")
+        yield Digits("3", id="count")
+
+    def tables_width(self) -> int:
+        """Columns of the tables, as they were laid out last."""
+        return max(20, (self.query_one("#tables").size.width or self.app.size.width) - 3)
+
+    def show(self, face: Face, desk: Desk, *, fresh: bool) -> None:
+        """Draw a face; `fresh` where another page was shown before."""
+        for name, content in (("head", face.head), ("list", face.menu), ("words", face.words),
+                              ("foot", face.foot)):  # fmt: skip
+            words = self.query_one(f"#{name}", Words)
+            words.say(content)
+            words.display = bool(content.plain)
+        self.query_one("#menu").display = bool(face.menu.plain)
+        self._parts(face, desk)
+        count = self.query_one(Digits)
+        count.display = bool(face.digits)
+        count.update(face.digits)
+        if fresh:
+            for name in ("top", "tables"):
+                self.query_one(f"#{name}", VerticalScroll).scroll_home(animate=False)
+
+    def _parts(self, face: Face, desk: Desk) -> None:
+        """Show as many parts as there is room for, beginning with the one that was turned to."""
+        columns, lines = self.app.size
+        room = 3 if columns >= _WIDE else 2 if columns >= _NORMAL else 1
+        room = max(1, room + 1 - face.beside)
+        there = {"drawing": face.drawing is not None, "plots": bool(face.pictures),
+                 "tables": bool(face.words.plain)}  # fmt: skip
+        order = ("tables", "drawing", "plots") if face.top else tuple(there)
+        parts = [part for part in order if there[part]]
+        turned = desk.part % len(parts) if len(parts) > room else 0
+        shown = [*parts[turned:], *parts[:turned]][:room]
+        for part in there:
+            self.query_one(f"#{part}").display = part in shown
+        if face.drawing is not None and "drawing" in shown:
+            view = self.query_one("#drawing", SpanView)
+            view.take(painted(face.drawing, view.size.width or 38, view.size.height or 16))
+        most = (
+            face.beside * (2 if columns >= _WIDE and lines >= 40 else 1)
+            if columns >= _NORMAL
+            else 1
+        )
+        turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
+        pictures = [*face.pictures[turn:], *face.pictures[:turn]][: most * ("plots" in shown)]
+        self.query_one("#plots").set_class(most > 1 and face.beside > 1, "-pairs")
+        for figure, picture in zip_longest(self.query(Figure), pictures):
+            figure.show(picture, face.moment)
+
+    def scroll_tables(self, by: int) -> None:
+        """Scroll what is longer than its place."""
+        for part in self.query(VerticalScroll):
+            if part.id != "menu":
+                part.scroll_relative(y=by, animate=False)
+
+    def show_row(self, line: int) -> None:
+        """Scroll the list so that a line of it is seen."""
+        menu = self.query_one("#menu", VerticalScroll)
+        menu.scroll_to(y=line - menu.size.height // 2, animate=False)

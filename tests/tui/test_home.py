@@ -1,0 +1,51 @@
+"""From an empty folder, without a daemon, to a first result; and nothing is wrong before it is."""
+
+import shutil
+
+from rig.campaign.machine import Stage
+from rig.tui.app import RigApp
+from rig.tui.context import Options
+from tests.tui.lab import KEYS, Operator, flat, run, short_folder
+
+KEYS_AT_MOST = 4
+
+
+def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
+    folder = short_folder()
+    (folder / "work").mkdir()
+    monkeypatch.chdir(folder / "work")
+    pressed = []
+
+    async def work():
+        options = Options(socket=folder / "rig.sock", countdown_s=0.2, still_s=0.0)
+        app = RigApp(options, KEYS)
+        async with app.run_test(size=(80, 24)) as pilot:
+            op = Operator(app, pilot)
+            await op.sees("HOME", "Try it", "New experiment", "no rig yet", "Enter open")
+            await op.press("escape")
+            await pilot.pause(0.3)
+            assert "✗" not in flat(app)
+            assert "supply" not in flat(app)
+            assert app.driver.stop is None
+
+            async def press(key):
+                pressed.append(key)
+                await op.press(key)
+
+            await press("enter")
+            await op.at(Stage.DEVICE)
+            await op.until(lambda: app.view and app.indicators.known and app.client.driving)
+            await press("enter")
+            await op.at(Stage.PREPARE)
+            await op.sees("Run 1 of 10", "Enter arms")
+            await pilot.pause(0.7)  # it stands there to be read
+            await press("enter")
+            await op.at(Stage.RESULT)
+            await op.sees("g = 9.")
+            trial = app.client.daemon
+            assert trial.poll() is None
+        assert trial.poll() is not None
+
+    run(work())
+    assert len(pressed) <= KEYS_AT_MOST
+    shutil.rmtree(folder)
