@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.frame import Findings
 from bench.studies.baselines import TimerReading, plain_fit
+from bench.studies.columns import Column, aligned
 from bench.studies.errors import Errors
 from bench.studies.figures import estimators_figure
 from bench.studies.sessions import with_device
@@ -20,7 +21,6 @@ from rig.analysis.quantities import COMPUTED, Adjusted, measurands
 from rig.analysis.result import GOOD
 from rig.commands.output import say
 from rig.errors import InputError
-from rig.report.columns import Column, aligned
 from rig.threads import one_thread
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from bench.frame import Findings
+from bench.studies.columns import Column, aligned
 from bench.studies.sessions import with_device
 from rig.analysis.components import stated
 from rig.analysis.joint_fit import FEWEST
@@ -19,7 +20,6 @@ from rig.estimate.session import estimate
 from rig.measurands import MEASURANDS
 from rig.protocol.reader import read
 from rig.ready import ready_protocol
-from rig.report.columns import Column, aligned
 from rig.report.estimate import symbol
 
 if TYPE_CHECKING:

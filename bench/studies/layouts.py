@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.frame import Findings
 from bench.studies.baselines import plain_fit
+from bench.studies.columns import Column, filled
 from bench.studies.disturbances import DOUBLED, STACK
 from bench.studies.figures import layouts_figure
 from bench.studies.layout_catalogue import LAYOUTS, chosen
@@ -26,7 +27,6 @@ from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.plan import runs
-from rig.report.columns import Column, filled
 from rig.text_table import text_table
 from rig.threads import one_thread
 
