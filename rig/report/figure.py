@@ -137,7 +137,7 @@ def chart(name: str, *panels: Mapping[str, Any], **values: object) -> Chart:
 
 
 def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[Panel]:
-    """Draw panels from their rows, without those that stay empty."""
+    """Draw panels from their rows; without those that stay empty, but for maps."""
     panels: list[Panel] = []
     scale = 1.0
     for kind, *cells in rows:
@@ -153,7 +153,7 @@ def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[P
             panels += residual_panels(panels[-1].x, _points(cells, sources))
         else:
             panels[-1].series.extend(_traces(kind, cells, sources, scale))
-    return [panel for panel in panels if panel.series]
+    return [panel for panel in panels if panel.series or "traces" in sources]
 
 
 def _traces(

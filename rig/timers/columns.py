@@ -16,7 +16,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from rig.timers import vocabulary
-from rig.timers.table import HEADER, Row, RowBlock, Table, count_known, find_time_base
+from rig.timers.edge_rows import HEADER
+from rig.timers.table import Row, RowBlock, Table, count_known, find_time_base
 from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, is_number, normal, words
 
 if TYPE_CHECKING:

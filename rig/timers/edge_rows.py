@@ -6,12 +6,14 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from rig.timers.moments import seconds
-from rig.timers.table import HEADER
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from rig.records import Drop
+
+HEADER = ("run", "channel", "time_s", "state")
+"""Of the project's own format, in which every line is a row."""
 
 
 def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:

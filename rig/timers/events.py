@@ -10,12 +10,13 @@ from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.timers.columns import Signal, TimerColumn, find_signals, roles
+from rig.timers.edge_rows import HEADER
 from rig.timers.moments import TICK_HZ, moment, picoseconds, seconds
-from rig.timers.table import HEADER, Row
 from rig.timers.vocabulary import number_of, state_of
 
 if TYPE_CHECKING:
     from rig.timers.problems import ProblemList
+    from rig.timers.table import Row
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -56,6 +57,15 @@ def check_is_file(path: str | Path) -> None:
         require_file(path)
     except OSError as error:
         raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
+
+
+def is_cut(path: str | Path) -> bool:
+    """Whether a file may end in the middle of its last number."""
+    with Path(path).open("rb") as stream:
+        stream.seek(-min(_START, Path(path).stat().st_size), os.SEEK_END)
+        lines = stream.read().replace(b"\0", b"").split(b"\n")[-2:]
+    before, last = (re.search(rb"[.,](\d*)\W*$", line) for line in (lines[0], lines[-1]))
+    return before is not None and last is not None and len(last[1]) < len(before[1])
 
 
 def find_kind(path: str | Path) -> str:

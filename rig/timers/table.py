@@ -17,14 +17,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.timers import vocabulary
+from rig.timers.edge_rows import HEADER
 from rig.timers.vocabulary import LONGEST, POWERS, is_measured, is_number, is_value, words
 
 if TYPE_CHECKING:
     from rig.arrays import Array
     from rig.timers.problems import ProblemList
 
-HEADER = ("run", "channel", "time_s", "state")
-"""Of the project's own format, in which every line is a row."""
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
 _CHUNK = 4096

@@ -17,12 +17,13 @@ from pathlib import Path
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
 from rig.timers.columns import VALUES, columns_of
+from rig.timers.edge_rows import HEADER
 from rig.timers.events import FilePart, RowReader
-from rig.timers.lines import find_kind, read_lines
+from rig.timers.lines import find_kind, is_cut, read_lines
 from rig.timers.moments import TICK_HZ, moment
 from rig.timers.problems import ProblemList
 from rig.timers.samples import read_samples
-from rig.timers.table import HEADER, Row, RowBlock, Table
+from rig.timers.table import Row, RowBlock, Table
 from rig.timers.vcd import BEGINNINGS, vcd_rows
 from rig.timers.vocabulary import LONGEST, number_of, recognise_format
 
@@ -99,11 +100,13 @@ def read_timer_file(path: str | Path, unit: str | None = None) -> TimerFile:
         Every fault of the file at its line and column, or what it is instead.
     """
     try:
-        return _read(read_lines(path), unit, ProblemList(str(path), _HINT))
+        file = _read(read_lines(path), unit, ProblemList(str(path), _HINT))
     except InputError as error:
         if error.problems and (kind := find_kind(path)):
             ProblemList(str(path)).refuse(1, 1, "other_kind", kind=kind)
         raise
+    file.notes += [make_reason("last_line_cut")] if is_cut(path) else []
+    return file
 
 
 def _read(lines: Iterator[str], unit: str | None, problems: ProblemList) -> TimerFile:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
     from rig.tui.plotting import Picture
     from rig.tui.scale import Drawing
-    from rig.tui.survey import Reading, Row
+    from rig.tui.survey import ProtocolFile, Row
 
 T = TypeVar("T")
 REPLAY_S = 6.0
@@ -103,7 +103,7 @@ class Desk:
         """The row of the home page that Enter takes."""
         return self.rows[self.row % len(self.rows)] if self.rows else None
 
-    def reading(self, file: Path) -> Reading:
+    def reading(self, file: Path) -> ProtocolFile:
         """A protocol, read again when it changed: it may be open in an editor beside this."""
         try:
             changed_ns = file.stat().st_mtime_ns

@@ -52,7 +52,7 @@ class SessionEntry(NamedTuple):
     trouble: str = ""
 
 
-class Reading(NamedTuple):
+class ProtocolFile(NamedTuple):
     """A protocol, and what is wrong with its file; empty where it can be used."""
 
     protocol: Protocol | None
@@ -149,7 +149,7 @@ def _boards() -> Iterator[Row]:
             yield Row("Connect a board", "board", title, value=port.path)
 
 
-def read_file(file: Path) -> Reading:
+def read_file(file: Path) -> ProtocolFile:
     """Read a protocol, and say what is wrong with it at which line."""
     protocol = None
     try:
@@ -158,8 +158,8 @@ def read_file(file: Path) -> Reading:
         check_recordable(protocol)
     except InputError as error:
         lines = [plain(problem, 300) for problem in error.problems]
-        return Reading(protocol, "\n".join(lines or [plain(error.message), plain(error.hint)]))
-    return Reading(protocol)
+        return ProtocolFile(protocol, "\n".join(lines or [plain(error.message), plain(error.hint)]))
+    return ProtocolFile(protocol)
 
 
 def session_list(folder: Path) -> list[SessionEntry]:

@@ -306,3 +306,13 @@ def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
 
 def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
     assert faults(tmp_path, "time (s),state\n0.1,1\n" + "1" * 20_001 + "\n") == [(3, 1, "")]
+
+
+@pytest.mark.parametrize(
+    ("end", "is_said"), [("0.647812", False), ("0.6478", True), ("0.6478\n", False), ("0", False)]
+)
+def test_a_number_that_may_be_cut_off_is_said(tmp_path, end, is_said):
+    path = tmp_path / "export.txt"
+    path.write_text(f"Time (s)\n0.251234\n0.262345\n0.473456\n{end}", "utf-8")
+    notes = {note.code for note in read_timer_file(path).notes}
+    assert ("last_line_cut" in notes) is is_said

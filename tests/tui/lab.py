@@ -165,6 +165,7 @@ class Lab:
         """Sit down with the first run prepared."""
         async with self.operator(size, countdown_s) as operator:
             await operator.until(lambda: operator.app.client and operator.app.client.driving)
+            await operator.until(lambda: operator.app.desk.chosen)
             await operator.press("enter")
             await operator.at(Stage.DEVICE)
             await operator.until(lambda: operator.app.view and operator.app.indicators.known)

@@ -20,7 +20,7 @@ def test_a_chosen_protocol_is_described_once_with_what_the_model_notes(lab, monk
     monkeypatch.setattr(screen, "notes", lambda protocol: asked.append(protocol) or notes(protocol))
 
     async def work():
-        async with lab.operator(size=(160, 90)) as op:
+        async with lab.operator(size=(160, 120)) as op:
             await op.at(Stage.PROTOCOL)
             await op.sees("note: 0°: rods gather on a pile", "recording: 1.5 s")
             for _ in range(3):
