@@ -69,12 +69,11 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class PlotAxis:
-    """An axis: its label with the unit, names in place of numbers, limits, whole numbers only."""
+    """An axis: its label with the unit, names in place of numbers, limits."""
 
     label: str
     names: Mapping[float, str] = field(default_factory=dict)
     limits: tuple[float, float] | None = None
-    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +88,11 @@ class Panel:
     series: list[Trace]
     height: float = 120.0
     true: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing lies between whole numbers of x, such as of runs."""
+        return all(place.is_integer() for trace in self.series for place in trace.x)
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,9 +124,8 @@ def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
 
 def _set_up(axes: Axes, panel: Panel, *, numbered: bool) -> None:
     """Set limits, ticks and labels of both axes."""
-    whole = all(place.is_integer() for trace in panel.series for place in trace.x)
     for axis, about in ((axes.xaxis, panel.x), (axes.yaxis, panel.y)):
-        integer = whole and about is panel.x
+        integer = panel.whole and about is panel.x
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=integer))
         if about.names:
             axis.set_ticks([*about.names], [*about.names.values()])

@@ -144,7 +144,7 @@ def plotted(
     numbers = [*upright.ticks.values(), *(lower.ticks.values() if strip else ())]
     margin = 1 + max((len(_number(value)) for value in numbers), default=0)
     columns = max(1, width - margin - 1)
-    x = axis_over(*_spread(panel), columns, _TICK_COLUMNS, whole=panel.x.whole)
+    x = axis_over(*_spread(panel), columns, _TICK_COLUMNS, whole=panel.whole)
     out = [_legend(panel, width), *_drawn(panel, x, upright, moment, margin)]
     if residuals is not None:
         head = f" {_one_line(residuals.y.label)} "[:columns]
@@ -157,7 +157,7 @@ def _spread(panel: Panel) -> tuple[float, float]:
     """Take the horizontal ends that are given, or those of the data."""
     x = panel.x
     places = [place for trace in panel.series for place in trace.x] or [0.0]
-    low, high = x.limits or (min(places) - 0.5 * x.whole, max(places) + 0.5 * x.whole)
+    low, high = x.limits or (min(places) - 0.5 * panel.whole, max(places) + 0.5 * panel.whole)
     return (low, high) if low < high else (low - 0.5, low + 0.5)
 
 
