@@ -21,14 +21,14 @@ from rig.tui.actions import ACTIONS, help_text, shown_key
 from rig.tui.follow import open_live
 from rig.tui.replay import Player
 from rig.tui.survey import session_list
-from rig.tui.widgets.dialogs import Ask, Confirm, Reader
+from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from rig.tui.app import RigApp
-    from rig.tui.survey import Row, SessionEntry
+    from rig.tui.survey import Beginning, SessionEntry
 
 
 REASONS = (
@@ -72,7 +72,7 @@ def _go_on(app: RigApp) -> None:
 # ------------------------------------------------------------------ home
 
 
-def _open(app: RigApp, row: Row) -> None:
+def _open(app: RigApp, row: Beginning) -> None:
     """Open an experiment with the rig that is there, or in simulation where there is none."""
     client = app.client
     if client is None or row.file is None or app.desk.reading(row.file).problem:
@@ -90,7 +90,7 @@ def _open(app: RigApp, row: Row) -> None:
         app.begin(app.driver.open_session(*files, app.options.seed))
 
 
-def _connect(app: RigApp, row: Row) -> None:
+def _connect(app: RigApp, row: Beginning) -> None:
     """Go to a board; what was a trial ends."""
     if app.client is not None and row.value:
         app.driver.asked = None
@@ -100,20 +100,20 @@ def _connect(app: RigApp, row: Row) -> None:
         app.tell("plug the board in by USB; it appears here by itself")
 
 
-def _flash(app: RigApp, row: Row) -> None:
+def _flash(app: RigApp, row: Beginning) -> None:
     question = "What was on the board is replaced."
     _confirm(app, "Write the firmware?", question, "flash",
              lambda: app.begin(_run(app, "flash", *row.value.split())))  # fmt: skip
 
 
-def _new(app: RigApp, row: Row) -> None:
+def _new(app: RigApp, row: Beginning) -> None:
     """Have a protocol drafted, under a name that is free."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
     name = next(name for name in names if not Path(name).exists())
     app.begin(_run(app, "new", name, "--scene", row.value, "--yes"))
 
 
-def _end_other(app: RigApp, row: Row) -> None:
+def _end_other(app: RigApp, row: Beginning) -> None:
     """Ask, then end the daemon that stands in the way."""
     client = app.client
     if client is None or client.in_the_way is None:
@@ -129,7 +129,7 @@ def _end_other(app: RigApp, row: Row) -> None:
     _confirm(app, "End it?", question, "end it", end)
 
 
-_BEGIN: dict[str, Callable[[RigApp, Row], object]] = {
+_BEGIN: dict[str, Callable[[RigApp, Beginning], object]] = {
     "try": _open,
     "open": _open,
     "board": _connect,
@@ -359,7 +359,7 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "previous": lambda app: _move(app, -1),
     "next": lambda app: _move(app, 1),
     "theme": lambda app: app.next_theme(),
-    "help": lambda app: app.ask(Reader(help_text(app.keys, wide=app.size.width >= 120))),
+    "help": lambda app: app.ask(TextDialog(help_text(app.keys, wide=app.size.width >= 120))),
     "palette": _palette,
     "quit": _quit,
     "go_on": _go_on,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
     from rig.tui.plotting import Picture
     from rig.tui.scale import Drawing
-    from rig.tui.survey import ProtocolFile, Row
+    from rig.tui.survey import Beginning, ProtocolFile
 
 T = TypeVar("T")
 REPLAY_S = 6.0
@@ -83,7 +83,7 @@ class Desk:
         self.other: SessionView | None = None
         self.chart = self.part = 0
         self.row = -1  # none yet
-        self.rows: list[Row] = []
+        self.rows: list[Beginning] = []
         self.opened: Path | None = None  # the protocol that was opened here last
         self.replayed: Job | None = None
         self._latest: dict[str, tuple[object, Any]] = {}
@@ -99,7 +99,7 @@ class Desk:
         return value
 
     @property
-    def chosen(self) -> Row | None:
+    def chosen(self) -> Beginning | None:
         """The row of the home page that Enter takes."""
         return self.rows[self.row % len(self.rows)] if self.rows else None
 
@@ -111,7 +111,7 @@ class Desk:
             changed_ns = -1
         return self.latest("reading", (file, changed_ns), lambda: read_file(file))
 
-    def begin_with(self, rows: list[Row]) -> None:
+    def begin_with(self, rows: list[Beginning]) -> None:
         """List what can be begun, and keep the row that was chosen."""
         before, self.rows = self.chosen, rows
         self.row = rows.index(before) if before in rows else first_row(rows, self.options)

@@ -51,7 +51,7 @@ class Picture(NamedTuple):
     residuals: Panel | None = None
 
 
-class Axis(NamedTuple):
+class CellAxis(NamedTuple):
     """Units a character, such that numbers stand in the middle of characters.
 
     Attributes
@@ -93,7 +93,7 @@ def _middle(dots: int) -> float:
     return 0.5 * (dots - 1)
 
 
-def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = False) -> Axis:
+def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = False) -> CellAxis:
     """Find the axis that shows a range as large as there is room.
 
     Parameters
@@ -111,13 +111,13 @@ def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = 
     power = math.floor(math.log10(span / cells))
     steps = [share * 10.0**exponent for exponent in range(power, power + 4) for share in (1, 2, 5)]
     axes = [
-        Axis(step / every, math.floor(low * every / step + 0.5), cells, every)
+        CellAxis(step / every, math.floor(low * every / step + 0.5), cells, every)
         for step in steps
         if step >= 1.0 or not whole
         for every in range(least, 1 + min(cells, int(step * cells / span)))
     ]
     fitting = [axis for axis in axes if axis.value(cells - 0.5) >= high and len(axis.ticks) > 1]
-    bare = Axis(span / max(1, cells - 1), 0, cells, cells)
+    bare = CellAxis(span / max(1, cells - 1), 0, cells, cells)
     return min(fitting, key=lambda axis: (len(axis.ticks) < 3, axis.unit), default=bare)
 
 
@@ -187,7 +187,7 @@ def _number(value: float) -> str:
 
 
 def _drawn(
-    panel: Panel, x: Axis, y: Axis, moment: float | None, margin: int
+    panel: Panel, x: CellAxis, y: CellAxis, moment: float | None, margin: int
 ) -> Iterator[list[Span]]:
     """Draw traces on one pair of axes, behind the upright one."""
     sheet = Sheet(x.cells, y.cells, _COLORS)
@@ -204,7 +204,7 @@ def _drawn(
         yield [Span(f"{number:>{margin}}{'┤' if number else '│'}"), *line]
 
 
-def _draw(sheet: Sheet, trace: Trace, x: Axis, y: Axis) -> None:
+def _draw(sheet: Sheet, trace: Trace, x: CellAxis, y: CellAxis) -> None:
     ink = _COLORS.index(_color(trace))
     values, off = np.asarray(trace.y, dtype=np.float64), np.asarray(trace.u, dtype=np.float64)
     down = ROWS * y.cells - 1.0 - y.at(values, ROWS)
@@ -227,7 +227,7 @@ def _draw(sheet: Sheet, trace: Trace, x: Axis, y: Axis) -> None:
         sheet.strokes(np.stack([places[:-1], places[1:]], axis=1), ink)
 
 
-def _foot(label: str, axis: Axis, margin: int) -> Iterator[list[Span]]:
+def _foot(label: str, axis: CellAxis, margin: int) -> Iterator[list[Span]]:
     """Write the horizontal axis with its name in it, and its numbers below."""
     line, below = ["─"] * axis.cells, [" "] * (margin + 2 + axis.cells)
     for column, value in axis.ticks.items():

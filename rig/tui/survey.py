@@ -59,7 +59,7 @@ class ProtocolFile(NamedTuple):
     problem: str = ""
 
 
-class Row(NamedTuple):
+class Beginning(NamedTuple):
     """One thing to begin with.
 
     Attributes
@@ -82,7 +82,7 @@ class Row(NamedTuple):
     session: Path | None = None
 
 
-def look_around(options: Options, port: str, other: str) -> list[Row]:
+def look_around(options: Options, port: str, other: str) -> list[Beginning]:
     """List what can be begun, from the folder, the ready protocols, and what USB lists.
 
     Parameters
@@ -99,18 +99,18 @@ def look_around(options: Options, port: str, other: str) -> list[Row]:
     files = [*{path.resolve(): path for path in own if path.resolve() not in ready}.values()]
     named = {path.name: path for path in (*ready, *files)}
     scenes = [
-        Row(section, kind, title, named.get(f"{name}.yaml"), value)
+        Beginning(section, kind, title, named.get(f"{name}.yaml"), value)
         for row in _SCENES.splitlines()
         for section, kind, name, value, title in [map(str.strip, row.split("|"))]
     ]
     boards = [*_boards()]
     if other:
-        boards.append(Row("Connect a board", "end", f"end {other}, which runs already"))
+        boards.append(Beginning("Connect a board", "end", f"end {other}, which runs already"))
     if not boards and not port:
-        boards.append(Row("Connect a board", "board", "none is plugged in"))
+        boards.append(Beginning("Connect a board", "board", "none is plugged in"))
     sessions = session_list(Path())
     going = [
-        Row("Continue", "open", f"{entry.path.stem}, {entry.over} of {entry.runs}",
+        Beginning("Continue", "open", f"{entry.path.stem}, {entry.over} of {entry.runs}",
             named[entry.source], "sim://" * entry.simulated, entry.path)
         for entry in sessions if entry.over < entry.runs and entry.source in named
     ]  # fmt: skip
@@ -118,14 +118,14 @@ def look_around(options: Options, port: str, other: str) -> list[Row]:
         *(row for row in scenes if row.kind == "try"),
         *boards,
         *going[:3],
-        *(Row("Experiments here", "open", path.stem, path) for path in files),
+        *(Beginning("Experiments here", "open", path.stem, path) for path in files),
         *(row for row in scenes if row.kind == "new"),
-        *(Row("Open results", "results", f"of {entry.path.stem}") for entry in sessions[:1]),
-        *(Row("Ready experiments", "open", path.stem, path) for path in ready),
+        *(Beginning("Open results", "results", f"of {entry.path.stem}") for entry in sessions[:1]),
+        *(Beginning("Ready experiments", "open", path.stem, path) for path in ready),
     ]
 
 
-def first_row(rows: list[Row], options: Options) -> int:
+def first_row(rows: list[Beginning], options: Options) -> int:
     """Choose the row to begin with: what is unfinished, what can be used here, or a trial."""
     sections = "Continue" * (not options.port), "Experiments here", "Ready experiments"
     places = [
@@ -136,17 +136,17 @@ def first_row(rows: list[Row], options: Options) -> int:
     return min(places, default=(False, 0, 0))[2]
 
 
-def _boards() -> Iterator[Row]:
+def _boards() -> Iterator[Beginning]:
     from rig.flash.drive import waiting_drives  # noqa: PLC0415 - not needed to paint
     from rig.usb.listing import serial_ports  # noqa: PLC0415 - nor is this
 
     for _ in waiting_drives():
         title = "Raspberry Pi Pico: put the firmware on it"
-        yield Row("Connect a board", "flash", title, value="pico")
+        yield Beginning("Connect a board", "flash", title, value="pico")
     for port in serial_ports():
         if port.candidate:
             title = f"{port.kind} at {port.path}"
-            yield Row("Connect a board", "board", title, value=port.path)
+            yield Beginning("Connect a board", "board", title, value=port.path)
 
 
 def read_file(file: Path) -> ProtocolFile:

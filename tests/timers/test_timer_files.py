@@ -309,7 +309,7 @@ def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("end", "is_said"), [("0.647812", False), ("0.6478", True), ("0.6478\n", False), ("0", False)]
+    ("end", "is_said"), [("0.647812", False), ("0.6478", True), ("0.6478\n", False), ("1", False)]
 )
 def test_a_number_that_may_be_cut_off_is_said(tmp_path, end, is_said):
     path = tmp_path / "export.txt"

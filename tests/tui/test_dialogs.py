@@ -7,7 +7,7 @@ from textual.widgets import Input
 
 from rig.campaign.events import Stage
 from rig.session.store import Session
-from rig.tui.widgets.dialogs import Ask, Confirm, Reader
+from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
 from tests.tui.lab import DAEMON, run
 
 
@@ -43,7 +43,7 @@ def test_stop_works_on_every_page_and_in_every_dialog(lab):
             await op.press("3")
             for opens, dialog, key in (
                 ("l", Confirm, "f9"), ("l", Confirm, "escape"),
-                ("question_mark", Reader, "f9"), ("question_mark", Reader, "escape"),
+                ("question_mark", TextDialog, "f9"), ("question_mark", TextDialog, "escape"),
             ):  # fmt: skip
                 await op.press(opens)
                 await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rig.tui.desk import Desk
     from rig.tui.model import Model
     from rig.tui.scale import Drawing
-    from rig.tui.survey import Row
+    from rig.tui.survey import Beginning
 
 _FALLEN = 0.7  # of the way down, in the small pictures
 _DOES = {
@@ -58,7 +58,7 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     return Face(Content(""), picture, words=Content("\n").join(parts), menu=_menu(desk), top=True)
 
 
-def _into(model: Model, desk: Desk, row: Row) -> str:
+def _into(model: Model, desk: Desk, row: Beginning) -> str:
     """Say where the experiment is carried out, and which file it makes."""
     session = plain(row.session or desk.options.session or "")
     rig = model.port or "a simulation: no board is connected"

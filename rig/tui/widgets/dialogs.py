@@ -73,7 +73,7 @@ class Confirm(Dialog):
         super().__init__(words, keys=f"Enter: {yes}   any other key: stay")
 
 
-class Reader(Dialog):
+class TextDialog(Dialog):
     """Something long to be read; any key but the arrows closes it."""
 
     def __init__(self, text: Content) -> None:
