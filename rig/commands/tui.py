@@ -14,7 +14,6 @@ from pathlib import Path
 from rig.daemon.socket_path import require_sockets
 from rig.errors import InputError
 from rig.ports import check_name
-from rig.ready import ready_protocols
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
@@ -59,7 +58,6 @@ def _options(arguments: Namespace) -> Options:
     else:
         folders = (Path("protocols"), Path())
         files = tuple(path for folder in folders for path in sorted(folder.glob("[!.]*.yaml")))
-        files = files or tuple(ready_protocols().values())
     offline = bool(arguments.session) and not (
         arguments.port or arguments.protocol or arguments.socket
     )
