@@ -231,6 +231,7 @@ async def _looks(
     client = FakeClient(shot.state)
     app = RigApp(options, keys, client)
     app.driver.flow = shot.flow
+    app.desk.replayed = shot.flow.job  # its slow motion is over
     if shot.state.section("session"):
         app.follower.look_with(live)
     found = []
@@ -246,7 +247,6 @@ async def _looks(
         if shot.page == "history":
             app.desk.players["history"] = Player(0, _REPLAYED_S)
             app.turn("history")
-        app.desk.replayed = shot.flow.job  # its slow motion is over
         await until(lambda: app.page == shot.page and (app.view or app.desk.rows))
         # All edges came at once, which looks like flicker for a while.
         await until(lambda: _all_counted(app, shot) and _quiet(app))
