@@ -71,6 +71,6 @@ def test_a_daemon_of_another_port_is_named(lab):
 
     async def work():
         async with lab.operator() as op:
-            await op.sees("the daemon has sim://?seed=3, not sim://?seed=99", "--socket")
+            await op.sees("the daemon has sim://?seed=3, not sim://?seed=99", "--name")
 
     run(work())
