@@ -99,16 +99,23 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
         app = RigApp(Options(session=other, offline=True), KEYS)
         async with app.run_test(size=(120, 36)) as pilot:
             op = Operator(app, pilot)
+
+            async def enter():  # which right behind letters may be part of what was pasted
+                await op.press("enter")
+                return len(app.screen_stack) == 1
+
             await op.sees("No drop recorded yet")
             await op.press("o")
             await op.sees("abba.session", "4 drops", "broken.session")
-            await op.press(*"abba", "enter")
+            await op.press(*"abba")
+            await op.until(enter)
             await op.sees("drop 1 of 4", "abba.session")
             await op.press("6", "up")
             await op.sees("drop 4 of 4")
             await op.press("o")
             await op.sees("broken.session")
-            await op.press(*"broken", "enter")
+            await op.press(*"broken")
+            await op.until(enter)
             await op.sees("✗", "drop 4 of 4")
 
     run(work())
