@@ -119,7 +119,7 @@ class DropModel:
         return _model_of(_Condition(protocol, content, tuple(records))).changed(
             records={record.role: record for record in records},
             pairings=_pairings(records),
-            guesses=stated_guesses(protocol, records) if guesses is None else guesses,
+            guesses=_stated_guesses(protocol, records) if guesses is None else guesses,
             clock_u=clock_u,
             components=components or stated(protocol),
         )
@@ -380,7 +380,7 @@ class _Condition:
 @lru_cache(maxsize=64)
 def _model_of(condition: _Condition) -> DropModel:
     protocol, records = condition.protocol, condition.records
-    return DropModel(protocol, records, stated_guesses(protocol, records), 0.0)
+    return DropModel(protocol, records, _stated_guesses(protocol, records), 0.0)
 
 
 def _expectations(record: ChainRecord) -> tuple[object, ...]:
@@ -392,7 +392,7 @@ def _expectations(record: ChainRecord) -> tuple[object, ...]:
     return (*fields, gates, len(record.trains), *(array.tobytes() for array in arrays))
 
 
-def stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
+def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
     """Let chains begin as stated."""
     kappa, _ = prior_air(protocol)
     return {record.role: Guess(0.0, protocol.drop.value, record.alpha, kappa) for record in records}

@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.equations import STRAY, linearize, scaled
 from rig.analysis.fit import Matched
-from rig.analysis.square_root import RowSum, eliminate, square_root
+from rig.analysis.square_root import EquationRows, condensed, eliminate, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,17 +86,18 @@ def joint_step(
     Root, list of JointDrop
         In units of `sd`; and the drops with their own unknowns eliminated.
     """
-    rows, reduced = RowSum(x.size), []
+    rows: list[EquationRows] = []
+    reduced = []
     for drop in drops:
         own_sd, pull = drop.model.unknowns.sd, np.zeros(drop.x.size)
         off = drop.x[drop.own] if drop.centre is None else drop.x[drop.own] - drop.centre
         pull[drop.own] = scaled(off, own_sd[drop.own])
         blocks = [*linearize(drop.model, drop.matches, drop.x, cut=cut).rows.values()]
         inverse, gain, target, rest = eliminate(blocks, own_sd, pull, drop.own, drop.common)
-        rows.add(rest._replace(columns=drop.here))
+        rows = condensed([*rows, rest._replace(columns=drop.here)], x.size)
         reduced.append(replace(drop, inverse=inverse, gain=gain, target=target))
     pull = scaled(x if centre is None else x - centre, sd)
-    return square_root([rows.rows()], np.ones(x.size), pull), reduced
+    return square_root(rows, np.ones(x.size), pull), reduced
 
 
 def take(

@@ -79,31 +79,6 @@ class Root(NamedTuple):
         return Root(stack[:size, :size], stack[:size, size])
 
 
-class RowSum:
-    """Rows of many blocks in few: more than some are reduced to a triangle as they come.
-
-    Parameters
-    ----------
-    size
-        Number of unknowns.
-    """
-
-    def __init__(self, size: int) -> None:
-        self._columns = np.arange(size, dtype=np.intp)
-        self._blocks: list[EquationRows] = []
-
-    def add(self, block: EquationRows) -> None:
-        """Count a block's rows."""
-        self._blocks.append(block)
-        if sum(block.left.size for block in self._blocks) > _MANY * (self._columns.size + 1):
-            self._blocks = [self.rows()]
-
-    def rows(self) -> EquationRows:
-        """Return all of them, in no more rows than there are unknowns and one."""
-        reduced = _stacked(self._blocks, self._columns, np.zeros(0))
-        return EquationRows(reduced[:, :-1], reduced[:, -1], self._columns)
-
-
 class Eliminated(NamedTuple):
     """Some unknowns o eliminated from observations of these and others c: o = own − gain·c.
 
@@ -165,6 +140,21 @@ def eliminate(
     return Eliminated(
         inverse, beside[:, :-1], -beside[:, -1], EquationRows(last[:, :-1], last[:, -1], common)
     )
+
+
+def condensed(blocks: list[EquationRows], size: int) -> list[EquationRows]:
+    """Return the same sum of squares in few rows: where there are many they become a triangle.
+
+    Parameters
+    ----------
+    size
+        Number of unknowns.
+    """
+    if sum(block.left.size for block in blocks) <= _MANY * size:
+        return blocks
+    columns = np.arange(size)
+    reduced = _stacked(blocks, columns, np.zeros(0))
+    return [EquationRows(reduced[:, :-1], reduced[:, -1], columns)]
 
 
 def _eliminate_private(

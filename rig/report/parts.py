@@ -78,11 +78,6 @@ def summary_incline(line: Incline) -> str:
     return "" if acceleration_in(line.means) else degrees(line.incline_deg)
 
 
-def main_error(line: Incline) -> float | None:
-    """Eₙ of the first of the quantities, which is what the scene is for."""
-    return line.normalized_error(next(iter(line.means)))
-
-
 def means_parts(summary: Sequence[Incline]) -> list[Part]:
     """Return the means of each measurand beside the model; unlike chains have a line each."""
     return [part for row in averaged() for part in tables("model", means_of(summary, row), row=row)]

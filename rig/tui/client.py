@@ -55,6 +55,8 @@ class ReconnectingClient:
         How long the daemon may take to answer a sign of life.
     lost
         Why the port was lost last, for who says so when it is back, which may be a moment later.
+    is_trial
+        Whether that one simulates for this screen alone, and ends with it.
     in_the_way
         Port and process of a daemon that has another port than the wanted one; empty for none.
     """
@@ -79,7 +81,7 @@ class ReconnectingClient:
         self._wants_control = True
         self._started_at = -_START_S
         self._port = ""
-        self._is_trial = False
+        self.is_trial = False
 
     @property
     def idle(self) -> bool:
@@ -158,7 +160,7 @@ class ReconnectingClient:
         await asyncio.to_thread(self.end_trial)
         usual = self._usual_path
         self.path = usual.with_name(f"trial-{os.getpid()}.sock") if trial else usual
-        self.url, self._is_trial, self._started_at = url, trial, -_START_S
+        self.url, self.is_trial, self._started_at = url, trial, -_START_S
         self._wants_control, self.in_the_way, self.silence = True, None, "connecting"
         if self._client is not None:
             await self._client.close()
@@ -166,11 +168,11 @@ class ReconnectingClient:
 
     def end_trial(self) -> None:
         """End the simulation that was begun for this screen alone."""
-        if self._is_trial and self.daemon is not None:
+        if self.is_trial and self.daemon is not None:
             self.daemon.terminate()
             self.daemon.wait()
             self.path.with_suffix(".log").unlink(missing_ok=True)
-            self.daemon, self._is_trial = None, False
+            self.daemon, self.is_trial = None, False
 
     async def keep(self) -> None:
         """Connect, and connect again, until cancelled."""

@@ -176,6 +176,8 @@ def _close(app: RigApp) -> None:
 def _quit(app: RigApp) -> None:
     """Ask, then leave."""
     question = "The rig keeps running after you quit." if app.client else ""
+    if app.client and app.client.is_trial:
+        question = "The simulation ends too. What it has recorded stays in its file."
     _confirm(app, "Quit?", question, "quit", app.exit)
 
 

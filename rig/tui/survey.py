@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -92,9 +94,9 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
     other
         The port of a daemon that stands in the way of the wanted one; empty for none.
     """
-    from rig.ready import ready_protocol  # noqa: PLC0415 - not needed to paint
+    from rig.ready import ready_protocols  # noqa: PLC0415 - not needed to paint
 
-    ready = sorted(ready_protocol("falling-ball").parent.glob("*.yaml"))
+    ready = [*ready_protocols().values()]
     own = [*options.files, *sorted(Path().glob("[!.]*.yaml"))]
     files = [*{path.resolve(): path for path in own if path.resolve() not in ready}.values()]
     named = {path.name: path for path in (*ready, *files)}
@@ -166,14 +168,23 @@ def session_list(folder: Path) -> list[SessionEntry]:
     """List the sessions of a folder, the newest first."""
     dated = []
     for path in folder.glob("*.session"):
-        try:
+        with suppress(OSError):  # gone meanwhile
             dated.append((path.stat().st_mtime_ns, path))
-        except OSError:
-            continue  # gone meanwhile
-    return [_look(path) for _, path in sorted(dated, reverse=True)[:_MOST]]
+    return [_look(path, _change(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
 
 
-def _look(path: Path) -> SessionEntry:
+def _change(path: Path) -> tuple[tuple[int, int, int], ...]:
+    """Tell a session file, and what was written beside it, from what they were before."""
+    stats = []
+    for file in (path, path.with_name(f"{path.name}-wal")):
+        with suppress(OSError):
+            stat = file.stat()
+            stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))
+    return tuple(stats)
+
+
+@lru_cache(maxsize=_MOST)  # the home page lists them again and again
+def _look(path: Path, _: object) -> SessionEntry:
     from rig.protocol.plan import runs  # noqa: PLC0415 - not needed to paint
     from rig.results import protocol_of  # noqa: PLC0415 - nor is this
     from rig.session.store import Session  # noqa: PLC0415 - nor is this

@@ -9,6 +9,8 @@ import pytest
 from bench.pictures import seen
 from rig.analysis.quantities import COMPUTED
 from rig.measurands import MEASURANDS, Measurand
+from rig.results.live import LiveAnalysis
+from rig.tui.drop_words import number_table
 from tests.tui.lab import KEYS
 from tests.tui.screen import text_of
 
@@ -80,3 +82,5 @@ def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path):
     assert "could not be made" not in page
     screens = {name: text for name, *_, text in seen(session, KEYS, (), SIZE, ["dark"], text_of)}
     assert BLOW.symbol in screens["session"]
+    view = LiveAnalysis(session).read()
+    assert BLOW.symbol in number_table(view, view.jobs[-1]).plain  # behind Tab on the result page

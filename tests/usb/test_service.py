@@ -1,14 +1,12 @@
 """The units that are shipped for systemd."""
 
 import configparser
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
 from rig.cli import _parser
-from tests.waiting import PATIENCE_S
+from tests.usb.systemd import IS_HERE, complaints_of
 
 ROOT = Path(__file__).parents[2]
 UNITS = pytest.mark.parametrize(
@@ -27,15 +25,7 @@ def test_it_starts_a_command_that_there_is(unit):
     assert _parser().parse_args(arguments).module == "daemon"
 
 
-@pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="needs systemd-analyze")
+@pytest.mark.skipif(not IS_HERE, reason="needs systemd-analyze")
 @UNITS
 def test_systemd_understands_it(unit):
-    done = subprocess.run(
-        ["systemd-analyze", "verify", unit],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE_S,
-    )
-    complaints = [line for line in done.stderr.splitlines() if unit.name in line]
-    assert complaints == []
+    assert complaints_of(unit) == []
