@@ -102,7 +102,8 @@ def zipped(files: Mapping[str, bytes], compression: int = zipfile.ZIP_DEFLATED) 
 def is_bundle(path: str | os.PathLike[str]) -> bool:
     """Whether a bundle is meant: an archive, by its name or its end, or a folder."""
     place = Path(path)
-    return place.suffix == ".eln" or place.is_dir() or zipfile.is_zipfile(place)
+    is_archive = place.is_file() and zipfile.is_zipfile(place)  # a pipe would be waited for
+    return place.suffix == ".eln" or place.is_dir() or is_archive
 
 
 def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[str]]:
