@@ -44,6 +44,8 @@ class ChainFall:
         By how much the model's release is later than the fire stamp, so that it meets the points.
     end_s
         When all of it has struck or passed the last gate, by the model and by the points.
+    lies
+        Whether what arrives at the contact point stays there.
     """
 
     role: Side
@@ -53,6 +55,7 @@ class ChainFall:
     model: Trajectory | None
     delay_s: float
     end_s: float
+    lies: bool = False
 
     @property
     def length(self) -> float:
@@ -118,9 +121,8 @@ def motions(
             lowest = min(gate.height for gate in gates.on(role)) - rods.chain.length
             struck = float(model.time[-1]) if model.hits is not None else 0.0
             end = delay + (struck or float(model.times(np.array([lowest]))[0]))
-        falls.append(
-            ChainFall(role, rods, times, heights, model, delay, max([end, *times.tolist()]))
-        )
+        end, lies = max([end, *times.tolist()]), role == "impact" and protocol.surface is not None
+        falls.append(ChainFall(role, rods, times, heights, model, delay, end, lies))
     return tuple(falls)
 
 

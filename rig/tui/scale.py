@@ -37,6 +37,14 @@ class Stroke(NamedTuple):
     color: str
 
 
+class Rod(NamedTuple):
+    """Height above the lowest rod, m, and from its middle to its right end."""
+
+    place: float
+    across: float
+    up: float
+
+
 class Lamp(NamedTuple):
     """Channel of a gate, and where its beam begins, m."""
 
@@ -55,6 +63,37 @@ class Drawing(NamedTuple):
     top_m: float
     apart_m: float | None = None
     lamps: tuple[Lamp, ...] = ()
+
+
+class SceneFrame(NamedTuple):
+    """What of the world is shown, m: widths of a side, ends of its posts, and of the picture."""
+
+    pitch: float
+    low: float
+    high: float
+    bottom: float
+    top: float
+
+    def middle(self, column: int) -> float:
+        """Where the middle of a side is."""
+        return self.pitch * (2.0 * column + 1.2)
+
+
+def frame_of(protocol: Protocol, falls: Sequence[ChainFall]) -> SceneFrame:
+    """Find room for what falls and its gates.
+
+    Parameters
+    ----------
+    protocol
+        Its heights above the contact point of this run.
+    """
+    pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
+    length = max((fall.length for fall in falls), default=0.0)
+    heights = [gate.height for gate in protocol.gates.gates] if protocol.gates else [0.0]
+    low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
+    # A free chain that passes the contact point is shown as far down as one that struck it lies.
+    bottom = -0.35 * length if protocol.surface else low - length
+    return SceneFrame(pitch, low, high, bottom, protocol.drop.value + length + _MARGIN_M)
 
 
 def drawing(
@@ -78,15 +117,10 @@ def drawing(
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
     lamps: list[Lamp] = []
-    pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
-    half, length = 0.5 * pitch, max((fall.length for fall in falls), default=0.0)
-    heights = [gate.height for gate in protocol.gates.gates] if protocol.gates else [0.0]
-    low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
-    # A free chain that passes the contact point is shown as far down as one that struck it lies.
-    bottom = -0.35 * length if protocol.surface else low - length
-    top = protocol.drop.value + length + _MARGIN_M
+    pitch, low, high, bottom, top = frame = frame_of(protocol, falls)
+    half = 0.5 * pitch
     for column, fall in enumerate(falls):
-        middle = pitch * (2.0 * column + 1.2)
+        middle = frame.middle(column)
         left, right = middle - half, middle + half
         strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
         for gate in protocol.gates.on(fall.role) if protocol.gates else ():
@@ -146,23 +180,36 @@ def _rod_m(rods: RodChain) -> float:
     return rods.rod_length or _WIDTH_M
 
 
+def outline(protocol: Protocol, rods: RodChain, shown_m: float) -> tuple[float, list[Rod]]:
+    """Return the radius of what is round, 0 for rods, and each rod from its middle to an end.
+
+    Parameters
+    ----------
+    shown_m
+        Height of the whole picture.
+    """
+    if protocol.vocabulary.part == "object":
+        return max(0.5 * rods.widths[0], _BALL * shown_m), [Rod(0.0, 0.0, 0.0)]
+    half, tilt = 0.5 * _rod_m(rods), math.radians(rods.tilt_deg)
+    across, up = half * math.cos(tilt), half * math.sin(tilt)
+    places = enumerate(rods.chain.heights)
+    return 0.0, [Rod(place, across, up if number % 2 else -up) for number, place in places]
+
+
 def _rods(
     protocol: Protocol, fall: ChainFall, x: float, height: float, color: str, shown_m: float
 ) -> Iterator[Stroke]:
     """Rods on their strings; those that struck lie at the contact point. An object is round."""
-    rods = fall.rods
-    half = 0.5 * _rod_m(rods)
-    if protocol.vocabulary.part == "object":
-        radius = max(0.5 * rods.widths[0], _BALL * shown_m)
+    radius, rods = outline(protocol, fall.rods, shown_m)
+    if radius:
         corners = ((-1, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
         around = [(x + radius * across, height + radius * up) for across, up in corners]
         yield from (Stroke(*start, *end, color) for start, end in pairwise(around))
         return
-    lies = fall.role == "impact" and protocol.surface is not None
-    for number, place in enumerate(rods.chain.heights):
-        z = height + place
-        tilt = math.radians(rods.tilt_deg if number % 2 else -rods.tilt_deg)
-        if lies and z < 0.0:
-            z, tilt = 0.0, 0.0
-        across, up = half * math.cos(tilt), half * math.sin(tilt)
-        yield Stroke(x - across, z - up, x + across, z + up, color)
+    for rod in rods:
+        z = height + rod.place
+        if fall.lies and z < 0.0:
+            half = math.hypot(rod.across, rod.up)
+            yield Stroke(x - half, 0.0, x + half, 0.0, color)
+        else:
+            yield Stroke(x - rod.across, z - rod.up, x + rod.across, z + rod.up, color)
