@@ -8,35 +8,41 @@ import os
 import signal
 import socket
 import sys
-from contextlib import suppress
+import time
+from typing import Any
 
 from rig.board.page import SCRIPT_DIGEST, BoardPage
 from rig.board.server import PageServer
 
 _NICE = 5
-_LOOK_S = 1.0
+_LOOK_S, _LATEST_S = 1.0, 10.0  # from one look to the next
+_RESTS = 25.0  # times as long as it worked, or it would cost more than 4 % of a core
 
 
 async def serve(address: str, listener: socket.socket) -> None:
     """Serve the page until the daemon has ended, which its line tells."""
     loop = asyncio.get_running_loop()
-    reader = asyncio.StreamReader(limit=1 << 16)
+    reader = asyncio.StreamReader()
     await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
-    page, server = BoardPage(address), PageServer(SCRIPT_DIGEST)
+    page, server, news = BoardPage(address), PageServer(SCRIPT_DIGEST), dict[str, Any]()
+
+    async def hear() -> None:
+        async for line in reader:
+            news.update(json.loads(line))
+
     server.show(page.look({}) or "")
-    serving = loop.create_task(server.serve(listener))
-    news: dict[str, object] = {}
-    while not serving.done():
-        with suppress(TimeoutError):
-            async with asyncio.timeout(_LOOK_S):
-                line = await reader.readline()
-                if not line:
-                    return
-                news = json.loads(line)
-        text = await asyncio.to_thread(page.look, news)
+    tasks = [loop.create_task(hear()), loop.create_task(server.serve(listener))]
+    done: set[asyncio.Task[None]] = set()
+    while not done:
+        begun = time.process_time()
+        text = await asyncio.to_thread(page.look, dict(news))
         if text is not None:
             server.show(text)
-    serving.result()
+        rest_s = _RESTS * (time.process_time() - begun)
+        rest_s = min(max(_LOOK_S, rest_s), _LATEST_S)
+        done, _ = await asyncio.wait(tasks, timeout=rest_s, return_when=asyncio.FIRST_COMPLETED)
+    for task in done:
+        task.result()
 
 
 def main() -> None:
