@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.tui.context import Options
 
+HERE = "Experiments here"
 _MOST = 200
 """Session files that are listed, the newest."""
 _SCENES = """\
@@ -120,16 +121,19 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
         *(row for row in scenes if row.kind == "try"),
         *boards,
         *going[:3],
-        *(Beginning("Experiments here", "open", path.stem, path) for path in files),
+        *(Beginning(HERE, "open", path.stem, path) for path in files),
         *(row for row in scenes if row.kind == "new"),
-        *(Beginning("Open results", "results", f"of {entry.path.stem}") for entry in sessions[:1]),
+        *(Beginning("Open results", "results", f"of {entry.path.stem}") for entry in sorted(sessions, key=lambda entry: bool(entry.trouble))[:1]),
         *(Beginning("Ready experiments", "open", path.stem, path) for path in ready),
     ]
 
 
 def first_row(rows: list[Beginning], options: Options) -> int:
-    """Choose the row to begin with: what is unfinished, what can be used here, or a trial."""
-    sections = "Continue" * (not options.port), "Experiments here", "Ready experiments"
+    """Choose the row to begin with: what stands in the way, is unfinished, is here, or a trial."""
+    for at, row in enumerate(rows):
+        if row.kind == "end":
+            return at
+    sections = "Continue" * (not options.port), HERE, "Ready experiments"
     places = [
         (bool(read_file(row.file).problem), sections.index(row.section), at)
         for at, row in enumerate(rows)
