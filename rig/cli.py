@@ -175,6 +175,11 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     ),
     "name": _accept("letters, digits, - and _", str, _is_name),
     "rig": lambda _: {"dest": "socket"} | _accept("letters, digits, - and _", _socket, bool)(""),
+    "address": _accept(
+        ":8080 for this computer alone, HOST:8080 or 0.0.0.0:8080 for others too",
+        lambda text: (text.rpartition(":")[0].strip("[]") or "localhost", int(text.split(":")[-1])),
+        lambda address: 0 <= address[1] < 1 << 16,
+    ),
     "port": _accept(
         "a device path, or a URL such as sim://, or auto",
         lambda text: sole_port() if text == "auto" else text,

@@ -9,6 +9,7 @@ import signal
 import socket
 import sys
 import time
+from contextlib import suppress
 from typing import Any
 
 from rig.board.page import SCRIPT_DIGEST, BoardPage
@@ -21,37 +22,26 @@ _RESTS = 25.0  # times as long as it worked, or it would cost more than 4 % of a
 
 async def serve(address: str, listener: socket.socket) -> None:
     """Serve the page until the daemon has ended, which its line tells."""
-    loop = asyncio.get_running_loop()
-    reader = asyncio.StreamReader()
-    await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
     page, server, news = BoardPage(address), PageServer(SCRIPT_DIGEST), dict[str, Any]()
+    over, loop = asyncio.Event(), asyncio.get_running_loop()
 
-    async def hear() -> None:
-        async for line in reader:
-            news.update(json.loads(line))
+    def hear() -> None:
+        if lines := os.read(0, 1 << 16).splitlines():
+            news.update(json.loads(lines[-1]))
+        else:
+            over.set()
 
-    server.show(page.look({}) or "")
-    tasks = [loop.create_task(hear()), loop.create_task(server.serve(listener))]
-    done: set[asyncio.Task[None]] = set()
-    while not done:
-        begun = time.process_time()
-        text = await asyncio.to_thread(page.look, dict(news))
-        if text is not None:
-            server.show(text)
-        rest_s = _RESTS * (time.process_time() - begun)
-        rest_s = min(max(_LOOK_S, rest_s), _LATEST_S)
-        done, _ = await asyncio.wait(tasks, timeout=rest_s, return_when=asyncio.FIRST_COMPLETED)
-    for task in done:
-        task.result()
-
-
-def main() -> None:
-    """Serve with what the daemon gave: the page's address, and a socket that listens."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is for the daemon
-    os.nice(_NICE)
-    _, address, descriptor = sys.argv
-    asyncio.run(serve(address, socket.socket(fileno=int(descriptor))))
+    loop.add_reader(0, hear)
+    async with await server.start(listener):
+        while not over.is_set():
+            begun = time.process_time()
+            server.show(await asyncio.to_thread(page.look, dict(news)))
+            rest_s = _RESTS * (time.process_time() - begun)
+            with suppress(TimeoutError):
+                await asyncio.wait_for(over.wait(), min(max(_LOOK_S, rest_s), _LATEST_S))
 
 
 if __name__ == "__main__":
-    main()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is for the daemon
+    os.nice(_NICE)
+    asyncio.run(serve(sys.argv[1], socket.socket(fileno=int(sys.argv[2]))))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import re
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -26,11 +25,6 @@ if TYPE_CHECKING:
     from rig.report.figure import Chart
     from rig.results.live import SessionView
 
-_NOTHING = dict.fromkeys(
-    ("simulated", "blind", "trouble", "now", "said", "good", "past", "picture", "figure", "caption",
-     "together"), "",
-)  # fmt: skip
-"""What `board.html` shows beside the title."""
 _NOW = {"armed": "is armed", "fired": "falls"}
 _HERE = Path(__file__).parent
 SCRIPT = (_HERE / "board.js").read_text("utf-8")
@@ -47,13 +41,13 @@ class BoardPage:
     """
 
     def __init__(self, address: str) -> None:
-        from jinja2 import FileSystemLoader  # noqa: PLC0415 - pages only
+        from jinja2 import FileSystemLoader, Undefined  # noqa: PLC0415 - pages only
 
         self.address = address
         self._live: LiveAnalysis | None = None
         self._seen: object = None
         self._drawn: tuple[object, dict[str, Any]] = None, {}
-        self._template = environment().overlay(loader=FileSystemLoader(_HERE)).get_template
+        self._templates = environment().overlay(loader=FileSystemLoader(_HERE), undefined=Undefined)
         self._shell = {
             "address": address,
             "code": "" if is_local(address) else _qr_code(address),
@@ -89,7 +83,7 @@ class BoardPage:
             return self._render({"title": title, "trouble": f"{error.message} ({error.hint})"})
 
     def _render(self, about: dict[str, Any]) -> str:
-        text: str = self._template("board.html").render(_NOTHING | about | self._shell)
+        text: str = self._templates.get_template("board.html").render(about | self._shell)
         return text
 
     def _about(self, live: LiveAnalysis, news: dict[str, Any]) -> dict[str, Any]:
@@ -134,7 +128,6 @@ def _drawn(view: SessionView, job: Job | None) -> dict[str, Any]:
         "past": past_runs(view, job) if job is not None else "",
         "picture": moving_picture(view.protocol, run, falls) if falls else None,
         "figure": "" if chart is None else _svg(chart),
-        "caption": "" if chart is None else _caption(chart),
         "together": bool(view.fitted),
     }
 
@@ -145,12 +138,6 @@ def _svg(chart: Chart) -> str:
 
     panels = [panel for panel in chart.panels if not panel.y.label.startswith("residual")]
     return page_svg(replace(chart, panels=panels), COLUMN_PT, "slim")
-
-
-def _caption(chart: Chart) -> str:
-    """Return what is said below a figure, but of the panels that are left out."""
-    sentences = re.split(r"(?<=[.;]) ", chart.caption)
-    return " ".join(sentence for sentence in sentences if "panel" not in sentence)
 
 
 def _qr_code(address: str) -> str:

@@ -10,7 +10,6 @@ import asyncio
 import json
 import logging
 import os
-import re
 import socket
 import subprocess
 import sys
@@ -24,12 +23,8 @@ if TYPE_CHECKING:
     from rig.recorder.published import PublishedState
 
 log = logging.getLogger(__name__)
-_BACKLOG = 256
-_LAST_PORT = 65535
 _TELL_S = 0.25
-_ACCEPTED = ":8080 for this computer alone, HOST:8080 or 0.0.0.0:8080 for others too"
 _SOMEWHERE = ("192.0.2.1", 9)  # TEST-NET-1 (RFC 5737); nothing is sent there
-_LOCAL = "localhost"
 
 
 class BoardProcess:
@@ -37,8 +32,8 @@ class BoardProcess:
 
     Parameters
     ----------
-    place
-        ``:PORT``, ``HOST:PORT`` or ``[IPv6]:PORT``.
+    host, port
+        Where it is seen; port 0 for any that is free.
 
     Attributes
     ----------
@@ -48,31 +43,24 @@ class BoardProcess:
     Raises
     ------
     InputError
-        It is no such place, or it cannot be had.
+        There is no such host here, or another program has the port.
     """
 
-    def __init__(self, place: str) -> None:
-        parts = re.fullmatch(r"(?:\[([\w:.%]+)\]|([\w.-]*)):(\d{1,5})", place, re.ASCII)
-        if parts is None or int(parts[3]) > _LAST_PORT:
-            raise InputError(f"--board: found '{place}'", f"accepted: {_ACCEPTED}")
-        host = parts[1] or parts[2] or _LOCAL
+    def __init__(self, host: str, port: int) -> None:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
-            family, *_, name = socket.getaddrinfo(
-                host, int(parts[3]), type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-            )[0]
-            with socket.create_server(name[:2], family=family, backlog=_BACKLOG) as listener:
-                port = listener.getsockname()[1]
-                self.address = _address(host, str(name[0]), port)
-                command = [sys.executable, "-m", "rig.board", self.address]
-                self._process = subprocess.Popen(
-                    [*command, str(listener.fileno())],
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.DEVNULL,
-                    pass_fds=[listener.fileno()],
-                )
+            listener = socket.create_server((host, port), family=family)
         except OSError as error:
-            why = error.strerror or error
-            raise InputError(f"--board {place}: {why}", f"accepted: {_ACCEPTED}") from error
+            raise InputError(f"--board {host}:{port}: {error}", "another HOST:PORT") from error
+        with listener:
+            self.address = _address(host, listener.getsockname()[1])
+            descriptor = listener.fileno()
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "rig.board", self.address, str(descriptor)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                pass_fds=[descriptor],
+            )
         assert self._process.stdin is not None
         self._line = self._process.stdin.fileno()
         os.set_blocking(self._line, False)
@@ -93,9 +81,10 @@ class BoardProcess:
         await asyncio.Event().wait()  # the rig goes on without it
 
     @property
-    def local(self) -> bool:
-        """Whether no other computer sees the page."""
-        return is_local(self.address)
+    def words(self) -> str:
+        """Where the page is, and for whom."""
+        who = "on this computer only" if is_local(self.address) else "for everyone who reaches it"
+        return f"{who}: {self.address}"
 
     def close(self) -> None:
         """End the page."""
@@ -105,13 +94,13 @@ class BoardProcess:
 
 def is_local(address: str) -> bool:
     """Whether a page's address is of this computer alone."""
-    return urlsplit(address).hostname in {_LOCAL, "127.0.0.1", "::1"}
+    return urlsplit(address).hostname in {"localhost", "127.0.0.1", "::1"}
 
 
-def _address(host: str, numbers: str, port: int) -> str:
+def _address(host: str, port: int) -> str:
     """Return the page's address as a browser elsewhere needs it."""
-    if numbers in {"0.0.0.0", "::"}:  # noqa: S104 - only where the user said so
-        host = _LOCAL
+    if host in {"0.0.0.0", "::"}:  # noqa: S104 - only where the user said so
+        host = socket.gethostname()
         with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.connect(_SOMEWHERE)
             host = probe.getsockname()[0]

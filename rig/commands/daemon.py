@@ -8,21 +8,16 @@ import os
 import queue
 import threading
 from argparse import Namespace
-from contextlib import closing, nullcontext, suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from rig.board.process import BoardProcess
 from rig.commands.output import say
 from rig.daemon.listener import notify_systemd
 from rig.daemon.server import Server, logging_to
 from rig.daemon.socket_path import default_socket, require_sockets
 from rig.link.port import check_url
 from rig.printable import printable
-
-if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
-
-    from rig.board.process import BoardProcess
 
 _WAITING = 1000  # lines that a terminal which does not take them may be behind
 _LAST_S = 1.0  # for the last lines, when it still does not
@@ -66,28 +61,20 @@ def main(arguments: Namespace) -> int:
 
     def ready() -> None:
         say(f"rig daemon: {arguments.port} at {path}")
-        if board is not None:
-            seen = "on this computer only" if board.local else "for everyone who reaches it"
-            say(f"rig daemon: page to look on, {seen}: {board.address}")
+        for board in boards:
+            say(f"rig daemon: page to look on, {board.words}")
         notify_systemd()
 
-    with logging_to(StderrHandler()), _page(arguments.board) as board:
+    with logging_to(StderrHandler()), ExitStack() as stack:
+        places = [] if arguments.board is None else [arguments.board]
+        boards = [stack.enter_context(closing(BoardProcess(*place))) for place in places]
         server = Server(
             arguments.port,
             path,
             tcp=arguments.tcp,
             idle_s=arguments.idle_timeout,
-            onlookers=[] if board is None else [board.follow],
+            onlookers=[board.follow for board in boards],
         )
         asyncio.run(server.run(ready))
     say("rig daemon: ended")
     return 0
-
-
-def _page(place: str | None) -> AbstractContextManager[BoardProcess | None]:
-    """Start the page on which others look on, where it is wanted."""
-    if place is None:
-        return nullcontext()
-    from rig.board.process import BoardProcess  # noqa: PLC0415 - few daemons have a page
-
-    return closing(BoardProcess(place))

@@ -27,9 +27,7 @@ SLOW_DISK_S = 0.5
 """A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
 HOT = frozenset({*BEFORE_RELEASE, Stage.LIVE})
 UNDER_WAY = HOT | {Stage.JUDGING}
-_ALONE = (
-    "a fired drop is recorded without this screen; in danger, switch the release's supply off"
-)
+_ALONE = "a fired drop is recorded without this screen; in danger, switch the release's supply off"
 _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
 """Where a watcher is, by the state of the drop."""

@@ -123,7 +123,10 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
         *going[:3],
         *(Beginning(HERE, "open", path.stem, path) for path in files),
         *(row for row in scenes if row.kind == "new"),
-        *(Beginning("Open results", "results", f"of {entry.path.stem}") for entry in sorted(sessions, key=lambda entry: bool(entry.trouble))[:1]),
+        *(
+            Beginning("Open results", "results", f"of {entry.path.stem}")
+            for entry in sorted(sessions, key=lambda entry: bool(entry.trouble))[:1]
+        ),
         *(Beginning("Ready experiments", "open", path.stem, path) for path in ready),
     ]
 

@@ -67,6 +67,6 @@ def test_what_is_new_comes_by_itself_under_the_servers_policy(session, tmp_path)
         telling.cancel()
         return page
 
-    with closing(BoardProcess(":0")) as board:
+    with closing(BoardProcess("localhost", 0)) as board:
         page = asyncio.run(asyncio.wait_for(look(board), PATIENCE_S))
     assert 'class="rod impact"' in page
