@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.protocol.contact import at_contact
 from rig.tui.indicators import Indicators
-from rig.tui.scale import drawing, frame_of, outline
+from rig.tui.scale import drawing, outline
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,15 +28,13 @@ def moving_picture(protocol: Protocol, run: Run, falls: Sequence[ChainFall]) -> 
     falls
         As `rig.tui.motion.motions` gives them.
     """
-    here = at_contact(protocol, run.incline_deg, run.impact)
-    frame = frame_of(here, falls)
     fell = any(fall.times.size for fall in falls)
     end_s = max(fall.end_s for fall in falls) + _AFTER_S if fell else 0.0
     times = np.linspace(0.0, end_s, _MOMENTS if fell else 1)
     still = drawing(protocol, run, falls, Indicators(), 0.0)
     bodies = []
-    for column, fall in enumerate(falls):
-        radius, rods = outline(protocol, fall.rods, frame.top - frame.bottom)
+    for middle, fall in zip(still.middles, falls, strict=True):
+        radius, rods = outline(protocol, fall.rods, still.top_m - still.bottom_m)
         expected = [fall.expected(time) for time in times]
         measured = [fall.measured(time) for time in times]
         seen = [
@@ -48,7 +45,7 @@ def moving_picture(protocol: Protocol, run: Run, falls: Sequence[ChainFall]) -> 
             {
                 "role": fall.role if len(falls) > 1 else "impact",
                 "words": _words(protocol, run, fall),
-                "x": round(1e3 * frame.middle(column)),
+                "x": round(1e3 * middle),
                 "radius": 1e3 * radius,
                 "rods": [_mm(rod) for rod in rods],
                 "top": _mm([fall.length])[0],
@@ -61,8 +58,8 @@ def moving_picture(protocol: Protocol, run: Run, falls: Sequence[ChainFall]) -> 
         )
     return {
         "width": round(1e3 * still.width_m),
-        "bottom": round(1e3 * frame.bottom),
-        "top": round(1e3 * frame.top),
+        "bottom": round(1e3 * still.bottom_m),
+        "top": round(1e3 * still.top_m),
         "end_s": round(end_s, 4),
         "still": [
             [_STILL[stroke.color], *_mm(stroke[:4])]

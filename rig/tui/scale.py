@@ -55,45 +55,18 @@ class Lamp(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """Strokes, and what of the world they show, m; `apart_m` is Δz as far as it was measured."""
+    """Strokes, and what of the world they show, m.
+
+    `middles` are those of the sides, `apart_m` is Δz as far as it was measured.
+    """
 
     strokes: tuple[Stroke, ...]
     width_m: float
     bottom_m: float
     top_m: float
-    apart_m: float | None = None
-    lamps: tuple[Lamp, ...] = ()
-
-
-class SceneFrame(NamedTuple):
-    """What of the world is shown, m: widths of a side, ends of its posts, and of the picture."""
-
-    pitch: float
-    low: float
-    high: float
-    bottom: float
-    top: float
-
-    def middle(self, column: int) -> float:
-        """Where the middle of a side is."""
-        return self.pitch * (2.0 * column + 1.2)
-
-
-def frame_of(protocol: Protocol, falls: Sequence[ChainFall]) -> SceneFrame:
-    """Find room for what falls and its gates.
-
-    Parameters
-    ----------
-    protocol
-        Its heights above the contact point of this run.
-    """
-    pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
-    length = max((fall.length for fall in falls), default=0.0)
-    heights = [gate.height for gate in protocol.gates.gates] if protocol.gates else [0.0]
-    low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
-    # A free chain that passes the contact point is shown as far down as one that struck it lies.
-    bottom = -0.35 * length if protocol.surface else low - length
-    return SceneFrame(pitch, low, high, bottom, protocol.drop.value + length + _MARGIN_M)
+    middles: list[float]
+    lamps: list[Lamp]
+    apart_m: float | None
 
 
 def drawing(
@@ -117,10 +90,15 @@ def drawing(
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
     lamps: list[Lamp] = []
-    pitch, low, high, bottom, top = frame = frame_of(protocol, falls)
-    half = 0.5 * pitch
-    for column, fall in enumerate(falls):
-        middle = frame.middle(column)
+    pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
+    half, length = 0.5 * pitch, max((fall.length for fall in falls), default=0.0)
+    heights = [gate.height for gate in protocol.gates.gates] if protocol.gates else [0.0]
+    low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
+    # A free chain that passes the contact point is shown as far down as one that struck it lies.
+    bottom = -0.35 * length if protocol.surface else low - length
+    top = protocol.drop.value + length + _MARGIN_M
+    middles = [pitch * (2.0 * column + 1.2) for column in range(len(falls))]
+    for middle, fall in zip(middles, falls, strict=True):
         left, right = middle - half, middle + half
         strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
         for gate in protocol.gates.on(fall.role) if protocol.gates else ():
@@ -141,12 +119,12 @@ def drawing(
     # Δz is known as long as both chains are seen.
     until_s = min([time_s, *(float(fall.times[-1]) for fall in falls if fall.times.size)])
     tops = [z + fall.length for fall in falls if (z := fall.measured(until_s)) is not None]
-    if len(tops) < 2:
-        return Drawing(tuple(strokes), width, bottom, top, None, tuple(lamps))
-    at = 2.2 * pitch
-    strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
-    strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
-    return Drawing(tuple(strokes), width, bottom, top, tops[1] - tops[0], tuple(lamps))
+    apart_m = None
+    if len(tops) > 1:
+        at, apart_m = 2.2 * pitch, tops[1] - tops[0]
+        strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
+        strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
+    return Drawing(tuple(strokes), width, bottom, top, middles, lamps, apart_m)
 
 
 def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
@@ -154,7 +132,7 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
 
     A dot is as high as it is wide.
     """
-    strokes, width_m, bottom, top, apart_m, lamps = drawing
+    strokes, width_m, bottom, top, _, lamps, apart_m = drawing
     rows, dots = max(1, height - 1), COLUMNS * width - 1
     scale = min((ROWS * rows - 1) / (top - bottom), dots / width_m)
     left = 0.5 * (dots / scale - width_m)
@@ -172,7 +150,9 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
     inks = [_COLORS.index(stroke.color) for stroke in strokes]
     sheet.strokes(scale * (np.array([left, top]) + ends * [1.0, -1.0]), inks)
     apart = "" if apart_m is None else f"  Δz {apart_m * 1e2:.1f} cm as it falls"
-    words = [Span("model", "accent"), Span(" behind measured"), Span(apart, "success", bold=True)]
+    measured = {"primary", "secondary"} & {stroke.color for stroke in strokes}
+    behind = Span(" behind measured" * bool(measured))
+    words = [Span("model", "accent"), behind, Span(apart, "success", bold=True)]
     return [*sheet.rows(), words]
 
 

@@ -29,13 +29,15 @@ from rig.tui.widgets.text import plain
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.protocol.protocol import Run
+    from rig.protocol.protocol import Protocol, Run
     from rig.reasons import Reason
     from rig.records import Job
     from rig.results.live import SessionView
     from rig.tui.desk import Desk
     from rig.tui.model import Model
+    from rig.tui.motion import ChainFall
     from rig.tui.replay import Player
+    from rig.tui.scale import Drawing
 
 _DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
          Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}  # fmt: skip
@@ -51,18 +53,26 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     protocol, run = model.protocol, model.run
     if model.loading or protocol is None or run is None:
         return Face(Content(model.loading or next_step(model).text))
-    falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
+    falls, rig = hanging(model, desk, protocol, run)
     counting = model.stage is Stage.COUNTDOWN and model.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
     facts = f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}\nmodel  {expected}\n"
     gates = board(protocol, model.indicators, model.now_s, width)
     return Face(
         Content("\n").join([steps(model), _headline(model, run), _action(model)]),
-        drawing(protocol, run, falls, model.indicators, 0.0),
+        rig,
         desk.latest("pictures", (protocol, run), lambda: fall_pictures(falls)),
         words=Content("\n").join([Content(facts), *gates]),
         digits=f"{max(0.0, model.flow.left_s):.1f}" if counting else "",
     )
+
+
+def hanging(
+    model: Model, desk: Desk, protocol: Protocol, run: Run
+) -> tuple[tuple[ChainFall, ...], Drawing]:
+    """Draw what is to fall, and its gates as they are now; with its motion by the model."""
+    falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
+    return falls, drawing(protocol, run, falls, model.indicators, 0.0)
 
 
 def steps(model: Model) -> Content:
