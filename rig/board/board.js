@@ -10,33 +10,16 @@ const element = (parent, name, attributes, text = "") => {
   parent.append(node);
   return node;
 };
-const place = (line, x1, z1, x2, z2) =>
-  Object.entries({ x1, y1: -z1, x2, y2: -z2 }).forEach(([key, value]) => line.setAttribute(key, value));
-
-/** Draw a body once; the function that comes back moves it to a height. */
-const draw = (svg, body, kind) => {
-  const shapes = body.rods.map(() => body.radius
-    ? element(svg, "circle", { class: `rod ${kind}`, cx: body.x, r: body.radius })
-    : element(svg, "line", { class: `rod ${kind}` }));
-  return (height) => shapes.forEach((shape, number) => {
-    shape.style.display = height === null ? "none" : "";
-    if (height === null) return;
-    if (body.radius) { shape.setAttribute("cy", -height); return; }
-    let [rise, across, up] = body.rods[number], z = height + rise;
-    if (body.lies && z < 0) [z, across, up] = [0, Math.hypot(across, up), 0];
-    place(shape, body.x - across, z - up, body.x + across, z + up);
-  });
-};
 
 const play = () => {
   stop();
   const figure = document.querySelector("[data-picture]");
   if (!figure) return;
-  const { width, bottom, top, end_s: end, still: strokes, lamps, bodies } =
+  const { end_s: end, box: [width, bottom, top], names, lamps, moments, apart_cm: apart } =
     JSON.parse(figure.dataset.picture);
   const svg = figure.querySelector("svg"), button = figure.querySelector("button");
-  svg.setAttribute("viewBox", `-60 ${-top - 90} ${width + (bodies.length > 1 ? 320 : 100)} ${top - bottom + 110}`);
-  for (const [kind, ...ends] of strokes) place(element(svg, "line", { class: kind }), ...ends);
+  const two = names.length > 1, last = moments.length - 1;
+  svg.setAttribute("viewBox", `-60 ${-top - 90} ${width + (two ? 320 : 100)} ${top - bottom + 110}`);
   let lamp = null, [lastX, lastZ] = [NaN, NaN];
   for (const [channel, x, z] of lamps) {
     const near = x === lastX && Math.abs(z - lastZ) < LETTER_MM;
@@ -44,28 +27,25 @@ const play = () => {
     else lamp = element(svg, "text", { class: "lamp", x: x - 12, y: 12 - z, "text-anchor": "end" }, channel);
     [lastX, lastZ] = near ? [lastX, lastZ] : [x, z];
   }
-  for (const { x, words } of bodies) {
-    element(svg, "text", { x, y: -top - 30, "text-anchor": "middle" }, words);
-  }
-  const moves = bodies.flatMap((body) => [
-    [draw(svg, body, "model"), body.model], [draw(svg, body, body.role), body.seen]]);
-  const bracket = [1, 2, 3].map(() => element(svg, "line", { class: "apart" }));
+  for (const [x, name] of names) element(svg, "text", { x, y: -top - 30, "text-anchor": "middle" }, name);
+  const lines = Array.from({ length: Math.max(...moments.map((moment) => moment.length)) },
+    () => element(svg, "line", {}));
   const size = element(svg, "text", { class: "apart", x: width - 50 });
-  const last = bodies[0].model.length - 1;
 
-  const show = (moment) => {
-    for (const [move, heights] of moves) move(heights[moment]);
-    // Both chains are seen only so far: later nothing is known of the distance.
-    const until = Math.min(moment, ...bodies.map((body) => body.last));
-    const known = bodies.length > 1 && bodies.every((body) => until >= body.known);
-    if (known) {
-      const [low, high] = bodies.map((body) => body.seen[until] + body.top), x = width - 100;
-      place(bracket[0], x, low, x, high);
-      [low, high].forEach((z, side) => place(bracket[side + 1], x - 30, z, x + 30, z));
-      size.setAttribute("y", 25 - (low + high) / 2);
-      size.textContent = `Δz ${((high - low) / 10).toFixed(1)} cm`;
-    } else size.textContent = "";
-    for (const line of bracket) line.style.display = known ? "" : "none";
+  /** Show a moment, or how it is on its way to the next. */
+  const show = (at) => {
+    const before = Math.floor(at), now = moments[before], then = moments[Math.min(before + 1, last)];
+    const share = now.length === then.length ? at - before : 0;
+    lines.forEach((line, number) => {
+      if (number >= now.length) { line.setAttribute("class", "none"); return; }
+      const [x1, y1, x2, y2, color] = now[number].map((value, part) =>
+        (part < 4 ? (value + share * (then[number]?.[part] - value || 0)) * (part % 2 ? -1 : 1) : value));
+      Object.entries({ x1, y1, x2, y2, class: color })
+        .forEach(([key, value]) => line.setAttribute(key, value));
+    });
+    const known = apart[before] !== null;
+    size.textContent = known ? `Δz ${apart[before].toFixed(1)} cm` : "";
+    if (known) size.setAttribute("y", 25 - (now.at(-1)[1] + now.at(-2)[1]) / 2);
   };
 
   show(last);
@@ -75,7 +55,7 @@ const play = () => {
   let begun = performance.now(), halted = still.matches ? SHOWN_S : null, frame = 0;
   const tick = (now) => {
     const at = Math.max(0, (now - begun) / 1000) % (SHOWN_S + REST_S);
-    show(Math.min(last, Math.round((at / SHOWN_S) * last)));
+    show(Math.min(last, (at / SHOWN_S) * last));
     frame = requestAnimationFrame(tick);
   };
   const go = () => {

@@ -12,6 +12,7 @@ from rig.analysis.result import GOOD
 from rig.board.picture import moving_picture
 from rig.board.process import is_local
 from rig.errors import RigError
+from rig.files import file_stamp
 from rig.report import looks
 from rig.report.figure import COLUMN_PT
 from rig.report.figures import result_figure
@@ -69,8 +70,7 @@ class BoardPage:
             return self._render({"title": f"{path.name} is being read …"})
         seen: object = news
         if self._live is not None:  # a session that was closed stays on the page
-            path = self._live.path
-            seen = (news, _stamp(path), _stamp(Path(f"{path}-wal")))
+            seen = (news, file_stamp(self._live.path))
         if seen == self._seen:
             return None
         self._seen = seen
@@ -144,11 +144,3 @@ def _qr_code(address: str) -> str:
     import segno  # noqa: PLC0415 - only where others can see the page
 
     return segno.make(address, error="m", micro=False).svg_inline(border=2, omitsize=True)
-
-
-def _stamp(path: Path) -> tuple[int, int]:
-    try:
-        status = path.stat()
-    except OSError:
-        return 0, 0
-    return status.st_mtime_ns, status.st_size

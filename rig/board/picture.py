@@ -1,4 +1,4 @@
-"""A drop to scale, as the page moves it: what stands still, and where what falls is when."""
+"""A drop to scale, moment by moment, as the terminal draws it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.tui.indicators import Indicators
-from rig.tui.scale import drawing, outline
+from rig.tui.scale import drawing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, Run
     from rig.tui.motion import ChainFall
 
-_MOMENTS = 150
+_MOMENTS = 60  # between which the page moves
 _AFTER_S = 0.02
-_STILL = {"border": "post", "foreground": "beam"}
 
 
 def moving_picture(protocol: Protocol, run: Run, falls: Sequence[ChainFall]) -> dict[str, Any]:
@@ -31,56 +30,22 @@ def moving_picture(protocol: Protocol, run: Run, falls: Sequence[ChainFall]) -> 
     fell = any(fall.times.size for fall in falls)
     end_s = max(fall.end_s for fall in falls) + _AFTER_S if fell else 0.0
     times = np.linspace(0.0, end_s, _MOMENTS if fell else 1)
-    still = drawing(protocol, run, falls, Indicators(), 0.0)
-    bodies = []
-    for middle, fall in zip(still.middles, falls, strict=True):
-        radius, rods = outline(protocol, fall.rods, still.top_m - still.bottom_m)
-        expected = [fall.expected(time) for time in times]
-        measured = [fall.measured(time) for time in times]
-        seen = [
-            model if height is None and fall.times.size else height
-            for height, model in zip(measured, expected, strict=True)
-        ]
-        bodies.append(
-            {
-                "role": fall.role if len(falls) > 1 else "impact",
-                "words": _words(protocol, run, fall),
-                "x": round(1e3 * middle),
-                "radius": 1e3 * radius,
-                "rods": [_mm(rod) for rod in rods],
-                "top": _mm([fall.length])[0],
-                "lies": fall.lies,
-                "model": _mm(expected),
-                "seen": _mm(seen),
-                "known": [height is not None for height in measured].count(False),
-                "last": int(np.searchsorted(times, fall.times[-1])) - 1 if fall.times.size else 0,
-            }
-        )
+    first, *_ = drawings = [drawing(protocol, run, falls, Indicators(), time) for time in times]
+    names = [protocol.vocabulary.body]
+    if protocol.vocabulary.two_sides:
+        names = [f"{run.impact} strikes", f"{run.free} falls freely"]
+    lamps = sorted(first.lamps, key=lambda lamp: (lamp.x, -lamp.z))
     return {
-        "width": round(1e3 * still.width_m),
-        "bottom": round(1e3 * still.bottom_m),
-        "top": round(1e3 * still.top_m),
-        "end_s": round(end_s, 4),
-        "still": [
-            [_STILL[stroke.color], *_mm(stroke[:4])]
-            for stroke in still.strokes
-            if stroke.color in _STILL
+        "end_s": end_s,
+        "box": _mm(first.width_m, first.bottom_m, first.top_m),
+        "names": [*zip(_mm(*first.middles), names, strict=False)],
+        "lamps": [[lamp.channel, *_mm(lamp.x, lamp.z)] for lamp in lamps],
+        "moments": [
+            [[*_mm(*ends), color] for *ends, color in moment.strokes] for moment in drawings
         ],
-        "lamps": [
-            [lamp.channel, *_mm([lamp.x, lamp.z])]
-            for lamp in sorted(still.lamps, key=lambda lamp: (lamp.x, -lamp.z))
-        ],
-        "bodies": bodies,
+        "apart_cm": [moment.apart_m and round(1e2 * moment.apart_m, 1) for moment in drawings],
     }
 
 
-def _words(protocol: Protocol, run: Run, fall: ChainFall) -> str:
-    """Name what falls, in the words of the scene."""
-    words = protocol.vocabulary
-    if not words.two_sides:
-        return words.body
-    return f"{run.impact} strikes" if fall.role == "impact" else f"{run.free} falls freely"
-
-
-def _mm(lengths_m: Sequence[float | None]) -> list[float | None]:
-    return [None if length is None else round(1e3 * length, 1) for length in lengths_m]
+def _mm(*lengths_m: float) -> list[int]:
+    return [round(1e3 * length) for length in lengths_m]

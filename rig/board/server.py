@@ -6,6 +6,7 @@ Nothing of a request is kept, and no request makes the page: it is there when it
 from __future__ import annotations
 
 import asyncio
+import gzip
 import re
 from contextlib import suppress
 from hashlib import sha256
@@ -21,6 +22,7 @@ _WAITING_BYTES = 1 << 18
 _REQUEST = re.compile(rb"[A-Za-z]+ [!-~]+ HTTP/1\.[01]\r\n")
 _PAGE = re.compile(rb"GET /(\?\S*)? ")
 _CLOSES = re.compile(rb"(?i)\r\n(connection: *close|content-length: *[1-9]|transfer-encoding:)")
+_GZIP = re.compile(rb"(?i)\r\naccept-encoding:[^\r]*gzip")
 _ANSWER = """\
 HTTP/1.1 {status}
 Content-Security-Policy: default-src 'none'; style-src 'unsafe-inline'; \
@@ -30,6 +32,7 @@ X-Content-Type-Options: nosniff
 Referrer-Policy: no-referrer
 Cross-Origin-Resource-Policy: same-origin
 Cache-Control: no-cache
+Vary: Accept-Encoding
 Content-Type: text/html; charset=utf-8
 Content-Length: {length}
 Connection: {connection}
@@ -48,14 +51,15 @@ class PageServer:
 
     def __init__(self, script: str) -> None:
         self._script = script
-        self._page, self._tag = b"", ""
+        self._page, self._packed, self._tag = b"", b"", ""
         self._lines: dict[asyncio.StreamWriter, None] = {}  # whoever was heard last is last
 
     def show(self, page: str | None) -> None:
         """Have another page; `None` for the same."""
         if page is not None:
             self._page = page.encode("utf-8", "replace")
-            self._tag = f'"{sha256(self._page).hexdigest()[:20]}"'
+            self._packed = gzip.compress(self._page, mtime=0)
+            self._tag = f'W/"{sha256(self._page).hexdigest()[:20]}"'
 
     async def start(self, listener: socket.socket) -> asyncio.Server:
         """Begin to serve."""
@@ -102,6 +106,8 @@ class PageServer:
             status = f"304 Not Modified\nETag: {self._tag}"
         else:
             status, body = f"200 OK\nETag: {self._tag}", self._page
+            if _GZIP.search(head):
+                status, body = f"{status}\nContent-Encoding: gzip", self._packed
         closes = not head or _CLOSES.search(head)
         text = _ANSWER.format(
             status=status,

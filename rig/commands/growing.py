@@ -11,8 +11,8 @@ from rig.analysis.session import Analysis
 from rig.analysis.summary import summarize
 from rig.commands.output import has_colours, tint
 from rig.printable import printable
-from rig.runner import narration
 from rig.report.figures import result_figure
+from rig.runner import narration
 from rig.tui.plots import pictures_of
 from rig.tui.plotting import plotted
 

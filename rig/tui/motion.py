@@ -44,8 +44,6 @@ class ChainFall:
         By how much the model's release is later than the fire stamp, so that it meets the points.
     end_s
         When all of it has struck or passed the last gate, by the model and by the points.
-    lies
-        Whether what arrives at the contact point stays there.
     """
 
     role: Side
@@ -55,7 +53,6 @@ class ChainFall:
     model: Trajectory | None
     delay_s: float
     end_s: float
-    lies: bool = False
 
     @property
     def length(self) -> float:
@@ -121,8 +118,9 @@ def motions(
             lowest = min(gate.height for gate in gates.on(role)) - rods.chain.length
             struck = float(model.time[-1]) if model.hits is not None else 0.0
             end = delay + (struck or float(model.times(np.array([lowest]))[0]))
-        end, lies = max([end, *times.tolist()]), role == "impact" and protocol.surface is not None
-        falls.append(ChainFall(role, rods, times, heights, model, delay, end, lies))
+        falls.append(
+            ChainFall(role, rods, times, heights, model, delay, max([end, *times.tolist()]))
+        )
     return tuple(falls)
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _WIDTH_M = 0.1  # of a rod whose length nobody stated
 _MARGIN_M = 0.04
 _BALL = 0.012  # of the height that is shown: a smaller ball would not be seen
+_CORNERS = 17  # of what is round
 _COLORS = ("border", "foreground", "accent", "primary", "secondary", "success", "warning")
 
 
@@ -35,14 +36,6 @@ class Stroke(NamedTuple):
     to_x: float
     to_z: float
     color: str
-
-
-class Rod(NamedTuple):
-    """Height above the lowest rod, m, and from its middle to its right end."""
-
-    place: float
-    across: float
-    up: float
 
 
 class Lamp(NamedTuple):
@@ -64,9 +57,9 @@ class Drawing(NamedTuple):
     width_m: float
     bottom_m: float
     top_m: float
-    middles: list[float]
-    lamps: list[Lamp]
-    apart_m: float | None
+    apart_m: float | None = None
+    lamps: tuple[Lamp, ...] = ()
+    middles: tuple[float, ...] = ()
 
 
 def drawing(
@@ -124,7 +117,7 @@ def drawing(
         at, apart_m = 2.2 * pitch, tops[1] - tops[0]
         strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
         strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
-    return Drawing(tuple(strokes), width, bottom, top, middles, lamps, apart_m)
+    return Drawing(tuple(strokes), width, bottom, top, apart_m, tuple(lamps), tuple(middles))
 
 
 def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
@@ -132,7 +125,7 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
 
     A dot is as high as it is wide.
     """
-    strokes, width_m, bottom, top, _, lamps, apart_m = drawing
+    strokes, width_m, bottom, top, apart_m, lamps, _ = drawing
     rows, dots = max(1, height - 1), COLUMNS * width - 1
     scale = min((ROWS * rows - 1) / (top - bottom), dots / width_m)
     left = 0.5 * (dots / scale - width_m)
@@ -160,36 +153,25 @@ def _rod_m(rods: RodChain) -> float:
     return rods.rod_length or _WIDTH_M
 
 
-def outline(protocol: Protocol, rods: RodChain, shown_m: float) -> tuple[float, list[Rod]]:
-    """Return the radius of what is round, 0 for rods, and each rod from its middle to an end.
-
-    Parameters
-    ----------
-    shown_m
-        Height of the whole picture.
-    """
-    if protocol.vocabulary.part == "object":
-        return max(0.5 * rods.widths[0], _BALL * shown_m), [Rod(0.0, 0.0, 0.0)]
-    half, tilt = 0.5 * _rod_m(rods), math.radians(rods.tilt_deg)
-    across, up = half * math.cos(tilt), half * math.sin(tilt)
-    places = enumerate(rods.chain.heights)
-    return 0.0, [Rod(place, across, up if number % 2 else -up) for number, place in places]
-
-
 def _rods(
     protocol: Protocol, fall: ChainFall, x: float, height: float, color: str, shown_m: float
 ) -> Iterator[Stroke]:
     """Rods on their strings; those that struck lie at the contact point. An object is round."""
-    radius, rods = outline(protocol, fall.rods, shown_m)
-    if radius:
-        corners = ((-1, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
-        around = [(x + radius * across, height + radius * up) for across, up in corners]
+    rods = fall.rods
+    half = 0.5 * _rod_m(rods)
+    if protocol.vocabulary.part == "object":
+        radius = max(0.5 * rods.widths[0], _BALL * shown_m)
+        around = [
+            (x + radius * math.cos(angle), height + radius * math.sin(angle))
+            for angle in np.linspace(0.0, 2.0 * math.pi, _CORNERS)
+        ]
         yield from (Stroke(*start, *end, color) for start, end in pairwise(around))
         return
-    for rod in rods:
-        z = height + rod.place
-        if fall.lies and z < 0.0:
-            half = math.hypot(rod.across, rod.up)
-            yield Stroke(x - half, 0.0, x + half, 0.0, color)
-        else:
-            yield Stroke(x - rod.across, z - rod.up, x + rod.across, z + rod.up, color)
+    lies = fall.role == "impact" and protocol.surface is not None
+    for number, place in enumerate(rods.chain.heights):
+        z = height + place
+        tilt = math.radians(rods.tilt_deg if number % 2 else -rods.tilt_deg)
+        if lies and z < 0.0:
+            z, tilt = 0.0, 0.0
+        across, up = half * math.cos(tilt), half * math.sin(tilt)
+        yield Stroke(x - across, z - up, x + across, z + up, color)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import InputError, RigError
+from rig.files import file_stamp
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.tui.widgets.text import plain
@@ -177,17 +178,7 @@ def session_list(folder: Path) -> list[SessionEntry]:
     for path in folder.glob("*.session"):
         with suppress(OSError):  # gone meanwhile
             dated.append((path.stat().st_mtime_ns, path))
-    return [_look(path, _change(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
-
-
-def _change(path: Path) -> tuple[tuple[int, int, int], ...]:
-    """Tell a session file, and what was written beside it, from what they were before."""
-    stats = []
-    for file in (path, path.with_name(f"{path.name}-wal")):
-        with suppress(OSError):
-            stat = file.stat()
-            stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))
-    return tuple(stats)
+    return [_look(path, file_stamp(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
 
 
 @lru_cache(maxsize=_MOST)  # the home page lists them again and again

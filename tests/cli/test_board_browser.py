@@ -20,7 +20,8 @@ from tests.waiting import PATIENCE_S
 
 PAGES = ["board.html", "local.html"]
 DRAWN = """const page = (await visit("board.html")).contentDocument;
-tell([page.querySelectorAll(".rod").length, page.querySelector("text.apart").textContent]);"""
+const rods = page.querySelectorAll(".accent, .primary, .secondary").length;
+tell([rods, page.querySelector("text.apart").textContent]);"""
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(MISSING, reason="chromium or axe is missing")]
 
 
@@ -52,7 +53,7 @@ def test_axe_finds_nothing_and_nothing_is_too_wide(built, tmp_path, width, numbe
 
 def test_who_asks_for_less_motion_sees_how_it_ended(built, tmp_path):
     rods, apart = ask_browser(built, tmp_path, DRAWN, "--force-prefers-reduced-motion")
-    assert (rods, apart) == (4 * 25, "Δz 4.2 cm")
+    assert (rods, apart) == (4 * 25, "Δz 4.3 cm")
 
 
 def test_what_is_new_comes_by_itself_under_the_servers_policy(session, tmp_path):
@@ -69,4 +70,4 @@ def test_what_is_new_comes_by_itself_under_the_servers_policy(session, tmp_path)
 
     with closing(BoardProcess("localhost", 0)) as board:
         page = asyncio.run(asyncio.wait_for(look(board), PATIENCE_S))
-    assert 'class="rod impact"' in page
+    assert 'class="primary"' in page
