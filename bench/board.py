@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 _HEAD = """\
 # Cost of the page for onlookers
 
-`./run bench board`: `rig daemon --board` during a session of picket fences, browsers that ask each
-second. Shares are processor time, of one core."""
+`./run bench board`: processor time over one core's, while picket fences fall; browsers ask each second."""
 BROWSERS = 30
 _ASK_S = 1.0
 _LASTING_S = 60.0
