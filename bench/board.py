@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 _HEAD = """\
 # Cost of the page for onlookers
 
-`./run bench board`: processor time over one core's, while picket fences fall; browsers ask each second."""
+`./run bench board`: processor time over one core's, while picket fences fall; browsers ask each
+second."""
 BROWSERS = 30
 _ASK_S = 1.0
 _LASTING_S = 60.0

@@ -115,13 +115,8 @@ def _new(app: RigApp, row: Beginning) -> None:
     """Have a protocol drafted, under a name that is free."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
     name = next(name for name in names if not Path(name).exists())
-
-    async def write() -> None:
-        await _run(app, "new", name, "--scene", row.value, "--yes")
-        if Path(name).exists():
-            app.tell(f"{name} is written: change what differs in your rig; then Enter opens it")
-
-    app.begin(write())
+    written = f"{name} is written: change what differs in your rig; then Enter opens it"
+    app.begin(_run(app, "new", name, "--scene", row.value, "--yes", done=written))
 
 
 def _end_other(app: RigApp, row: Beginning) -> None:
@@ -281,8 +276,8 @@ def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
              lambda: app.begin(_run(app, command, str(view.path), option, target)))  # fmt: skip
 
 
-async def _run(app: RigApp, *command: str) -> None:
-    """Run a command, and say where its files are or what went wrong.
+async def _run(app: RigApp, *command: str, done: str = "") -> None:
+    """Run a command, and say what is done, or where its files are, or what went wrong.
 
     A process of its own: what it computes takes nothing from STOP.
     """
@@ -300,7 +295,7 @@ async def _run(app: RigApp, *command: str) -> None:
         await process.wait()
         raise
     lines = [line for line in output.decode("utf-8", "replace").splitlines() if line.strip()]
-    last_lines = lines[-1:] if process.returncode == 0 else lines[-2:]
+    last_lines = [done or lines[-1]] if process.returncode == 0 else lines[-2:]
     app.tell("; ".join(last_lines) or f"rig {command[0]} ended with {process.returncode}")
 
 

@@ -22,10 +22,8 @@ if TYPE_CHECKING:
 
 def face(model: Model, desk: Desk, width: int) -> Face:
     """Show what is connected, and what its gates see."""
-    protocol, run, rig = model.protocol, model.run, None
-    if protocol is not None and run is not None:
-        rig = hanging(model, desk, protocol, run)[1]
-    gates = board(protocol, model.indicators, model.now_s, width)
+    rig = hanging(model, desk)[1]
+    gates = board(model.protocol, model.indicators, model.now_s, width)
     words = [*gates, Content(""), _gate_check(model), _release(model)]
     return Face(_facts(model), rig, words=Content("\n").join(words), top=True)
 

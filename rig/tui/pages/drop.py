@@ -10,14 +10,7 @@ from rig.analysis.result import GOOD
 from rig.campaign.events import Stage
 from rig.reasons import notes_in, remedies
 from rig.tui.desk import Face
-from rig.tui.drop_words import (
-    LOOKS,
-    expected_words,
-    headline,
-    number_table,
-    past_runs,
-    sentence,
-)
+from rig.tui.drop_words import LOOKS, expected_words, headline, number_table, past_runs, sentence
 from rig.tui.motion import motions
 from rig.tui.next_step import hand, next_step
 from rig.tui.plots import drop_pictures, fall_pictures
@@ -29,7 +22,7 @@ from rig.tui.widgets.text import plain
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.protocol.protocol import Protocol, Run
+    from rig.protocol.protocol import Run
     from rig.reasons import Reason
     from rig.records import Job
     from rig.results.live import SessionView
@@ -53,7 +46,7 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     protocol, run = model.protocol, model.run
     if model.loading or protocol is None or run is None:
         return Face(Content(model.loading or next_step(model).text))
-    falls, rig = hanging(model, desk, protocol, run)
+    falls, rig = hanging(model, desk)
     counting = model.stage is Stage.COUNTDOWN and model.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
     facts = f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}\nmodel  {expected}\n"
@@ -67,10 +60,11 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     )
 
 
-def hanging(
-    model: Model, desk: Desk, protocol: Protocol, run: Run
-) -> tuple[tuple[ChainFall, ...], Drawing]:
+def hanging(model: Model, desk: Desk) -> tuple[tuple[ChainFall, ...], Drawing | None]:
     """Draw what is to fall, and its gates as they are now; with its motion by the model."""
+    protocol, run = model.protocol, model.run
+    if protocol is None or run is None:
+        return (), None
     falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
     return falls, drawing(protocol, run, falls, model.indicators, 0.0)
 
