@@ -13,6 +13,7 @@ from rig.board.picture import moving_picture
 from rig.board.process import is_local
 from rig.errors import RigError
 from rig.files import file_stamp
+from rig.records import Job
 from rig.report import looks
 from rig.report.figure import COLUMN_PT
 from rig.report.figures import result_figure
@@ -22,11 +23,12 @@ from rig.tui.drop_words import LOOKS, headline, past_runs, sentence
 from rig.tui.motion import motions
 
 if TYPE_CHECKING:
-    from rig.records import Job
+    from collections.abc import Mapping
+
     from rig.report.figure import Chart
     from rig.results.live import SessionView
 
-_NOW = {"armed": "is armed", "fired": "falls"}
+_NOW = {"armed": " · is armed", "fired": " · falls"}
 _HERE = Path(__file__).parent
 SCRIPT = (_HERE / "board.js").read_text("utf-8")
 SCRIPT_DIGEST = f"sha256-{base64.b64encode(sha256(SCRIPT.encode()).digest()).decode()}"
@@ -42,21 +44,23 @@ class BoardPage:
     """
 
     def __init__(self, address: str) -> None:
-        from jinja2 import FileSystemLoader, Undefined  # noqa: PLC0415 - pages only
+        from jinja2 import ChainableUndefined, FileSystemLoader  # noqa: PLC0415 - pages only
 
-        self.address = address
         self._live: LiveAnalysis | None = None
         self._seen: object = None
         self._drawn: tuple[object, dict[str, Any]] = None, {}
-        self._templates = environment().overlay(loader=FileSystemLoader(_HERE), undefined=Undefined)
-        self._shell = {
+        templates = environment().overlay(
+            loader=FileSystemLoader(_HERE), undefined=ChainableUndefined
+        )
+        templates.globals = {
             "address": address,
             "code": "" if is_local(address) else _qr_code(address),
             "css": f"{render('figure.css', looks=looks)}{(_HERE / 'board.css').read_text('utf-8')}",
             "script": SCRIPT,
         }
+        self._template = templates.get_template("board.html")
 
-    def look(self, news: dict[str, Any]) -> str | None:
+    def look(self, news: Mapping[str, Any]) -> str | None:
         """Return the page as it is now; `None` where nothing has changed.
 
         Parameters
@@ -66,70 +70,50 @@ class BoardPage:
         """
         path = Path(news["session"]) if news.get("session") else None
         if path is not None and (self._live is None or self._live.path != path):
-            self._live, self._drawn, self._seen = LiveAnalysis(path), (None, {}), None
-            return self._render({"title": f"{path.name} is being read …"})
-        seen: object = news
-        if self._live is not None:  # a session that was closed stays on the page
-            seen = (news, file_stamp(self._live.path))
+            self._live, self._seen = LiveAnalysis(path), None
+            return self._template.render(title=f"{path.name} is being read …")
+        # A session that was closed stays on the page.
+        seen = news, self._live and file_stamp(self._live.path)
         if seen == self._seen:
             return None
         self._seen = seen
         if self._live is None:
-            return self._render({"title": "No session is open"})
+            return self._template.render(title="No session is open")
         try:
-            return self._render(self._about(self._live, news))
+            return self._template.render(self._about(self._live.read(), news.get("drop") or {}))
         except RigError as error:
-            title = "The session cannot be read"
-            return self._render({"title": title, "trouble": f"{error.message} ({error.hint})"})
+            return self._template.render(title="The session cannot be read", error=error)
 
-    def _render(self, about: dict[str, Any]) -> str:
-        text: str = self._templates.get_template("board.html").render(about | self._shell)
-        return text
-
-    def _about(self, live: LiveAnalysis, news: dict[str, Any]) -> dict[str, Any]:
-        view = live.read()
-        job = view.jobs[-1] if view.jobs else None
-        key = (view.path, view.states, view.fitted, view.blind)
+    def _about(self, view: SessionView, drop: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what the page says; what takes long is drawn once of each state of the file."""
+        key = view.path, view.states, view.fitted, view.blind
         if key != self._drawn[0]:
-            self._drawn = key, _drawn(view, job)
-        drop, total = news.get("drop") or {}, len(view.plan)
-        if drop.get("state") in _NOW and drop["run"] in view.plan:
-            words = headline(view.plan[drop["run"]], total, drop["attempt"])
-            now = f"{words} · {_NOW[drop['state']]}"
-        elif job is not None:
-            now = headline(view.plan[job.run], total, job.attempt)
-        else:
-            now = f"{total} runs are planned"
+            self._drawn = key, _drawn(view)
+        last = view.jobs[-1] if view.jobs else Job(min(view.plan), 1)
+        job = Job(drop["run"], drop["attempt"]) if drop.get("run") in view.plan else last
+        now = headline(view.plan[job.run], len(view.plan), job.attempt)
         return {
             "title": view.protocol.title,
-            "simulated": view.simulated,
-            "blind": view.blind,
-            "now": now,
+            "view": view,
+            "now": now + _NOW.get(drop.get("state", ""), ""),
             **self._drawn[1],
         }
 
 
-def _drawn(view: SessionView, job: Job | None) -> dict[str, Any]:
+def _drawn(view: SessionView) -> dict[str, Any]:
     """Return words and pictures of the latest drop, and of all."""
-    gravity = view.protocol.gravity.value
-    chart = result_figure(view.analysis, view.curves, site_m_s2=gravity)
-    run, recorded, said, good = view.plan[min(view.plan)], None, "", True
-    if job is not None:
+    chart = result_figure(view.analysis, view.curves, site_m_s2=view.protocol.gravity.value)
+    parts: dict[str, Any] = {"figure": chart and _svg(chart)}
+    run, recorded = view.plan[min(view.plan)], None
+    for job in view.jobs[-1:]:
         run, result = view.plan[job.run], view.results[job]
-        recorded, good = (view.drops[job], view.scales[job].hz, result), result.verdict in GOOD
-        said = sentence(view, job)
-        if not good:
+        recorded = view.drops[job], view.scales[job].hz, result
+        parts |= {"said": sentence(view, job), "past": past_runs(view, job)}
+        if result.verdict not in GOOD:
             reasons = "; ".join(map(str, result.reasons[:2]))
-            said = f"{LOOKS[result.verdict][0]} {result.verdict}: {reasons}"
+            parts["bad"] = f"{LOOKS[result.verdict][0]} {result.verdict}: {reasons}"
     falls = () if view.blind else motions(view.protocol, run, recorded)
-    return {
-        "said": said,
-        "good": good,
-        "past": past_runs(view, job) if job is not None else "",
-        "picture": moving_picture(view.protocol, run, falls) if falls else None,
-        "figure": "" if chart is None else _svg(chart),
-        "together": bool(view.fitted),
-    }
+    return parts | {"picture": falls and moving_picture(view.protocol, run, falls)}
 
 
 def _svg(chart: Chart) -> str:
