@@ -1,4 +1,4 @@
-"""The page in a real browser: axe, four widths, both schemes, and what comes while it is open.
+"""Report and page for onlookers in a real browser: axe, four widths, both schemes; what comes new.
 
 Of `./run bench soaks`, for a browser is large; `test_board.py` holds what can be told without one.
 """
@@ -6,19 +6,21 @@ Of `./run bench soaks`, for a browser is large; `test_board.py` holds what can b
 import asyncio
 import json
 import lzma
+import re
 from contextlib import closing
 
 import pytest
 
 from rig.board.page import BoardPage
 from rig.board.process import BoardProcess
+from rig.cli import main
 from rig.recorder.published import PublishedState
 from tests.report.test_browser import browse
 from tests.test_site_browser import AXE, MISSING, RUN_AXE, ask_browser
 from tests.tui.test_pictures import RECORDED
 from tests.waiting import PATIENCE_S
 
-PAGES = ["board.html", "local.html"]
+PAGES = ["board.html", "local.html", "report.html"]
 DRAWN = """const page = (await visit("board.html")).contentDocument;
 const rods = page.querySelectorAll(".accent, .primary, .secondary").length;
 tell([rods, page.querySelector("text.apart").textContent]);"""
@@ -39,6 +41,9 @@ def built(session, tmp_path_factory):
         page = BoardPage(address)
         page.look({"session": str(session)})
         (folder / f"{name}.html").write_text(page.look({"session": str(session)}), "utf-8")
+    report = folder / "report.html"
+    assert main(["report", str(session), "-o", str(report)]) == 0
+    report.write_text(re.sub("<meta http-equiv=[^>]*>", "", report.read_text("utf-8")), "utf-8")
     return folder
 
 
