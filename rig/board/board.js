@@ -44,7 +44,7 @@ const play = () => {
         .forEach(([key, value]) => line.setAttribute(key, value));
     });
     const known = apart[before] !== null;
-    size.textContent = known ? `Δz ${apart[before].toFixed(1)} cm` : "";
+    size.textContent = known ? `Δz ${apart[before].toFixed(1).replace("-", "−")} cm` : "";
     if (known) size.setAttribute("y", 25 - (now.at(-1)[1] + now.at(-2)[1]) / 2);
   };
 
