@@ -126,6 +126,7 @@ BENCHES = {
                 help="at each incline"),
         _switch("--more", "go on with the sessions of that folder"),
     )),
+    "board": Bench("board", "what a class costs that looks on", (_PAGE,)),
     "bulk": Bench("studies.bulk", "one fall, batches, a C loop and a solver, in ratios", (
         _number("--falls", "in a batch", 100_000),
         _number("--rounds", "of measurement", 15),

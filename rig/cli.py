@@ -8,15 +8,15 @@ import os
 import re
 import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
 from rig import __version__
 from rig.boards import GATES
 from rig.command_help import Parser, build_parser, runnable
+from rig.ctrl_c import ctrl_c_goes_to
 from rig.errors import RigError
 from rig.ready import find_protocol
 from rig.streams import open_streams, say, settle_streams
@@ -70,7 +70,7 @@ def _run(argv: Sequence[str] | None) -> int:
             say(parser.format_help(), end="")
             return BAD_INPUT
         command = import_module(f"rig.commands.{arguments.module}")
-        with _put_in_order():
+        with ctrl_c_goes_to(signal.default_int_handler):
             code: int = command.main(arguments)
             sys.stdout.flush()
     except RigError as error:
@@ -103,20 +103,6 @@ def _run(argv: Sequence[str] | None) -> int:
         say(f"rig: {error.filename}: {error.strerror}" if named else f"rig: {error}")
         return BAD_INPUT
     return code
-
-
-@contextmanager
-def _put_in_order() -> Iterator[None]:
-    """Have Ctrl-C be an exception while a command is at work, however it ends the process else."""
-    before = signal.getsignal(signal.SIGINT)
-    if not callable(before) or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _parser() -> Parser:
@@ -175,6 +161,11 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     ),
     "name": _accept("letters, digits, - and _", str, _is_name),
     "rig": lambda _: {"dest": "socket"} | _accept("letters, digits, - and _", _socket, bool)(""),
+    "address": _accept(
+        ":8080 for this computer alone, HOST:8080 or 0.0.0.0:8080 for others too",
+        lambda text: (text.rpartition(":")[0].strip("[]") or "localhost", int(text.split(":")[-1])),
+        lambda address: 0 <= address[1] < 1 << 16,
+    ),
     "port": _accept(
         "a device path, or a URL such as sim://, or auto",
         lambda text: sole_port() if text == "auto" else text,

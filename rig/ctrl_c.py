@@ -8,8 +8,22 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from types import FrameType
+
+
+@contextmanager
+def ctrl_c_goes_to(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """Have Ctrl-C handled so in a block, where this thread has it and nobody ignores it."""
+    before = signal.getsignal(signal.SIGINT)
+    if not callable(before) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    try:
+        signal.signal(signal.SIGINT, handler)
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
@@ -19,15 +33,10 @@ def ctrl_c_waits() -> Iterator[None]:
     An exception that strikes where a library calls back from C++ ends the process, and in the
     callback of a weak reference it is shown and lost.
     """
-    before = signal.getsignal(signal.SIGINT)
-    if not callable(before) or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[FrameType | None] = []
-    signal.signal(signal.SIGINT, lambda _number, frame: came.append(frame))
+    before, came = signal.getsignal(signal.SIGINT), list["FrameType | None"]()
     try:
-        yield
+        with ctrl_c_goes_to(lambda _number, frame: came.append(frame)):
+            yield
     finally:
-        signal.signal(signal.SIGINT, before)
-        if came:
+        if came and callable(before):
             before(signal.SIGINT, came[0])

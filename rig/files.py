@@ -135,6 +135,16 @@ def state_folder() -> Path:
     return Path(base) / "chainrig"
 
 
+def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
+    """Tell a session file, and what was written beside it, from what they were before."""
+    stats = []
+    for file in (path, path.with_name(f"{path.name}-wal")):
+        with suppress(OSError):
+            stat = file.stat()
+            stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))
+    return tuple(stats)
+
+
 def identity_of(path: Path) -> tuple[int, int] | None:
     """Return device and number of what is at a path, which a file that replaces it has not."""
     try:

@@ -91,7 +91,6 @@ MEASURANDS = {
 }
 
 SEPARATION = MEASURANDS["separation_m"]
-SEPARATION_RAW = MEASURANDS["separation_raw_m"]
 SPEED = MEASURANDS["speed_m_s"]
 RELEASE_SKEW = MEASURANDS["release_skew_s"]
 FALL_TIME = MEASURANDS["fall_time_s"]

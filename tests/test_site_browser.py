@@ -28,7 +28,7 @@ const visit = (page) => new Promise((loaded) => {
 const tell = (found) => { document.title = JSON.stringify(found); };
 (async () => { WORK })();
 </script></body>"""
-_AXE = """const findings = {};
+RUN_AXE = """const findings = {};
 for (const page of PAGES) {
   const frame = await visit(page), inside = frame.contentWindow, { body } = inside.document;
   const script = inside.document.createElement("script");
@@ -78,7 +78,7 @@ def test_axe_finds_nothing(built, tmp_path, width, scheme, number):
     pages.remove("404.html")  # for servers: it looks for its style at their root
     assert len(pages) > 30
     flag = f"--blink-settings=preferredColorScheme={number}"
-    axe = _AXE.replace("SOURCE", AXE.as_uri())
+    axe = RUN_AXE.replace("SOURCE", AXE.as_uri())
     findings = {}
     for begin in range(0, len(pages), AT_ONCE):
         work = axe.replace("PAGES", json.dumps(pages[begin : begin + AT_ONCE]))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import queue
 import threading
 from argparse import Namespace
-from contextlib import suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
+from rig.board.process import BoardProcess
 from rig.commands.output import say
 from rig.daemon.listener import notify_systemd
-from rig.daemon.server import logging_to, serve
+from rig.daemon.server import Server, logging_to
 from rig.daemon.socket_path import default_socket, require_sockets
 from rig.link.port import check_url
 from rig.printable import printable
@@ -59,9 +61,20 @@ def main(arguments: Namespace) -> int:
 
     def ready() -> None:
         say(f"rig daemon: {arguments.port} at {path}")
+        for board in boards:
+            say(f"rig daemon: page to look on, {board.words}")
         notify_systemd()
 
-    with logging_to(StderrHandler()):
-        serve(arguments.port, path, tcp=arguments.tcp, idle_s=arguments.idle_timeout, ready=ready)
+    with logging_to(StderrHandler()), ExitStack() as stack:
+        places = [] if arguments.board is None else [arguments.board]
+        boards = [stack.enter_context(closing(BoardProcess(*place))) for place in places]
+        server = Server(
+            arguments.port,
+            path,
+            tcp=arguments.tcp,
+            idle_s=arguments.idle_timeout,
+            onlookers=[board.follow for board in boards],
+        )
+        asyncio.run(server.run(ready))
     say("rig daemon: ended")
     return 0

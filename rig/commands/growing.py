@@ -11,8 +11,9 @@ from rig.analysis.session import Analysis
 from rig.analysis.summary import summarize
 from rig.commands.output import has_colours, tint
 from rig.printable import printable
+from rig.report.figures import result_figure
 from rig.runner import narration
-from rig.tui.plots import inclined
+from rig.tui.plots import pictures_of
 from rig.tui.plotting import plotted
 
 if TYPE_CHECKING:
@@ -85,10 +86,10 @@ class Growing:
         width = min(columns - 1, _WIDEST)
         runs = tuple(self._results[number] for number in sorted(self._results))
         analysis = Analysis(runs, (), tuple(summarize(self._protocol, runs)))
-        pictures = inclined(analysis, self._curves)[: max(1, (rows - 6) // _ROWS)]
+        drawn = pictures_of(result_figure(analysis, self._curves))
         lines = [
             "".join(map(_ink, row))
-            for picture in pictures
+            for picture in drawn[: max(1, (rows - 6) // _ROWS)]
             for row in plotted(picture, width, _ROWS)
         ]
         self._write([*lines, self._last[:width]])

@@ -30,6 +30,8 @@ def main(arguments: Namespace) -> int:
     folder = make_folder(platformdirs.user_config_path() / "systemd/user")
     write_atomic(folder / f"{service}.service", text)
     say(f"{folder / service}.service: {port}")
+    if "://" not in port and not Path(port).exists():
+        say(f"nothing is at {port} now: plug the board in, or name another port; see rig ports")
     say(f"start it: systemctl --user daemon-reload && systemctl --user enable --now {service}")
     return 0
 

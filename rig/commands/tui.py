@@ -7,7 +7,6 @@ import gc
 import os
 import sys
 from argparse import Namespace
-from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -72,16 +71,6 @@ def _options(arguments: Namespace) -> Options:
         seed=arguments.seed,
         socket=Path(arguments.socket).absolute() if arguments.socket else None,
         offline=offline,
-        last=_last(),
         bell=arguments.bell,
         ascii=arguments.ascii or ascii_only(os.environ),
     )
-
-
-def _last() -> Path | None:
-    """Find the session that was written last in this folder."""
-    sessions = []
-    for path in Path().glob("*.session"):
-        with suppress(OSError):  # gone meanwhile
-            sessions.append((path.stat().st_mtime_ns, path))
-    return max(sessions)[1] if sessions else None

@@ -9,7 +9,7 @@ import secrets
 import signal
 import sys
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.daemon import rpc
@@ -30,8 +30,10 @@ from rig.recorder.published import PublishedState
 
 if TYPE_CHECKING:
     import socket
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Coroutine, Iterator, Sequence
     from pathlib import Path
+
+    Onlooker = Callable[[PublishedState], Coroutine[Any, Any, None]]
 
 log = logging.getLogger(__name__)
 _SWITCH_S = 1e-3
@@ -55,6 +57,8 @@ class Server:
     idle_s
         End when for so long no client was there, as soon as nothing is armed, falling or unsaved;
         `None` to wait for a signal.
+    onlookers
+        What else follows the published state in the server's loop; it must not fail.
     """
 
     def __init__(
@@ -64,6 +68,7 @@ class Server:
         *,
         tcp: bool = False,
         idle_s: float | None = None,
+        onlookers: Sequence[Onlooker] = (),
     ) -> None:
         self.url = url
         self.path = path
@@ -76,6 +81,7 @@ class Server:
         self._admission = self._service.admission
         self._turns = Turns()
         self._idle_s = idle_s
+        self._onlookers = onlookers
         self._left_at = 0.0  # when the last client went
         self._serving: set[asyncio.Task[None]] = set()
         self._over = asyncio.Event()
@@ -114,6 +120,7 @@ class Server:
             self._watch_lease(),
             self._watch_worker(),
             self._watch_door(door),
+            *(onlooker(self.published) for onlooker in self._onlookers),
         ]
         if self._idle_s is not None:
             parts.append(self._watch_clients(self._idle_s))
@@ -277,19 +284,3 @@ def _allow_descriptors() -> None:
     limit = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
     if soft != resource.RLIM_INFINITY and soft < limit:
         resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
-
-
-def serve(
-    url: str,
-    path: Path,
-    *,
-    tcp: bool,
-    idle_s: float | None,
-    ready: Callable[[], None],
-) -> None:
-    """Run a daemon to its end; see `Server`."""
-
-    async def run() -> None:
-        await Server(url, path, tcp=tcp, idle_s=idle_s).run(ready)
-
-    asyncio.run(run())

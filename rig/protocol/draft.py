@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
 SCENES: tuple[Scene, ...] = get_args(Scene)
-STRUCK: tuple[Scene, ...] = ("two-chains", "one-chain")
 
 # Lowest first in importance: of the end speed first, then where the chain is before anything
 # strikes. Each is a height in m that is meant, and the share of the free way that it may take.

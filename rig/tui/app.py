@@ -340,6 +340,9 @@ class RigApp(App[None], inherit_bindings=False):
         rows = await asyncio.to_thread(look_around, self.options, port, other[0] if other else "")
         self.desk.begin_with(rows)
         self.draw()
+        if self.desk.opens_first and self.page == "protocol":
+            self.action_do("go_on")
+        self.desk.opens_first = False
 
     def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None:
         """Ask the operator, and act on the answer; nothing opens while something may fall."""

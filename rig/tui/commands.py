@@ -65,7 +65,9 @@ def _go_on(app: RigApp) -> None:
         app.driver.take(GoOn(app.model.next_job))
     elif app.page != "protocol":
         app.turn("protocol")
-    elif app.desk.chosen is not None:
+    elif app.desk.chosen is None:
+        app.desk.opens_first = True
+    else:
         _BEGIN[app.desk.chosen.kind](app, app.desk.chosen)
 
 
@@ -75,7 +77,10 @@ def _go_on(app: RigApp) -> None:
 def _open(app: RigApp, row: Beginning) -> None:
     """Open an experiment with the rig that is there, or in simulation where there is none."""
     client = app.client
-    if client is None or row.file is None or app.desk.reading(row.file).problem:
+    if client is None or row.file is None:
+        return
+    if app.desk.reading(row.file).problem:
+        app.tell("mend the file in an editor; it is read again by itself")
         return
     session = row.session or app.options.session
     others = app.desk.opened not in {None, row.file}
@@ -110,7 +115,8 @@ def _new(app: RigApp, row: Beginning) -> None:
     """Have a protocol drafted, under a name that is free."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
     name = next(name for name in names if not Path(name).exists())
-    app.begin(_run(app, "new", name, "--scene", row.value, "--yes"))
+    written = f"{name} is written: change what differs in your rig; then Enter opens it"
+    app.begin(_run(app, "new", name, "--scene", row.value, "--yes", done=written))
 
 
 def _end_other(app: RigApp, row: Beginning) -> None:
@@ -214,10 +220,11 @@ async def _sessions(app: RigApp) -> None:
     folder = own.parent if own else Path()
     entries = await asyncio.to_thread(session_list, folder)
     app.turn("history")
+    whole = (at for at, entry in enumerate(entries) if not entry.trouble)
     question = Ask(
         f"Sessions in {plain(folder.resolve(), 80)}, newest first",
         choices=[_session_line(entry) for entry in entries],
-        free=False, yes="play", chosen=0,
+        free=False, yes="play", chosen=next(whole, 0),
     )  # fmt: skip
     app.ask(question, lambda number: app.begin(_look_at(app, entries[number])))
 
@@ -269,8 +276,8 @@ def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
              lambda: app.begin(_run(app, command, str(view.path), option, target)))  # fmt: skip
 
 
-async def _run(app: RigApp, *command: str) -> None:
-    """Run a command, and say where its files are or what went wrong.
+async def _run(app: RigApp, *command: str, done: str = "") -> None:
+    """Run a command, and say what is done, or where its files are, or what went wrong.
 
     A process of its own: what it computes takes nothing from STOP.
     """
@@ -288,7 +295,7 @@ async def _run(app: RigApp, *command: str) -> None:
         await process.wait()
         raise
     lines = [line for line in output.decode("utf-8", "replace").splitlines() if line.strip()]
-    last_lines = lines[-1:] if process.returncode == 0 else lines[-2:]
+    last_lines = [done or lines[-1]] if process.returncode == 0 else lines[-2:]
     app.tell("; ".join(last_lines) or f"rig {command[0]} ended with {process.returncode}")
 
 

@@ -35,8 +35,6 @@ class Options:
         Only look at `session`: no daemon is asked for.
     still_s
         How long the screen stands still before Enter can arm.
-    last
-        The session that was recorded last in this folder, if any.
     bell
         Whether it rings at a verdict.
     ascii
@@ -51,6 +49,5 @@ class Options:
     offline: bool = False
     countdown_s: float = COUNTDOWN_S
     still_s: float = STILL_S
-    last: Path | None = None
     bell: bool = False
     ascii: bool = False

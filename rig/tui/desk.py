@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from textual.content import Content
 
 from rig.tui.replay import Player, end_of
-from rig.tui.survey import first_row, read_file
+from rig.tui.survey import HERE, first_row, read_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -71,6 +71,8 @@ class Desk:
         How the drop of each page is played.
     other
         Another session than the one in hand, on the history page.
+    opens_first
+        Whether Enter was pressed before there was a list.
     replayed
         The latest drop whose slow motion was begun.
     chart, part, row
@@ -83,6 +85,7 @@ class Desk:
         self.other: SessionView | None = None
         self.chart = self.part = 0
         self.row = -1  # none yet
+        self.opens_first = False
         self.rows: list[Beginning] = []
         self.opened: Path | None = None  # the protocol that was opened here last
         self.replayed: Job | None = None
@@ -112,9 +115,11 @@ class Desk:
         return self.latest("reading", (file, changed_ns), lambda: read_file(file))
 
     def begin_with(self, rows: list[Beginning]) -> None:
-        """List what can be begun, and keep the row that was chosen."""
-        before, self.rows = self.chosen, rows
-        self.row = rows.index(before) if before in rows else first_row(rows, self.options)
+        """List what can be begun; choose an experiment that is new here, or as before."""
+        before, known, self.rows = self.chosen, self.rows, rows
+        new = [row for row in rows if row.section == HERE and known and row not in known]
+        chosen = new[0] if new else before
+        self.row = rows.index(chosen) if chosen in rows else first_row(rows, self.options)
 
     def view(self, model: Model) -> SessionView | None:
         """The session of the history page; `None` without a drop."""

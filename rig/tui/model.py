@@ -27,6 +27,7 @@ SLOW_DISK_S = 0.5
 """A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
 HOT = frozenset({*BEFORE_RELEASE, Stage.LIVE})
 UNDER_WAY = HOT | {Stage.JUDGING}
+_ALONE = "a fired drop is recorded without this screen; in danger, switch the release's supply off"
 _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
 """Where a watcher is, by the state of the drop."""
@@ -211,11 +212,10 @@ def alarm(model: Model) -> Alarm | None:
     """Name what is most wrong now; `None` when all is well."""
     if not model.connected and not model.idle:
         silence, _, hint = model.silence.partition("\n")
-        return Alarm(
-            f"no daemon: {silence or 'connecting'}",
-            f"{hint}{'; ' * bool(hint)}reconnecting; a fired drop is recorded without this screen; "
-            "in danger, switch the release's supply off",
-        )
+        begun = model.flow.stage is not Stage.PROTOCOL
+        parts = [hint, "reconnecting", *[_ALONE] * begun]
+        message = f"no daemon: {silence or 'connecting'}"
+        return Alarm(message, "; ".join(filter(None, parts)))
     if model.disk_s > SLOW_DISK_S:
         return Alarm(
             f"the disk has not finished a write for {model.disk_s:.1f} s",

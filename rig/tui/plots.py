@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.report.falls import fall_figures
 from rig.report.figure import Panel, PlotAxis, Trace
@@ -11,9 +11,8 @@ from rig.report.looks import MODEL, SECOND
 from rig.tui.plotting import Picture
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
-    from rig.analysis.session import Analysis
     from rig.records import Job
     from rig.report.figure import Chart
     from rig.results.live import SessionView
@@ -48,17 +47,6 @@ def drop_pictures(view: SessionView, job: Job) -> list[Picture]:
     """Draw a drop as the report does; nothing where it does not count."""
     drop, hz = view.drops[job], view.scales[job].hz
     return pictures_of(*fall_figures(view.protocol, drop, hz, view.results[job]))
-
-
-def inclined(analysis: Analysis, curves: Mapping[str, Any]) -> list[Picture]:
-    """Draw the result beside the model: against incline, the paper's Fig. 3, growing.
-
-    Parameters
-    ----------
-    curves
-        The model, as `rig.analysis.curves.model_curves` gives it.
-    """
-    return pictures_of(result_figure(analysis, curves))
 
 
 def session_pictures(view: SessionView) -> Iterator[tuple[Picture, str]]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _WIDTH_M = 0.1  # of a rod whose length nobody stated
 _MARGIN_M = 0.04
 _BALL = 0.012  # of the height that is shown: a smaller ball would not be seen
+_CORNERS = 17  # of what is round
 _COLORS = ("border", "foreground", "accent", "primary", "secondary", "success", "warning")
 
 
@@ -47,7 +48,10 @@ class Lamp(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """Strokes, and what of the world they show, m; `apart_m` is Δz as far as it was measured."""
+    """Strokes, and what of the world they show, m.
+
+    `middles` are those of the sides, `apart_m` is Δz as far as it was measured.
+    """
 
     strokes: tuple[Stroke, ...]
     width_m: float
@@ -55,6 +59,7 @@ class Drawing(NamedTuple):
     top_m: float
     apart_m: float | None = None
     lamps: tuple[Lamp, ...] = ()
+    middles: tuple[float, ...] = ()
 
 
 def drawing(
@@ -85,8 +90,8 @@ def drawing(
     # A free chain that passes the contact point is shown as far down as one that struck it lies.
     bottom = -0.35 * length if protocol.surface else low - length
     top = protocol.drop.value + length + _MARGIN_M
-    for column, fall in enumerate(falls):
-        middle = pitch * (2.0 * column + 1.2)
+    middles = [pitch * (2.0 * column + 1.2) for column in range(len(falls))]
+    for middle, fall in zip(middles, falls, strict=True):
         left, right = middle - half, middle + half
         strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
         for gate in protocol.gates.on(fall.role) if protocol.gates else ():
@@ -107,12 +112,12 @@ def drawing(
     # Δz is known as long as both chains are seen.
     until_s = min([time_s, *(float(fall.times[-1]) for fall in falls if fall.times.size)])
     tops = [z + fall.length for fall in falls if (z := fall.measured(until_s)) is not None]
-    if len(tops) < 2:
-        return Drawing(tuple(strokes), width, bottom, top, None, tuple(lamps))
-    at = 2.2 * pitch
-    strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
-    strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
-    return Drawing(tuple(strokes), width, bottom, top, tops[1] - tops[0], tuple(lamps))
+    apart_m = None
+    if len(tops) > 1:
+        at, apart_m = 2.2 * pitch, tops[1] - tops[0]
+        strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
+        strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
+    return Drawing(tuple(strokes), width, bottom, top, apart_m, tuple(lamps), tuple(middles))
 
 
 def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
@@ -120,7 +125,7 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
 
     A dot is as high as it is wide.
     """
-    strokes, width_m, bottom, top, apart_m, lamps = drawing
+    strokes, width_m, bottom, top, apart_m, lamps, _ = drawing
     rows, dots = max(1, height - 1), COLUMNS * width - 1
     scale = min((ROWS * rows - 1) / (top - bottom), dots / width_m)
     left = 0.5 * (dots / scale - width_m)
@@ -138,7 +143,9 @@ def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
     inks = [_COLORS.index(stroke.color) for stroke in strokes]
     sheet.strokes(scale * (np.array([left, top]) + ends * [1.0, -1.0]), inks)
     apart = "" if apart_m is None else f"  Δz {apart_m * 1e2:.1f} cm as it falls"
-    words = [Span("model", "accent"), Span(" behind measured"), Span(apart, "success", bold=True)]
+    measured = {"primary", "secondary"} & {stroke.color for stroke in strokes}
+    behind = Span(" behind measured" * bool(measured))
+    words = [Span("model", "accent"), behind, Span(apart, "success", bold=True)]
     return [*sheet.rows(), words]
 
 
@@ -154,8 +161,10 @@ def _rods(
     half = 0.5 * _rod_m(rods)
     if protocol.vocabulary.part == "object":
         radius = max(0.5 * rods.widths[0], _BALL * shown_m)
-        corners = ((-1, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
-        around = [(x + radius * across, height + radius * up) for across, up in corners]
+        around = [
+            (x + radius * math.cos(angle), height + radius * math.sin(angle))
+            for angle in np.linspace(0.0, 2.0 * math.pi, _CORNERS)
+        ]
         yield from (Stroke(*start, *end, color) for start, end in pairwise(around))
         return
     lies = fall.role == "impact" and protocol.surface is not None

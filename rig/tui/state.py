@@ -110,17 +110,10 @@ def _line(run: Mapping[str, Any]) -> RunLine:
 
 def state_of(view: SessionView) -> DaemonState:
     """Say what a daemon would of a file that nobody is writing."""
-    last = {entry.run: entry for entry in view.states}
-    runs = []
-    for run in view.plan.values():
-        line = RunLine(run.number, run.incline_deg, run.impact, run.free)
-        if (entry := last.get(run.number)) is not None:
-            state: dict[str, Any] = {
-                "attempt": entry.attempt,
-                "state": str(entry.state),
-                "reasons": entry.reasons,
-            }
-            line = line._replace(**state)
-        runs.append(line)
+    last = {entry.run: (entry.attempt, str(entry.state), entry.reasons) for entry in view.states}
+    runs = [
+        RunLine(run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ()))
+        for run in view.plan.values()
+    ]
     session = {"path": str(view.path), "title": view.protocol.title, "simulated": view.simulated}
     return DaemonState(0, {"session": session}, tuple(runs))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import InputError, RigError
+from rig.files import file_stamp
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.tui.widgets.text import plain
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.tui.context import Options
 
+HERE = "Experiments here"
 _MOST = 200
 """Session files that are listed, the newest."""
 _SCENES = """\
@@ -120,16 +122,22 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
         *(row for row in scenes if row.kind == "try"),
         *boards,
         *going[:3],
-        *(Beginning("Experiments here", "open", path.stem, path) for path in files),
+        *(Beginning(HERE, "open", path.stem, path) for path in files),
         *(row for row in scenes if row.kind == "new"),
-        *(Beginning("Open results", "results", f"of {entry.path.stem}") for entry in sessions[:1]),
+        *(
+            Beginning("Open results", "results", f"of {entry.path.stem}")
+            for entry in sorted(sessions, key=lambda entry: bool(entry.trouble))[:1]
+        ),
         *(Beginning("Ready experiments", "open", path.stem, path) for path in ready),
     ]
 
 
 def first_row(rows: list[Beginning], options: Options) -> int:
-    """Choose the row to begin with: what is unfinished, what can be used here, or a trial."""
-    sections = "Continue" * (not options.port), "Experiments here", "Ready experiments"
+    """Choose the row to begin with: what stands in the way, is unfinished, is here, or a trial."""
+    for at, row in enumerate(rows):
+        if row.kind == "end":
+            return at
+    sections = "Continue" * (not options.port), HERE, "Ready experiments"
     places = [
         (bool(read_file(row.file).problem), sections.index(row.section), at)
         for at, row in enumerate(rows)
@@ -170,17 +178,7 @@ def session_list(folder: Path) -> list[SessionEntry]:
     for path in folder.glob("*.session"):
         with suppress(OSError):  # gone meanwhile
             dated.append((path.stat().st_mtime_ns, path))
-    return [_look(path, _change(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
-
-
-def _change(path: Path) -> tuple[tuple[int, int, int], ...]:
-    """Tell a session file, and what was written beside it, from what they were before."""
-    stats = []
-    for file in (path, path.with_name(f"{path.name}-wal")):
-        with suppress(OSError):
-            stat = file.stat()
-            stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))
-    return tuple(stats)
+    return [_look(path, file_stamp(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
 
 
 @lru_cache(maxsize=_MOST)  # the home page lists them again and again

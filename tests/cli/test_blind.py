@@ -5,6 +5,7 @@ import json
 import pytest
 
 import rig as door
+from rig.board.page import BoardPage
 from tests.cli.lab import short
 
 
@@ -37,12 +38,19 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
     assert "hidden until <code>rig unblind</code>" in html
     for absent in ("No accepted runs", "Δz", "m/s<", "separation", "end speed"):
         assert absent not in html
+    board, news = BoardPage("http://localhost:8080/"), {"session": str(session)}
+    board.look(news)
+    shown = board.look(news).partition("<script>")[0]
+    assert "hidden until <code>rig unblind</code>" in shown
+    for absent in ("wins", "Δz", "m/s", "separation", "data-picture", "<svg"):
+        assert absent not in shown
     for refused in (("estimate", session), ("analyze", session, "--budget", "1")):
         done = call(*refused)
         assert done.code != 0
         assert "is blind" in done.err
     first = call("unblind", session)
     assert first.code == 0, first.err
+    assert " wins by " in board.look(news)
     again = call("unblind", session)
     assert (again.code, "is open since" in again.err) == (2, True)
     after = json.loads(call("analyze", session, "--json").out)

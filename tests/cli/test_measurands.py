@@ -83,4 +83,4 @@ def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path):
     screens = {name: text for name, *_, text in seen(session, KEYS, (), SIZE, ["dark"], text_of)}
     assert BLOW.symbol in screens["session"]
     view = LiveAnalysis(session).read()
-    assert BLOW.symbol in number_table(view, view.jobs[-1]).plain  # behind Tab on the result page
+    assert BLOW.symbol in number_table(view, view.jobs[-1])  # behind Tab on the result page

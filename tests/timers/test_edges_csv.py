@@ -1,6 +1,8 @@
 """Edges as CSV: exact there and back, and every fault at its place."""
 
+from collections.abc import Callable
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -23,13 +25,19 @@ def read(tmp_path: Path, content: str | bytes) -> list[Drop]:
     return read_edges(path)
 
 
-def faults(tmp_path: Path, content: str | bytes) -> list[tuple[int, int, str]]:
+def faults_of(
+    read: Callable[..., object], tmp_path: Path, content: str | bytes
+) -> list[tuple[int, int, str]]:
+    """Where a file is refused, and of what."""
     with pytest.raises(InputError) as caught:
         read(tmp_path, content)
     assert caught.value.exit_code == 2
     for problem in caught.value.problems:
         assert problem.message == problem.reason.text
     return [(problem.line, problem.column, problem.key) for problem in caught.value.problems]
+
+
+faults = partial(faults_of, read)
 
 
 def test_times_are_exact(tmp_path: Path) -> None:

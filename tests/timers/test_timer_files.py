@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from rig.timers.problems import ProblemList
 from rig.timers.table import Table
 from rig.timers.timer_file import read_timer_file
 from tests.examples import examples
+from tests.timers.test_edges_csv import faults_of
 
 VERNIER = (
     "Vernier Format 2\nfence.cmbl\nRun 1\nTime\tGateState\tDistance\nT\tS\tD\ns\t\tm\n\n"
@@ -75,13 +77,7 @@ def test_a_column_of_times_is_of_darkening_or_of_both(tmp_path, text):
     assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
 
 
-def faults(tmp_path: Path, content: str) -> list[tuple[int, int, str]]:
-    with pytest.raises(InputError) as caught:
-        read(tmp_path, content)
-    assert caught.value.exit_code == 2
-    for problem in caught.value.problems:
-        assert problem.message == problem.reason.text
-    return [(problem.line, problem.column, problem.key) for problem in caught.value.problems]
+faults = partial(faults_of, read)
 
 
 @pytest.mark.parametrize(

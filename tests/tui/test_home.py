@@ -32,6 +32,7 @@ def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
                 pressed.append(key)
                 await op.press(key)
 
+            app.desk.rows = []  # as before it has looked around
             await press("enter")
             await op.at(Stage.DEVICE)
             await op.until(lambda: app.view and app.indicators.known and app.client.driving)

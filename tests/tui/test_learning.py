@@ -52,11 +52,11 @@ def test_a_drop_is_said_in_a_sentence_and_a_table(recorded):
     said = sentence(view, job)
     assert said.startswith(f"{chain} wins by {apart * 100:.2f} ± ")
     assert "; model 1" in said
-    assert "together" not in number_table(view, job).plain
+    assert "together" not in number_table(view, job)
     live.fit_jointly(view)
-    both = number_table(live.read(), job).plain
+    both = number_table(live.read(), job)
     assert both.split("\n")[0].split() == ["alone", "together"]
-    assert past_runs(view, view.jobs[1]).startswith(f"past runs  1 ✓ {apart * 100:.4g} · 2 ✓ ")
+    assert past_runs(view, view.jobs[1]).startswith(f"past runs (cm)  1 ✓ {apart * 100:.4g} · 2 ✓ ")
     labels = [picture.panel.y.label for picture in drop_pictures(view, job)]
     assert labels[0].startswith("separation")
 

@@ -81,9 +81,10 @@ def _model(state=None, **more):
 
 def test_what_is_wrong_is_said_with_what_to_do():
     assert alarm(_model()) is None
-    gone = alarm(Model(DaemonState(), Flow(), Indicators(), silence="it is gone"))
-    assert "it is gone" in gone.message
-    assert "supply" in gone.hint
+    for stage, begun in ((Stage.PROTOCOL, False), (Stage.PREPARE, True)):
+        gone = alarm(Model(DaemonState(), Flow(stage), Indicators(), silence="it is gone"))
+        assert "it is gone" in gone.message
+        assert ("supply" in gone.hint) == begun, "nothing of ours can fall before that"
     lost = alarm(
         _model({"link": {"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}})
     )

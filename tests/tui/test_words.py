@@ -8,9 +8,9 @@ from rig.campaign.events import GoOn, Stage
 from rig.campaign.machine import Flow, step
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.records import Job
-from rig.tui.drop_words import verdict_words
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model
+from rig.tui.pages.drop import verdict_words
 from rig.tui.state import typed
 from rig.tui.widgets.bars import headline, hints
 from tests.tui.lab import KEYS

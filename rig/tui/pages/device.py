@@ -10,6 +10,7 @@ from textual.content import Content
 from rig.campaign.events import Stage
 from rig.report.finding import clock_lines
 from rig.tui.desk import Face
+from rig.tui.pages.drop import hanging
 from rig.tui.widgets.bars import LINKS
 from rig.tui.widgets.gates import board, named
 from rig.tui.widgets.text import checked, plain
@@ -21,10 +22,10 @@ if TYPE_CHECKING:
 
 def face(model: Model, desk: Desk, width: int) -> Face:
     """Show what is connected, and what its gates see."""
-    del desk
+    rig = hanging(model, desk)[1]
     gates = board(model.protocol, model.indicators, model.now_s, width)
     words = [*gates, Content(""), _gate_check(model), _release(model)]
-    return Face(_facts(model), words=Content("\n").join(words))
+    return Face(_facts(model), rig, words=Content("\n").join(words), top=True)
 
 
 def _facts(model: Model) -> Content:

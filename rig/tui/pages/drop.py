@@ -6,17 +6,11 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from rig.analysis.result import GOOD
 from rig.campaign.events import Stage
-from rig.reasons import notes_in
+from rig.reasons import notes_in, remedies
 from rig.tui.desk import Face
-from rig.tui.drop_words import (
-    LOOKS,
-    expected_words,
-    number_table,
-    past_runs,
-    sentence,
-    verdict_words,
-)
+from rig.tui.drop_words import LOOKS, expected_words, headline, number_table, past_runs, sentence
 from rig.tui.motion import motions
 from rig.tui.next_step import hand, next_step
 from rig.tui.plots import drop_pictures, fall_pictures
@@ -34,11 +28,15 @@ if TYPE_CHECKING:
     from rig.results.live import SessionView
     from rig.tui.desk import Desk
     from rig.tui.model import Model
+    from rig.tui.motion import ChainFall
     from rig.tui.replay import Player
+    from rig.tui.scale import Drawing
 
 _DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
          Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}  # fmt: skip
 """Steps that are behind, by stage."""
+_REMEDIES = 2
+"""Things to do that are shown: what else is wrong shows when these are mended."""
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
@@ -48,18 +46,27 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     protocol, run = model.protocol, model.run
     if model.loading or protocol is None or run is None:
         return Face(Content(model.loading or next_step(model).text))
-    falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
+    falls, rig = hanging(model, desk)
     counting = model.stage is Stage.COUNTDOWN and model.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
     facts = f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}\nmodel  {expected}\n"
     gates = board(protocol, model.indicators, model.now_s, width)
     return Face(
         Content("\n").join([steps(model), _headline(model, run), _action(model)]),
-        drawing(protocol, run, falls, model.indicators, 0.0),
+        rig,
         desk.latest("pictures", (protocol, run), lambda: fall_pictures(falls)),
         words=Content("\n").join([Content(facts), *gates]),
         digits=f"{max(0.0, model.flow.left_s):.1f}" if counting else "",
     )
+
+
+def hanging(model: Model, desk: Desk) -> tuple[tuple[ChainFall, ...], Drawing | None]:
+    """Draw what is to fall, and its gates as they are now; with its motion by the model."""
+    protocol, run = model.protocol, model.run
+    if protocol is None or run is None:
+        return (), None
+    falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
+    return falls, drawing(protocol, run, falls, model.indicators, 0.0)
 
 
 def steps(model: Model) -> Content:
@@ -78,16 +85,37 @@ def steps(model: Model) -> Content:
 
 
 def _headline(model: Model, run: Run) -> Content:
-    attempt = f" · attempt {model.job.attempt}" if model.job and model.job.attempt > 1 else ""
-    strikes = f" · {run.incline_deg:g}° · chain {plain(run.impact, 20)} strikes"
-    what = strikes if run.impact is not None else ""
-    total = len(model.state.runs) or 1
-    return Content.styled(f"Run {run.number} of {total}{attempt}{what}", "bold $primary")
+    attempt = model.job.attempt if model.job else 1
+    return Content.styled(headline(run, len(model.state.runs) or 1, attempt), "bold $primary")
 
 
 def _action(model: Model) -> Content:
     step = next_step(model)
     return Content.styled(f"→ {step.text}", f"bold {step.color}")
+
+
+def verdict_words(model: Model) -> Content:
+    """Write the verdict and its reasons."""
+    verdict, reasons = model.verdict
+    if model.job is None or not verdict:
+        return Content(model.loading or "No verdict yet.")
+    symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
+    lines = [Content.styled(f" {symbol} {verdict.upper()} ", f"bold $background on {colour}")]
+    lines += [Content(f"  {plain(reason, 200)}") for reason in reasons[:4]]
+    if len(reasons) > 4:
+        lines.append(Content("  and more reasons, in the session file"))
+    replaced = model.replaced
+    if verdict not in GOOD and replaced is not None:
+        lines += [
+            Content(f"  Only the latest attempt counts: attempt {replaced.attempt} was good, "
+                    f"but run {model.job.run} has no result now."),
+            Content("  → press a to repeat it before you change anything at the rig"),
+        ]  # fmt: skip
+    if model.blind:
+        lines.append(Content("  BLIND: results are hidden until you unblind the session"))
+    if verdict == "void":
+        lines += [Content(f"  → {remedy}") for remedy in remedies(reasons)[:_REMEDIES]]
+    return Content("\n").join(lines)
 
 
 def _result(model: Model, desk: Desk, width: int) -> Face:
@@ -114,7 +142,7 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     pictures = desk.latest(
         "figures", key[:3], lambda: drop_pictures(view, job) or fall_pictures(falls)
     )
-    words = desk.latest("words", key, lambda: number_table(view, job))
+    words = desk.latest("words", key, lambda: Content(number_table(view, job)))
     logged = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
     reasons = next(logged, ())
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0

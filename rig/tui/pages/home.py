@@ -51,7 +51,7 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     parts = [Content(does)]
     protocol, problem = desk.reading(row.file) if row.file else (None, "")
     if problem:
-        parts.append(Content.assemble((f"✗ {plain(row.file)}\n\n", "bold $error"), problem))
+        parts = [Content.assemble((f"✗ {plain(row.file)}\n\n", "bold $error"), problem)]
     elif protocol is not None:
         parts.append(_description(desk, protocol))
         picture = _picture(desk, protocol)

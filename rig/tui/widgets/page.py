@@ -76,11 +76,8 @@ class Page(Vertical):
         if face.drawing is not None and "drawing" in shown:
             view = self.query_one("#drawing", SpanView)
             view.take(painted(face.drawing, view.size.width or 38, view.size.height or 16))
-        most = (
-            face.beside * (2 if columns >= _WIDE and lines >= 40 else 1)
-            if columns >= _NORMAL
-            else 1
-        )
+        pairs = 2 if columns >= _WIDE and lines >= 40 else 1
+        most = face.beside * pairs if columns >= _NORMAL else 1
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
         pictures = [*face.pictures[turn:], *face.pictures[:turn]][: most * ("plots" in shown)]
         self.query_one("#plots").set_class(most > 1 and face.beside > 1, "-pairs")

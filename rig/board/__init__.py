@@ -1,0 +1,1 @@
+"""A page on which a class can look on: a process beside the daemon, which only reads."""

@@ -1,0 +1,163 @@
+"""The page on which a class looks on: read-only, of any size and patience, beside the daemon."""
+
+import json
+import lzma
+import re
+import socket
+import subprocess
+import sys
+from contextlib import ExitStack, suppress
+from http.client import HTTPConnection
+from urllib.parse import urlsplit
+
+import pytest
+
+from rig.board.page import BoardPage
+from rig.daemon.client import Client
+from rig.results.live import LiveAnalysis
+from rig.tui.indicators import Indicators
+from rig.tui.motion import motions
+from rig.tui.scale import drawing
+from tests.cli.lab import command
+from tests.tui.test_pictures import RECORDED
+from tests.waiting import PATIENCE_S, until
+
+CLIENTS = 400
+TOO_MUCH = b"GET / HTTP/1.1\r\nX-Junk: " + b"a" * 10**6
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory):
+    """Yield a daemon's process, its socket and the port of its page."""
+    path = tmp_path_factory.mktemp("board") / "rig.sock"
+    process = subprocess.Popen(
+        command("daemon", "--port", "sim://", "--socket", path, "--board", ":0"),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    lines = [process.stderr.readline() for _ in range(2)]
+    assert "on this computer only" in lines[1], lines
+    address = urlsplit(lines[1].split()[-1])
+    assert address.hostname == "localhost"
+    yield process, path, address.port
+    process.kill()
+    process.communicate()
+    until(lambda: not answers(address.port), lambda: "the page outlives its daemon")
+
+
+def answers(port):
+    """Whether anybody listens."""
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def ask(port, method="GET", target="/", **headers):
+    """Ask the page's server once."""
+    connection = HTTPConnection("localhost", port, timeout=PATIENCE_S)
+    try:
+        connection.request(method, target, headers=headers)
+        answer = connection.getresponse()
+        return answer, answer.read()
+    finally:
+        connection.close()
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS", "get", "TRACE"])
+def test_nothing_but_reading_is_answered(daemon, method):
+    answer, _ = ask(daemon[2], method)
+    assert (answer.status, answer.getheader("Allow")) == (405, "GET")
+
+
+def test_a_page_is_sent_once_and_needs_nothing_else(daemon):
+    answer, page = ask(daemon[2])
+    assert answer.status == 200
+    policy = answer.getheader("Content-Security-Policy")
+    assert "default-src 'none'" in policy
+    assert "unsafe-eval" not in policy
+    assert not re.search(rb"""(src|href)=["'](?!data:)|url\(|@import""", page)
+    tag = answer.getheader("ETag")
+    assert ask(daemon[2], **{"If-None-Match": tag})[0].status == 304
+    assert ask(daemon[2], target="/../etc/passwd")[0].status == 404
+
+
+def test_whatever_clients_do_stop_and_page_are_there(daemon):
+    process, path, port = daemon
+    with ExitStack() as stack:
+        for number in range(CLIENTS):
+            line = stack.enter_context(socket.create_connection(("127.0.0.1", port), PATIENCE_S))
+            line.sendall(b"GET / HT" if number % 2 else b"")
+        long = stack.enter_context(socket.create_connection(("127.0.0.1", port), PATIENCE_S))
+        with suppress(OSError):  # it hangs up on what has no end
+            long.sendall(TOO_MUCH)
+        client = Client(path, "a test")
+        client.stop("a test")
+        client.close()
+        assert ask(port)[0].status == 200
+    raw = stack.enter_context(socket.create_connection(("127.0.0.1", port), PATIENCE_S))
+    raw.sendall(b"\0\xff / nonsense\r\n\r\n")
+    assert raw.recv(100).startswith(b"HTTP/1.1 400 ")
+    raw.close()
+    assert process.poll() is None
+
+
+@pytest.mark.parametrize("place", [":x", "nowhere.invalid:8080", ":99999", "a b:80", "", "TAKEN"])
+def test_a_place_that_cannot_be_had_is_refused(daemon, call, place):
+    place = f":{daemon[2]}" if place == "TAKEN" else place
+    refused = call("daemon", "--port", "sim://", "--socket", "x", f"--board={place}")
+    assert (refused.code, "--board" in refused.err) == (2, True), refused.err
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    session = tmp_path / "a.session"
+    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
+    return session
+
+
+def test_a_session_is_shown_in_words_and_pictures_until_another_is_open(recorded):
+    page = BoardPage("http://192.0.2.7:8080/")
+    assert "No session is open" in page.look({})
+    news = {"session": str(recorded), "drop": None}
+    assert "is being read" in page.look(news)
+    text = page.look(news)
+    assert page.look(news) is None, "nothing has changed"
+    assert re.search(r"Run 4 of 4 · \d+° · chain \w strikes", text)
+    assert re.search(r"\w wins by \d+\.\d+ ± \d\.\d+ cm; model ", text)
+    assert "SIMULATED DATA" in text
+    assert 'aria-label="QR code of http://192.0.2.7:8080/"' in text
+    picture = json.loads(re.search("data-picture='(.*?)'", text)[1])
+    assert [name[1:] for _, name in picture["names"]] == [" strikes", " falls freely"]
+    view = LiveAnalysis(recorded).read()
+    job = view.jobs[-1]
+    drop = view.drops[job], view.scales[job].hz, view.results[job]
+    run = view.plan[job.run]
+    moved = drawing(view.protocol, run, motions(view.protocol, run, drop), Indicators(), 1.0)
+    assert picture["apart_cm"][-1] == round(1e2 * moved.apart_m, 1), "the terminal has another Δz"
+    armed = page.look(news | {"drop": {"run": 2, "attempt": 1, "state": "armed"}})
+    assert re.search(r"Run 2 of 4 .* is armed", armed)
+    assert "Run 4 of 4" in page.look({"session": None, "drop": None}), "it stays when it is closed"
+
+
+def test_a_page_of_this_computer_alone_says_so_in_place_of_a_code():
+    text = BoardPage("http://localhost:8080/").look({})
+    assert "Only this computer sees this page" in text
+    assert "QR code" not in text
+
+
+def test_a_session_that_cannot_be_read_is_said(tmp_path):
+    broken = tmp_path / "b.session"
+    broken.write_bytes(b"no session")
+    page = BoardPage("http://localhost:8080/")
+    page.look({"session": str(broken)})
+    assert "The session cannot be read" in page.look({"session": str(broken)})
+
+
+def test_a_code_needs_its_package_only_where_others_look_on():
+    script = (
+        "import sys; from rig.board.page import BoardPage as P; P('http://localhost:1/').look({});"
+        "print({'segno', 'matplotlib', 'textual'} & set(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "set()"
