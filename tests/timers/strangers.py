@@ -123,7 +123,7 @@ NOT_READ = {
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A word below",
     "Rows out of order", "Newest first", "A clock that overflows", "Samples with an index",
-    "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart", "JSON in a line",
+    "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
     "Thousands by points", "Microseconds as if they were seconds",
     "The last row cut",
 }  # fmt: skip
