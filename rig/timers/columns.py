@@ -30,7 +30,7 @@ from rig.timers.vocabulary import (
 if TYPE_CHECKING:
     from rig.timers.problems import ProblemList
 
-VALUES = (("level", "volts"), ("state",), ("edge",), ())
+VALUES = (("level", "volts"), ("state", "cleared"), ("edge",), ())
 """Roles that say what happened; of a table that has several, the first are read."""
 _UNITS = {*POWERS, "v"}
 _MOST_COLUMNS = 200
@@ -78,7 +78,8 @@ class TimerColumn:
     @property
     def meaning(self) -> str:
         """What it was taken for, in words."""
-        return roles()[self.role][0] + f" in {SYMBOLS[self.power]}" * (self.role == "time")
+        meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
+        return meaning + f" in {SYMBOLS[self.power]}" * (self.role == "time")
 
 
 ROW_COUNT = TimerColumn(-1, "", "index")
@@ -158,8 +159,10 @@ def columns_of(
         if column.role == "level" and len(cells[column.at]) < len(rows):
             column.role = "state"  # of samples, each row has every level
         if column.role == "time" and column.power is None:
-            is_said = all(text[-1:] == "s" or ":" in text for text in cells[column.at])
-            column.power = POWERS[unit] if unit else 0 if is_said else None
+            # Fractions are seconds, and so are small whole numbers.
+            is_count = all(re.fullmatch(r"[+-]?[0-9]{1,30}", text) for text in cells[column.at])
+            is_long = is_count and abs(int(cells[column.at][-1]) - int(cells[column.at][0])) > 100
+            column.power = POWERS[unit] if unit else None if is_long else 0
     _name_traces(block, columns if heading is None else [])
     # Of columns that say the same times in other units, the finest is kept.
     times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
@@ -212,7 +215,7 @@ def check_columns(
         problems.add(first.line, place, "", "no_heading", columns=len(columns))
     for column in columns if heading else ():
         place, unit = above.column(column.at), vocabulary.unit_of(column.name)
-        if column.role == "setting":
+        if column.role == "setting" or "|" in column.role:
             values = {"column": column.name, "readings": column.meaning}
             problems.add(above.line, place, column.name, "ambiguous", **values)
         elif column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):

@@ -102,12 +102,12 @@ class FileReading(NamedTuple):
 
         Where the file says when they are blocked, it is not doubted.
         """
-        if self.layout.dark in {"states", "inverted", "each"}:
-            return True
         counts = Counter((drop.run, edge.channel) for drop in self.drops for edge in drop.edges)
+        if self.layout.dark.startswith("turns"):
+            return not any(n % 2 for n in counts.values())
         began_dark = sum(drop.initial_state.bit_count() for drop in self.drops)
-        is_turning = self.layout.dark.startswith("turns")
-        return began_dark < len(counts) and not (is_turning and any(n % 2 for n in counts.values()))
+        is_level = self.file.is_sampled and self.layout.dark in {"high", "low"}
+        return not is_level or began_dark < len(counts)
 
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:

@@ -104,6 +104,7 @@ class Table:
         plain = [line for _, line in sample if line.strip() and not REMARK.match(line[:LONGEST])]
         self._names = _find_names(plain)
         self.separator = "" if self._names else find_separator(plain)
+        self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(_shape(self.split(line)) for line in plain)
         shapes = Counter({shape: n for shape, n in shapes.items() if any(map(all, shape))})
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
@@ -122,7 +123,9 @@ class Table:
         if self._names:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
-        cells = split_cells(line, self.separator)
+        cells = line.split() if self.separator == " " else []
+        if not cells or len(cells) != len(self._usual):
+            cells = split_cells(line, self.separator)
         if "," in line and (self.separator != "," or '"' in line):
             return [t.replace(",", ".") if _DECIMAL.fullmatch(t[:LONGEST]) else t for t in cells]
         return cells

@@ -27,7 +27,6 @@ from rig.timers.vocabulary import LONGEST, number_of, recognise_format
 
 _SAMPLE = 200
 """Rows that show what columns are."""
-_MOST_WAYS = 16
 _HINT = (
     "accepted are run,channel,time_s,state; tables with a heading such as time (s), gate, state; "
     "samples of inputs (0 and 1, or volts) with times; and value change dumps; see "
@@ -125,7 +124,7 @@ def read_ways(path: str | Path, unit: str | None = None) -> list[TimerFile]:
             files.append(file)
         except InputError as error:
             faults.append(error)
-        ways = min(_MOST_WAYS, max(ways, file.ways))
+        ways = max(ways, file.ways)
     if not files:
         if faults[0].problems and (kind := find_kind(path)):
             ProblemList(str(path)).refuse(1, 1, "other_kind", kind=kind)
@@ -168,10 +167,10 @@ def _read_block(
     sample = list(itertools.islice(rows, _SAMPLE))
     rows = itertools.chain(sample, rows)
     columns, heading = columns_of(block, sample, remarks, unit, problems)
-    ways = list(itertools.product(*(column.role.split("|") for column in columns)))
-    file.ways = max(file.ways, len(ways))
-    for column, role in zip(columns, ways[way % len(ways)], strict=True):
-        column.role = role
+    unclear = [column for column in columns if "|" in column.role]
+    for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
+        roles = column.role.split("|")
+        file.ways, column.role = max(file.ways, len(roles)), roles[way % len(roles)]
     check_columns(columns, heading, sample[0], problems)
     problems.raise_if_any()
     file.columns |= {column.name: column.meaning for column in columns}
@@ -194,7 +193,7 @@ def _read_block(
     title = " ".join(block.headings[0].texts) if block.headings and not file.is_sampled else ""
     for (run, _), events in out.by_part.items():
         if is_plain:
-            has_states = bool({"edge", "state", "gate", "run"} & known)
+            has_states = bool({"edge", "state", "cleared", "gate", "run"} & known)
             _check_moments(events, "" if has_states else unused, problems, has_states)
         pieces = [events] if "run" in known or not is_plain else _split(events, problems)
         file.parts += [FilePart(run or title, run, piece) for piece in pieces]
