@@ -174,10 +174,6 @@ BENCHES = {
         _number("--tables", "of other timers", 1000),
         _option("--seed", type=int, default=0, help="of the first"),
     )),
-    "imports": Bench("studies.imports", "other timers' files and mutants: is one read wrongly?", (
-        _PAGE, _JOBS, _number("--mutants", "of each shape (default 100)", 100),
-        _option("--seed", type=int, default=0, help="of the first"),
-    )),
     "layouts": Bench("studies.layouts", "which layouts of gates let drops be read", (
         _FILES, _LAYOUT, _JOBS,
         _number("--drops", "on each layout with each disturbance"),

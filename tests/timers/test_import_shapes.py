@@ -96,8 +96,13 @@ def read_mutants(path, name: str, seeds) -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("name", [name for name, shape in SHAPES.items() if not shape.sampled])
 def test_no_mutant_is_read_as_another_truth(tmp_path, name):
-    """A hundred of each, and of samples, too, are read by ``./run bench imports``."""
     assert read_mutants(tmp_path / "file", name, range(4))["wrong"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SHAPES)
+def test_none_of_many_mutants_is_read_as_another_truth(tmp_path, name):
+    assert read_mutants(tmp_path / "file", name, range(100))["wrong"] == []
 
 
 @pytest.mark.parametrize("name", STRANGERS)

@@ -209,35 +209,6 @@ def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, code, re
     assert caught.value.hint
 
 
-@examples(60, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.lists(st.tuples(st.integers(1, 10**5), st.integers(0, 3)), min_size=2, max_size=25),
-    st.permutations(["time", "channel", "state"]),
-    st.sampled_from([("s", 6), ("ms", 3), ("us", 0)]),
-    st.sampled_from([",", ";", "\t"]),
-)
-def test_a_long_table_is_read_in_any_order_of_columns(tmp_path, steps, order, unit, separator):
-    name, decimals = unit
-    dark = dict.fromkeys(range(4), False)
-    time, rows, wanted = 0, [], []
-    for step, channel in steps:
-        time += step
-        dark[channel] = not dark[channel]
-        cells = {
-            "time": f"{time / 10 ** (decimals):.{decimals}f}",
-            "channel": str(channel),
-            "state": str(int(dark[channel])),
-        }
-        rows.append(separator.join(cells[key] for key in order))
-        wanted.append((time * 10**6, channel, dark[channel]))
-    titles = {"time": f"Time ({name})", "channel": "Pin", "state": "State"}
-    path = tmp_path / "export"
-    path.write_text("\n".join([separator.join(titles[key] for key in order), *rows]))
-    (drop,) = drops_of(read_ways(path)[0], {str(n): n for n in range(4)}, 8)
-    start = drop.edges[0].tick - wanted[0][0]
-    assert [(e.tick - start, e.channel, e.blocked) for e in drop.edges] == wanted
-
-
 FALL = (0.24, 0.29, 0.41, 0.44)
 
 
