@@ -2,18 +2,98 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rig.timers.moments import seconds
+from rig.records import Drop, Edge
+from rig.timers.moments import TICK_HZ, moment, seconds
+from rig.timers.table import REMARK, Row, split_cells
+from rig.timers.vocabulary import LONGEST
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    from rig.records import Drop
+    from rig.timers.problems import ProblemList
 
 HEADER = ("run", "channel", "time_s", "state")
 """Of the project's own format, in which every line is a row."""
+_CELLS: tuple[tuple[str, Callable[[str], Any], str], ...] = (
+    (r"[+]?0*[1-9][0-9]{0,8}", int, "a run: a whole number from 1"),
+    (r"(?!1[6-9])1?[0-9]", int, "a channel: 0 to 15"),
+    (r"[^:]+", moment, "a time of a drop in seconds"),
+    (r"[01]", int, "a state: 1 is blocked, 0 is clear"),
+)
+"""Of each column: form, how it is read, and what is accepted."""
+_LONGEST_RUN_S = 3600
+"""More in a run means a wrong unit or a wrong run."""
+
+
+def is_own(head: Iterable[str]) -> bool:
+    """Whether lines begin as the project's own format does, perhaps below remarks."""
+    plain = (line[:LONGEST] for line in head if line.strip() and not REMARK.match(line[:LONGEST]))
+    first = next(plain, "").lower()
+    return [text.strip() for text in first.split(",")[:2]] == list(HEADER[:2])
+
+
+def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[Drop]:
+    """Read drops in the import format, and note faults at their places."""
+    runs: dict[int, list[Edge]] = {}
+    last: dict[tuple[int, int], int] = {}
+    plain = ((n, line) for n, line in lines if line.strip() and not REMARK.match(line))
+    number, line = next(plain, (1, ""))
+    if tuple(text.lower() for text in split_cells(line, ",")) != HEADER:
+        problems.refuse(number, 1, "wrong_header", header=",".join(HEADER))
+    for number, line in plain:
+        row = Row(number, split_cells(line, ","), line)
+        cells = _read_cells(row, problems)
+        if None in cells:
+            continue
+        run, channel, tick, state = cells
+        edges = runs.setdefault(run, [])
+        edge, place = Edge(tick, channel, bool(state)), (number, row.column(2), HEADER[2])
+        lasting_s = abs(tick - (edges or [edge])[0].tick) / TICK_HZ
+        before = last.get((run, channel), tick)
+        if lasting_s > _LONGEST_RUN_S:
+            limit = {"lasting_s": lasting_s, "limit_s": _LONGEST_RUN_S}
+            problems.add(*place, "too_long", recording=f"run {run}", **limit)
+        elif tick < before:
+            times = {"last": seconds(before, Fraction(TICK_HZ)), "text": row.texts[2]}
+            problems.add(*place, "before_last", channel=str(channel), run=run, **times)
+        else:
+            last[run, channel] = tick
+            edges.append(edge)
+    problems.raise_if_any()
+    if not runs:
+        problems.refuse(1, 1, "no_edges")
+    return [make_drop(run, runs[run]) for run in sorted(runs)]
+
+
+def _read_cells(row: Row, problems: ProblemList) -> list[Any]:
+    """Return the values of a row, `None` for each that is not accepted."""
+    if row.raw.count('"') % 2:
+        problems.add(row.line, 1, "", "open_quote")
+        return [None]
+    if len(row.texts) != len(HEADER):
+        values = {"values": len(row.texts), "needed": len(HEADER), "header": ",".join(HEADER)}
+        problems.add(row.line, 1, "", "wrong_width", **values)
+        return [None]
+    cells = []
+    for n, (text, (form, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
+        cells.append(read(text) if re.fullmatch(form, text) else None)
+        if cells[-1] is None:
+            problems.reject(row.line, row.column(n), HEADER[n], text, accepted)
+    return cells
+
+
+def make_drop(run: int, edges: list[Edge]) -> Drop:
+    """Make a drop of edges in ps: in order, counted from the whole second before the first."""
+    edges.sort(key=lambda edge: edge.tick)  # equal times stay in their order
+    start = edges[0].tick // TICK_HZ * TICK_HZ
+    first = {edge.channel: edge.blocked for edge in reversed(edges)}
+    clear = sum(1 << channel for channel, blocked in first.items() if not blocked)
+    stamps = tuple(edge._replace(tick=edge.tick - start) for edge in edges)
+    return Drop(run, 1, TICK_HZ, stamps, initial_state=clear)
 
 
 def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:

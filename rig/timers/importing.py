@@ -6,6 +6,7 @@ decides is asked, and rows of which no edge is made are refused.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections import Counter
@@ -13,17 +14,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rig.errors import InputError
 from rig.reasons import make_reason
+from rig.timers.edge_rows import HEADER, is_own, read_edges
 from rig.timers.layouts import (
     SETTINGS,
-    FileLayout,
     FileReading,
     find_layouts,
     part_names,
     read_drops,
 )
-from rig.timers.problems import refusal
-from rig.timers.timer_file import TimerFile, read_timer_file
+from rig.timers.lines import read_lines
+from rig.timers.problems import ProblemList, refusal
+from rig.timers.timer_file import TimerFile, read_ways
 from rig.timers.vocabulary import POWERS
 
 if TYPE_CHECKING:
@@ -39,6 +42,8 @@ _CLOSE = 0.1
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
+_HEAD = 50
+"""Lines above or at which the project's own header stands."""
 _EXCESS = 4
 """Edges for each bar, twice as many as it has, beyond which several gates are on one wire: a beam
 that flickers makes a few more than two."""
@@ -112,21 +117,31 @@ def import_drops(
         of which no edge is made.
     """
     place = options.events
-    file = read_timer_file(place, options.unit)
-    if file.is_own:
-        return Import(read_drops(file, FileLayout.own(file)).drops, {}, [file.kind], [])
-    stated = _read_stated(options, file, gates)
-    layouts = find_layouts(file, gates, bars, stated)[: 1 if options.as_read else None]
-    if not layouts:
+    head = list(itertools.islice(read_lines(place), _HEAD))
+    if is_own(head):
+        drops = read_edges(enumerate(read_lines(place), 1), ProblemList(place))
+        return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
+    readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
+    for file in read_ways(place, options.unit):
+        try:
+            stated = _read_stated(options, file, gates)
+        except InputError as error:
+            faults.append(error)
+            continue
+        readings += [read_drops(file, way) for way in find_layouts(file, gates, bars, stated)]
+    if faults and not readings:
+        raise faults[0]
+    if not readings:
         pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
         raise refusal(place, "inputs_unclear", **values, pairs=pairs)
-    readings = [read_drops(file, layout) for layout in layouts]
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
+        readings = [reading for reading in readings if reading.is_whole] or readings
         reading, match = _choose(readings, place, fit, is_stated="channels" in stated)
-    layout = reading.layout
-    if layout.groups == "passing" and file.labels and "groups" not in stated:
+    file, layout = reading.file, reading.layout
+    is_single = layout.groups == "passing" and not file.is_wide and bool(file.labels)
+    if is_single and "groups" not in stated:
         raise refusal(place, "one_wire", option=str(layout))
     if not options.as_read:
         _refuse_excess(file, reading, bars, place)
@@ -155,7 +170,6 @@ def _choose(
     Where the user said which input is which gate, that reading, if there is no other, is taken
     whatever falls say.
     """
-    readings = [reading for reading in readings if reading.is_whole] or readings
     distinct = {repr(reading.drops): reading for reading in reversed(readings) if reading.drops}
     if is_stated and len(distinct) == 1:
         (reading,) = distinct.values()
@@ -238,18 +252,17 @@ def _assumptions(file: TimerFile, reading: FileReading, gates: Sequence[int]) ->
 
 def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
     """Return what is decided by a saved layout and by options, which come before it."""
-    stated: dict[str, Any] = {}
-    if options.map_file is not None and Path(options.map_file).exists():
-        with Path(options.map_file).open(encoding="utf-8", errors="replace") as saved:
-            stated = _read_map(saved.read(LONGEST_MAP).strip(), options.map_file, file, gates, {})
-    options_given = {"unit": None if file.has_unit else options.unit, "dark": options.dark}
-    stated |= {name: value for name, value in options_given.items() if value is not None}
-    if options.map is not None:
-        stated = _read_map(options.map, "--map", file, gates, stated)
-    elif options.channel is not None and len(file.labels) < 2:
-        text = f"{next(iter(file.labels), 'input')}={options.channel}"
-        stated = _read_map(text, "--channel", file, gates, stated)
-    return stated
+    saved, stated = Path(options.map_file or ""), dict[str, Any]()
+    if saved.is_file():
+        with saved.open(encoding="utf-8", errors="replace") as stream:
+            text = stream.read(LONGEST_MAP).strip()
+        stated = _read_map(text, options.map_file, file, gates, {})
+    settings = {"unit": None if file.has_unit else options.unit, "dark": options.dark}
+    stated |= {name: value for name, value in settings.items() if value is not None}
+    place, text = "--map", options.map
+    if text is None and options.channel is not None and len(file.labels) < 2:
+        place, text = "--channel", f"{next(iter(file.labels), 'input')}={options.channel}"
+    return stated if text is None else _read_map(text, place, file, gates, stated)
 
 
 def _read_map(

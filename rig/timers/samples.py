@@ -7,23 +7,25 @@ straight line between two samples crosses that middle.
 from __future__ import annotations
 
 import itertools
-from array import array
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.reasons import Reason, make_reason
-from rig.timers.events import RowReader, TimerEvent
-from rig.timers.moments import TICK_HZ
+from rig.timers.events import EventList, TimerEvent
+from rig.timers.moments import TICK_HZ, moment
 from rig.timers.vocabulary import is_number, state_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.arrays import Array
-    from rig.timers.columns import TimerColumn
-    from rig.timers.table import Row, RowBlock, Table
+    from rig.timers.columns import Signal, TimerColumn
+    from rig.timers.table import Row
+
+    Levels = NDArray[np.float32]
 
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
@@ -32,126 +34,126 @@ _CLEAR_SWING = 8.0
 _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
 _EXACT = 2.0**53
+"""Ticks beyond which a float is not exact to the picosecond."""
+_REGULAR = 1.5
+"""Longest over usual step below which samples are all as far apart."""
 _CHUNK = 4096
-"""Rows that are read one by one where some cannot be read at once."""
 _LEVELS = {"zero": 0.0, "low": 0.0, "one": 1.0, "high": 1.0}
 
 
-class _Samples:
-    """Samples as they are read: those at which nothing changes are left out of levels."""
+class SampleReader:
+    """Reads rows of samples; of levels it keeps only those at which something changes.
 
-    def __init__(self, reader: RowReader, base: tuple[float, float]) -> None:
-        self.reader, self.base = reader, base
-        self.clocks = list(dict.fromkeys(signal.clock for signal in reader.signals))
-        self.values = [v for v in dict.fromkeys(s.value for s in reader.signals) if v]
+    Parameters
+    ----------
+    base
+        Of samples without times: when the first was taken, and the time between them, s.
+
+    Attributes
+    ----------
+    period_s
+        Of samples that are all as far apart; `None` for others.
+    """
+
+    def __init__(self, signals: Sequence[Signal], base: tuple[float, float], out: EventList):
+        self.signals, self.base, self.out = signals, base, out
+        self.clocks = list(dict.fromkeys(signal.clock for signal in signals))
+        self.values = [v for v in dict.fromkeys(signal.value for signal in signals) if v]
         self.is_digital = all(value.role == "level" for value in self.values)
-        self.stamps, self.levels, self.lines = array("d"), array("f"), array("L")
         self.origin: int | None = None
-        self._last, self._last_texts = list[float](), list[str]()
+        self.period_s: float | None = None
 
-    def add(self, row: Row) -> None:
-        """Add a row of any form."""
-        reader, first = self.reader, self.clocks[0]
-        reader.rows += 1
-        texts = [row.cell(column.at) for column in self.values]
-        ticks = [self._read_tick(row, clock) for clock in self.clocks]
-        self.origin = ticks[0] if self.origin is None else self.origin
-        now = [np.nan if tick is None else float(tick - (self.origin or 0)) for tick in ticks]
-        if first and self._last and now[0] < self._last[0]:
-            place, text = row.column(first.at), row.cell(first.at)
-            reader.problems.add(row.line, place, "time", "backwards", text=text)
-        self._last = now
-        if self.is_digital and texts == self._last_texts:
+    def read(self, rows: Iterator[Row]) -> Iterator[Reason]:
+        """Add the changes of each input, and say how many volts there are."""
+        chunks: list[tuple[Array, Levels, Array]] = []
+        last = np.empty((0, 0))
+        while chunk := list(itertools.islice(rows, _CHUNK)):
+            times = np.array([self._read_ticks(chunk, clock) for clock in self.clocks])
+            levels = np.array([self._read_levels(chunk, value) for value in self.values])
+            lines = np.array([row.line for row in chunk])
+            self.out.rows += len(chunk)
+            steps = np.diff(times[0], prepend=last[0] if len(last) else times[0, :1])
+            for n in np.flatnonzero(steps < 0)[:1]:
+                row, at = chunk[n], self.clocks[0].at
+                place = row.line, row.column(at), "time"
+                self.out.problems.add(*place, "backwards", text=row.cell(at))
+            if not len(last) and len(chunk) > 1:
+                usual = float(np.median(steps[1:]))
+                self.period_s = usual / TICK_HZ if steps.max() < _REGULAR * usual else None
+            last = times[:, -1]
+            if self.is_digital:
+                before = chunks[-1][1][:, -1:] if chunks else levels[:, :1] - 1
+                kept = np.any(np.diff(levels, prepend=before) != 0, axis=0)
+                times, levels, lines = times[:, kept], levels[:, kept], lines[kept]
+            chunks += [(times, levels, lines)] if lines.size else []
+        times, levels, lines = (np.concatenate(part, axis=-1) for part in zip(*chunks, strict=True))
+        for signal in self.signals:
+            trace = levels[self.values.index(signal.value or self.values[0])]
+            yield from self._find_changes(
+                signal, times[self.clocks.index(signal.clock)], trace, lines
+            )
+
+    def _read_ticks(self, rows: Sequence[Row], clock: TimerColumn) -> Array:
+        """Return when samples were taken, ps from the origin; NaN where a trace ends."""
+        is_time, empty = clock.role == "time", "nan" if len(self.clocks) > 1 else ""
+        start, step = (0.0, 10.0 ** -(clock.power or 0)) if is_time else self.base
+        if clock.at < 0:
+            numbers = self.out.rows + np.arange(len(rows), dtype=float)
+        else:
+            numbers = _numbers([row.cell(clock.at) or empty for row in rows])
+        ticks = (start + step * numbers) * TICK_HZ
+        if np.nanmax(np.abs(ticks), initial=0.0) < _EXACT:
+            self.origin = self.origin or 0
+            return np.asarray(np.round(ticks - self.origin))
+        exact = [
+            self._read_cell(row, clock, partial(moment, power=clock.power or 0)) for row in rows
+        ]
+        if not is_time:
+            exact = [x if x is None else round(start * TICK_HZ + step * x) for x in exact]
+        if self.origin is None:
+            self.origin = next((x for x in exact if x is not None), 0)
+        return np.array([np.nan if x is None else float(x - self.origin) for x in exact])
+
+    def _read_levels(self, rows: Sequence[Row], value: TimerColumn) -> Levels:
+        numbers = _numbers([row.cell(value.at) for row in rows])
+        if np.isinf(numbers).any() or (self.is_digital and not np.isin(numbers, (0.0, 1.0)).all()):
+            cells = [self._read_cell(row, value, _level_of) for row in rows]
+            numbers = np.array([np.nan if cell is None else cell for cell in cells])
+        return numbers.astype(np.float32)
+
+    def _read_cell(self, row: Row, column: TimerColumn, read: Callable[[str], Any]) -> Any:
+        value = read(row.cell(column.at))
+        # A trace may end before another.
+        if value is None and (len(self.clocks) == 1 or row.cell(column.at)):
+            self.out.reject(row, column)
+        return value
+
+    def _find_changes(
+        self, signal: Signal, times: Array, trace: Levels, lines: Array
+    ) -> Iterator[Reason]:
+        at = np.flatnonzero(np.isfinite(times) & np.isfinite(trace))
+        threshold = (0.5, 0.0) if self.is_digital else find_threshold(trace[at])
+        if threshold is None:
+            span = {"low": float(trace[at].min()), "high": float(trace[at].max())}
+            yield make_reason("no_passage", input=signal.label, **span)
             return
-        self._last_texts = texts
-        try:
-            self.levels.extend(list(map(float, texts)))
-        except ValueError:
-            cells = [reader.read_cell(row, column, _level_of, np.nan) for column in self.values]
-            self.levels.extend([np.nan if level is None else level for level in cells])
-        self.stamps.extend(now)
-        self.lines.append(row.line)
-
-    def add_numbers(self, lines: Sequence[int], numbers: Array) -> bool:
-        """Add rows of numbers at once; false where these are to be read row by row."""
-        count, width = len(lines), sum(clock is not None for clock in self.clocks)
-        if self.origin is None or (
-            self.is_digital and not np.isin(numbers[:, width:], (0, 1)).all()
-        ):
-            return False
-        ticks = np.empty((count, len(self.clocks)))
-        for n, clock in enumerate(self.clocks):
-            is_time = clock is not None and clock.role == "time"
-            start, step = (0.0, 10.0 ** -((clock and clock.power) or 0)) if is_time else self.base
-            number = numbers[:, n] if clock else self.reader.rows + np.arange(count)
-            ticks[:, n] = (start + step * number) * TICK_HZ - self.origin
-        # Beyond that, a float is not exact to the picosecond.
-        if np.abs(ticks + self.origin).max() > _EXACT or np.any(
-            np.diff(ticks[:, 0], prepend=self._last[0]) < 0
-        ):
-            return False
-        values = numbers[:, width:].astype(np.float32)
-        is_kept = np.ones(count, dtype=bool)
-        if self.is_digital:
-            is_kept[1:] = np.any(values[1:] != values[:-1], axis=1)
-        self.reader.rows += count
-        self._last, self._last_texts = list(ticks[-1]), []
-        self.stamps.frombytes(np.round(ticks[is_kept]).tobytes())
-        self.levels.frombytes(values[is_kept].tobytes())
-        self.lines.extend(np.asarray(lines)[is_kept].tolist())
-        return True
-
-    def find_changes(self) -> Iterator[Reason]:
-        """Give the changes of each input to the reader, and say how many volts have."""
-        times: Array = np.frombuffer(self.stamps).reshape(-1, len(self.clocks)).T
-        volts = np.frombuffer(self.levels, dtype=np.float32).reshape(-1, len(self.values)).T
-        by_clock = dict(zip(self.clocks, times, strict=True))
-        by_value = dict(zip(self.values, volts, strict=True))
-        for signal in self.reader.signals:
-            at_time, label = by_clock[signal.clock], signal.label
-            trace = by_value[signal.value or self.values[0]]
-            at = np.flatnonzero(np.isfinite(at_time) & np.isfinite(trace))
-            threshold = (0.5, 0.0) if self.is_digital else find_threshold(trace[at])
-            if threshold is None:
-                span = {"low": float(trace[at].min()), "high": float(trace[at].max())}
-                yield make_reason("no_passage", input=label, **span)
-                continue
-            crossings = list(_crossings(at_time[at], trace[at], threshold))
-            for n, tick, is_high in crossings:
-                ticks = round(float(at_time[at[n]]) if self.is_digital else tick)
-                level, line = "high" if is_high else "low", self.lines[at[n]]
-                event = TimerEvent((self.origin or 0) + ticks, label, level, line)
-                self.reader.put((0, signal.run), signal.run, 0, event)
-            if not self.is_digital:
-                values = {"crossings": len(crossings), "level": threshold[0]}
-                yield make_reason("crossings", input=label, **values)
-
-    def _read_tick(self, row: Row, clock: TimerColumn | None) -> int | None:
-        """Return when a sample was taken, ps; nothing where a trace ends before another."""
-        if clock and len(self.clocks) > 1 and not row.cell(clock.at):
-            return None
-        if clock and clock.role == "time":
-            return self.reader.read_time(row, clock)
-        count = (self.reader.rows - 1) * TICK_HZ
-        number = self.reader.read_time(row, clock) if clock else count
-        return None if number is None else round(TICK_HZ * self.base[0] + number * self.base[1])
+        crossings = list(_crossings(times[at], trace[at], threshold))
+        for n, tick, is_high in crossings:
+            ticks = round(float(times[at[n]]) if self.is_digital else tick)
+            state, line = "high" if is_high else "low", int(lines[at[n]])
+            event = TimerEvent((self.origin or 0) + ticks, signal.label, state, line)
+            self.out.put(signal.run, 0, event)
+        if not self.is_digital:
+            values = {"crossings": len(crossings), "level": threshold[0]}
+            yield make_reason("crossings", input=signal.label, **values)
 
 
-def read_samples(
-    reader: RowReader, sample: Sequence[Row], rows: Iterator[Row], table: Table, block: RowBlock
-) -> list[Reason]:
-    """Read rows of samples; give the changes to a reader, and say how many volts there are."""
-    samples = _Samples(reader, block.base)
-    further, columns = sample, [*filter(None, samples.clocks), *samples.values]
-    while further:
-        for row in further:
-            samples.add(row)
-        while numbers := table.take_numbers([column.at for column in columns]):
-            if not samples.add_numbers(*numbers):
-                table.put_back()
-                break
-        further = list(itertools.islice(rows, _CHUNK))
-    return list(samples.find_changes())
+def _numbers(texts: Sequence[str]) -> Array:
+    """Return numbers; infinity, for all of them, where one is none."""
+    try:
+        return np.fromiter(map(float, texts), float, len(texts))
+    except ValueError:
+        return np.full(len(texts), np.inf)
 
 
 def _level_of(text: str) -> float | None:
@@ -162,7 +164,7 @@ def _level_of(text: str) -> float | None:
 
 
 def _crossings(
-    times: Array, volts: NDArray[np.float32], threshold: tuple[float, float]
+    times: Array, volts: Levels, threshold: tuple[float, float]
 ) -> Iterator[tuple[int, float, bool]]:
     """Yield the sample behind each crossing, its moment, and whether it rises."""
     is_high = volts > threshold[0]
@@ -174,7 +176,7 @@ def _crossings(
         yield int(n), float(times[n] - share * (times[n] - times[n - 1])), bool(is_high[n])
 
 
-def find_threshold(volts: NDArray[np.float32]) -> tuple[float, float] | None:
+def find_threshold(volts: Levels) -> tuple[float, float] | None:
     """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
     low, high = float(volts.min()), float(volts.max())
     for _ in range(50):  # two means, one for each level

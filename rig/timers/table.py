@@ -1,7 +1,7 @@
-"""Tables as timers write them: rows of cells below headings, in blocks, with remarks and settings.
+"""A text file as blocks of rows: cells below headings, with remarks and settings.
 
-How the lines of a file are written (cells parted by a separator, names with values, sentences) is
-found out from its first lines; then lines are read one after the other, and none is kept.
+How the lines of a file are written (cells parted by a separator, or values between words) is found
+out from its first lines; then lines are read one after the other, and none is kept.
 """
 
 from __future__ import annotations
@@ -12,40 +12,22 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
+from functools import cache
+from typing import NamedTuple
 
 from rig.timers import vocabulary
-from rig.timers.edge_rows import HEADER
-from rig.timers.vocabulary import LONGEST, POWERS, is_measured, is_number, is_value, words
-
-if TYPE_CHECKING:
-    from rig.arrays import Array
-    from rig.timers.problems import ProblemList
+from rig.timers.vocabulary import CLOCK, LONGEST, POWERS, is_measured, is_number, is_value, words
 
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
-_CHUNK = 4096
-"""Lines that are read at once, and row by row where that cannot be."""
-_ATTEMPTS = 20
-"""How often lines are read at once in vain before all are read row by row."""
 _PLAIN = re.compile(r"[-+0-9.,;eE\t ]*[0-9][-+0-9.,;eE\t ]*")
 _DECIMAL = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]{1,2})?")
-_AROUND = re.compile(
-    r"^[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{3} -> "
-    r"|^\s*(?:\w{1,40}\s?=\s?)?[\[(]{1,3}([-+0-9.][^\[\]():]*)[\])]{1,3}[,;]?\s*$"
-)
-"""What Arduino's serial monitor writes before a line, and Python around a list of numbers."""
-_KEYED = re.compile(r"([^\W\d][\w ]{0,40})[\"']?\s?[=:]\s?[\"']?([^\s,;=:\"'{}]{1,60})")
-"""A name with its value: ``gate=1``, ``gate: 1`` or, of JSON, ``"gate": 1``."""
-_SENTENCE = re.compile(
-    r"(?:gate|pin|sensor|channel|beam)[\s#_-]*([0-9]{1,4})\b.*?\b(un|not )?(block|clear|dark)\w*"
-    r".*?([0-9]+(?:[.,][0-9]+)?)\s*(us|µs|ms|s|micros|millis|microseconds|milliseconds|seconds)\b",
-    re.IGNORECASE,
-)
-"""What a board may say to whoever reads along: ``Gate 1 blocked at 402345 us``."""
-_REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)|FRAME-(?:BEGIN|END)')
+_LISTED = re.compile(r"\s*(?:\w{1,40}\s?=\s?)?[\[({]+\s*(?=[-+\"'.0-9]|$)|\s*[\])}]+[,;]?\s*$")
+"""What programs print around a list of values, or of lists."""
+_BETWEEN_LISTS = re.compile(r"[\])}]\s?,\s?(?=[\[({])")
+_NAME = re.compile(r"([^\W\d][\w ]*?)[\"']?\s?[=:]?\s?[\"']?$")
+"""What stands before a value: ``gate=``, ``"gate": `` or, in a sentence, ``at``."""
+REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)|FRAME-(?:BEGIN|END)')
 """A line that is marked as a remark, or parts what sigrok captured."""
 _QUANTITY = re.compile(
     r"([+-]?[0-9][0-9.,]{0,30}(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))", re.IGNORECASE
@@ -73,8 +55,9 @@ class Row(NamedTuple):
 
     def column(self, at: int) -> int:
         """Return the column, from 1, at which a cell begins; 1 where the row ends before it."""
-        cells = self.raw.split(self.separator)
-        before = sum(len(cell) + 1 for cell in cells[:at]) if at < len(self.texts) else 0
+        if at >= len(self.texts) or not self.separator:
+            return max(0, self.raw.find(self.texts[at])) + 1 if at < len(self.texts) else 1
+        before = sum(len(cell) + 1 for cell in self.raw.split(self.separator)[:at])
         return before + len(self.raw[before:]) - len(self.raw[before:].lstrip(' "')) + 1
 
 
@@ -88,14 +71,11 @@ class RowBlock:
         What stands above them, and above those of the block before.
     width
         How many cells the first one has.
-    base
-        Of samples without times: when the first was taken, and the time between them, s.
     """
 
     headings: list[Row] = field(default_factory=list)
     above: list[Row] = field(default_factory=list)
     width: int = 0
-    base: tuple[float, float] = (0.0, 1.0)
 
 
 class Table:
@@ -105,36 +85,26 @@ class Table:
     ----------
     lines
         All of them, one after the other, with their numbers.
-    problems
-        Where faults are noted.
 
     Attributes
     ----------
     separator
-        Of the cells; a blank stands for any number of blanks.
-    is_own
-        Whether it has the header of the project's own format, or begins as that does.
+        Of the cells; a blank stands for any number of blanks, nothing for words between values.
     remarks
         Lines that are marked as such, without the mark, as far as read.
     strays
         Lines between rows that are neither rows nor headings, as far as read.
     """
 
-    def __init__(self, lines: Iterable[tuple[int, str]], problems: ProblemList) -> None:
-        self.problems, self.remarks, self.strays = problems, list[Row](), list[int]()
-        # Most lines begin otherwise: to search them costs less than to change them.
-        numbered = (
-            (number, _AROUND.sub(r"\1", line) if _AROUND.match(line) else line)
-            for number, line in lines
-        )
-        sample = list(itertools.islice(numbered, _SAMPLE))
-        self._lines: Iterator[tuple[int, str]] = itertools.chain(sample, numbered)
-        head, self._taken, self._attempts = [line for _, line in sample], sample, _ATTEMPTS
-        plain = [line for line in head if line.strip() and not _REMARK.match(line[:LONGEST])]
-        first = re.sub(r"\s", "", "".join(plain[:1])[:LONGEST].lower()).split(",")
-        self.is_own = first[:2] == list(HEADER[:2])
-        self._names = [] if self.is_own else _find_names(head)
-        self.separator = "," if self.is_own else "\t" if self._names else find_separator(plain)
+    def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
+        self.remarks, self.strays = list[Row](), list[int]()
+        unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
+        sample = list(itertools.islice(unwrapped, _SAMPLE))
+        self._lines = itertools.chain(sample, unwrapped)
+        plain = [line for _, line in sample if line.strip() and not REMARK.match(line[:LONGEST])]
+        self._names = _find_names(plain)
+        self.separator = "" if self._names else find_separator(plain)
+        self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(_shape(self.split(line)) for line in plain)
         shapes = Counter({shape: n for shape, n in shapes.items() if any(map(all, shape))})
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
@@ -148,73 +118,36 @@ class Table:
         for block, pairs in itertools.groupby(self._rows(), key=lambda pair: pair[0]):
             yield block, (row for _, row in pairs)
 
-    def take_numbers(self, places: Sequence[int]) -> tuple[list[int], Array] | None:
-        """Take further lines at once, if they are rows of plain numbers.
-
-        Returns
-        -------
-        tuple or None
-            Their numbers, and what the columns have, of shape ``(lines, len(places))``; `None`, and
-            nothing is taken, where a line is anything else.
-        """
-        lines = list(itertools.islice(self._lines, _CHUNK * (self._attempts > 0)))
-        if not lines:
-            return None
-        texts = [line if self.separator == "," else line.replace(",", ".") for _, line in lines]
-        mark = None if self.separator == " " else self.separator
-        try:
-            numbers = np.loadtxt(texts, delimiter=mark, usecols=places, comments=None, ndmin=2)
-        except ValueError:
-            numbers = np.empty((0, 0))
-        self._taken = lines
-        if len(numbers) == len(lines) and np.isfinite(numbers).all():
-            return [number for number, _ in lines], numbers
-        self.put_back()
-        return None
-
-    def put_back(self) -> None:
-        """Give back the lines taken last, to be read row by row."""
-        self._attempts -= 1
-        self._lines = itertools.chain(self._taken, self._lines)
-
     def split(self, line: str) -> list[str]:
         """Split a line into cells; numbers get a decimal point."""
         if self._names:
-            return _split_named(line[:LONGEST], self._names)
-        separator = self.separator
-        if separator == " ":
-            # A heading has names of several words: two blanks or more part them.
-            cells = line.split()
-            cells = cells if all(map(is_value, cells)) else re.split(r" {2,}|\t", line.strip())
-        elif '"' in line:
-            (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
-            cells = [text.strip().strip('"').strip() for text in cells]
-        else:
-            cells = [text.strip() for text in line.split(separator)]
-        if not self.is_own and "," in line and (separator != "," or '"' in line):
-            cells = [t.replace(",", ".") if _DECIMAL.fullmatch(t[:LONGEST]) else t for t in cells]
+            values = dict(_named_values(line))
+            return [values.get(name, "") for name in self._names] if any(values) else [line]
+        cells = line.split() if self.separator == " " else []
+        if not cells or len(cells) != len(self._usual):
+            cells = split_cells(line, self.separator)
+        if "," in line and (self.separator != "," or '"' in line):
+            return [t.replace(",", ".") if _DECIMAL.fullmatch(t[:LONGEST]) else t for t in cells]
         return cells
 
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [])
         remark = Row(0, [])
-        while pair := next(self._lines, None):
-            number, line = pair
+        for number, line in self._lines:
             if not line or line.isspace():
                 continue
             if block.width and not self._beside and _PLAIN.fullmatch(line):
                 yield block, Row(number, self.split(line), line, self.separator)
                 continue
-            mark = _REMARK.match(line[:LONGEST])
+            mark = REMARK.match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, self.separator)
             if mark:
                 remark = row
                 self.remarks += [row] * (number <= _SAMPLE)
             row = self._without_settings(row, block) if self._beside else row
-            begins = _is_mark(row) if mark else block.width > 0 and self._begins_block(row, block)
-            if begins and not self.is_own:
+            if _is_mark(row) if mark else block.width > 0 and self._begins_block(row, block):
                 block = RowBlock([row], block.headings)
             elif not mark and self._is_row(row, block):
                 if not block.headings and len(list(filter(None, remark.texts))) == len(row.texts):
@@ -245,50 +178,63 @@ class Table:
         return _is_mark(row) or (is_heading and not any(map(is_number, row.texts)))
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
-        if self.is_own:
-            return len(block.headings) > 0
-        texts, last = row.texts, (block.headings or [Row(0, [])])[-1]
+        texts = row.texts
         if any(texts) and (_shape(texts) == self._usual or _is_data(texts)):
             return True
         # One of data with a fault: some of it is a number, as in those above.
-        is_timed = any("time" in vocabulary.roles_in(text) for text in last.texts)
-        is_named = is_timed and len(last.texts) == len(texts) and not count_known(row)
-        is_faulty = len(texts) == block.width if block.width else is_named
-        return is_faulty and len(texts) > 1 and any(map(is_number, texts))
+        return 1 < len(texts) == block.width and any(map(is_number, texts))
 
 
-def _is_data(texts: Sequence[str]) -> bool:
-    """Whether cells hold values only, and at least one number or date."""
-    return all(is_value(text) for text in texts if text) and any(map(is_measured, texts))
+def split_cells(line: str, separator: str) -> list[str]:
+    """Split a line into cells, without the blanks and the quotes around them."""
+    if separator == " ":
+        # A heading has names of several words: two blanks or more part them.
+        cells = line.split()
+        return cells if all(map(is_value, cells)) else re.split(r" {2,}|\t", line.strip())
+    if '"' in line:
+        (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
+        return [text.strip().strip('"').strip() for text in cells]
+    return [text.strip() for text in line.split(separator)]
 
 
-def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
-    """Return which cells are filled, and numbers; of most rows of data it is the same."""
-    return tuple((text != "", is_measured(text)) for text in texts)
+def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
+    """Return a line without the brackets around it; lists in a line are lines of their own."""
+    if not _LISTED.match(line):
+        return [(number, line)]
+    pieces = _BETWEEN_LISTS.split(line)
+    return [(number, _LISTED.sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
+
+
+@cache
+def _value_pattern() -> re.Pattern[str]:
+    """Return what is a value within words: a time of day, a number or a state, but no key."""
+    states = set().union(*(words()[role] for role in ("blocked", "clear", "high", "low")))
+    longest = sorted((w for w in states if len(w) > 2), key=len, reverse=True)
+    return re.compile(
+        rf"(?<![\w.]){CLOCK.pattern}|(?<![\w.])[-+]?[0-9]+(?:[.,][0-9]+)?(?:e[-+]?[0-9]{{1,2}})?"
+        r"(?:\s?(?:s|ms|us|µs|μs|ns|micros|millis|seconds))?(?![\w.])"
+        r"|(?<=[a-z_])[0-9]{1,4}(?![\w.]|[\"']?\s?[:=])"
+        rf"|(?<!\w)(?:{'|'.join(map(re.escape, longest))}|true|false)(?!\w|[\"']?\s?[:=])",
+        re.IGNORECASE,
+    )
+
+
+def _named_values(line: str) -> list[tuple[str, str]]:
+    """Return the values between the words of a line, each with the words right before it."""
+    values, end = [], 0
+    for match in _value_pattern().finditer(line[:LONGEST]):
+        name = _NAME.search(line[end : match.start()])
+        values.append((name[1].strip() if name else "", match[0].replace(",", ".")))
+        end = match.end()
+    return values
 
 
 def _find_names(lines: Sequence[str]) -> list[str]:
-    """Return what most lines name before each value, or what most sentences say."""
-    sample = [line[:LONGEST] for line in lines if line.strip()]
-    named = [[name.strip() for name, _ in _KEYED.findall(line)] for line in sample]
-    names = max(named, key=len, default=[])
-    if sum(len(set(names) & set(row)) > 1 for row in named) * 2 > len(sample):
-        return names
-    matches = [match for line in sample if (match := _SENTENCE.search(line))]
-    units = {match[5] for match in matches}
-    is_said = len(units) == 1 and len(matches) * 2 > len(sample)
-    return ["gate", f"time ({units.pop()})", "state"] if is_said else []
-
-
-def _split_named(line: str, names: Sequence[str]) -> list[str]:
-    row = {name.strip(): value for name, value in _KEYED.findall(line)}
-    if set(row) & set(names):
-        return [row.get(name, "") for name in names]
-    match = _SENTENCE.search(line)
-    if match is None:  # with numbers, it is a faulty row
-        return ["0", line, ""] if len(re.findall("[0-9]+", line)) > 1 else [line]
-    blocked = (match[3].lower() != "clear") is not bool(match[2])
-    return [match[1], match[4].replace(",", "."), str(int(blocked))]
+    """Return what most lines that have values name before these; nothing if they do not."""
+    rows = [tuple(name for name, _ in _named_values(line)) for line in lines[:100]]
+    usual, count = next(iter(Counter(filter(None, rows)).most_common(1)), ((), 0))
+    is_named = len(set(usual) - {""}) > 1 and 2 * count > sum(map(bool, rows))
+    return list(usual) if is_named else []
 
 
 def find_separator(lines: Sequence[str]) -> str:
@@ -306,6 +252,16 @@ def find_separator(lines: Sequence[str]) -> str:
     # Blanks part values; a comma behind one parts them, too.
     parted = [row.split() for row in rows if ", " not in row and " " in row]
     return " " if sum(all(map(is_value, row)) for row in parted) * 2 > len(rows) else ","
+
+
+def _is_data(texts: Sequence[str]) -> bool:
+    """Whether cells hold values only, and at least one number or date."""
+    return all(is_value(text) for text in texts if text) and any(map(is_measured, texts))
+
+
+def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
+    """Return which cells are filled, and numbers; of most rows of data it is the same."""
+    return tuple((text != "", is_measured(text)) for text in texts)
 
 
 def count_known(row: Row) -> int:

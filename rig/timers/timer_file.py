@@ -1,29 +1,27 @@
 """A timer's file: its events, and what it leaves open.
 
 Loggers of photogates (tables of times, or of times and states), boards that print pin, edge and
-time, logic analysers (a column an input, or value change dumps), oscilloscopes (volts), and the
-project's own format, which leaves nothing open. What a file does not say (which gate, which level
-is dark, which unit) is left to `rig.timers.layouts`.
+time, logic analysers (a column an input, or value change dumps) and oscilloscopes (volts). What a
+file does not say (which gate, which level is dark, which unit) is left to `rig.timers.layouts`.
 """
 
 from __future__ import annotations
 
 import itertools
-import statistics
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
-from rig.timers.columns import VALUES, columns_of
-from rig.timers.edge_rows import HEADER
-from rig.timers.events import FilePart, RowReader
+from rig.timers.columns import VALUES, check_columns, columns_of, find_signals
+from rig.timers.events import EventList, TimerEvent, read_passages
 from rig.timers.lines import find_kind, is_cut, read_lines
-from rig.timers.moments import TICK_HZ, moment
+from rig.timers.moments import TICK_HZ
 from rig.timers.problems import ProblemList
-from rig.timers.samples import read_samples
-from rig.timers.table import Row, RowBlock, Table
+from rig.timers.samples import SampleReader
+from rig.timers.table import Row, RowBlock, Table, find_time_base
 from rig.timers.vcd import BEGINNINGS, vcd_rows
 from rig.timers.vocabulary import LONGEST, number_of, recognise_format
 
@@ -37,6 +35,22 @@ _HINT = (
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks", "|": "bars"}
 
 
+class FilePart(NamedTuple):
+    """Events that stand together: those of a run, or of a gate.
+
+    Attributes
+    ----------
+    name
+        What the file calls it; empty where nothing is said.
+    run
+        The run, where the file says it.
+    """
+
+    name: str
+    run: str
+    events: list[TimerEvent]
+
+
 @dataclass(slots=True)
 class TimerFile:
     """What was understood of a file.
@@ -45,8 +59,6 @@ class TimerFile:
     ----------
     kind
         In words.
-    is_own
-        Whether it has the project's own format.
     columns
         What each column was taken for, by its heading.
     parts
@@ -56,24 +68,29 @@ class TimerFile:
         known better than that; `None` for others.
     has_unit
         Whether the file says the unit of its times; without it they are read as seconds.
-    rows
-        How many lines of data there are.
     is_sampled
         Whether it has samples: a level that changes may be of an input that is no gate.
+    is_wide
+        Whether a row has several times, so that it may be a run.
+    ways
+        How many there are to understand its columns.
+    rows
+        How many lines of data there are.
     unread
         Those that neither change anything nor say that nothing changes.
     notes
         What is to be said, a reason each.
     """
 
-    kind: str
-    is_own: bool = False
+    kind: str = ""
     columns: dict[str, str] = field(default_factory=dict)
     parts: list[FilePart] = field(default_factory=list)
     period_s: float | None = None
     has_unit: bool = True
-    rows: int = 0
     is_sampled: bool = False
+    is_wide: bool = False
+    ways: int = 1
+    rows: int = 0
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
 
@@ -84,8 +101,8 @@ class TimerFile:
         return tuple(sorted(labels, key=lambda label: (number_of(label) or 0, label)))
 
 
-def read_timer_file(path: str | Path, unit: str | None = None) -> TimerFile:
-    """Find out what a file says.
+def read_ways(path: str | Path, unit: str | None = None) -> list[TimerFile]:
+    """Find out what a file says, in every way in which its columns may be understood.
 
     Parameters
     ----------
@@ -99,108 +116,118 @@ def read_timer_file(path: str | Path, unit: str | None = None) -> TimerFile:
     InputError
         Every fault of the file at its line and column, or what it is instead.
     """
-    try:
-        file = _read(read_lines(path), unit, ProblemList(str(path), _HINT))
-    except InputError as error:
-        if error.problems and (kind := find_kind(path)):
+    files, faults, ways = list[TimerFile](), list[InputError](), 1
+    while (way := len(files) + len(faults)) < ways:
+        file = TimerFile()
+        try:
+            _read(file, read_lines(path), unit, way, ProblemList(str(path), _HINT))
+            files.append(file)
+        except InputError as error:
+            faults.append(error)
+        ways = max(ways, file.ways)
+    if not files:
+        if faults[0].problems and (kind := find_kind(path)):
             ProblemList(str(path)).refuse(1, 1, "other_kind", kind=kind)
-        raise
-    file.notes += [make_reason("last_line_cut")] if is_cut(path) else []
-    return file
+        raise faults[0]
+    for file in files:
+        file.notes += [make_reason("last_line_cut")] if is_cut(path) else []
+    return files
 
 
-def _read(lines: Iterator[str], unit: str | None, problems: ProblemList) -> TimerFile:
+def _read(
+    file: TimerFile, lines: Iterator[str], unit: str | None, way: int, problems: ProblemList
+) -> None:
     head = list(itertools.islice(lines, 50))
     numbered = enumerate(itertools.chain(head, lines), 1)
     is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
-    table = Table(vcd_rows(numbered, problems) if is_dump else numbered, problems)
-    file = TimerFile(f"the project's own format: {','.join(HEADER)}", table.is_own)
-    if table.is_own:
-        problems.hint = ""  # its faults are told each
-    else:
-        name = recognise_format("\n".join(line[:LONGEST] for line in head))
-        file.kind = f"a table, its cells separated by {_SEPARATORS[table.separator]}"
-        file.kind += f"; it looks like {name}" if name else ""
+    table = Table(vcd_rows(numbered, problems) if is_dump else numbered)
+    cells = f"separated by {_SEPARATORS[table.separator]}" if table.separator else "between words"
+    name = recognise_format("\n".join(line[:LONGEST] for line in head))
+    file.kind = f"a table, its cells {cells}" + (f"; it looks like {name}" if name else "")
     for block, rows in table.blocks():
-        _read_block(file, table, block, rows, unit)
+        _read_block(file, block, rows, table.remarks, unit, way, problems)
+        problems.raise_if_any()
     file.rows += len(table.strays)
     file.unread += table.strays
-    problems.raise_if_any()
     if not file.parts:
         notes = "".join(f"; {note}" for note in file.notes)
         problems.refuse(1, 1, "nothing_passes" if file.rows else "no_edges", notes=notes)
-    return file
 
 
 def _read_block(
-    file: TimerFile, table: Table, block: RowBlock, rows: Iterator[Row], unit: str | None
+    file: TimerFile,
+    block: RowBlock,
+    rows: Iterator[Row],
+    remarks: Sequence[Row],
+    unit: str | None,
+    way: int,
+    problems: ProblemList,
 ) -> None:
-    """Add what a block says: samples, or passages, divided where times begin anew."""
-    sample, problems = list(itertools.islice(rows, _SAMPLE)), table.problems
-    columns = columns_of(block, sample, table, unit)
+    """Add what a block says: samples, or passages."""
+    sample = list(itertools.islice(rows, _SAMPLE))
+    rows = itertools.chain(sample, rows)
+    columns, heading = columns_of(block, sample, remarks, unit, problems)
+    unclear = [column for column in columns if "|" in column.role]
+    for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
+        roles = column.role.split("|")
+        file.ways, column.role = max(file.ways, len(roles)), roles[way % len(roles)]
+    check_columns(columns, heading, sample[0], problems)
     problems.raise_if_any()
     file.columns |= {column.name: column.meaning for column in columns}
     file.has_unit &= all(column.power is not None for column in columns)
+    known, signals, out = {c.role for c in columns}, find_signals(columns), EventList(problems)
     unused = ", ".join(column.name for column in columns if column.role in {"other", "duration"})
-    reader = RowReader(columns, sample, problems, table.is_own)
-    is_sampled = any(column.role in VALUES[0] for column in columns)
-    if is_sampled:
-        file.notes += read_samples(reader, sample, rows, table, block)
+    if known & set(VALUES[0]):
+        base = find_time_base([*remarks, *block.headings])
+        if base is None and "time" not in known:
+            problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
+        reader = SampleReader(signals, base or (0.0, 1.0), out)
+        file.notes += reader.read(rows)
+        file.period_s, file.is_sampled = reader.period_s, True
     else:
-        reader.read(itertools.chain(sample, rows))
-    problems.raise_if_any()
+        read_passages(columns, signals, rows, out)
+        clocks = {signal.clock for signal in signals}
+        file.is_wide |= len(clocks) > 1 and not any(clock.run for clock in clocks)
     file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
-    parts = list(reader.parts.values())
-    if is_sampled:
-        clock = reader.signals[0].clock
-        ticks = (
-            [moment(row.cell(clock.at), clock.power or 0) or 0 for row in sample] if clock else []
-        )
-        steps = [b - a for a, b in itertools.pairwise(ticks)] or [TICK_HZ]
-        if max(steps) < 1.5 * statistics.median(steps):
-            file.period_s = statistics.median(steps) / TICK_HZ * block.base[1]
-    else:
-        is_stated = bool({"edge", "state", "gate", "run"} & {column.role for column in columns})
-        title = " ".join(block.headings[0].texts if block.headings else ())
-        for part in parts:
-            part.name = part.name or title
-            if not is_stated:
-                _check_moments(part, unused, problems)
-        if not reader.has_runs:
-            parts = [piece for part in parts for piece in _split_at_jumps(part, problems)]
-    file.parts += parts
-    file.rows += reader.rows
-    file.unread += reader.unread
-    file.is_sampled |= is_sampled
+    is_plain = not (file.is_sampled or file.is_wide)
+    title = " ".join(block.headings[0].texts) if block.headings and not file.is_sampled else ""
+    for (run, _), events in out.by_part.items():
+        if is_plain:
+            has_states = bool({"edge", "state", "cleared", "gate", "run"} & known)
+            _check_moments(events, "" if has_states else unused, problems, has_states)
+        pieces = [events] if "run" in known or not is_plain else _split(events, problems)
+        file.parts += [FilePart(run or title, run, piece) for piece in pieces]
+    file.rows += out.rows
+    file.unread += out.unread
 
 
-def _check_moments(part: FilePart, unused: str, problems: ProblemList) -> None:
+def _check_moments(
+    events: Sequence[TimerEvent], unused: str, problems: ProblemList, has_states: bool
+) -> None:
     """Refuse numbers that are no moments of a passage: durations, or samples of something else."""
-    if len({event.line for event in part.events}) == 1:  # columns may stand in any order
-        part.events.sort(key=lambda event: event.tick)
-    steps = [b.tick - a.tick for a, b in itertools.pairwise(part.events)]
+    steps = [b.tick - a.tick for a, b in itertools.pairwise(events)]
     backwards = sum(step < 0 for step in steps)
-    if backwards > 1 and backwards * 4 > len(part.events):
+    if not has_states and backwards > 1 and backwards * 4 > len(events):
         numbers = "these numbers go up and down: they"
-        problems.refuse(part.events[0].line, 1, "durations", numbers=numbers)
+        problems.refuse(events[0].line, 1, "durations", numbers=numbers)
     if unused and len(steps) > 3 and max(steps) < 1.5 * min(steps):
-        problems.refuse(part.events[0].line, 1, "regular_samples", columns=unused)
+        problems.refuse(events[0].line, 1, "regular_samples", columns=unused)
 
 
-def _split_at_jumps(part: FilePart, problems: ProblemList) -> list[FilePart]:
+def _split(events: Sequence[TimerEvent], problems: ProblemList) -> list[list[TimerEvent]]:
     """Divide what stands one below the other where the times of an input do not go on."""
-    pieces, last = [FilePart(part.name, part.number)], dict[str, int]()
+    pieces, last = [list[TimerEvent]()], dict[str, int]()
     # Where each row has a single time, one before any above it begins anew.
-    in_order = len({event.line for event in part.events}) == len(part.events)
-    for event in part.events:
+    in_order = len({event.line for event in events}) == len(events)
+    for event in events:
         latest = max(last.values(), default=0) if in_order else last.get(event.label, 0)
         if event.label in last and event.tick < latest:
-            pieces.append(FilePart(part.name))
+            pieces.append([])
             last = {}
         last[event.label] = event.tick
-        pieces[-1].events.append(event)
+        pieces[-1].append(event)
     for before, piece in itertools.pairwise(pieces):
-        if min(len(before.events), len(piece.events)) == 1:
-            line, text = piece.events[0].line, f"{piece.events[0].tick / TICK_HZ:.9g}"
+        if min(len(before), len(piece)) == 1:
+            line, text = piece[0].line, f"{piece[0].tick / TICK_HZ:.9g}"
             problems.add(line, 1, "time", "backwards", text=text)
     return pieces

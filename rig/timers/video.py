@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -48,28 +47,24 @@ def read_video(path: str | Path) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), _HINT)
-    block, rows = next(
-        Table(enumerate(read_lines(path), 1), problems).blocks(), (RowBlock(), iter(()))
-    )
-    first = next(rows, None)
+    block, rows = next(Table(enumerate(read_lines(path), 1)).blocks(), (RowBlock(), iter(())))
     columns = next(filter(None, map(_find_columns, reversed(block.headings))), {})
-    if first is None or not columns:
+    if not columns:
         problems.refuse(1, 1, "no_track")
-    at, scales = {name: n for name, (n, _, _) in columns.items()}, dict[str, float]()
+    scales = {}
     for name, (n, heading, unit) in columns.items():
         scales[name] = _SCALES[name].get(unit, 0.0)
         if not scales[name]:
             accepted, text = "a unit of this column: s, ms; m, cm, mm", heading.cell(n)
             problems.reject(heading.line, heading.column(n), text, unit, accepted)
     frames: list[list[float]] = []
-    for row in itertools.chain([first], rows):
-        texts = {name: row.cell(n) for name, n in at.items()}
-        if not all(texts.values()):
-            continue
-        wrong = [name for name, text in texts.items() if not is_number(text)]
-        for name in wrong[:1]:
-            problems.reject(row.line, row.column(at[name]), name, texts[name], "a number")
-        if not wrong:
+    for row in rows:
+        texts = {name: row.cell(n) for name, (n, _, _) in columns.items()}
+        wrong = [name for name, text in texts.items() if text and not is_number(text)]
+        for name in wrong:
+            place = row.line, row.column(columns[name][0]), name
+            problems.reject(*place, texts[name], "a number")
+        if not wrong and all(texts.values()):
             frames.append([scales[name] * float(text) for name, text in texts.items()])
     problems.raise_if_any()
     track = VideoTrack(*np.array(frames, dtype=float).reshape(-1, 3).T)

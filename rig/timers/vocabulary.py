@@ -23,6 +23,7 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,
 _NAME = re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}")
 _BRACKETED = re.compile(r"[\[({]\s*([^\W\d_]{1,20})\s*[\])}]")
 _LAST = re.compile(r"(?:^|[\W_])([^\W\d_]{1,20})\W*$")
+_ENDING = r"(?![^\W\d_])"
 _NUMBERED = r"[\s#:_-]{0,3}(?:nr\.?|no\.?)?\s?(?:[0-9]{1,4}|[a-d])(?![^\W_])"
 
 
@@ -41,9 +42,10 @@ def words() -> dict[str, frozenset[str]]:
 
 
 @cache
-def _pattern(role: str, ending: str = r"(?![^\W\d_])") -> re.Pattern[str]:
-    listed = "|".join(sorted(map(re.escape, words()[role]), key=len, reverse=True))
-    return re.compile(rf"(?<![^\W\d_])(?:{listed}){ending}", re.IGNORECASE)
+def _pattern(role: str, number: str = "") -> re.Pattern[str]:
+    known = words()[role] | (words()[f"{role} letter"] if number and role == "gate" else set())
+    listed = "|".join(sorted(map(re.escape, known), key=len, reverse=True))
+    return re.compile(rf"(?<![^\W\d_])(?:{listed}){number or _ENDING}", re.IGNORECASE)
 
 
 def without_accents(text: str) -> str:
@@ -65,6 +67,7 @@ def roles_in(heading: str) -> frozenset[str]:
     """Return the roles of which a heading has a word, and ``setting`` where it names one."""
     facts = {role for role in words() if _pattern(role).search(normal(heading))}
     is_setting = is_number(heading) or bool({"start", "step", "rate"} & facts)
+    facts |= {"gate"} if find_label(heading, "gate") else set()
     return frozenset(facts | ({"setting"} if is_setting else set()))
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rig.timers.layouts import FileLayout, read_drops
-from rig.timers.timer_file import read_timer_file
+from rig.timers.edge_rows import read_edges as read_rows
+from rig.timers.lines import read_lines
+from rig.timers.problems import ProblemList
 
 
 def read_edges(path):
-    file = read_timer_file(path)
-    return read_drops(file, FileLayout.own(file)).drops
+    return read_rows(enumerate(read_lines(path), 1), ProblemList(str(path)))

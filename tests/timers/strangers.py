@@ -48,6 +48,10 @@ def strangers() -> dict[str, Shape]:
         ("On and off of each gate", ",".join(
             f"Gate {g} {w}" for g in HEIGHTS for w in ("on", "off")) + "\n"
          + table([f"{t:.6f}" for t, _, _ in edges] for edges in RUNS)),
+        ("Times of a row, numbered", "drop," + ",".join(f"t{k}" for k in range(1, 9)) + "\n"
+         + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
+        ("A word for gates that is unknown", "Prova;Traguardo;Tempo (s);Stato\n"
+         + write("{n};{c};{S};{d}\n", runs=RUNS)),
         ("A list for each run", "[[" + "],\n [".join(
             ", ".join(f"{t:.6f}" for t, _, _ in edges) for edges in RUNS) + "]]\n"),
     ):  # fmt: skip
@@ -83,6 +87,13 @@ def strangers() -> dict[str, Shape]:
             f"{c};{round(t * 1e6):,};{int(d)}\n".replace(",", ".") for t, c, d in one)),
         ("JSON in a line", "[" + ", ".join(
             f'{{"gate": {c}, "time_s": {t:.6f}, "blocked": {int(d)}}}' for t, c, d in one) + "]"),
+        ("JSON, a list of lines", "[\n" + ",\n".join(
+            f'{{"gate": {c}, "ts_ns": {t * 1e9:.0f}, "blocked": {str(d).lower()}}}'
+            for t, c, d in one) + "\n]\n"),
+        ("A clock before values", write("14:03:2{s} -> {c},{d},{us}\n")),
+        ("Clear or not", GTS.replace("state", "clear") + write("{c},{s},{no}\n")),
+        ("A word for states that is unknown", "tijd (ms);sensor;toestand\n"
+         + write("{MS};{c};{d}\n")),
         ("The last row cut", GTS + each[0][:-3]),
     ):  # fmt: skip
         put(name, content)
@@ -107,6 +118,7 @@ def strangers() -> dict[str, Shape]:
         ("Axes by numbers", "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", ",", "{:+.5E}"),
         ("Units in words", "Time,CH1,CH2,CH3,CH4\nin s,in V,in V,in V,in V\n", ",", "{:.4e}"),
         ("Light", "t (s);Light 0 (lx);Light 1 (lx);Light 2 (lx);Light 3 (lx)\n", ";", "{:.5f}"),
+        ("Counts of a converter", "t(s) A0 A1 A2 A3\n", " ", "{:.4f}"),
         ("Decimal commas", "Zeit [s]\tU0 [V]\tU1 [V]\tU2 [V]\tU3 [V]\n", "\t", "{:,.5f}"),
     ):  # fmt: skip
         point = "," if "," in form else "."
@@ -123,7 +135,7 @@ NOT_READ = {
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A word below",
     "Rows out of order", "Newest first", "A clock that overflows", "Samples with an index",
-    "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart", "JSON in a line",
+    "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
     "Thousands by points", "Microseconds as if they were seconds",
     "The last row cut",
 }  # fmt: skip
