@@ -154,7 +154,8 @@ class Microcontroller:
             The answer, perhaps a refusal.
         """
         self._now_ns = now_ns
-        if frame.type >= 0x80 or frame.type not in wire.TABLE:
+        kind = wire.TABLE.get(frame.type)
+        if kind is None or kind is wire.Flash or not issubclass(kind, wire.HostMessage):
             return wire.Refused(RefusalReason.UNKNOWN_MESSAGE, frame.type)
         try:
             request = wire.unpack(frame.type, frame.payload)
