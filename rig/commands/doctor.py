@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
+from rig.boards import BOARDS, UNSEEN
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
 from rig.commands.output import print_json, say
@@ -85,5 +86,7 @@ def _board(url: str) -> Iterator[Finding]:
         yield _failure("board", error)
         return
     identity = facts.identity
-    yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}")
+    unseen = any(board.name == identity.board and not board.seen for board in BOARDS.values())
+    note = f"; its firmware was {UNSEEN}" if unseen else ""
+    yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}{note}")
     yield from _check_all(BOARD_CHECKS, facts)

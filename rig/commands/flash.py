@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
+from rig.boards import FLASHED, UNSEEN
 from rig.commands.output import goes_on, say
 from rig.errors import InputError
 from rig.flash.boards import DRIVE, TARGETS
@@ -29,4 +30,6 @@ def main(arguments: Namespace) -> int:
         f"{identity.board}, {identity.firmware}, {identity.gates} gates, "
         f"id {identity.unique_id.hex()}: flashed and verified"
     )
+    if not FLASHED[board].seen:
+        say(f"this firmware was {UNSEEN}")
     return 0

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from contextlib import closing
+from contextlib import ExitStack, closing
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
 from rig.protocol import reader
 from rig.reasons import remedies
-from rig.selftest.board import SelftestOptions
+from rig.selftest.board import BoardUnderTest, SelftestOptions
 from rig.selftest.findings import Verdict
+from rig.selftest.judge import Judge
 from rig.selftest.run import selftest
 
 
@@ -21,12 +22,20 @@ def main(arguments: Namespace) -> int:
     if arguments.protocol is not None:
         protocol = reader.read(arguments.protocol)
         gates = (gates or 0) | (protocol.gates.mask if protocol.gates else 0)
-    options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release, gates)
-    if options.release:
+    judges = [arguments.judge] if arguments.judge else []
+    release = arguments.release or bool(judges)
+    options = SelftestOptions(arguments.loopback, arguments.drops, release, gates)
+    if judges:
+        say("the releases of both boards will be driven: no magnet may be wired")
+    elif options.release:
         say("release 0 will be driven once: keep clear of it")
     findings = []
-    with closing(open_port(arguments.port)) as port:
-        for finding in selftest(port, port_clock(port), options):
+    with ExitStack() as ports:
+        port, *others = (
+            ports.enter_context(closing(open_port(name))) for name in (arguments.port, *judges)
+        )
+        judge = [Judge(BoardUnderTest(one, port_clock(one), options)) for one in others]
+        for finding in selftest(port, port_clock(port), options, *judge):
             findings.append(finding)
             if not arguments.json:
                 words = finding.name, finding.verdict, finding.what

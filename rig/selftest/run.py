@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from rig.clock.host import Clock
     from rig.link.port import Port
+    from rig.selftest.judge import Judge
 
 
 class Check(NamedTuple):
@@ -74,7 +75,20 @@ CHECKS = (
 )
 
 
-def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Finding]:
+def _judged_checks(judge: Judge) -> tuple[Check, ...]:
+    return (
+        Check("wires of the judge", judge.find_wires),
+        Check("stamps", judge.measure_stamps),
+        Check("release pulse", judge.measure_release),
+        Check("emergency stop", judge.measure_stop),
+        Check("STOPPED", judge.open_stop),
+        Check("GATE_UNSTEADY", judge.disturb_beam),
+    )
+
+
+def selftest(
+    port: Port, clock: Clock, options: SelftestOptions, judge: Judge | None = None
+) -> Iterator[Finding]:
     """Make every check, one after the other.
 
     Parameters
@@ -83,6 +97,8 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
         The open port and its time.
     options
         What may be done.
+    judge
+        A second board that is wired to this one.
 
     Yields
     ------
@@ -96,8 +112,10 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
     """
     board = BoardUnderTest(port, clock, options)
     lost: Reason | None = None
+    judged = () if judge is None else _judged_checks(judge)
+    replaced = {check.name for check in judged}
     try:
-        for check in CHECKS:
+        for check in (*(check for check in CHECKS if check.name not in replaced), *judged):
             if lost is not None:
                 yield explain(check.name, lost, Verdict.NOT_POSSIBLE)
                 continue
@@ -106,8 +124,9 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
             if finding.verdict is Verdict.FAILED:
                 lost = _why_lost(board)
     finally:
-        with suppress(CheckEndedError, DeviceError):
-            board.settle()
+        for used in (board, judge.board) if judge else (board,):
+            with suppress(CheckEndedError, DeviceError):
+                used.settle()
 
 
 def _make(check: Check, board: BoardUnderTest) -> str | None:

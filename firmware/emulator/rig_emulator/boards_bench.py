@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import random
 import subprocess
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,6 +58,8 @@ class Bench:
         yield "stamp, worst", f"{1e3 * seen.worst / self.us:.0f} ns"
         sustained = self._fastest(_RATES, self._sustained)
         yield f"{_EDGES} edges of all gates by chance, a second", f"{sustained:,.0f}"
+        full = partial(self._sustained, count=self.stand.identity.capacity - 24)
+        yield "edges until its memory is full, a second", f"{self._fastest(_RATES[6:], full):,.0f}"
         yield f"{_BURST} edges of one gate, a second", f"{self._fastest(_BURSTS, self._burst):,.0f}"
         one, two = self._closest(0), self._closest(len(self.wiring.gates) - 1)
         yield "shortest pulse that is always two edges", f"{one} ns"
@@ -95,8 +98,8 @@ class Bench:
         record_ms = flips[-1].cycle // (self.wiring.clock_hz // 1000) + 5
         return self.stand.record(flips, record_ms).stamps(flips)
 
-    def _sustained(self, rate: float) -> bool:
-        return len(self._recorded(self._train(rate))) == _EDGES
+    def _sustained(self, rate: float, count: int = _EDGES) -> bool:
+        return len(self._recorded(self._train(rate, count))) == count
 
     def _burst(self, rate: float) -> bool:
         gap = self.wiring.clock_hz / rate
