@@ -31,8 +31,6 @@ class Capabilities:
         Edges that it can keep.
     streams
         Whether it keeps the latest ones only, so that a drop may have any number of them.
-    seen
-        Whether anybody has told that it worked: else only the emulator has.
     """
 
     name: str
@@ -41,7 +39,6 @@ class Capabilities:
     longest_pulse: float
     events: int
     streams: bool
-    seen: bool = False
 
     @property
     def most_edges(self) -> float:
@@ -54,7 +51,6 @@ class Capabilities:
         return f"{'an' if self.name[0] in 'AEIOU' else 'a'} {self.name}"
 
 
-UNSEEN = "never seen on hardware: please tell us how it goes (docs/first-board.md)"
 MEGA = Capabilities("Arduino Mega 2560", 16, 2, 0.5, 1024, streams=False)
 UNO = Capabilities("Arduino Uno", 12, 2, 0.5, 191, streams=True)
 PICO = Capabilities("Raspberry Pi Pico", 16, 2, 0.5, 16384, streams=False)

@@ -154,8 +154,7 @@ class Microcontroller:
             The answer, perhaps a refusal.
         """
         self._now_ns = now_ns
-        kind = wire.TABLE.get(frame.type)
-        if kind is None or kind is wire.Flash or not issubclass(kind, wire.HostMessage):
+        if frame.type >= 0x80 or wire.TABLE.get(frame.type) in {None, wire.Flash}:
             return wire.Refused(RefusalReason.UNKNOWN_MESSAGE, frame.type)
         try:
             request = wire.unpack(frame.type, frame.payload)

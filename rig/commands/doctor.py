@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
-from rig.boards import BOARDS, UNSEEN
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
 from rig.commands.output import print_json, say
@@ -86,7 +85,5 @@ def _board(url: str) -> Iterator[Finding]:
         yield _failure("board", error)
         return
     identity = facts.identity
-    unseen = any(board.name == identity.board and not board.seen for board in BOARDS.values())
-    note = f"; its firmware was {UNSEEN}" if unseen else ""
-    yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}{note}")
+    yield Finding("board", f"{identity.board}, id {identity.unique_id.hex()}")
     yield from _check_all(BOARD_CHECKS, facts)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from contextlib import ExitStack, closing
+from contextlib import closing, nullcontext
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
 from rig.protocol import reader
 from rig.reasons import remedies
-from rig.selftest.board import BoardUnderTest, SelftestOptions
+from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
-from rig.selftest.judge import Judge
 from rig.selftest.run import selftest
 
 
@@ -22,20 +21,14 @@ def main(arguments: Namespace) -> int:
     if arguments.protocol is not None:
         protocol = reader.read(arguments.protocol)
         gates = (gates or 0) | (protocol.gates.mask if protocol.gates else 0)
-    judges = [arguments.judge] if arguments.judge else []
-    release = arguments.release or bool(judges)
+    release = arguments.release or arguments.judge is not None
     options = SelftestOptions(arguments.loopback, arguments.drops, release, gates)
-    if judges:
-        say("the releases of both boards will be driven: no magnet may be wired")
-    elif options.release:
-        say("release 0 will be driven once: keep clear of it")
+    if options.release:
+        say("releases will be driven: keep clear of them")
     findings = []
-    with ExitStack() as ports:
-        port, *others = (
-            ports.enter_context(closing(open_port(name))) for name in (arguments.port, *judges)
-        )
-        judge = [Judge(BoardUnderTest(one, port_clock(one), options)) for one in others]
-        for finding in selftest(port, port_clock(port), options, *judge):
+    judge_port = closing(open_port(arguments.judge)) if arguments.judge else nullcontext()
+    with closing(open_port(arguments.port)) as port, judge_port as judge:
+        for finding in selftest(port, port_clock(port), options, judge):
             findings.append(finding)
             if not arguments.json:
                 words = finding.name, finding.verdict, finding.what

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DeviceError
+from rig.link.port import port_clock
 from rig.reasons import Reason, make_reason
 from rig.selftest import drops, line_checks, requests
 from rig.selftest.board import BoardUnderTest, SelftestOptions
@@ -18,13 +19,13 @@ from rig.selftest.findings import (
     explain,
     make_check,
 )
+from rig.selftest.judge import JudgeBoard
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rig.clock.host import Clock
     from rig.link.port import Port
-    from rig.selftest.judge import Judge
 
 
 class Check(NamedTuple):
@@ -75,9 +76,9 @@ CHECKS = (
 )
 
 
-def _judged_checks(judge: Judge) -> tuple[Check, ...]:
+def _judged_checks(judge: JudgeBoard) -> tuple[Check, ...]:
     return (
-        Check("wires of the judge", judge.find_wires),
+        Check("judge", judge.identify),
         Check("stamps", judge.measure_stamps),
         Check("release pulse", judge.measure_release),
         Check("emergency stop", judge.measure_stop),
@@ -87,7 +88,7 @@ def _judged_checks(judge: Judge) -> tuple[Check, ...]:
 
 
 def selftest(
-    port: Port, clock: Clock, options: SelftestOptions, judge: Judge | None = None
+    port: Port, clock: Clock, options: SelftestOptions, judge_port: Port | None = None
 ) -> Iterator[Finding]:
     """Make every check, one after the other.
 
@@ -97,8 +98,8 @@ def selftest(
         The open port and its time.
     options
         What may be done.
-    judge
-        A second board that is wired to this one.
+    judge_port
+        The open port of a second board that is wired to this one.
 
     Yields
     ------
@@ -112,7 +113,11 @@ def selftest(
     """
     board = BoardUnderTest(port, clock, options)
     lost: Reason | None = None
-    judged = () if judge is None else _judged_checks(judge)
+    used: list[BoardUnderTest] = [board]
+    judged: tuple[Check, ...] = ()
+    if judge_port is not None:
+        used.append(BoardUnderTest(judge_port, port_clock(judge_port), options))
+        judged = _judged_checks(JudgeBoard(used[1]))
     replaced = {check.name for check in judged}
     try:
         for check in (*(check for check in CHECKS if check.name not in replaced), *judged):
@@ -124,9 +129,9 @@ def selftest(
             if finding.verdict is Verdict.FAILED:
                 lost = _why_lost(board)
     finally:
-        for used in (board, judge.board) if judge else (board,):
+        for each in used:
             with suppress(CheckEndedError, DeviceError):
-                used.settle()
+                each.settle()
 
 
 def _make(check: Check, board: BoardUnderTest) -> str | None:

@@ -6,9 +6,8 @@ from itertools import islice
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
-from rig.selftest.board import BoardUnderTest, SelftestOptions
+from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
-from rig.selftest.judge import Judge
 from rig.selftest.run import CHECKS, selftest
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
 from rig_emulator.protocol_emu import EmulatedSerial
@@ -44,9 +43,7 @@ class Pair:
 
     def findings(self):
         options = SelftestOptions(drops=DROPS, release=True)
-        clock = self.port.clock
-        judge = Judge(BoardUnderTest(self.judge_port, clock, options))
-        return selftest(self.port, clock, options, judge)
+        return selftest(self.port, self.port.clock, options, self.judge_port)
 
 
 @pytest.fixture
@@ -58,14 +55,15 @@ def pair(monkeypatch):
 def test_a_right_board_is_measured_as_the_emulator_itself_measures_it(pair):
     found = {finding.name: finding for finding in pair.findings()}
     assert {str(f) for f in found.values() if f.verdict is not Verdict.OK} == set()
-    assert found["stamps"].what.startswith(f"clock {PPM[0] - PPM[1]:+.2f} ppm")
+    (ppm,) = map(float, re.findall(r"clock (\S+) ppm", found["stamps"].what))
+    assert ppm == pytest.approx(PPM[0] - PPM[1], abs=0.3)  # two ticks in 0.4 s
     table = (FIRMWARE.parent / "docs" / "results" / "boards.md").read_text("utf-8")
     ((_, sd),) = re.findall(r"stamp, standard deviation \| (\d+) ns \| (\d+) ns", table)
     scatter, worst, skew = map(int, re.findall(r"(\d+) ns", found["stamps"].what))
-    assert scatter < 2 * int(sd)
+    assert int(sd) / 2 < scatter < 2 * int(sd)
     assert worst < 100  # two stamps, each within a tick
     assert skew == 0
-    assert max(map(int, re.findall(r"(\d+) ns", found["release pulse"].what))) <= 50
+    assert max(map(int, re.findall(r"(\d+) ns", found["release pulse"].what))) <= 75
     assert 300 <= int(re.findall(r"after (\d+) µs", found["emergency stop"].what)[0]) < 1000
     assert len(found) == 7
 
@@ -76,10 +74,9 @@ def test_wires_that_are_missing_are_asked_for(pair):
     assert found["stamps"].verdict is Verdict.OK
     assert found["release pulse"].reason.code == "judged_edges"
     pair.judge.wires.clear()
-    *_, wires, stamps = islice(pair.findings(), 3)
-    for finding in (wires, stamps):
-        assert finding.verdict is Verdict.NOT_POSSIBLE
-        assert "docs/first-board.md" in finding.what
+    *_, stamps = islice(pair.findings(), 3)
+    assert stamps.reason.code == "judged_edges"
+    assert "docs/first-board.md" in stamps.advice
 
 
 @pytest.mark.parametrize(("late_ns", "code"), [(40, None), (2_000, "judged_limit")])
