@@ -14,7 +14,7 @@ from rig.link.assembly import ticks_since
 from rig.link.gatewatch import listed
 from rig.link.messages import DisarmReason, DropCertificate2, Phase, PulseEnd, RefusalReason
 from rig.selftest.board import LABEL, BoardUnderTest, RecordedDrop
-from rig.selftest.findings import CheckFailedError, insist, wrong_answer
+from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 from rig.selftest.requests import identify
 
 RELEASE, SYNC, QUIET = 1, 2, 4
@@ -51,10 +51,10 @@ class JudgeBoard:
 
     def measure_stamps(self, board: BoardUnderTest) -> str:
         """See how exactly all gates stamp pulses whose length is known, from 1 µs on."""
-        hz, judge_hz = board.known_identity().tick_hz, self.board.known_identity().tick_hz
         recorded, judged = self._pulse(board, BEAMS, _LONG_US, AT_BEAMS)
         self.rate = _flanks(recorded, AT_BEAMS)[1] / _certificate(judged).pulse_ticks
-        off = self.rate * judge_hz / hz - 1
+        hz = board.known_identity().tick_hz
+        off = self.rate * self.board.known_identity().tick_hz / hz - 1
         _limit("the clocks differ by", [1e6 * off], 2e6 * RESONATOR_TOLERANCE, "ppm")
         errors, skews = [], []
         for n in range(board.options.drops):
@@ -98,12 +98,12 @@ class JudgeBoard:
         for _ in range(max(1, board.options.drops // 4)):
             recorded, _ = self._pulse(board, STOP, 10_000, AT_STOP, **release)
             seal = _certificate(recorded)
-            insist("the stop in a pulse", PulseEnd(seal.pulse_end), PulseEnd.STOPPED)
+            insist("the stop in a pulse", PulseEnd(seal.pulse_end).name, "STOPPED")
             ticks = seal.pulse_ticks - _changes(recorded, AT_STOP)[0]
             delays.append(1e6 / board.known_identity().tick_hz * ticks)
         _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
         recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **release)
-        insist("a spike", PulseEnd(_certificate(recorded).pulse_end), PulseEnd.ORDERED)
+        insist("a spike", PulseEnd(_certificate(recorded).pulse_end).name, "ORDERED")
         return f"after {max(delays):.0f} µs at most; {_SPIKE_US} µs are ignored"
 
     def open_stop(self, board: BoardUnderTest) -> None:
@@ -141,6 +141,10 @@ class JudgeBoard:
         self, board: BoardUnderTest, own: dict[str, int], order: dict[str, int]
     ) -> tuple[int, int]:
         """Arm both at once, when both releases have rested; give the tokens."""
+        if self.board.identity is None:
+            raise NotPossibleError("no_identity")
+        self.board.settle()
+        self.board.need_idle()
         order = {"gates": QUIET} | order
         _arm(self.board, **order)
         token = _arm(board, **own)
