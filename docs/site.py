@@ -32,8 +32,8 @@ REFERENCE: dict[str, tuple[str, ...]] = {
         "docs/protocol.md", "docs/glossary.md", "docs/notebook.ipynb", "docs/tui/README.md",
         "rig/daemon/API.md", "firmware/PROTOCOL.md",
     ),
-    "Proofs": ("docs/results/README.md", "docs/resolved-world.md", "docs/results/[a-z]*.md",
-               "docs/results/*/*.md"),
+    "Proofs": ("docs/results/README.md", "docs/first-board.md", "docs/resolved-world.md",
+               "docs/results/[a-z]*.md", "docs/results/*/*.md"),
     "The project": ("docs/architecture.md", "docs/decisions.md", "CONTRIBUTING.md"),
 }  # fmt: skip
 """Pages to look something up in, by group: all of them below one heading of the menu."""

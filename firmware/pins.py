@@ -61,7 +61,7 @@ def read_pins(folder: str) -> Pins:
         raise ValueError(f"{folder}/board.h names no channels or no board")
     others = {found: (pin, port) for found, port, pin in _PIN.findall(text)}
     numbers = {
-        found: (f"GP{pin}", f"pin {_EDGE.index(int(pin)) + 1}" if int(pin) in _EDGE else "on board")
+        found: (f"GP{pin}", f"{_EDGE.index(int(pin)) + 1}" if int(pin) in _EDGE else "on board")
         for found, pin in _NUMBER.findall(text)
     }
     led, _ = (others | numbers)["LED"]

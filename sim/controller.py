@@ -154,7 +154,7 @@ class Microcontroller:
             The answer, perhaps a refusal.
         """
         self._now_ns = now_ns
-        if frame.type >= 0x80 or frame.type not in wire.TABLE:
+        if frame.type >= 0x80 or wire.TABLE.get(frame.type) in {None, wire.Flash}:
             return wire.Refused(RefusalReason.UNKNOWN_MESSAGE, frame.type)
         try:
             request = wire.unpack(frame.type, frame.payload)

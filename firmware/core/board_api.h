@@ -33,6 +33,7 @@
  * BOARD_BYTES_WAIT: 1 where bytes on the line wait until they are taken, 0 where they are lost.
  * BOARD_STEPS: how many entries become events, and events go into a frame, in one turn of the main
  *   loop.
+ * BOARD_BOOTS: only where the chip has a program of its own that takes firmware.
  * BOARD_FLASH: attribute of tables that stay in flash; BOARD_KEPT: of variables that a reset leaves
  *   as they are.
  * board_type, board_channels: tables of text, what the board and its gate pins are called. */
@@ -167,6 +168,10 @@ NEEDS_FUNCTION(board_kick, void (*)(void), "void board_kick(void)");
 /* The board's own name as a record of name.h, and a new one to keep. A board that has its number
  * from the factory seals that and is never asked to keep another. */
 NEEDS_FUNCTION(board_name, void (*)(uint8_t *), "void board_name(uint8_t record[])");
+#ifdef BOARD_BOOTS
+/* Start that program once the line has taken everything; until then called in each turn. */
+NEEDS_FUNCTION(board_boot, void (*)(void), "void board_boot(void)");
+#endif
 NEEDS_FUNCTION(board_rename, void (*)(const uint8_t *), "void board_rename(const uint8_t record[])");
 
 #endif

@@ -55,6 +55,7 @@ static struct {
 } restarts BOARD_KEPT;
 static uint8_t untold;  /* the DISARM_REASON that the host has still to be told, or 0 */
 static bool aborted;    /* ABORT came for the drop that is recorded or held */
+static bool leaving;    /* for the program that takes firmware */
 static bool closing;    /* the recording is over, but not everything is sent */
 static uint8_t room;    /* events that still belong into the frame being written */
 static uint32_t lately; /* the time, at most SELDOM turns ago */
@@ -427,6 +428,20 @@ static void pong(void)
     answer(MSG_PONG, PONG_SIZE, ticks_now());
 }
 
+#ifdef BOARD_BOOTS
+static void flash(void)
+{
+    if (phase == PHASE_HOLDING) {
+        refuse(REASON_HOLDING_A_DROP, (uint16_t)drop.label);
+    } else if (phase != PHASE_IDLE) {
+        refuse(REASON_BUSY, 0);
+    } else {
+        leaving = true;
+        done();
+    }
+}
+#endif
+
 static uint16_t pulses;
 static uint32_t pulse_tick;
 
@@ -449,6 +464,9 @@ static RARE void execute(void)
         [MSG_FIRE] = {FIRE_SIZE, fire},             [MSG_ABORT] = {ABORT_SIZE, abort_all},
         [MSG_READ] = {READ_SIZE, read},             [MSG_ACKNOWLEDGE] = {ACKNOWLEDGE_SIZE, acknowledge},
         [MSG_REFERENCE] = {REFERENCE_SIZE, reference},
+#ifdef BOARD_BOOTS
+        [MSG_FLASH] = {FLASH_SIZE, flash},
+#endif
     };
     bool repeated = last.seq == request.seq && last.type == request.type && last.crc == request.crc;
     if (request.seq == 0)
@@ -459,6 +477,7 @@ static RARE void execute(void)
         answer_again();
         return;
     }
+    leaving = false;
     last.seq = request.seq;
     last.type = request.type;
     last.crc = request.crc;
@@ -548,6 +567,10 @@ void device_pass(void)
     }
     watch_stop();
     board_resume();
+#ifdef BOARD_BOOTS
+    if (leaving && send_idle())
+        board_boot();
+#endif
     if (++turn % SELDOM == 0) {
         lately = ticks_roughly();
         seldom(lately);
@@ -561,7 +584,7 @@ void device_start(uint8_t cause)
     release_reset();
     receive_reset();
     send_reset();
-    requested = closing = aborted = false;
+    requested = closing = aborted = leaving = false;
     untold = 0;
     stop.open = board_stopped();
     stop.wavers = false;

@@ -25,6 +25,7 @@
 #define BOARD_SHORT 1
 #define BOARD_BYTES_WAIT 1
 #define BOARD_STEPS 6
+#define BOARD_BOOTS
 #define BOARD_FLASH
 #define BOARD_KEPT __attribute__((section(".kept")))
 
@@ -105,6 +106,7 @@ uint8_t board_send(const uint8_t *bytes, uint8_t count);
 void board_led(bool on);
 void board_kick(void);
 void board_name(uint8_t record[]);
+void board_boot(void);
 void board_rename(const uint8_t record[]);
 
 #endif

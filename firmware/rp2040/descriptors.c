@@ -1,5 +1,7 @@
 #include "descriptors.h"
 
+#include "registers.h"
+
 /* The maker's number for a CDC port of the RP2040. */
 #define VENDOR 0x2E8A
 #define PRODUCT 0x000A
@@ -36,7 +38,7 @@ static const uint8_t configuration[ALL] = {
     7, 5, 0x80 | BYTES, 2, PACKET, 0, 0,
 };
 
-static uint8_t text[2 + 2 * 24];
+static uint8_t text[2 + 2 * 36];
 
 static void add(char letter)
 {
@@ -46,7 +48,10 @@ static void add(char letter)
 
 const uint8_t *descriptor(uint8_t type, uint8_t index, const uint8_t number[8], uint16_t *size)
 {
-    static const char *const texts[] = {0, "chainrig", "chainrig on a Pico"};
+    /* The oldest chips may not be seen behind a hub (RP2040-E5). */
+    const char *const texts[] = {
+        0, "chainrig",
+        CHIP_REVISION(REGISTER(CHIP_ID)) < 2 ? "chainrig on a Pico B1 (use no hub)" : "chainrig on a Pico"};
     uint8_t n;
     if (type == DEVICE) {
         *size = sizeof device;

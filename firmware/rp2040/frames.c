@@ -12,13 +12,13 @@
 static uint32_t number;
 static uint32_t began;  /* the frame, or a little earlier: when we looked before it had begun */
 static uint32_t noticed; /* it was by then */
-static uint32_t looked;
+static uint32_t glanced;
 static bool counted; /* at least one since we know nothing */
 
 void frames_forget(void)
 {
     number = REGISTER(USB_FRAME) & NUMBER;
-    looked = REGISTER(TIMER_RAW_LOW);
+    glanced = REGISTER(TIMER_RAW_LOW);
     counted = false;
 }
 
@@ -28,7 +28,7 @@ void frames_pass(void)
     bool suspended = REGISTER(USB_SIE_STATUS) & SUSPENDED;
     if (latest != number) {
         number = latest;
-        began = looked;
+        began = glanced;
         noticed = now;
         counted = true;
         if (suspended) /* no longer */
@@ -36,7 +36,7 @@ void frames_pass(void)
     } else if (suspended) {
         counted = false;
     }
-    looked = now;
+    glanced = now;
 }
 
 bool frames_early(void)
@@ -46,5 +46,5 @@ bool frames_early(void)
 
 bool frames_ended(void)
 {
-    return counted && looked - noticed >= ENDED_US;
+    return counted && glanced - noticed >= ENDED_US;
 }

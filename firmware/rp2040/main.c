@@ -17,6 +17,8 @@
 #define ALL_BUT_CLOCKS 0x1FFFCu /* what a watchdog resets */
 #define NAP_US 40u              /* between two turns of the loop with nothing to do */
 
+#define START_USB_BOOT ('U' | 'B' << 8)
+
 #define BOOT_POWER 1
 #define BOOT_PIN 2
 #define BOOT_WATCHDOG 8
@@ -74,6 +76,19 @@ void board_name(uint8_t to[])
 void board_rename(const uint8_t unused[])
 {
     (void)unused;
+}
+
+/* The chip's own program shows a drive to copy firmware to. It restarts the chip, and so all pins are
+ * inputs that are pulled down. */
+void board_boot(void)
+{
+    const uint16_t *function = (const uint16_t *)(uintptr_t)*(volatile uint16_t *)ROM_FUNCTIONS;
+    if (!usb_taken())
+        return;
+    while (*function && *function != START_USB_BOOT)
+        function += 2;
+    if (*function)
+        ((void (*)(uint32_t, uint32_t))(uintptr_t)(function[1] | 1u))(1u << LED, 0);
 }
 
 /* -- the start */

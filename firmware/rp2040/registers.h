@@ -24,6 +24,9 @@
 #define RESET_USB (1u << 24)
 #define PSM_WDSEL 0x40010008u
 
+/* 2.8.3 what its own program offers: where the list is; of each function two letters and a place */
+#define ROM_FUNCTIONS 0x14u
+
 /* 2.20.2 which chip it is */
 #define CHIP_ID 0x40000000u
 #define CHIP_REVISION(id) ((id) >> 28) /* 1: B0 and B1, 2: B2 */

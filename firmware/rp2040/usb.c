@@ -435,6 +435,11 @@ static void plug_in(void)
     controller_start();
 }
 
+bool usb_taken(void)
+{
+    return !listening || (!packets.closed && packets.room == FULL);
+}
+
 bool usb_unseen(void)
 {
     return OLDER_THAN_B2 && !configured;

@@ -6,7 +6,7 @@ from argparse import Namespace
 
 from rig.commands.output import goes_on, say
 from rig.errors import InputError
-from rig.flash.boards import DRIVE, TARGETS
+from rig.flash.boards import DRIVE, TARGETS, UNSEEN
 from rig.flash.steps import flash, flash_drive
 from rig.reasons import make_error
 
@@ -29,4 +29,5 @@ def main(arguments: Namespace) -> int:
         f"{identity.board}, {identity.firmware}, {identity.gates} gates, "
         f"id {identity.unique_id.hex()}: flashed and verified"
     )
+    say(f"this firmware was {UNSEEN}")
     return 0

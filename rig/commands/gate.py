@@ -2,6 +2,7 @@
 
 from argparse import Namespace
 
+from rig.commands.output import say
 from rig.model.photogate import design_photogate
 
 
@@ -10,4 +11,5 @@ def main(arguments: Namespace) -> int:
     how = arguments.distance, arguments.slit, arguments.led, arguments.detector
     for name, value in design_photogate(*how).items():
         print(f"{name:50}{value:8.4g}")
+    say("check the parts' values against their data sheets: firmware/README.md")
     return 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from contextlib import closing
+from contextlib import closing, nullcontext
 
 from rig.commands.output import print_json, say
 from rig.errors import DeviceError
@@ -21,12 +21,14 @@ def main(arguments: Namespace) -> int:
     if arguments.protocol is not None:
         protocol = reader.read(arguments.protocol)
         gates = (gates or 0) | (protocol.gates.mask if protocol.gates else 0)
-    options = SelftestOptions(arguments.loopback, arguments.drops, arguments.release, gates)
+    release = arguments.release or arguments.judge is not None
+    options = SelftestOptions(arguments.loopback, arguments.drops, release, gates)
     if options.release:
-        say("release 0 will be driven once: keep clear of it")
+        say("releases will be driven: keep clear of them")
     findings = []
-    with closing(open_port(arguments.port)) as port:
-        for finding in selftest(port, port_clock(port), options):
+    judge_port = closing(open_port(arguments.judge)) if arguments.judge else nullcontext()
+    with closing(open_port(arguments.port)) as port, judge_port as judge:
+        for finding in selftest(port, port_clock(port), options, judge):
             findings.append(finding)
             if not arguments.json:
                 words = finding.name, finding.verdict, finding.what

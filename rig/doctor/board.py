@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from math import tau
 from typing import TYPE_CHECKING
 
+from rig.flash.boards import UNSEEN
 from rig.flash.image import shipped_firmware
 from rig.link.client import Device
 from rig.link.gatewatch import GateStates, listed, watch_gates
@@ -139,7 +140,7 @@ def _firmware(board: BoardFacts) -> str:
         return f"{firmware}; none for a {board.identity.board} comes with rig"
     if firmware != board.shipped:
         raise CheckFailedError("firmware_differs", firmware=firmware, shipped=board.shipped)
-    return f"{firmware}, as it comes with rig"
+    return f"{firmware}, as it comes with rig; {UNSEEN}"
 
 
 def _held_drop(board: BoardFacts) -> str:

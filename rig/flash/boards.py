@@ -7,6 +7,8 @@ from pathlib import Path
 
 from rig.boards import MEGA, PICO, UNO, Capabilities
 
+UNSEEN = "never seen on hardware: please tell us how it goes (docs/first-board.md)"
+"""Said of every board until somebody has: then it becomes an attribute of `Target`."""
 FIRMWARE = "chainrig"
 """What a firmware of this project begins its name with; its version follows."""
 

@@ -44,6 +44,18 @@ def sees_boot_pico(devices: Path = _USB) -> bool:
     return False
 
 
+def sees_waiting_pico() -> bool:
+    """Whether a Pico waits for firmware, mounted or not."""
+    return bool(waiting_drives()) or sees_boot_pico()
+
+
+def wait_for_drive(patience_s: float = 5.0) -> None:
+    """Give a desktop some time to mount the drive of a Pico that goes over to wait."""
+    end = time.monotonic() + patience_s
+    while not waiting_drives() and time.monotonic() < end:
+        time.sleep(_LOOK_S)
+
+
 def choose_drive(folder: str | None, mounts: Path = _MOUNTS, devices: Path = _USB) -> Path:
     """Find the one drive to copy to.
 

@@ -10,10 +10,20 @@ from typing import TYPE_CHECKING
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.avrdude import find_avrdude, write_flash
 from rig.flash.boards import DRIVE, TARGETS, Target
-from rig.flash.drive import choose_drive, copy_to, new_port, pico_ports
+from rig.flash.drive import (
+    choose_drive,
+    copy_to,
+    new_port,
+    pico_ports,
+    sees_waiting_pico,
+    wait_for_drive,
+)
 from rig.flash.image import read_image
+from rig.link import messages as wire
 from rig.link.client import Device
+from rig.link.messages import RefusalReason
 from rig.link.port import Port, open_port, port_clock
+from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
@@ -99,12 +109,35 @@ def flash_drive(
         No Pico waits, writing failed, or the board does not say what it should.
     """
     file = read_image(DRIVE.shipped if image is None else Path(image), DRIVE)
+    if drive is None and not sees_waiting_pico():
+        _ask_to_wait(port, say)
     folder = choose_drive(drive)
     before = pico_ports()
     say(f"copying {file.firmware} ({file.size} bytes) to the {DRIVE.board.name} at {folder}")
     copy_to(folder, file.path)
     say("copied; asking the board who it is")
     return identify(port or new_port(before), DRIVE, file.firmware)
+
+
+def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
+    """Ask the one Pico that runs to take firmware, which it does when it has nothing else to do."""
+    ports = {port} if port else pico_ports()
+    if len(ports) != 1:
+        return
+    (path,) = ports
+    with closing(open_port(path)) as opened:
+        device = Device(opened, port_clock(opened))
+        try:
+            device.connect()
+            device.request(wire.Flash(), wire.Done)
+        except DeviceTimeoutError:
+            return  # by its button
+        except DeviceRefusedError as refusal:
+            if refusal.reason in {RefusalReason.UNKNOWN_MESSAGE, RefusalReason.VERSION}:
+                return  # it has older firmware
+            raise
+    say(f"the {DRIVE.board.name} at {path} waits for firmware")
+    wait_for_drive()
 
 
 def identify(port: str, target: Target, firmware: str) -> Identity:

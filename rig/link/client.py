@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.boards import LONGEST_RECORD_MS
@@ -9,6 +11,7 @@ from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
+from rig.link.port import BAUDRATE
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Received, Record
 from rig.reasons import make_error
@@ -20,9 +23,14 @@ if TYPE_CHECKING:
     from rig.link.assembly import Assembly
 
 BOOT_WAIT_S = 2.0
-"""The Mega's boot loader listens this long before it starts the firmware."""
+"""In which every boot loader starts the firmware, if it hears nothing: the Mega's after 0.83 s."""
 LOADER_WAIT_S = 6.0
-"""A boot loader that has heard anything waits 5 s for more, and each byte more holds it again."""
+"""The Mega's boot loader, once it has heard anything, goes on 5 s after the last byte."""
+_IDENTIFY_TRIES = 4
+_LOADER_BAUDRATE = 115_200
+_LEAVE = bytes.fromhex("1b 01 00 01 0e 11 04")
+"""CMD_LEAVE_PROGMODE_ISP of STK500 version 2 (Atmel AVR068), as the Mega's boot loader has it."""
+_LEAVE_S = 0.1
 _LATE_S = 0.25  # how much later than announced a certificate may come before the host asks
 _SMALLEST_READ = 4
 _FIRE_WAIT_S = 0.05
@@ -78,20 +86,32 @@ class Device(Exchange):
             Protocol versions differ, or nobody answers.
         """
         self.expect_boot = True
+        tries = min(self.tries, _IDENTIFY_TRIES)
+        outwait = partial(self.wait_for, LOADER_WAIT_S, _is_boot)
+        ways: tuple[Callable[[], object], ...] = (self._leave_loader, outwait)
         try:
             self.write(DELIMITER)  # ends whatever junk the line has seen so far
-            booted = self.wait_for(boot_wait_s, _is_boot)
-            try:
-                identity = self.request(wire.Identify(), wire.Identity)
-            except DeviceTimeoutError:
-                if booted is not None or self.wait_for(LOADER_WAIT_S, _is_boot) is None:
-                    raise
-                identity = self.request(wire.Identify(), wire.Identity)
+            self.wait_for(boot_wait_s, _is_boot)
+            for end_loader in ways:
+                with suppress(DeviceTimeoutError):
+                    return self._identify(tries)
+                end_loader()
+            return self._identify(tries)
         finally:
             self.expect_boot = False
+
+    def _identify(self, tries: int) -> wire.Identity:
+        identity = self.request(wire.Identify(), wire.Identity, tries)
         if identity.protocol_version != wire.PROTOCOL_VERSION:
             raise DeviceRefusedError(wire.RefusalReason.VERSION, identity.protocol_version)
         return identity
+
+    def _leave_loader(self) -> None:
+        """Tell a boot loader, which any byte before has held, to start the firmware."""
+        self.set_rate(_LOADER_BAUDRATE)
+        self.write(_LEAVE)
+        self.wait_for(_LEAVE_S, _is_boot)
+        self.set_rate(BAUDRATE)
 
     def statistics(self) -> dict[str, int]:
         """Count frames, faults and bytes since the connection began.

@@ -222,6 +222,19 @@ class Exchange:
         except OSError as error:
             raise _lost(error) from error
 
+    def set_rate(self, baudrate: int) -> None:
+        """Change the line's rate, bit/s.
+
+        Raises
+        ------
+        DeviceError
+            The connection broke.
+        """
+        try:
+            self._port.baudrate = baudrate
+        except OSError as error:
+            raise _lost(error) from error
+
     def abort_past(self) -> None:
         """Send ABORT at once, from any thread, past a request that is under way.
 

@@ -208,6 +208,11 @@ class Reference(HostMessage):
     """Ask for the latest pulse of the 1 Hz reference."""
 
 
+@_message(0x0A)
+class Flash(HostMessage):
+    """Start the program that takes firmware; a board without one does not know this request."""
+
+
 @_message(0x81)
 class Identity(DeviceMessage):
     """Who the device is and what it can do.

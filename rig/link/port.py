@@ -32,7 +32,9 @@ _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
 
 
 class Port(Protocol):
-    """What this program needs of a pyserial port."""
+    """What this program needs of a pyserial port; its rate in bit/s counts only on a UART."""
+
+    baudrate: int
 
     @property
     def in_waiting(self) -> int:
@@ -158,6 +160,7 @@ class NetworkPort:
     def __init__(self, port: Any) -> None:
         self._port = port
         self._socket = port._socket
+        self.baudrate = BAUDRATE
         self.read = port.read
         self.write = port.write
 

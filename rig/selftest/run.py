@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DeviceError
+from rig.link.port import port_clock
 from rig.reasons import Reason, make_reason
 from rig.selftest import drops, line_checks, requests
 from rig.selftest.board import BoardUnderTest, SelftestOptions
@@ -18,6 +19,7 @@ from rig.selftest.findings import (
     explain,
     make_check,
 )
+from rig.selftest.judge import JudgeBoard
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -74,7 +76,20 @@ CHECKS = (
 )
 
 
-def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Finding]:
+def _judged_checks(judge: JudgeBoard) -> tuple[Check, ...]:
+    return (
+        Check("judge", judge.identify),
+        Check("stamps", judge.measure_stamps),
+        Check("release pulse", judge.measure_release),
+        Check("emergency stop", judge.measure_stop),
+        Check("STOPPED", judge.open_stop),
+        Check("GATE_UNSTEADY", judge.disturb_beam),
+    )
+
+
+def selftest(
+    port: Port, clock: Clock, options: SelftestOptions, judge_port: Port | None = None
+) -> Iterator[Finding]:
     """Make every check, one after the other.
 
     Parameters
@@ -83,6 +98,8 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
         The open port and its time.
     options
         What may be done.
+    judge_port
+        The open port of a second board that is wired to this one.
 
     Yields
     ------
@@ -96,8 +113,14 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
     """
     board = BoardUnderTest(port, clock, options)
     lost: Reason | None = None
+    used: list[BoardUnderTest] = [board]
+    judged: tuple[Check, ...] = ()
+    if judge_port is not None:
+        used.append(BoardUnderTest(judge_port, port_clock(judge_port), options))
+        judged = _judged_checks(JudgeBoard(used[1]))
+    replaced = {check.name for check in judged}
     try:
-        for check in CHECKS:
+        for check in (*(check for check in CHECKS if check.name not in replaced), *judged):
             if lost is not None:
                 yield explain(check.name, lost, Verdict.NOT_POSSIBLE)
                 continue
@@ -106,8 +129,9 @@ def selftest(port: Port, clock: Clock, options: SelftestOptions) -> Iterator[Fin
             if finding.verdict is Verdict.FAILED:
                 lost = _why_lost(board)
     finally:
-        with suppress(CheckEndedError, DeviceError):
-            board.settle()
+        for each in used:
+            with suppress(CheckEndedError, DeviceError):
+                each.settle()
 
 
 def _make(check: Check, board: BoardUnderTest) -> str | None:

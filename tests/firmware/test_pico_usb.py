@@ -101,14 +101,58 @@ def test_a_controller_that_stays_dead_does_not_stop_the_board(stand):
     assert isinstance(stand.ask(wire.Ping()), wire.Pong)
 
 
-@pytest.mark.parametrize(("revision", "flickers"), [(1, True), (2, False)])
-def test_an_old_chip_that_no_host_sees_says_so(revision, flickers):
-    """RP2040-E5: B0 and B1 may miss the end of a bus reset."""
+@pytest.mark.parametrize(
+    ("revision", "product"), [(1, "chainrig on a Pico B1 (use no hub)"), (2, "chainrig on a Pico")]
+)
+def test_an_old_chip_that_a_hub_hides_says_so(revision, product):
+    """RP2040-E5: B0 and B1 miss the end of a bus reset while the hub is busy."""
     chip = PicoChip(build(), bytes(8), revision=revision)
-    chip.run(70 * MS)
-    chip.hang_usb()
-    seen = set()
-    for _ in range(20):
-        chip.run(chip.cycle + 20 * MS)
-        seen.add(chip.output("GP25"))
-    assert (seen == {False, True}) == flickers
+
+    def lamp():
+        levels = set()
+        for _ in range(20):
+            chip.run(chip.cycle + 20 * MS)
+            levels.add(chip.output("GP25"))
+        return levels
+
+    chip.busy_hub(True)
+    assert lamp() == ({False, True} if revision == 1 else {False})
+    chip.busy_hub(False)  # and now it is plugged straight into the computer
+    chip.reset_bus()
+    chip.run(chip.cycle + 50 * MS)
+    assert lamp() == {False}
+    assert chip.texts[1] == product
+    for sleeps in (True, False):
+        chip.sleep_bus(sleeps)
+        assert lamp() == {False}
+    chip.open()
+    chip.run(chip.cycle + 10 * MS)
+    assert chip.usb["ready"]
+
+
+def test_it_goes_over_to_take_firmware_from_idle_only(stand):
+    def refused(detail=0):
+        answer = stand.ask(wire.Flash())
+        assert isinstance(answer, wire.Refused)
+        stand.hear(5 * MS)
+        assert (stand.avr.usb["boots"], answer.detail) == (0, detail)
+        return answer.reason
+
+    label = wire.pack_label(1, 1)
+    assert isinstance(stand.ask(wire.Arm(label, 1, 0, 0, 200, 20)), wire.Armed)
+    assert refused() is wire.RefusalReason.BUSY
+    stand.ask(wire.Abort())
+    stand.arm_and_fire(200, 10_000)
+    stand.hear(MS)
+    assert refused() is wire.RefusalReason.BUSY
+    certificate = stand.hear(200 * MS)[-1]
+    assert refused(detail=1) is wire.RefusalReason.HOLDING_A_DROP
+    stand.ask(wire.Acknowledge(label, certificate.crc32))
+    stand.avr.reads(False)  # it waits for its answer to be taken, and meanwhile goes on
+    stand.send(wire.Flash())
+    stand.hear(5 * MS)
+    assert stand.avr.usb["boots"] == 0
+    stand.avr.reads(True)
+    assert stand.hear(5 * MS) == [wire.Done()]
+    assert stand.avr.usb["boots"] == 1
+    assert not any(map(stand.avr.output, (*PICO.releases, PICO.sync)))

@@ -22,9 +22,9 @@ WORDS = {
 # From the pin-out of each board, as its maker prints it: port by Arduino pin.
 MAPS = {
     "rp2040": {
-        **{f"GP{n}": f"pin {at}" for n, at in enumerate((1, 2, 4, 5, 6, 7, 9, 10, 11, 12))},
-        **{f"GP{10 + n}": f"pin {at}" for n, at in enumerate((14, 15, 16, 17, 19, 20, 21, 22))},
-        **{f"GP{18 + n}": f"pin {at}" for n, at in enumerate((24, 25, 26, 27))},
+        **{f"GP{n}": f"{at}" for n, at in enumerate((1, 2, 4, 5, 6, 7, 9, 10, 11, 12))},
+        **{f"GP{10 + n}": f"{at}" for n, at in enumerate((14, 15, 16, 17, 19, 20, 21, 22))},
+        **{f"GP{18 + n}": f"{at}" for n, at in enumerate((24, 25, 26, 27))},
         "GP25": "on board",
     },
     "atmega2560": {
@@ -55,16 +55,18 @@ def rows(board: str) -> list[tuple[str, ...]]:
     return [
         tuple(cell.strip() for cell in line.strip("|").split("|"))
         for line in section.splitlines()
-        if re.match(r"\| (?!what)[^-]", line)
+        if re.match(r"\| (?!gate)[^-]", line)
     ]
 
 
 @EACH
 def test_the_table_has_the_pins_of_the_board(board):
     pins = read_pins(board)
-    gates = [(f"gate {n}", pin, MAPS[board][pin]) for n, pin in enumerate(pins.gates)]
+    gates = [(str(n), pin, MAPS[board][pin]) for n, pin in enumerate(pins.gates)]
     others = [(WORDS[name], pin, port) for name, (pin, port) in pins.others.items()]
-    assert sorted(rows(board)) == sorted(gates + others)
+    assert all(MAPS[board][pin] == port for _, pin, port in others)
+    columns = 3 if board == "rp2040" else 2  # ports of an AVR are nobody's business
+    assert sorted(rows(board)) == sorted(row[:columns] for row in gates + others)
 
 
 @EACH

@@ -1,5 +1,6 @@
 """``rig flash`` with the real avrdude, against Arduino's own boot loaders, in the emulator."""
 
+import random
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
@@ -12,8 +13,11 @@ from rig.flash.boards import TARGETS
 from rig.link.client import Device
 from rig.link.messages import Phase
 from rig.link.port import open_port
-from rig_emulator.bootloader import LOADERS, BoughtBoard
-from rig_emulator.wiring import BOARDS, Wiring
+from rig_emulator.board import EmulatedBoard
+from rig_emulator.bootloader import LOADERS, BoughtBoard, behind_loader
+from rig_emulator.protocol_emu import EmulatedSerial
+from rig_emulator.wiring import BOARDS, Wiring, firmware_for
+from sim.clock import VirtualClock
 from tests.firmware.toolchain import need
 from tests.link.bench import LABEL
 from tests.waiting import until
@@ -94,6 +98,29 @@ def test_another_chip_than_the_board_that_was_named_is_not_written(bought, flash
         assert (code, out) == (4, "")
         assert "wrong --board" in err
         assert there.avr.program(0, 256) == before
+
+
+def test_no_opening_within_a_boot_loader_takes_longer_than_five_seconds():
+    """Where opening does not reset, and others have sent bytes, only asking it to leave helps."""
+    if not LOADERS["mega"].exists():
+        pytest.skip("not installed: arduino-core-avr")
+    wiring, chance = BOARDS["mega"], random.Random(5)
+    image = behind_loader(wiring.mcu, LOADERS["mega"], firmware_for(wiring))
+    board, clock = EmulatedBoard(wiring, image), VirtualClock()
+    for n in range(12):
+        port = EmulatedSerial("test", board=board, timeout=0.02, clock=clock)
+        for _ in range(n % 3 and chance.randrange(8)):
+            clock.sleep(chance.uniform(0.05, 0.3))
+            port.write(chance.randbytes(8))
+        clock.sleep(chance.uniform(0.0, 1.5))
+        port.close()
+        board.line.arrived(clock.now_ns())  # as the kernel, which forgets what nobody has read
+        resets = n % 2 == 0
+        port = EmulatedSerial("test", board=board, timeout=0.02, clock=clock, reset_on_open=resets)
+        began_ns = clock.now_ns()
+        Device(port, clock).connect()
+        assert clock.now_ns() - began_ns < 5e9
+        port.close()
 
 
 def drop(there: BoughtBoard, wiring: Wiring):

@@ -1,6 +1,8 @@
 """``rig flash --board pico``: a folder for its drive, and a board that is there afterwards."""
 
+from collections.abc import Callable
 from functools import partial
+from itertools import count
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -13,8 +15,11 @@ from rig.flash import drive as drives
 from rig.flash import steps
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.image import read_image, shipped_firmware
+from rig.link import messages as wire
+from rig.link.messages import RefusalReason
 from rig.link.port import open_port
 from rig.reasons import make_error
+from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 
 VERSION = shipped_firmware(DRIVE.board.name)
@@ -40,18 +45,18 @@ def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
     return made
 
 
+def plug_in(monkeypatch, path: str, is_in: Callable[[], bool] = lambda: True) -> None:
+    """Have a Pico's port be there, while it is."""
+    info = ListPortInfo(path)
+    info.vid, info.pid, info.product = 0x2E8A, 0x000A, "chainrig on a Pico"
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [info] if is_in() else [])
+    monkeypatch.setattr(drives, "_LOOK_S", 0.001)
+
+
 def plugged(monkeypatch, path: str, after: int = 1) -> None:
     """Have a Pico's port appear, at the look after so many."""
-    looks = []
-
-    def ports():
-        looks.append(path)
-        info = ListPortInfo(path)
-        info.vid, info.pid, info.product = 0x2E8A, 0x000A, "chainrig on a Pico"
-        return [info] if len(looks) > after else []
-
-    monkeypatch.setattr("serial.tools.list_ports.comports", ports)
-    monkeypatch.setattr(drives, "_LOOK_S", 0.001)
+    looks = count()
+    plug_in(monkeypatch, path, lambda: next(looks) >= after)
 
 
 @pytest.fixture
@@ -68,6 +73,51 @@ def test_a_pico_is_flashed_and_asked(flash, tmp_path, monkeypatch):
     assert out.startswith(f"Raspberry Pi Pico, {VERSION}, 16 gates, id ")
     assert out.endswith(": flashed and verified\n")
     assert (drive / "chainrig.uf2").read_bytes() == DRIVE.shipped.read_bytes()
+
+
+def running(monkeypatch, mounts: Path, answer: wire.DeviceMessage) -> None:
+    """Have a running board answer FLASH; only when it is granted the drive is mounted."""
+    mounted = mounts.read_text()
+    mounts.write_text("")
+
+    class Asked(Microcontroller):
+        def answer(self, frame, now_ns):
+            if frame.type != wire.CODES[wire.Flash]:
+                return super().answer(frame, now_ns)
+            mounts.write_text(mounted if answer == wire.Done() else "")
+            return answer
+
+    monkeypatch.setattr("sim.board.Microcontroller", Asked)
+
+
+def test_a_running_pico_is_asked_to_take_firmware(flash, tmp_path, monkeypatch):
+    (drive,) = picos(tmp_path, monkeypatch, "RPI-RP2")
+    copy, mounts = drive / "chainrig.uf2", tmp_path / "mounts"
+    running(monkeypatch, mounts, wire.Done())
+    with PtyBoard(**NAMES) as there:
+        plug_in(monkeypatch, there.path, lambda: not mounts.read_text() or copy.exists())
+        code, out, err = flash()
+    assert code == 0, err
+    assert out.endswith(": flashed and verified\n")
+    assert copy.read_bytes() == DRIVE.shipped.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("reason", "message"),
+    [
+        (RefusalReason.HOLDING_A_DROP, "the device still holds the drop of run 7"),
+        (RefusalReason.BUSY, "the device is busy with a drop"),
+        (RefusalReason.UNKNOWN_MESSAGE, "hold its BOOTSEL button"),
+    ],
+)
+def test_a_running_pico_that_refuses_is_left_alone(flash, tmp_path, monkeypatch, reason, message):
+    picos(tmp_path, monkeypatch, "RPI-RP2")
+    running(monkeypatch, tmp_path / "mounts", wire.Refused(reason, 7))
+    with PtyBoard(**NAMES) as there:
+        plug_in(monkeypatch, there.path)
+        code, out, err = flash()
+    assert (code, out) == (4, "")
+    assert message in err
 
 
 def test_no_drive_says_how_to_make_it_appear(flash, tmp_path, monkeypatch):

@@ -48,7 +48,7 @@ def test_every_message_has_its_table():
     for code, kind in wire.TABLE.items():
         text = section(f"### {page_name(kind)} 0x{code:02X}")
         assert [row[:3] for row in rows(text)] == expected_rows(kind), kind
-        assert all(row[3] for row in rows(text)), kind
+        assert all(row[3] for row in rows(text)[kind is wire.DropCertificate2 :]), kind
 
 
 def expected_rows(kind: type) -> list[list[str]]:
@@ -67,6 +67,9 @@ def expected_rows(kind: type) -> list[list[str]]:
                 name = f"{record} bytes each"
         found.append(["" if at is None else str(at), field.name, name])
         at = None if at is None or size is None else at + size
+    if kind is wire.DropCertificate2:
+        inherited = len(wire.FIELDS[wire.DropCertificate])
+        return [["0", "as DROP_CERTIFICATE", f"{found[inherited][0]} bytes"], *found[inherited:]]
     return found
 
 

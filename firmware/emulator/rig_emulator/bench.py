@@ -12,7 +12,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
-from rig.link.messages import pack_label
 from rig.protocol import reader
 from rig_emulator import rivals, trials
 from rig_emulator.stand import Flip, Stand
@@ -41,14 +40,7 @@ def _row(name: str, seen: Spread, lost: int, us: float = _US) -> str:
 
 
 def _drops(wiring: Wiring, lab: ChainLab) -> list[list[Flip]]:
-    return [
-        [
-            Flip(round(seconds * wiring.clock_hz), channel, blocked)
-            for seconds, channel, blocked in lab.drop(pack_label(run, 1))
-            if channel < len(wiring.gates)
-        ]
-        for run in range(1, _DROPS + 1)
-    ]
+    return [trials.lab_flips(wiring, lab, run) for run in range(1, _DROPS + 1)]
 
 
 def _own(wiring: Wiring, drops: list[list[Flip]]) -> None:
@@ -57,12 +49,7 @@ def _own(wiring: Wiring, drops: list[list[Flip]]) -> None:
     heads = ("edges", "lost", "mean", "sd", "p99", "worst", "doubtful", "trusted")
     print(" " * 28 + f"{heads[0]:>7}{heads[1]:>6}" + "".join(f"{h:>9}" for h in heads[2:]))
     stand = Stand(wiring, firmware_for(wiring))
-    ms = wiring.clock_hz // 1000
-    stamps = [
-        stamp
-        for flips in drops
-        for stamp in stand.record(flips, flips[-1].cycle // ms + 5).stamps(flips)
-    ]
+    stamps = [stamp for flips in drops for stamp in stand.stamps_of(flips)]
     print(_row("the rig's firmware", trials.spread(stamps), 0, wiring.clock_hz / 1e6))
 
 

@@ -30,6 +30,7 @@ _BOOT = wire.CODES[wire.Boot]
 _POWERED_S = 0.1  # the board has been on for a while when the port is opened
 _PULSE_NS = 10**7  # width of the reference's pulses
 _HISTORY = 10_000
+_WIRE_NS = 100_000  # for which an edge is under way to another board: both keep step so closely
 
 
 class EmulatedBoard:
@@ -62,6 +63,10 @@ class EmulatedBoard:
         What its output pins did of late.
     runs
         Whether the firmware has said that it runs: before it, a boot loader may.
+    wires
+        By output pin the pins that it is joined to, and their boards.
+    beside
+        Another board, which keeps step; wires may join them.
     second_ns
         Period of a 1 Hz reference that gives pulses from now on; `None`: none is wired.
     """
@@ -89,7 +94,8 @@ class EmulatedBoard:
                 self.avr.edge(0, pin, False)
         self.runs = False
         self._sense_s: float | None = None
-        self._looped: str | None = None
+        self.wires: dict[str, list[tuple[EmulatedBoard, str]]] = {}
+        self.beside: EmulatedBoard | None = None
         self.second_ns: int | None = None
         self._pulses = 0
         self._sniff()
@@ -193,7 +199,7 @@ class EmulatedBoard:
 
     def loop_back(self, gate: int) -> None:
         """Join the sync output to a gate input with a wire."""
-        self._looped = self.wiring.gates[gate]
+        self.wires[self.wiring.sync] = [(self, self.wiring.gates[gate])]
 
     def outputs(self) -> int:
         """Mask of the release outputs that are on now."""
@@ -228,6 +234,14 @@ class EmulatedBoard:
             self.touch(self.lab.rest(order.label))
 
     def _run(self, until: int, *, stop_on_sent: bool = False) -> None:
+        while self.beside is not None and self.avr.cycle < until:
+            self._work(min(until, self.cycle_at(self.ns_at(self.avr.cycle) + _WIRE_NS)))
+            self.beside._work(self.beside.cycle_at(self.ns_at(self.avr.cycle)))
+            if stop_on_sent and self.line.next_arrival_ns() is not None:
+                return
+        self._work(until, stop_on_sent=stop_on_sent)
+
+    def _work(self, until: int, *, stop_on_sent: bool = False) -> None:
         self._pulse(until)
         while True:
             why = self.avr.run(until, stop_on_sent=stop_on_sent)
@@ -239,11 +253,10 @@ class EmulatedBoard:
                         self._label = self._asked[frame.ack]
             for change in self.avr.take_changes():
                 self.history.append(change)
-                if change.pin != self.wiring.sync:
-                    continue
-                if self._looped is not None:
-                    self.avr.edge(change.cycle, self._looped, change.high)
-                if change.high:
+                for board, pin in self.wires.get(change.pin, ()):
+                    ns = self.ns_at(change.cycle) + _WIRE_NS * (board is not self)
+                    board.avr.edge(board.cycle_at(ns), pin, change.high)
+                if change.pin == self.wiring.sync and change.high:
                     self._let_go(change.cycle)
             if why is not Stop.PIN:
                 return

@@ -7,8 +7,8 @@ Everything is counted in cycles of the emulated controllers, so it is the same o
 from __future__ import annotations
 
 import argparse
-import random
 import subprocess
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from rig.errors import DeviceError
 from rig.files import write_atomic
 from rig_emulator import trials
 from rig_emulator.pico_chip import PicoChip
-from rig_emulator.stand import Flip, Stamp, Stand
+from rig_emulator.stand import Flip, Stand
 from rig_emulator.wiring import BOARDS, PICO, Wiring, firmware_for
 
 if TYPE_CHECKING:
@@ -51,12 +51,14 @@ class Bench:
 
     def rows(self) -> Iterator[tuple[str, str]]:
         """Measure, one row of the table after another."""
-        seen = trials.spread(self._recorded(self._train(1500.0)))
+        seen = trials.spread(self.stand.stamps_of(self._train(1500.0)))
         yield "stamp, standard deviation", f"{1e3 * seen.sd / self.us:.0f} ns"
         yield "stamp, 99 % within", f"{1e3 * seen.p99 / self.us:.0f} ns"
         yield "stamp, worst", f"{1e3 * seen.worst / self.us:.0f} ns"
         sustained = self._fastest(_RATES, self._sustained)
         yield f"{_EDGES} edges of all gates by chance, a second", f"{sustained:,.0f}"
+        full = partial(self._sustained, count=self.stand.identity.capacity - 24)
+        yield "edges until its memory is full, a second", f"{self._fastest(_RATES[6:], full):,.0f}"
         yield f"{_BURST} edges of one gate, a second", f"{self._fastest(_BURSTS, self._burst):,.0f}"
         one, two = self._closest(0), self._closest(len(self.wiring.gates) - 1)
         yield "shortest pulse that is always two edges", f"{one} ns"
@@ -78,30 +80,13 @@ class Bench:
         yield "flash, memory without the stack", f"{flash / 1024:.1f} KB, {memory / 1024:.1f} KB"
 
     def _train(self, rate: float, count: int = _EDGES) -> list[Flip]:
-        """Flip gates by chance, so many times a second on the whole; all are clear at the end."""
-        chance = random.Random(1)
-        blocked = [False] * len(self.wiring.gates)
-        cycle, gap = round(1250 * self.us), self.wiring.clock_hz / rate
-        flips = []
-        for n in range(count):
-            on = [gate for gate, is_blocked in enumerate(blocked) if is_blocked]
-            gate = chance.choice(on) if len(on) >= count - n else chance.randrange(len(blocked))
-            blocked[gate] = not blocked[gate]
-            flips.append(Flip(cycle, gate, blocked[gate]))
-            cycle += max(1, round(gap * chance.uniform(0.5, 1.5)))
-        return flips
+        return trials.train(len(self.wiring.gates), count, rate, hz=self.wiring.clock_hz)
 
-    def _recorded(self, flips: list[Flip]) -> list[Stamp]:
-        record_ms = flips[-1].cycle // (self.wiring.clock_hz // 1000) + 5
-        return self.stand.record(flips, record_ms).stamps(flips)
-
-    def _sustained(self, rate: float) -> bool:
-        return len(self._recorded(self._train(rate))) == _EDGES
+    def _sustained(self, rate: float, count: int = _EDGES) -> bool:
+        return len(self.stand.stamps_of(self._train(rate, count))) == count
 
     def _burst(self, rate: float) -> bool:
-        gap = self.wiring.clock_hz / rate
-        flips = [Flip(round(200_000 + n * gap), 3, n % 2 == 0) for n in range(_BURST)]
-        return len(self._recorded(flips)) == _BURST
+        return len(trials.burst(self.stand, _BURST, rate)) == _BURST
 
     def _fastest(self, rates: tuple[float, ...], whole: Callable[[float], bool]) -> float:
         best = 0.0
@@ -124,8 +109,7 @@ class Bench:
                 if other:
                     back = at + 30_000
                     flips += [Flip(back, 0, False), Flip(back + gap, other, False)]
-            record_ms = flips[-1].cycle // (self.wiring.clock_hz // 1000) + 5
-            recording = self.stand.record(flips, record_ms)
+            recording = self.stand.record_all(flips)
             states = [event.state for event in recording.events]
             if len(states) == len(flips) and not recording.certificate.glitches:
                 return int(ns)
@@ -135,9 +119,7 @@ class Bench:
         """Measure FIRE to release in µs, skew in ns, and the wait for the certificate in ms."""
         stand = self.stand
         stand.avr.take_sent()
-        flips = self._train(1500.0)
-        record_ms = flips[-1].cycle // (self.wiring.clock_hz // 1000) + 5
-        recording = stand.record(flips, record_ms, pulse_us=1000)
+        recording = stand.record_all(self._train(1500.0), pulse_us=1000)
         on = {c.pin: c.cycle for c in recording.outputs if c.high and c.pin != self.wiring.sync}
         first = min(on.values())
         low = next(c for c in recording.outputs if c.pin == self.wiring.sync and not c.high)
@@ -151,15 +133,13 @@ class Bench:
         """Say how many bytes a second come of edges that come faster than they can be sent."""
         count = min(_RODS_EDGES, self.stand.identity.capacity - 24)
         flips, before = self._train(rate, count), self.stand.heard
-        self._recorded(flips)
+        self.stand.stamps_of(flips)
         seconds = (self.stand.certified - self.stand.fired - flips[0].cycle) / self.us / 1e6
         return round((self.stand.heard - before) / seconds, -3)
 
     def _rods(self) -> tuple[int, float]:
         """Count the edges kept of a long drop, and wait for its certificate, in ms."""
-        flips = self._train(_RODS_EDGES / _FALL_S, _RODS_EDGES)
-        record_ms = flips[-1].cycle // (self.wiring.clock_hz // 1000) + 5
-        recording = self.stand.record(flips, record_ms)
+        recording = self.stand.record_all(self._train(_RODS_EDGES / _FALL_S, _RODS_EDGES))
         low = next(c for c in recording.outputs if c.pin == self.wiring.sync and not c.high)
         wait = self.stand.certified - self.stand.fired - low.cycle
         return recording.certificate.events, wait / self.us / 1e3
@@ -189,12 +169,10 @@ class Bench:
 def page() -> str:
     """Measure both boards and write the page."""
     columns = {name: dict(Bench(wiring).rows()) for name, wiring in _COMPARED.items()}
-    names = list(next(iter(columns.values())))
     lines = [f"| | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
-    for (mega, pico), name in zip(
-        zip(*(column.values() for column in columns.values()), strict=True), names, strict=True
-    ):
-        lines.append(f"| {name} | {mega} | {pico} |")
+    for name in next(iter(columns.values())):
+        cells = [column[name] for column in columns.values()]
+        lines.append(f"| {' | '.join([name, *cells])} |")
     return _HEAD + "\n".join(lines) + "\n"
 
 

@@ -85,6 +85,10 @@ class Controller(Protocol):
         """Send it bytes, not before `cycle`."""
         ...
 
+    def rate(self, baudrate: float) -> None:
+        """Let the host at the other end of the line take another rate."""
+        ...
+
     def take_sent(self) -> list[Sent]:
         """Take what it has sent since the last time."""
         ...

@@ -63,7 +63,7 @@ class PicoChip:
     usb
         Whether the port is `ready`; how many packets were offered `late` in a frame, how many
         acknowledgements were `lost`, how often the host `gaveUp` a request, and how often the
-        device came to the bus (`plugs`).
+        device came to the bus (`plugs`), and went over to take firmware (`boots`).
     """
 
     def __init__(
@@ -153,9 +153,9 @@ class PicoChip:
         """Let the program that has opened its port stop reading, or go on."""
         self._order(reads=on)
 
-    def rate(self, baud: int) -> None:
+    def rate(self, baudrate: float) -> None:
         """Tell it a baud rate."""
-        self._order(rate=baud)
+        self._order(rate=round(baudrate))
 
     def reset_bus(self) -> None:
         """Let the bus go, as a hub may, and ask it anew who it is."""
@@ -168,6 +168,10 @@ class PicoChip:
     def hang_usb(self, *, dead_s: float = 0.0) -> None:
         """Let the controller hang (RP2040-E15), and take so long to come out of reset."""
         self._order(hang=True, deadNs=dead_s * 1e9)
+
+    def busy_hub(self, on: bool) -> None:
+        """Put it behind a hub so busy that an old chip misses the end of a bus reset (E5)."""
+        self._order(hub=on)
 
     def sleep_bus(self, sleeps: bool) -> None:
         """Suspend the bus, or let it go on."""

@@ -47,6 +47,11 @@ class EmulatedSerial(SimulatedSerial):
             self.board.opened(self.clock.now_ns(), False)
         super().close()
 
+    def _reconfigure_port(self) -> None:
+        """Take another rate, as the USB chip of 16 MHz makes it."""
+        if isinstance(self.board, EmulatedBoard):
+            self.board.avr.rate(16e6 / 8 / int(2e6 / self.baudrate))
+
     def upcoming(self, board: Board, end_ns: int | None) -> tuple[int | None, bool]:
         """Let the board run ahead of a read: as long as it lasts, the host sends nothing."""
         if not isinstance(board, EmulatedBoard):

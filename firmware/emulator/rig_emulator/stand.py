@@ -271,6 +271,15 @@ class Stand:
             events, certificate, self.identity.late_ticks, outputs, self.wiring.tick_cycles
         )
 
+    def record_all(self, flips: list[Flip], pulse_us: int = 0) -> Recording:
+        """Record for as long as gates change."""
+        record_ms = flips[-1].cycle // (self.wiring.clock_hz // 1000) + 5
+        return self.record(flips, record_ms, pulse_us=pulse_us)
+
+    def stamps_of(self, flips: list[Flip]) -> list[Stamp]:
+        """Let gates change, and tell how each was stamped."""
+        return self.record_all(flips).stamps(flips)
+
     def arm_and_fire(self, record_ms: int, pulse_us: int) -> tuple[int, list[Change]]:
         """Begin a drop of all gates and all releases.
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig_emulator.stand import Recording, Stamp, Stand
+    from rig_emulator.wiring import Wiring
     from sim.lab_interface import Lab
 
 HZ = 16_000_000
@@ -63,35 +64,39 @@ def spread(stamps: Sequence[Stamp]) -> Spread:
     )
 
 
-def lab_drop(stand: Stand, lab: Lab, run: int) -> list[Stamp]:
-    """Let chains fall before the board, as far as it has gates."""
-    flips = [
-        Flip(round(seconds * HZ), channel, blocked)
+def lab_flips(wiring: Wiring, lab: Lab, run: int) -> list[Flip]:
+    """Tell what chains do to a board's gates, as far as it has them."""
+    return [
+        Flip(round(seconds * wiring.clock_hz), channel, blocked)
         for seconds, channel, blocked in lab.drop(pack_label(run, 1))
-        if channel < len(stand.wiring.gates)
+        if channel < len(wiring.gates)
     ]
-    end_ms = (flips[-1].cycle + 10 * _MS) // _MS
-    return stand.record(flips, end_ms).stamps(flips)
 
 
-def train(gates: int, count: int, rate: float, seed: int = 1) -> list[Flip]:
+def lab_drop(stand: Stand, lab: Lab, run: int) -> list[Stamp]:
+    """Let chains fall before the board."""
+    return stand.stamps_of(lab_flips(stand.wiring, lab, run))
+
+
+def train(gates: int, count: int, rate: float, seed: int = 1, hz: int = HZ) -> list[Flip]:
     """Flip gates by chance, so many times a second on the whole; all are clear at the end."""
     chance = random.Random(seed)
     blocked = [False] * gates
-    cycle, gap = 20_000.0, HZ / rate
+    cycle, gap = hz // 800, hz / rate
     flips = []
-    for _ in range(count):
-        gate = chance.randrange(gates)
+    for n in range(count):
+        on = [gate for gate, is_blocked in enumerate(blocked) if is_blocked]
+        gate = chance.choice(on) if len(on) >= count - n else chance.randrange(gates)
         blocked[gate] = not blocked[gate]
-        flips.append(Flip(round(cycle), gate, blocked[gate]))
-        cycle += gap * chance.uniform(0.5, 1.5)
+        flips.append(Flip(cycle, gate, blocked[gate]))
+        cycle += max(1, round(gap * chance.uniform(0.5, 1.5)))
     return flips
 
 
 def sustained(stand: Stand, count: int, rate: float) -> tuple[int, int]:
     """Count the events of a train that arrived, and those for which there was no memory."""
     flips = train(len(stand.wiring.gates), count, rate)
-    recording = stand.record(flips, flips[-1].cycle // _MS + 5)
+    recording = stand.record_all(flips)
     if not recording.certificate.overflows:
         recording.stamps(flips)  # which would say what is missing
     return recording.certificate.events, recording.certificate.overflows
@@ -99,9 +104,9 @@ def sustained(stand: Stand, count: int, rate: float) -> tuple[int, int]:
 
 def burst(stand: Stand, count: int, rate: float) -> list[Stamp]:
     """Flip one gate as fast as that."""
-    gap = round(HZ / rate)
-    flips = [Flip(20_000 + n * gap, 3, n % 2 == 0) for n in range(count)]
-    return stand.record(flips, flips[-1].cycle // _MS + 5).stamps(flips)
+    hz = stand.wiring.clock_hz
+    flips = [Flip(round(hz / 800 + n * hz / rate), 3, n % 2 == 0) for n in range(count)]
+    return stand.stamps_of(flips)
 
 
 def twins(stand: Stand, count: int, spacing: int) -> list[Stamp]:
@@ -114,7 +119,7 @@ def twins(stand: Stand, count: int, spacing: int) -> list[Stamp]:
         for after, blocked in ((0, True), (spacing // 2, False)):
             flips.append(Flip(at + after, first, blocked))
             flips.append(Flip(at + after + lag, second, blocked))
-    return stand.record(flips, flips[-1].cycle // _MS + 5).stamps(flips)
+    return stand.stamps_of(flips)
 
 
 def across_halves(stand: Stand, reach: int) -> list[Stamp]:
@@ -146,5 +151,5 @@ def pulse(stand: Stand, gate: int, width: int, count: int = 16) -> tuple[int, in
     for n in range(count):
         at = 20_000 + 4001 * n
         flips += [Flip(at, gate, True), Flip(at + width, gate, False)]
-    recording = stand.record(flips, flips[-1].cycle // _MS + 5)
+    recording = stand.record_all(flips)
     return len(recording.events) - recording.certificate.glitches, recording.certificate.glitches

@@ -20,6 +20,8 @@ const LED = 25;
 const DREQ_RX = 4;
 const DMA_ABORT = 0x444;
 const XOSC_STATUS = 4, XOSC_STARTUP = 12, STABLE = 2 ** 31, CRYSTAL_KHZ = 12000;
+// Of the chip's own program: a list of one function, USB boot, which ends the emulation.
+const ROM = new Uint32Array([0, 0, 0, 0, 0, 0x20, 0, 0, 0x00304255, 0, 0, 0, 0xbe55be55]), USB_BOOT = 0x55;
 const CHIP_ID = 0x0002927; // behind the revision: 1 is B0 or B1, 2 is B2
 
 // A block of registers that only keeps what is written.
@@ -83,6 +85,7 @@ export class Chip {
     this.number = number;
     this.cycle = 0;
     this.watchdogs = 0;
+    this.boots = 0; // how often it went over to take firmware
     this.fault = null;
     this.sent = []; // [cycle, bytes]
     this.changes = []; // [cycle, pin, level]
@@ -110,6 +113,12 @@ export class Chip {
     if (memory) rp2040.sram.set(memory);
     else rp2040.sram.fill(0xc5);
     const { peripherals } = rp2040;
+    rp2040.bootrom.set(ROM);
+    rp2040.onBreak = (code) => {
+      if (code !== USB_BOOT) return this.fail(`a break ${code}`);
+      this.boots++;
+      this.host.controller.reset(true);
+    };
     peripherals[0x18000] = new Flash(this.number);
     peripherals[0x40018] = new Registers();
     peripherals[0x40030] = new Registers(); // the bus has no queue here
@@ -286,7 +295,9 @@ export class Chip {
     while (this.cycle < until && !this.stop && !this.fault) {
       if (this.restart) this.power(this.restart, this.rp2040.sram);
       const { core } = this.rp2040;
-      if (core.waiting) {
+      if (this.boots) {
+        this.cycle = until;
+      } else if (core.waiting) {
         this.cycle = Math.max(this.cycle + 1, Math.min(until, this.nextAlarm()));
         this.tick();
       } else {

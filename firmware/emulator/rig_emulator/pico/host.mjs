@@ -31,6 +31,7 @@ export class Host {
     this.lost = this.gaveUp = 0; // how many in all
     this.late = 0; // packets that were offered at a frame's end
     this.plugs = 0; // how often it came
+    this.busyHub = false; // the device misses the end of a bus reset
     const { clock } = rp2040;
     this.clock = clock;
     this.controller = new Controller(rp2040, this);
@@ -43,7 +44,7 @@ export class Host {
     this.nextTransfer = clock.createAlarm(() => {
       if (!this.transfer) this.begin();
     });
-    this.attach = clock.createAlarm(() => this.usb.resetDevice());
+    this.attach = clock.createAlarm(() => this.resetDevice());
     this.usb.onResetReceived = () => {
       this.controller.setFrames(true);
       this.enumerate();
@@ -68,7 +69,7 @@ export class Host {
 
   plugged() {
     if (this.plugs++) this.attach.schedule(DEBOUNCE_MS * 1e6);
-    else this.usb.resetDevice();
+    else this.resetDevice();
   }
 
   unplugged() {
@@ -79,10 +80,14 @@ export class Host {
     this.forget();
   }
 
+  resetDevice() {
+    if (!this.busyHub) this.usb.resetDevice();
+  }
+
   // A hub lets the bus go, and begins anew.
   resetBus() {
     this.forget();
-    this.usb.resetDevice();
+    this.resetDevice();
   }
 
   // The bus sleeps, or goes on.

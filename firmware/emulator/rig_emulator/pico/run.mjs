@@ -17,6 +17,7 @@ function obey(order) {
   if (order.open !== undefined) chip.setOpen(order.open);
   if (order.reads !== undefined) chip.host.setReads(order.reads);
   if (order.rate !== undefined) chip.host.setRate(order.rate);
+  if (order.hub !== undefined) chip.host.busyHub = order.hub && chip.revision < 2;
   if (order.resetBus) chip.host.resetBus();
   if (order.sleeps !== undefined) chip.host.setSleeps(order.sleeps);
   if (order.hang) chip.host.controller.hang();
@@ -45,13 +46,13 @@ function obey(order) {
 
 // What has come of it since the last answer.
 function state() {
-  const { cycle, changes, sent, watchdogs, fault } = chip;
+  const { cycle, changes, sent, watchdogs, fault, boots } = chip;
   const { texts, ready, late, lost, gaveUp, plugs } = chip.host;
   const outputs = OUTPUTS.reduce((mask, pin) => mask | (chip.output(pin) << pin), 0);
   chip.changes = [];
   chip.sent = [];
   chip.fault = null;
-  return { cycle, changes, sent, watchdogs, fault, outputs, texts, usb: { ready, late, lost, gaveUp, plugs }, why: null };
+  return { cycle, changes, sent, watchdogs, fault, outputs, texts, usb: { ready, late, lost, gaveUp, plugs, boots }, why: null };
 }
 
 for await (const line of createInterface({ input: process.stdin })) {
