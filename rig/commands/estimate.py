@@ -36,7 +36,7 @@ def main(arguments: Namespace) -> int:
         print(estimate_text(estimate, sections, simulated=simulated))
     if folder is not None:
         from rig.report.canvas import write_figure  # noqa: PLC0415 - likewise
-        from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
+        from rig.report.estimate import estimate_pictures  # noqa: PLC0415 - only drawn here
 
         entry = CacheEntry(dict, "estimate pictures", outcome.digest, fresh=fresh)
         drawn = entry.find()

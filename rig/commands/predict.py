@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.analysis.distributions import COVERAGE_95
+from rig.analysis.result import Measured
 from rig.commands.output import print_found, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
@@ -79,7 +79,7 @@ def _written(value: float | None, u: float | None, row: Measurand) -> str:
     """Write a prediction with what its own numbers leave open."""
     if value is None or u is None:
         return fixed(None if value is None else value * row.scale, row.decimals + 1)
-    return plus_minus({"value": value, "U95": COVERAGE_95 * u}, row.scale)
+    return plus_minus(Measured(value, u), row.scale)
 
 
 def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:

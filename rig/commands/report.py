@@ -10,8 +10,8 @@ from rig.cache.entry import CacheEntry
 from rig.commands.output import progress, say, stage, tell_damage
 from rig.files import check_place, write_atomic
 from rig.films import film_digest
-from rig.report.page import page_html
 from rig.report.session_page import Material, session_page
+from rig.report.templates import page_html
 from rig.results import SessionResults, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections

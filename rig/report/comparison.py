@@ -10,9 +10,8 @@ from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
 from rig.report.columns import table_parts
 from rig.report.figure import chart
-from rig.report.page import page_html
 from rig.report.parts import summary_table
-from rig.report.templates import sentence
+from rig.report.templates import page_html, sentence
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -2,6 +2,7 @@
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -62,7 +63,8 @@ def rows(path: Path) -> list[dict[str, str]]:
 def test_all_files(tmp_path: Path, session: Session) -> None:
     place = tmp_path / "deep" / "out"
     for _ in range(2):  # the second time replaces
-        export_csv(place, session, ANALYSIS, {1: 1001.0})
+        clock = SimpleNamespace(scale=lambda drop: SimpleNamespace(hz=drop.tick_hz + 1.0))
+        export_csv(place, session, ANALYSIS, clock)
     runs = rows(place / "runs.csv")
     assert [(row["run"], row["attempt"], row["superseded"]) for row in runs] == [
         ("1", "1", "1"),

@@ -26,8 +26,8 @@ from rig.report.attachments import METHOD, Attachment, method_page
 from rig.report.columns import Part
 from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.finding import ModelCheck, Number
-from rig.report.page import page_html
 from rig.report.session_page import PAPER, SOFTWARE
+from rig.report.templates import page_html
 from rig.report.timeline import Lanes, Timeline
 
 ROOT = Path(__file__).parents[2]
@@ -135,7 +135,7 @@ def test_page_and_citation_file_name_the_same():
 
 def test_importing_loads_neither_matplotlib_nor_jinja2():
     code = (
-        "import sys, rig.report.page, rig.report.figures, rig.report.columns, rig.bundle.tables,"
+        "import sys, rig.report.templates, rig.report.figures, rig.bundle.tables,"
         "rig.session.store\n"
         "assert not {'matplotlib', 'numpy', 'jinja2'} & set(sys.modules)"
     )

@@ -11,10 +11,9 @@ from rig.analysis.result import Measured
 from rig.errors import InputError
 from rig.estimate.posterior import Posterior
 from rig.estimate.session import Coefficient
-from rig.report.estimate import estimate_text, page_parts
-from rig.report.estimate_pictures import estimate_pictures
-from rig.report.page import page_html
+from rig.report.estimate import estimate_pictures, estimate_text, page_parts
 from rig.report.session_page import Material, session_page
+from rig.report.templates import page_html
 from rig.results import results
 from rig.sections import Sections
 from rig.session.store import Session
