@@ -22,8 +22,8 @@ from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
 from rig.ready import find_protocol
 from rig.report.numbers import plus_minus
-from rig.report.templates import parts_html
 from rig.report.parts import means_parts, summary_table
+from rig.report.templates import parts_html
 from rig.results import SessionResults, calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
 from rig.session.store import Session

@@ -54,8 +54,8 @@ def table_parts(
     name: str,
     records: Iterable[Any] = (),
     words: Iterable[str] = (),
+    derived: Mapping[str, Callable[[Any], Any]] = _NOTHING,
     row: Measurand | None = None,
-    **derived: Callable[[Any], Any],
 ) -> Iterator[Part]:
     """Yield a table of ``columns.txt``; nothing where there is nothing to say.
 
@@ -65,10 +65,10 @@ def table_parts(
         Of the table there.
     words
         Said of it too.
-    row
-        The measurand of all its records; without it each record has its own, or none.
     derived
         What the table calls with ``()``, by name.
+    row
+        The measurand of all its records; without it each record has its own, or none.
     """
     records, table = list(records), _TABLES[name]
     written = partial(str.format, row=row, first=records[0] if records else None)

@@ -108,7 +108,7 @@ def _tables(results: TogetherResults) -> Iterator[Part]:
             if row.name in line.means
         )
         yield from table_parts("sessions", means, row=row)
-        yield from table_parts("differences", differences, row=row, runs=_runs)
+        yield from table_parts("differences", differences, (), {"runs": _runs}, row)
 
 
 def _claims(results: TogetherResults) -> list[str]:

@@ -57,7 +57,7 @@ def page_parts(
     """Yield tables of ``columns.txt``, each made alone."""
 
     def make(name: str) -> list[Part]:
-        return [*table_parts(name, *_TABLES[name](found), **_CELLS)]
+        return [*table_parts(name, *_TABLES[name](found), _CELLS)]
 
     for name in names:
         yield from sections.make(f'The section "{heading_of(name)}"', partial(make, name)) or ()

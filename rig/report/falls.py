@@ -1,7 +1,9 @@
 """One fall as its edges tell it: where the object or chain was, when, and how fast.
 
 Each shadow of a known rod in a known beam is a point: its middle in time, and the rod's width over
-its duration. Release, acceleration and Δz are those of the session's results.
+its duration T, which is the speed then. The rod's own middle is aT²/8 short of the beam by then,
+under a constant acceleration a: between impacts, that of gravity. Release, acceleration and Δz are
+those of the session's results.
 """
 
 from __future__ import annotations
@@ -65,6 +67,8 @@ def passages(
     """
     name = result.run.impact if side == "impact" else result.run.free
     gates = {gate.channel: gate for gate in protocol.gates.on(side)} if protocol.gates else {}
+    row = acceleration_in(result.quantities)
+    pull = result.quantities[row.name].value if row else protocol.gravity.value
     begun: dict[tuple[int, int], float] = {}
     rows = []
     for number, edge in enumerate(drop.edges if name is not None else ()):
@@ -75,10 +79,11 @@ def passages(
         shadow, time = (edge.channel, rod), float(edge.tick / hz)
         if edge.blocked:
             begun[shadow] = time
-        elif shadow in begun and time > begun[shadow]:
-            before = begun.pop(shadow)
-            height = gates[edge.channel].height + rods.chain.length - rods.chain.heights[rod]
-            rows.append(((time + before) / 2, height, rods.widths[rod] / (time - before)))
+        elif shadow in begun and time > (before := begun.pop(shadow)):
+            lasted = time - before
+            beam = gates[edge.channel].height + pull * lasted**2 / 8
+            height = beam + rods.chain.length - rods.chain.heights[rod]
+            rows.append((before + lasted / 2, height, rods.widths[rod] / lasted))
     return Passages(*np.array(sorted(rows)).reshape(-1, 3).T)
 
 

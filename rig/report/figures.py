@@ -98,25 +98,16 @@ def runs_figure(analysis: Analysis, skew_limit_s: float | None = None) -> Chart 
         for line in analysis.summary
         if (reference := (line.predicted if predicted else line.means).get(SEPARATION.name))
     }
-    separation = {
-        "name": f"{SEPARATION.symbol} − {'model' if predicted else 'mean'}",
-        "unit": SEPARATION.fine,
-        "height": 90,
-        "scale": SEPARATION.fine_scale,
-        "middle": "zero",
-        "runs": _runs_by_chain(analysis, SEPARATION, references),
+    separation = _runs_by_chain(analysis, SEPARATION, references)
+    skew = _runs_by_chain(analysis, RELEASE_SKEW)
+    sources = {
+        "reference": "model" if predicted else "mean",
+        "separation": separation,
+        "middle": [0.0] * bool(separation),
+        "skew": skew,
+        "limits": [skew_limit_s, -skew_limit_s] if skew_limit_s and skew else (),
     }
-    skew = {
-        "name": RELEASE_SKEW.label,
-        "unit": RELEASE_SKEW.unit,
-        "height": 70,
-        "scale": RELEASE_SKEW.scale,
-        "middle": "",
-        "limits": [skew_limit_s, -skew_limit_s] if skew_limit_s else (),
-        "runs": _runs_by_chain(analysis, RELEASE_SKEW),
-    }
-    panels = [panel for panel in (separation, skew) if panel["runs"]]
-    return chart("order", *panels) if panels else None
+    return chart("order", sources) if separation or skew else None
 
 
 def budget_figure(summary: Sequence[Incline]) -> Chart | None:

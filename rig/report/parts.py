@@ -87,7 +87,7 @@ def tables(
     name: str, records: Iterable[Any], words: Iterable[str] = (), row: Measurand | None = None
 ) -> Iterator[Part]:
     """Yield a table of ``columns.txt`` of means, of drops, or of what both have."""
-    return table_parts(name, records, words, row, **_CELLS)
+    return table_parts(name, records, words, _CELLS, row)
 
 
 def budget_parts(summary: Sequence[Incline]) -> Iterator[Part]:
