@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from rig.analysis.result import Measured
+from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import print_found, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
@@ -79,7 +80,7 @@ def _written(value: float | None, u: float | None, row: Measurand) -> str:
     """Write a prediction with what its own numbers leave open."""
     if value is None or u is None:
         return fixed(None if value is None else value * row.scale, row.decimals + 1)
-    return plus_minus(Measured(value, u), row.scale)
+    return plus_minus(SimpleNamespace(value=value, expanded=COVERAGE_95 * u), row.scale)
 
 
 def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:

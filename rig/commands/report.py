@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.analysis.result import GOOD
 from rig.cache.entry import CacheEntry
 from rig.commands.output import progress, say, stage, tell_damage
-from rig.files import check_place, write_atomic
+from rig.files import check_place, replacing, write_atomic
 from rig.films import film_digest
 from rig.report.session_page import Material, session_page
 from rig.report.templates import page_html
@@ -36,6 +36,11 @@ class Report(NamedTuple):
 def main(arguments: Namespace) -> int:
     """Write a session's report."""
     check_place(arguments.output)
+    if arguments.pdf is not None:
+        from rig.report.pdf import load_weasyprint, page_pdf  # noqa: PLC0415 - an extra
+
+        check_place(arguments.pdf)
+        load_weasyprint()
     with Session.open(arguments.session, readonly=True) as session:
         fresh, estimate = arguments.fresh, arguments.estimate
         outcome = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=estimate)
@@ -53,9 +58,15 @@ def main(arguments: Namespace) -> int:
         stage("drawing figures")
         write_figures(Path(arguments.figures), report.figures)
         stage("")
+    if arguments.pdf is not None:
+        stage("setting the PDF")
+        pages = page_pdf(report.html, report.figures)
+        with replacing(arguments.pdf) as stream:
+            stream.write(pages)
+        stage("")
     for sentence in report.failed:
         say(sentence)
-    say(f"report: {arguments.output}")
+    say(f"report: {', '.join(filter(None, (arguments.output, arguments.pdf)))}")
     return tell_damage(outcome.analysis)
 
 

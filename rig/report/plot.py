@@ -96,6 +96,9 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
             _set_up(axes, panel, numbered=not joined)
             for trace in panel.series:
                 _draw(axes, trace)
+            axes.autoscale_view()
+            if panel.whole and np.ptp(axes.get_xlim()) < 1.0:
+                axes.margins(x=10.0)  # of a single run
         for panel, axes in zip(panels, figure.axes, strict=True):
             _name_series(axes, panel)
     return Canvas(figure, figure.axes, chart.facts or chart.title)
@@ -156,13 +159,14 @@ def _draw(axes: Axes, trace: Trace) -> None:
             axes.barh(y, x - trace.base, 0.72, trace.base, color=color)
         case "map" | "levels":
             _draw_map(axes, trace)
-        case "words" | "cross":  # texts do not set the scale
+        case "words" | "cross":  # texts do not set the scale of y
             cross = trace.role == "cross"
             side, words = (
                 ("center", "×") if cross else ("left" if x[0] > 0 else "right", trace.label)
             )
             for place in zip(x, y, strict=True):
                 axes.text(*place, words, ha=side, va="center", color=color, clip_on=cross)
+            axes.update_datalim(np.column_stack((x, y)), updatex=cross, updatey=False)
         case _:
             options: dict[str, Any] = {"linestyle": "none"} if "marker" in look else {}
             if u.size:
@@ -210,7 +214,8 @@ def _name_series(axes: Axes, panel: Panel) -> None:
         crowded = _meet(low, high, names[:, :2], names[:, 2:]) + (low[:, 1] < bottom)
         far = np.abs(corners[:, 1] - np.repeat(places[step, 1], len(offsets))) / _FAR_PT
         best = np.argmin(np.where(inside, hidden + far + _CROWDED * crowded, np.inf))
-        names = np.vstack((names, [*low[best] - _LETTER, *high[best] + _LETTER]))
+        apart = _LETTER, 0.0
+        names = np.vstack((names, [*low[best] - apart, *high[best] + apart]))
         place = axes.transData.inverted().transform(corners[best])
         color = COLORS[INK if bar else trace.color][0]
         axes.annotate(trace.label, tuple(place), color=color, annotation_clip=False)
