@@ -6,7 +6,6 @@ import base64
 import re
 from contextlib import redirect_stdout
 from html import escape
-from importlib import import_module
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
@@ -33,13 +32,14 @@ def load_weasyprint() -> Any:
     """
     try:
         with redirect_stdout(StringIO()):  # it prints links there
-            return import_module("weasyprint")
+            import weasyprint  # noqa: PLC0415 - an extra that few need
     except OSError as error:
         raise InputError(
             "--pdf: WeasyPrint needs the library Pango, which is not installed",
             "Debian: sudo apt-get install libpangoft2-1.0-0 libharfbuzz-subset0; "
             "or print the page from a browser",
         ) from error
+    return weasyprint
 
 
 def page_pdf(html: str, figures: Sequence[Chart]) -> bytes:
