@@ -10,7 +10,7 @@ from rig.cache.entry import CacheEntry
 from rig.commands.output import progress, say, stage, tell_damage
 from rig.files import check_place, replacing, write_atomic
 from rig.films import film_digest
-from rig.report.session_page import Material, session_page
+from rig.report.session_page import session_page
 from rig.report.templates import page_html
 from rig.results import SessionResults, protocol_of, results
 from rig.results.estimated import session_estimate
@@ -81,7 +81,7 @@ def make_report(
             "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
         )
     stage("writing the page")
-    html, figures = page_html(session_page(Material(session, outcome, bars, estimated, sections)))
+    html, figures = page_html(session_page(session, outcome, bars, estimated, sections))
     stage("")
     failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
     return Report(html, tuple(figures), failed)

@@ -107,33 +107,26 @@ def fall_figures(
     struck = struck._replace(time=struck.time - released)
     motion = motion_by_model(protocol, result.run)
     at = np.linspace(0.0, motion.end_s, _MOMENTS)
-    heights, speeds, gaps = _model(motion, at)
     u = 2.0 * np.hypot(protocol.gates.height_u, protocol.gates.datum_u)
     if free.time.size > 2 and RELEASE_SKEW.name in values:
         half, skew = 0.5 * protocol.gravity.value, values[RELEASE_SKEW.name]
         # The free chain's way, from all its passages, at the moments of the striking one's.
         since = free.time - released - skew.value
-        ahead = np.mean(free.height + half * since**2) - half * struck.time**2 - struck.height
-        name, curve, points, expected = "separation", gaps, ahead, _model(motion, struck.time)[2]
-        u = np.hypot(u, struck.speed * skew.expanded)
+        points = np.mean(free.height + half * since**2) - half * struck.time**2 - struck.height
+        name, u = "separation", np.hypot(u, struck.speed * skew.expanded)
     else:
-        name, curve, points, expected = (
-            "height",
-            heights,
-            struck.height,
-            _model(motion, struck.time)[0],
-        )
-        u = np.hypot(u, 2.0 * protocol.drop.u)
+        name, points, u = "height", struck.height, np.hypot(u, 2.0 * protocol.drop.u)
+    curves, expected = _model(motion, at), _model(motion, struck.time)[name]
     sources = {
-        "curve": np.column_stack((at, curve)),
+        "curve": np.column_stack((at, curves[name])),
         "passages": _with_residuals(struck.time, points, expected, u),
         "end": [(end, values.get(SEPARATION.name))],
     }
     yield chart(name, sources, run=head)
-    fallen = heights[0] * np.arange(2)
+    top = curves["height"][0]
     squares = {
-        "free_fall": np.column_stack((2.0 * motion.gravity * fallen, heights[0] - fallen)),
-        "curve": np.column_stack((speeds**2, heights)),
+        "free_fall": [(0.0, top), (2.0 * motion.gravity * top, 0.0)],
+        "curve": np.column_stack((curves["speed"] ** 2, curves["height"])),
         "free": np.column_stack((free.speed**2, free.height)),
         "struck": np.column_stack((struck.speed**2, struck.height)),
     }
@@ -174,12 +167,11 @@ def _with_residuals(times: Array, values: Array, expected: Array, u: Array | flo
         return np.column_stack((times, values, (values - expected) / u))
 
 
-def _model(motion: Motion, times: Array) -> Array:
-    """Return where the model has the top rod, m, its speed, m/s, and Δz, m; a row each."""
+def _model(motion: Motion, times: Array) -> dict[str, Array]:
+    """Return where the model has the top rod, m, its speed, m/s, and Δz, m, at each time."""
     instants = [motion.at(min(max(time, 0.0), motion.end_s)) for time in times.tolist()]
-    return np.transpose(
-        [
-            (instant.height_m + motion.chain.length, instant.speed_m_s, instant.separation_m)
-            for instant in instants
-        ]
-    )
+    return {
+        "height": np.array([at.height_m for at in instants]) + motion.chain.length,
+        "speed": np.array([at.speed_m_s for at in instants]),
+        "separation": np.array([at.separation_m for at in instants]),
+    }

@@ -76,7 +76,8 @@ def page_with(text: str) -> dict[str, Any]:
         attached_files=always([Simple(name=text, added=text)]),
     )  # fmt: skip
     analysis = Simple(
-        runs=(result,), superseded=(), summary=(Simple(incline_deg=1.0, gates=()),), damage=[text],
+        runs=(result,), drops=[result], superseded=(), damage=[text],
+        summary=(Simple(incline_deg=1.0, gates=()),),
         rig=Simple(likeness=Simple(sentence=text), drag=None),
     )  # fmt: skip
     outcome = Mock(blind=False, analysis=analysis, clock=Simple(details={text: text}))
@@ -84,10 +85,8 @@ def page_with(text: str) -> dict[str, Any]:
         "template": "session.html", "title": text, "simulated": True, "session": session,
         "outcome": outcome, "timed": (), "good": GOOD, "created": datetime(2026, 6, 3),
         "protocol": Mock(notes=text, track=None), "free": None, "notes": {Job(1, 1): text},
-        "material": Simple(
-            make=lambda _, make, *arguments: make(*arguments), drops=[result], bars="U95",
-            estimated=True, sections=Simple(failed={"a": text}),
-        ),
+        "make": lambda _, make, *arguments: make(*arguments), "drops": [result], "bars": "U95",
+        "estimated": True, "sections": Simple(failed={"a": text}),
         "paper": text, "software": text, "versions": {"rig": text},
         "curves": defaultdict(lambda: always([{}])), "fall": charts, "fallen": charts,
         "figures": defaultdict(lambda: charts, FEWEST_INCLINES=3), "plan": {"runs": always([])},

@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.estimate.posterior import Posterior
 from rig.estimate.session import Coefficient
 from rig.report.estimate import estimate_pictures, estimate_text, page_parts
-from rig.report.session_page import Material, session_page
+from rig.report.session_page import session_page
 from rig.report.templates import page_html
 from rig.results import results
 from rig.sections import Sections
@@ -112,10 +112,10 @@ def test_a_page_says_what_it_lacks(single, monkeypatch):
     for name in ("figures.budget_figure", "figures.result_figure", "session_page.fall_figures"):
         monkeypatch.setattr(f"rig.report.{name}", fail)
     with Session.open(single, readonly=True) as session:
-        material = Material(session, results(session))
-        page, _ = page_html(session_page(material))
-    assert len(material.sections.failed) == 3
-    for sentence in material.sections.failed.values():
+        sections = Sections()
+        page, _ = page_html(session_page(session, results(session), "U95", None, sections))
+    assert len(sections.failed) == 3
+    for sentence in sections.failed.values():
         assert sentence in page
     assert "The figure of the budget could not be made: TypeError: " in page
     assert "sortable" in page
