@@ -122,7 +122,7 @@ def _cell(
     derived: Mapping[str, Callable[[Any], Any]],
     record: Any,
 ) -> str:
-    row = row or value_at(record, "row")
+    row = row or value_at(record, "row") or MEASURANDS.get(value_at(record, "quantity"))
     value = value_at(record, place.format(row=row), derived)
     way, *numbers = way.split()
     return _WAYS[way](value, row, *map(float, numbers))
@@ -170,7 +170,7 @@ _WAYS: dict[str, Callable[..., str]] = {
     "words": _text,
     "text": _text,
     "verdict": _verdict,
-    "quantity": lambda row, _: f"{row.symbol} ({row.fine})",
+    "quantity": lambda _, row: f"{row.symbol} ({row.fine})",
     "symbol": lambda name, _: MEASURANDS[name].symbol,
     "degrees": lambda value, _: degrees(value),
     "times": lambda value, _: f"× {value:.2f}",
