@@ -8,12 +8,10 @@ processor time, which other programs on the machine change little; lateness does
 from __future__ import annotations
 
 import asyncio
-import fcntl
 import os
 import pty
 import re
 import select
-import struct
 import subprocess
 import sys
 import termios
@@ -74,8 +72,7 @@ class Terminal:
     def __init__(self, *arguments: str | Path) -> None:
         self.written: list[tuple[float, bytes]] = []
         self._far, near = pty.openpty()
-        columns, rows = SIZE
-        fcntl.ioctl(near, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        termios.tcsetwinsize(near, SIZE[::-1])
         self.begun = time.monotonic()
         self.process = subprocess.Popen(
             [*_RIG, "tui", *map(str, arguments)],
@@ -123,20 +120,6 @@ class Terminal:
                     return  # it has left
 
 
-def tui(protocol: str) -> dict[str, Any]:
-    """Measure the first paint, a quiet screen, one with `RATE` edges a second, and a long session.
-
-    Parameters
-    ----------
-    protocol
-        File with the scene.
-    """
-    with TemporaryDirectory(prefix="rig-") as folder:
-        path = str(Path(protocol).resolve())
-        found = asyncio.run(_measure(Path(folder), path))
-        return found | _opened(Path(folder), path)
-
-
 async def _measure(folder: Path, protocol: str) -> dict[str, Any]:
     loop = asyncio.get_running_loop()
     server, ready = Server("sim://", folder / "door" / "rig.sock"), asyncio.Event()
@@ -160,7 +143,12 @@ def _opened(folder: Path, protocol: str) -> dict[str, Any]:
     with Session.open(session, readonly=True) as opened:
         drops = len(opened.latest_drops())
     with Terminal("--session", session) as terminal:
-        return {"opened": {"runs": drops, **terminal.until(_RESULTS)}}
+        shown = {"runs": drops, **terminal.until(_RESULTS)}
+    before = os.times()
+    subprocess.run(
+        [*_RIG, "report", session, "-o", folder / "report.html"], check=True, capture_output=True
+    )
+    return {"opened": shown, "report_cpu_s": sum(os.times()[2:4]) - sum(before[2:4])}
 
 
 def _in_terminal(folder: Path, protocol: str, server: Server) -> dict[str, Any]:
@@ -232,8 +220,10 @@ def _lateness(
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:
-    """Measure what the screen costs."""
-    figures = tui(arguments.protocol)
+    """Measure the first paint, a quiet screen, one with `RATE` edges a second, a long session."""
+    with TemporaryDirectory(prefix="rig-") as name:
+        folder, scene = Path(name), arguments.protocol
+        figures = asyncio.run(_measure(folder, scene)) | _opened(folder, scene)
     yield Findings(figures, text_table(_rows(figures), left={0, 1}), _HEAD, name="terminal")
 
 
@@ -245,6 +235,7 @@ def _rows(found: dict[str, Any]) -> list[list[str]]:
             f"a session of {opened['runs']} runs, from the command to its results",
             f"{opened['wall_s']:.2f} s, {opened['cpu_s']:.2f} s of them computing",
         ],
+        ["its report, from kept results", f"{found['report_cpu_s']:.2f} s computing"],
         ["a quiet screen", f"{found['quiet_cpu']:.1%} of a core"],
         [f"{RATE:.0f} edges a second", f"{found['live_cpu']:.1%} of a core"],
         ["frames a second", f"{found['frames_per_s']:.1f}"],

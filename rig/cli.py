@@ -25,7 +25,12 @@ from rig.usb.listing import sole_port
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-OPTIONAL = {"minisign": "py-minisign"} | {n: n for n in ("distributed", "mpmath", "weasyprint")}
+OPTIONAL = {
+    "distributed": "distributed",
+    "minisign": "py-minisign",
+    "mpmath": "mpmath",
+    "weasyprint": "weasyprint",
+}
 """Packages that few need, with their names for pip: clusters for `rig sweep`, 50 digits for some of
 `rig bench`, a report as PDF, signatures."""
 

@@ -45,7 +45,7 @@ def _read_columns(measurands: tuple[Measurand, ...]) -> tuple[dict[str, str], di
 def csv_files(
     session: Reader,
     analysis: Mapping[str, Any],
-    clock: Calibration | None = None,
+    clock: Calibration,
 ) -> dict[str, str]:
     """Make ``runs``, ``summary``, ``budget``, ``edges``, ``states`` and ``pings.csv``, a README.
 
@@ -59,7 +59,7 @@ def csv_files(
     analysis
         What ``rig analyze --json`` prints.
     clock
-        Of its times; without it they are counted at the nominal rate.
+        Of its times.
 
     Returns
     -------
@@ -72,9 +72,7 @@ def csv_files(
     ]
     tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
     files = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
-    drops = session.latest_drops()
-    rates = {drop.run: clock.scale(drop).hz for drop in drops} if clock else {}
-    files["edges.csv"] = edges_text(drops, rates)
+    files["edges.csv"] = edges_text(session.latest_drops(), lambda drop: clock.scale(drop).hz)
     return files | {"README.txt": _readme(session, tables)}
 
 

@@ -79,7 +79,7 @@ def table(protocol: Protocol, lines: list[PredictedIncline]) -> str:
 def _written(value: float | None, u: float | None, row: Measurand) -> str:
     """Write a prediction with what its own numbers leave open."""
     if value is None or u is None:
-        return fixed(None if value is None else value * row.scale, row.decimals + 1)
+        return fixed(value and value * row.scale, row.decimals + 1)
     return plus_minus(SimpleNamespace(value=value, expanded=COVERAGE_95 * u), row.scale)
 
 

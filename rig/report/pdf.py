@@ -7,10 +7,21 @@ import re
 from contextlib import redirect_stdout
 from html import escape
 from io import StringIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.errors import InputError
+from rig.files import replacing
 from rig.report.canvas import figure_file
+
+try:
+    with redirect_stdout(StringIO()):  # it prints links where a library is missing
+        from weasyprint import HTML
+except OSError as error:
+    raise InputError(
+        "--pdf: WeasyPrint needs the library Pango, which is not installed",
+        "Debian: sudo apt-get install libpangoft2-1.0-0 libharfbuzz-subset0; "
+        "or print the page from a browser",
+    ) from error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,29 +31,7 @@ if TYPE_CHECKING:
 _DRAWN = re.compile(r'(?<=<figure class="fig">).*?(?=<figcaption>)', re.DOTALL)
 
 
-def load_weasyprint() -> Any:
-    """Import the package.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        It is not installed.
-    InputError
-        A library that it needs is not.
-    """
-    try:
-        with redirect_stdout(StringIO()):  # it prints links there
-            import weasyprint  # noqa: PLC0415 - an extra that few need
-    except OSError as error:
-        raise InputError(
-            "--pdf: WeasyPrint needs the library Pango, which is not installed",
-            "Debian: sudo apt-get install libpangoft2-1.0-0 libharfbuzz-subset0; "
-            "or print the page from a browser",
-        ) from error
-    return weasyprint
-
-
-def page_pdf(html: str, figures: Sequence[Chart]) -> bytes:
+def write_pdf(path: str, html: str, figures: Sequence[Chart]) -> None:
     """Set a page on paper: figures as in their own files, what is attached as attachments.
 
     Parameters
@@ -57,5 +46,5 @@ def page_pdf(html: str, figures: Sequence[Chart]) -> bytes:
         svg = base64.b64encode(figure_file(chart, "svg")).decode()
         return f'<img alt="{escape(chart.title)}" src="data:image/svg+xml;base64,{svg}">'
 
-    content: bytes = load_weasyprint().HTML(string=_DRAWN.sub(picture, html)).write_pdf()
-    return content
+    with replacing(path) as stream:
+        HTML(string=_DRAWN.sub(picture, html)).write_pdf(stream)

@@ -107,7 +107,6 @@ def test_the_page_is_whole_and_needs_nothing_else():
     places = [link[1:] for link in parser.links if not link.startswith("data:")]
     assert set(places) <= set(parser.ids)
     assert "SIMULATED DATA" in page
-    assert page == page_html(page_with("Text"))[0]
     (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
     assert f"script-src 'sha256-{digest}'" in page

@@ -42,10 +42,6 @@ def test_a_prediction_is_held_against_its_own_uncertainty(value, u, said) -> Non
     assert ("5.2580 ± 0.0078" in told) == bool(u)
 
 
-def test_no_summary() -> None:
-    assert summary_table([]) == "No accepted runs, so no summary."
-
-
 @pytest.mark.parametrize(
     ("quantity", "text"),
     [
