@@ -104,6 +104,9 @@ def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
 
 _CELLS: dict[str, Callable[[Any], str]] = {
     "incline": summary_incline,
+    "prior_incline": lambda move: (
+        "" if acceleration_in([move["quantity"]]) else degrees(move["incline_deg"])
+    ),
     "run_incline": lambda drop: "" if drop.run.impact is None else degrees(drop.run.incline_deg),
     "edges": lambda drop: " / ".join(str(getattr(drop.audit, name)) for name in COUNTS),
     "reasons": lambda drop: signed(sentences(drop.reasons)),
