@@ -25,9 +25,14 @@ from rig.usb.listing import sole_port
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-OPTIONAL = {"distributed": "distributed", "mpmath": "mpmath", "minisign": "py-minisign"}
+OPTIONAL = {
+    "distributed": "distributed",
+    "minisign": "py-minisign",
+    "mpmath": "mpmath",
+    "weasyprint": "weasyprint",
+}
 """Packages that few need, with their names for pip: clusters for `rig sweep`, 50 digits for some of
-`rig bench`, signatures."""
+`rig bench`, a report as PDF, signatures."""
 
 
 class _ListFormats(argparse.Action):

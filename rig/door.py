@@ -21,9 +21,9 @@ from rig.measurands import MEASURANDS
 from rig.predictions import PredictedIncline, predictions
 from rig.protocol import reader
 from rig.ready import find_protocol
-from rig.report.numbers import plus_minus
-from rig.report.page import parts_html
+from rig.report.numbers import with_unit
 from rig.report.parts import means_parts, summary_table
+from rig.report.templates import parts_html
 from rig.results import SessionResults, calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
 from rig.session.store import Session
@@ -262,13 +262,8 @@ class _Quantities:
         self.quantities = quantities
 
     def _written(self) -> str:
-        rows = (MEASURANDS[name] for name in self.quantities)
-        values = (
-            f"{row.symbol} {plus_minus(self.quantities[row.name], row.scale)} {row.unit}"
-            for row in rows
-            if row.told
-        )
-        return ", ".join(values)
+        values = ((MEASURANDS[name], value) for name, value in self.quantities.items())
+        return ", ".join(f"{row.symbol} {with_unit(at, row)}" for row, at in values if row.told)
 
 
 class RunResult(_Quantities):

@@ -1,4 +1,4 @@
-"""The site in a real browser: axe finds nothing on any page, at three widths, in both schemes.
+"""Site and report in a real browser: axe finds nothing, at three widths, in both schemes.
 
 Of `./run bench soaks`, for a browser is large; `test_site.py` holds what can be told without one.
 """
@@ -6,6 +6,7 @@ Of `./run bench soaks`, for a browser is large; `test_site.py` holds what can be
 from __future__ import annotations
 
 import json
+import lzma
 import os
 import re
 from html import unescape
@@ -13,10 +14,13 @@ from pathlib import Path
 
 import pytest
 
+from rig.cli import main
 from tests.report.test_browser import BROWSER, browse
 from tests.test_site import load
+from tests.tui.test_pictures import RECORDED
 
 AXE = Path(__file__).parent / "axe/node_modules/axe-core/axe.min.js"
+REPORT = "report.html"
 AT_ONCE = 10  # pages a browser visits before it is started anew
 MISSING = (BROWSER is None or not AXE.is_file()) and not os.environ.get("CI")
 _HOST = """<title></title><body><script>
@@ -37,7 +41,7 @@ for (const page of PAGES) {
   const { violations, passes } = await inside.axe.run(inside.document);
   const places = violations.flatMap((rule) => rule.nodes.map((node) => [rule.id, node.target]));
   const wide = inside.document.documentElement.scrollWidth > inside.innerWidth;
-  findings[page] = [places, wide, body.dataset.mdColorScheme, passes.length > 10];
+  findings[page] = [places, wide, body.dataset.mdColorScheme ?? null, passes.length > 10];
   frame.remove();
 }
 tell(findings);"""
@@ -57,6 +61,12 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(MISSING, reason="chromium or 
 def built(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     load("site").main(folder)
+    session, report = folder / "a.session", folder / REPORT
+    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
+    assert main(["report", str(session), "-o", str(report)]) == 0
+    # It lets no other script run, and folds what a referee wants.
+    text = re.sub(r"<meta http-equiv=.Content-Security-Policy[^>]*>", "", report.read_text("utf-8"))
+    report.write_text(text.replace("<details ", "<details open "), "utf-8")
     return folder
 
 
@@ -83,7 +93,8 @@ def test_axe_finds_nothing(built, tmp_path, width, scheme, number):
     for begin in range(0, len(pages), AT_ONCE):
         work = axe.replace("PAGES", json.dumps(pages[begin : begin + AT_ONCE]))
         findings |= ask_browser(built, tmp_path, work, flag, width=width)
-    assert findings == {page: [[], False, scheme, True] for page in pages}
+    schemes = dict.fromkeys(pages, scheme) | {REPORT: None}  # whose style sheet asks the browser
+    assert findings == {page: [[], False, schemes[page], True] for page in pages}
 
 
 def test_search_works_in_pages_that_are_opened_as_files(built, tmp_path):

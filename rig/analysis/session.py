@@ -92,15 +92,21 @@ class Analysis:
     unsettled: bool = False
 
     @property
+    def drops(self) -> list[DropResult]:
+        """All attempts at all runs, by run and attempt."""
+        drops = (*self.runs, *self.superseded)
+        return sorted(drops, key=lambda drop: (drop.run.number, drop.attempt))
+
+    @property
     def damaged(self) -> tuple[DropResult, ...]:
         """Drops whose stored record is damaged."""
-        return tuple(result for result in (*self.runs, *self.superseded) if result.damaged)
+        return tuple(drop for drop in self.drops if drop.damaged)
 
     @property
     def damage(self) -> list[str]:
         """A line that counts and names the damaged drops; none where there are none."""
         names = "; ".join(f"run {drop.run.number}, attempt {drop.attempt}" for drop in self.damaged)
-        count = f"{len(self.damaged)} of {len(self.runs) + len(self.superseded)} drops"
+        count = f"{len(self.damaged)} of {len(self.drops)} drops"
         line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
         return [line] if names else []
 

@@ -152,7 +152,7 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
                 member, quantities=_unshared(member.quantities)
             )
             for place, part in enumerate(parts)
-            for member in (*part.analysis.runs, *part.analysis.superseded)
+            for member in part.analysis.drops
         },
         drops,
     )

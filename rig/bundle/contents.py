@@ -18,7 +18,7 @@ from rig import __version__
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
 from rig.bundle.means import mean_tables
 from rig.bundle.tables import csv_files, data_package
-from rig.results import SessionResults, protocol_of, tick_rates
+from rig.results import SessionResults, protocol_of
 from rig.session.faults import translate_errors
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def bundle_files(
         Contents by name, ``SHA256SUMS`` included.
     """
     protocol = protocol_of(session)
-    texts = csv_files(session, results.json(), tick_rates(session))
+    texts = csv_files(session, results.json(), results.clock)
     readme = texts.pop("README.txt")
     # What drops have in common, and so covariances, only a joint fit knows.
     tables = {**texts, **mean_tables(protocol, results.complete or results.analysis)}

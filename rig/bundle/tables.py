@@ -16,8 +16,8 @@ from rig.timers.edge_rows import edges_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-    from fractions import Fraction
 
+    from rig.clock.calibration import Calibration
     from rig.session.reading import Reader
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
@@ -45,7 +45,7 @@ def _read_columns(measurands: tuple[Measurand, ...]) -> tuple[dict[str, str], di
 def csv_files(
     session: Reader,
     analysis: Mapping[str, Any],
-    tick_hz: Mapping[int, float | Fraction] | None = None,
+    clock: Calibration,
 ) -> dict[str, str]:
     """Make ``runs``, ``summary``, ``budget``, ``edges``, ``states`` and ``pings.csv``, a README.
 
@@ -58,8 +58,8 @@ def csv_files(
         Open, for the raw records.
     analysis
         What ``rig analyze --json`` prints.
-    tick_hz
-        Calibrated tick rate by run, Hz; runs left out use their nominal rate.
+    clock
+        Of its times.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def csv_files(
     ]
     tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
     files = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
-    files["edges.csv"] = edges_text(session.latest_drops(), tick_hz)
+    files["edges.csv"] = edges_text(session.latest_drops(), lambda drop: clock.scale(drop).hz)
     return files | {"README.txt": _readme(session, tables)}
 
 

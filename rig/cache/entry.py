@@ -36,8 +36,8 @@ class CacheEntry(Generic[Kept]):
     def __init__(self, kind: type[Kept], *content: object, fresh: bool = False) -> None:
         self._kind = kind
         parts = repr((kind.__qualname__, *content)).encode()
-        known = None not in content and _program()
-        self._key = f"{_program()} {hashlib.sha256(parts).hexdigest()}" if known else ""
+        program = "" if None in content else _program()
+        self._key = program and f"{program} {hashlib.sha256(parts).hexdigest()}"
         self._fresh = fresh
         self._file = CacheFile()
 
@@ -45,8 +45,8 @@ class CacheEntry(Generic[Kept]):
         """Return a kept result; `None` where there is none."""
         text = self._file.get(self._key) if self._key and not self._fresh else None
         with suppress(ValueError):
-            kept_value = None if text is None else from_text(text)
-            return kept_value if isinstance(kept_value, self._kind) else None
+            result = from_text(text or "")
+            return result if isinstance(result, self._kind) else None
         return None
 
     def keep(self, result: Kept) -> Kept:
@@ -55,10 +55,11 @@ class CacheEntry(Generic[Kept]):
         Parameters
         ----------
         result
-            As `rig.cache.plain.to_text` takes it.
+            As `rig.cache.plain.to_text` takes it. One whose attribute `failed` names what it lacks
+            is not kept.
         """
         text = to_text(result)
-        if self._key:
+        if self._key and not getattr(result, "failed", ()):
             self._file.put(self._key, text)
         found: Kept = from_text(text)
         return found

@@ -12,7 +12,7 @@ from rig.errors import InputError
 from rig.measurands import acceleration_in
 from rig.reasons import make_error
 from rig.report.numbers import plus_minus
-from rig.report.parts import prior_parts, scatter_parts, tables
+from rig.report.parts import scatter_parts, tables
 from rig.results import SessionResults, complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
@@ -51,7 +51,7 @@ def main(arguments: Namespace) -> int:
     if not arguments.json:
         summary = outcome.analysis.summary
         asked = [*scatter_parts(summary)] if arguments.scatter else []
-        asked += prior_parts(members["prior_sensitivity"]) if arguments.priors else ()
+        asked += tables("priors", members["prior_sensitivity"]) if arguments.priors else ()
         asked += tables("gates", (gate for line in summary for gate in line.gates))
         asked += tables("effects", outcome.analysis.effects)
         for part in asked:

@@ -172,7 +172,7 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
         )
     if trials < 2:
         raise InputError(f"{trials} trials tell no uncertainty", "ask for a hundred or more")
-    drops = {(run.run.number, run.attempt): run for run in (*analysis.runs, *analysis.superseded)}
+    drops = {(run.run.number, run.attempt): run for run in analysis.drops}
     samples = monte_carlo.session_monte_carlo(analysis.joint, trials, SEED)
     by_run = [
         {

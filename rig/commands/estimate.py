@@ -9,7 +9,7 @@ from typing import Any
 from rig.cache.entry import CacheEntry
 from rig.commands.output import print_json, progress, say, tell_damage
 from rig.files import make_folder
-from rig.report.estimate import estimate_text
+from rig.report.estimate import estimate_pictures, estimate_text
 from rig.results import check_open, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections
@@ -36,7 +36,6 @@ def main(arguments: Namespace) -> int:
         print(estimate_text(estimate, sections, simulated=simulated))
     if folder is not None:
         from rig.report.canvas import write_figure  # noqa: PLC0415 - likewise
-        from rig.report.estimate_pictures import estimate_pictures  # noqa: PLC0415 - only drawn here
 
         entry = CacheEntry(dict, "estimate pictures", outcome.digest, fresh=fresh)
         drawn = entry.find()

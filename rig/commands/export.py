@@ -9,7 +9,7 @@ from rig.commands.output import progress, say, tell_damage
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
 from rig.reasons import make_error
-from rig.results import results, tick_rates
+from rig.results import results
 from rig.session.store import Session
 
 
@@ -24,7 +24,7 @@ def main(arguments: Namespace) -> int:
     with Session.open(arguments.session, readonly=True) as session:
         folder = make_folder(arguments.csv)
         outcome = results(session, progress("analysing run"), fresh=arguments.fresh)
-        tables = csv_files(session, outcome.json(), tick_rates(session))
+        tables = csv_files(session, outcome.json(), outcome.clock)
         for name, text in tables.items():
             write_atomic(folder / name, text)
     say(f"CSV files: {arguments.csv}")

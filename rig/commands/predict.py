@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from rig.analysis.distributions import COVERAGE_95
@@ -78,8 +79,8 @@ def table(protocol: Protocol, lines: list[PredictedIncline]) -> str:
 def _written(value: float | None, u: float | None, row: Measurand) -> str:
     """Write a prediction with what its own numbers leave open."""
     if value is None or u is None:
-        return fixed(None if value is None else value * row.scale, row.decimals + 1)
-    return plus_minus({"value": value, "U95": COVERAGE_95 * u}, row.scale)
+        return fixed(value and value * row.scale, row.decimals + 1)
+    return plus_minus(SimpleNamespace(value=value, expanded=COVERAGE_95 * u), row.scale)
 
 
 def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:

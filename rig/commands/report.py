@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
-from rig.cache.entry import CacheEntry
+from rig.cache.entry import recall
 from rig.commands.output import progress, say, stage, tell_damage
 from rig.files import check_place, write_atomic
 from rig.films import film_digest
-from rig.report.page import page_html
-from rig.report.session_page import Material, session_page
+from rig.report.session_page import session_page
+from rig.report.templates import page_html
 from rig.results import SessionResults, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections
@@ -36,26 +35,32 @@ class Report(NamedTuple):
 def main(arguments: Namespace) -> int:
     """Write a session's report."""
     check_place(arguments.output)
+    if arguments.pdf is not None:
+        from rig.report.pdf import write_pdf  # noqa: PLC0415 - an extra that few need
+
+        check_place(arguments.pdf)
     with Session.open(arguments.session, readonly=True) as session:
         fresh, estimate = arguments.fresh, arguments.estimate
         outcome = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=estimate)
         # The page has the file's name; how simulated chains moved lies beside the file.
         content = session.path.name, arguments.bars, estimate, film_digest(session.path)
-        entry = CacheEntry(Report, outcome.digest, content, fresh=fresh)
-        report = entry.find()
-        if report is None:
-            report = make_report(session, outcome, arguments.bars, estimate=estimate, fresh=fresh)
-            report = report if report.failed else entry.keep(report)
+        report = recall(
+            Report,
+            lambda: make_report(session, outcome, arguments.bars, estimate=estimate, fresh=fresh),
+            outcome.digest,
+            content,
+            fresh=fresh,
+        )
     write_atomic(arguments.output, report.html)
     if arguments.figures is not None:
         from rig.report.canvas import write_figures  # noqa: PLC0415 - it needs matplotlib
 
         stage("drawing figures")
-        write_figures(Path(arguments.figures), report.figures)
+        write_figures(arguments.figures, report.figures)
         stage("")
-    for sentence in report.failed:
-        say(sentence)
-    say(f"report: {arguments.output}")
+    if arguments.pdf is not None:
+        write_pdf(arguments.pdf, report.html, report.figures)
+    say("\n".join((*report.failed, f"report: {arguments.output}")))
     return tell_damage(outcome.analysis)
 
 
@@ -70,7 +75,7 @@ def make_report(
             "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
         )
     stage("writing the page")
-    html, figures = page_html(session_page(Material(session, outcome, bars, estimated, sections)))
+    html, figures = page_html(session_page(session, outcome, bars, estimated, sections))
     stage("")
     failed = (*(estimated.failed if estimated else ()), *sections.failed.values())
     return Report(html, tuple(figures), failed)

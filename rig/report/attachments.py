@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bundle.archive import zipped
 from rig.bundle.tables import csv_files
-from rig.results import tick_rates
 
 if TYPE_CHECKING:
     from rig.results import SessionResults
@@ -32,7 +31,7 @@ class Attachment(NamedTuple):
 
 def attachments(session: Reader, outcome: SessionResults) -> list[Attachment]:
     """Pack a session's tables; without those that are too many for a page to carry."""
-    tables = csv_files(session, outcome.json(), tick_rates(session))
+    tables = csv_files(session, outcome.json(), outcome.clock)
     tables |= {"protocol.yaml": session.protocol_text}
     contents = {name: text.encode("utf-8", "replace") for name, text in tables.items()}
     words = "results, budgets and edges as CSV files, with the protocol"

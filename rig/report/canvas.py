@@ -133,11 +133,11 @@ def write_figure(path: Path, figure: Chart) -> None:
         stream.write(content)
 
 
-def write_figures(folder: Path, figures: Sequence[Chart]) -> None:
+def write_figures(folder: str | Path, figures: Sequence[Chart]) -> None:
     """Write each figure as ``figure-1.svg``, ``.pdf``, ``.png`` and its numbers as ``.csv``."""
-    make_folder(folder)
+    place = make_folder(folder)
     for number, figure in enumerate(figures, 1):
-        path = folder / f"figure-{number}.csv"
+        path = place / f"figure-{number}.csv"
         with replacing(path) as stream:
             stream.write(csv_table(figure).encode())
         for kind in KINDS:

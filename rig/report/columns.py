@@ -54,8 +54,8 @@ def table_parts(
     name: str,
     records: Iterable[Any] = (),
     words: Iterable[str] = (),
+    derived: Mapping[str, Callable[[Any], Any]] = _NOTHING,
     row: Measurand | None = None,
-    **derived: Callable[[Any], Any],
 ) -> Iterator[Part]:
     """Yield a table of ``columns.txt``; nothing where there is nothing to say.
 
@@ -65,10 +65,10 @@ def table_parts(
         Of the table there.
     words
         Said of it too.
-    row
-        The measurand of all its records; without it each record has its own, or none.
     derived
         What the table calls with ``()``, by name.
+    row
+        The measurand of all its records; without it each record has its own, or none.
     """
     records, table = list(records), _TABLES[name]
     written = partial(str.format, row=row, first=records[0] if records else None)
@@ -122,7 +122,7 @@ def _cell(
     derived: Mapping[str, Callable[[Any], Any]],
     record: Any,
 ) -> str:
-    row = row or value_at(record, "row")
+    row = row or value_at(record, "row") or MEASURANDS.get(value_at(record, "quantity"))
     value = value_at(record, place.format(row=row), derived)
     way, *numbers = way.split()
     return _WAYS[way](value, row, *map(float, numbers))
@@ -170,7 +170,7 @@ _WAYS: dict[str, Callable[..., str]] = {
     "words": _text,
     "text": _text,
     "verdict": _verdict,
-    "quantity": lambda row, _: f"{row.symbol} ({row.fine})",
+    "quantity": lambda _, row: f"{row.symbol} ({row.fine})",
     "symbol": lambda name, _: MEASURANDS[name].symbol,
     "degrees": lambda value, _: degrees(value),
     "times": lambda value, _: f"× {value:.2f}",

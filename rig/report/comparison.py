@@ -10,9 +10,8 @@ from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
 from rig.report.columns import table_parts
 from rig.report.figure import chart
-from rig.report.page import page_html
 from rig.report.parts import summary_table
-from rig.report.templates import sentence
+from rig.report.templates import page_html, sentence
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -54,16 +53,10 @@ def difference_lines(results: TogetherResults) -> Iterator[str]:
 
 def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
-    page = {
-        "template": "comparison.html",
-        "title": f"Comparison with {results.fit.parts[0].name}",
-        "simulated": results.simulated,
-        "figure_of_differences": draw_comparison(results),
-        "tables": [*_tables(results)],
-        "claims": _claims(results),
-        "results": results,
-    }
-    return page_html(page)[0]
+    title = f"Comparison with {results.fit.parts[0].name}"
+    page = {"template": "comparison.html", "title": title, "simulated": results.simulated}
+    page |= {"chart": draw_comparison(results), "tables": [*_tables(results)]}
+    return page_html({**page, "claims": _claims(results)})[0]
 
 
 def draw_comparison(results: TogetherResults) -> Chart:
@@ -73,18 +66,18 @@ def draw_comparison(results: TogetherResults) -> Chart:
 
 
 def _panel(row: Measurand, differences: Sequence[MeanDifference]) -> dict[str, Any]:
-    names = [", ".join(filter(None, [each.session, _runs(each)])) for each in differences]
-    rows = [(-float(place), each.value) for place, each in enumerate(differences)]
-    limits = rows[-1][0] - 0.6, 0.6
+    places = {-float(place): each for place, each in enumerate(differences)}
+    names = {
+        place: ", ".join(filter(None, [each.session, _runs(each)]))
+        for place, each in places.items()
+    }
+    limits = min(places) - 0.6, 0.6
     return {
         "row": row,
         "middle": [(0.0, limit) for limit in limits],
-        "differences": rows,
-        "height": 16.0 * (len(rows) + 0.5),
-        "y_axis": {
-            "names": {place: name for (place, _), name in zip(rows, names, strict=True)},
-            "limits": limits,
-        },
+        "differences": [(place, each.value) for place, each in places.items()],
+        "height": 16.0 * (len(places) + 0.5),
+        "y_axis": {"names": names, "limits": limits},
     }
 
 
@@ -109,7 +102,7 @@ def _tables(results: TogetherResults) -> Iterator[Part]:
             if row.name in line.means
         )
         yield from table_parts("sessions", means, row=row)
-        yield from table_parts("differences", differences, row=row, runs=_runs)
+        yield from table_parts("differences", differences, (), {"runs": _runs}, row)
 
 
 def _claims(results: TogetherResults) -> list[str]:

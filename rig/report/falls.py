@@ -1,7 +1,9 @@
 """One fall as its edges tell it: where the object or chain was, when, and how fast.
 
 Each shadow of a known rod in a known beam is a point: its middle in time, and the rod's width over
-its duration. Release, acceleration and Δz are those of the session's results.
+its duration T, which is the speed then. The rod's own middle is aT²/8 short of the beam by then,
+under a constant acceleration a: between impacts, that of gravity. Release, acceleration and Δz are
+those of the session's results.
 """
 
 from __future__ import annotations
@@ -65,6 +67,8 @@ def passages(
     """
     name = result.run.impact if side == "impact" else result.run.free
     gates = {gate.channel: gate for gate in protocol.gates.on(side)} if protocol.gates else {}
+    row = acceleration_in(result.quantities)
+    pull = result.quantities[row.name].value if row else protocol.gravity.value
     begun: dict[tuple[int, int], float] = {}
     rows = []
     for number, edge in enumerate(drop.edges if name is not None else ()):
@@ -75,10 +79,11 @@ def passages(
         shadow, time = (edge.channel, rod), float(edge.tick / hz)
         if edge.blocked:
             begun[shadow] = time
-        elif shadow in begun and time > begun[shadow]:
-            before = begun.pop(shadow)
-            height = gates[edge.channel].height + rods.chain.length - rods.chain.heights[rod]
-            rows.append(((time + before) / 2, height, rods.widths[rod] / (time - before)))
+        elif shadow in begun and time > (before := begun.pop(shadow)):
+            lasted = time - before
+            beam = gates[edge.channel].height + pull * lasted**2 / 8
+            height = beam + rods.chain.length - rods.chain.heights[rod]
+            rows.append((before + lasted / 2, height, rods.widths[rod] / lasted))
     return Passages(*np.array(sorted(rows)).reshape(-1, 3).T)
 
 
@@ -102,33 +107,26 @@ def fall_figures(
     struck = struck._replace(time=struck.time - released)
     motion = motion_by_model(protocol, result.run)
     at = np.linspace(0.0, motion.end_s, _MOMENTS)
-    heights, speeds, gaps = _model(motion, at)
     u = 2.0 * np.hypot(protocol.gates.height_u, protocol.gates.datum_u)
     if free.time.size > 2 and RELEASE_SKEW.name in values:
         half, skew = 0.5 * protocol.gravity.value, values[RELEASE_SKEW.name]
         # The free chain's way, from all its passages, at the moments of the striking one's.
         since = free.time - released - skew.value
-        ahead = np.mean(free.height + half * since**2) - half * struck.time**2 - struck.height
-        name, curve, points, expected = "separation", gaps, ahead, _model(motion, struck.time)[2]
-        u = np.hypot(u, struck.speed * skew.expanded)
+        points = np.mean(free.height + half * since**2) - half * struck.time**2 - struck.height
+        name, u = "separation", np.hypot(u, struck.speed * skew.expanded)
     else:
-        name, curve, points, expected = (
-            "height",
-            heights,
-            struck.height,
-            _model(motion, struck.time)[0],
-        )
-        u = np.hypot(u, 2.0 * protocol.drop.u)
+        name, points, u = "height", struck.height, np.hypot(u, 2.0 * protocol.drop.u)
+    curves, expected = _model(motion, at), _model(motion, struck.time)[name]
     sources = {
-        "curve": np.column_stack((at, curve)),
+        "curve": np.column_stack((at, curves[name])),
         "passages": _with_residuals(struck.time, points, expected, u),
         "end": [(end, values.get(SEPARATION.name))],
     }
     yield chart(name, sources, run=head)
-    fallen = heights[0] * np.arange(2)
+    top = curves["height"][0]
     squares = {
-        "free_fall": np.column_stack((2.0 * motion.gravity * fallen, heights[0] - fallen)),
-        "curve": np.column_stack((speeds**2, heights)),
+        "free_fall": [(0.0, top), (2.0 * motion.gravity * top, 0.0)],
+        "curve": np.column_stack((curves["speed"] ** 2, curves["height"])),
         "free": np.column_stack((free.speed**2, free.height)),
         "struck": np.column_stack((struck.speed**2, struck.height)),
     }
@@ -169,12 +167,11 @@ def _with_residuals(times: Array, values: Array, expected: Array, u: Array | flo
         return np.column_stack((times, values, (values - expected) / u))
 
 
-def _model(motion: Motion, times: Array) -> Array:
-    """Return where the model has the top rod, m, its speed, m/s, and Δz, m; a row each."""
+def _model(motion: Motion, times: Array) -> dict[str, Array]:
+    """Return where the model has the top rod, m, its speed, m/s, and Δz, m, at each time."""
     instants = [motion.at(min(max(time, 0.0), motion.end_s)) for time in times.tolist()]
-    return np.transpose(
-        [
-            (instant.height_m + motion.chain.length, instant.speed_m_s, instant.separation_m)
-            for instant in instants
-        ]
-    )
+    return {
+        "height": np.array([at.height_m for at in instants]) + motion.chain.length,
+        "speed": np.array([at.speed_m_s for at in instants]),
+        "separation": np.array([at.separation_m for at in instants]),
+    }

@@ -180,7 +180,7 @@ def _traces(
         widths = [scale * (width or 0.0) for width in (more[0] if more else expanded)]
         yield Trace(
             _written(label, known),
-            _floats(x, scale if across else 1.0),
+            _floats(x, scale if across or known.get("true") else 1.0),
             _floats(y, 1.0 if across else scale),
             kind,
             int(color) if color.isdigit() else getattr(looks, color.upper()),

@@ -32,6 +32,7 @@ FEWEST_INCLINES = 3
 _GAP_DEG = 2.0  # the curve has a point each degree
 _SEGMENTS = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
 _HIDDEN = " Shaded inclines: the rods would not slide, the model has no answer."
+_CHAINS = " If A and B differ above, the chains differ."
 _SMALL = 4.0
 """Percent of U² below which a source is among the others."""
 
@@ -53,7 +54,8 @@ def result_figure(
     site_m_s2
         Expected gravity, for scenes without a surface.
     """
-    measured = {name for run in analysis.runs for name in run.quantities}
+    good = [run for run in analysis.runs if run.verdict in GOOD]
+    measured = {name for run in good for name in run.quantities}
     rows = [row for row in averaged() if row.name in measured]
     if not rows:
         return None
@@ -68,7 +70,7 @@ def result_figure(
             "gaps": [{"ends": gap} for gap in gaps],
             "model": _model_parts(curves, row),
             "free_fall": [curves.get("free_fall_speed_m_s")] * (row == SPEED),
-            "runs": [run for run in analysis.runs if run.verdict in GOOD],
+            "runs": good,
             "means": means_of(analysis.summary, row),
             "bars": bars,
         }
@@ -98,25 +100,17 @@ def runs_figure(analysis: Analysis, skew_limit_s: float | None = None) -> Chart 
         for line in analysis.summary
         if (reference := (line.predicted if predicted else line.means).get(SEPARATION.name))
     }
-    separation = {
-        "name": f"{SEPARATION.symbol} − {'model' if predicted else 'mean'}",
-        "unit": SEPARATION.fine,
-        "height": 90,
-        "scale": SEPARATION.fine_scale,
-        "middle": "zero",
-        "runs": _runs_by_chain(analysis, SEPARATION, references),
+    separation = _runs_by_chain(analysis, SEPARATION, references)
+    skew = _runs_by_chain(analysis, RELEASE_SKEW)
+    sources = {
+        "reference": "model" if predicted else "mean",
+        "separation": separation,
+        "middle": [0.0] * bool(separation),
+        "skew": skew,
+        "limits": [skew_limit_s, -skew_limit_s] if skew_limit_s and skew else (),
     }
-    skew = {
-        "name": RELEASE_SKEW.label,
-        "unit": RELEASE_SKEW.unit,
-        "height": 70,
-        "scale": RELEASE_SKEW.scale,
-        "middle": "",
-        "limits": [skew_limit_s, -skew_limit_s] if skew_limit_s else (),
-        "runs": _runs_by_chain(analysis, RELEASE_SKEW),
-    }
-    panels = [panel for panel in (separation, skew) if panel["runs"]]
-    return chart("order", *panels) if panels else None
+    chains = _CHAINS if separation else ""
+    return chart("order", sources, chains=chains) if separation or skew else None
 
 
 def budget_figure(summary: Sequence[Incline]) -> Chart | None:

@@ -148,10 +148,7 @@ def alone_lines(analysis: Analysis) -> list[str]:
 
 def void_lines(analysis: Analysis) -> list[str]:
     """Return why drops are void, a line for each kind of reason, and what to do about them."""
-    drops = sorted(
-        (*analysis.runs, *analysis.superseded), key=lambda drop: (drop.run.number, drop.attempt)
-    )
-    voids = [drop for drop in drops if drop.verdict == "void"]
+    voids = [drop for drop in analysis.drops if drop.verdict == "void"]
     kinds: dict[tuple[object, ...], list[tuple[DropResult, Reason]]] = defaultdict(list)
     for drop in voids:
         for reason in drop.reasons:

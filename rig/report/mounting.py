@@ -106,17 +106,18 @@ def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, 
             along * math.sin(slope) + above * math.cos(slope),
         )
 
-    ends = {gate: (at(gate.height), at(gate.height, _POST_M)) for gate in gates.gates}
     return {
         "x": f"the track at {track.incline_deg.value:g}°, from the side (mm)",
         "y": "mm",
         "height": 0.6 * _HEIGHT_PT,
         "true": True,
-        "posts": [{"ends": _mm(at(1.05 * start), at(0.0))}],
-        "rods": _mm(at(start)),
-        "mark": _mm(at(0.0)),
-        "beams": [{"role": "line", "color": "model", "ends": _mm(*pair)} for pair in ends.values()],
-        "names": [_named(_name(gate), end, "model") for gate, (_, end) in ends.items()],
+        "posts": [{"ends": [at(1.05 * start), at(0.0)]}],
+        "rods": [at(start)],
+        "mark": [at(0.0)],
+        "beams": [
+            _beam("line", "model", [at(gate.height), at(gate.height, _POST_M)], _name(gate))
+            for gate in gates.gates
+        ],
     }
 
 
@@ -127,21 +128,19 @@ def _side_view(
     inclines = _inclines(protocol)
     post = _POST_M if top > 2 * _POST_M else top / 2
     chain = next(iter(protocol.chains.values()))
-    names, beams, boards = [], [], []
+    beams, boards = [], []
     for place, incline in enumerate(inclines):
         away = top * (0.3 if place % 2 else 0.45)  # neighbours' names would meet
         slope, face = math.radians(incline), face_below(protocol, incline)
-        boards.append(_mm(*((y, y * math.tan(slope) - face) for y in (-0.5 * post, 1.2 * post))))
-        if not named_above:
-            at = away * math.cos(slope), away * math.sin(slope) - face
-            names.append(_named(f"{incline:g}°", at, "ink"))
+        at = away * math.cos(slope), away * math.sin(slope) - face
+        ends = [(y, y * math.tan(slope) - face) for y in (-0.5 * post, 1.2 * post)]
+        boards.append(_beam("line", "muted", ends, "" if named_above else f"{incline:g}°", at))
     for gate in gates.gates:
         side, role, color = _SIDES[gate.side]
         if gate.height <= top:
-            ends = _mm((-post, gate.height), (post, gate.height))
-            beams.append({"role": role, "color": color, "ends": ends})
-            if gate.height >= named_above:
-                names.append(_named(_name(gate), (1.05 * side * post, gate.height), color))
+            ends = [(-side * post, gate.height), (side * post, gate.height)]
+            name, at = _name(gate), (1.05 * side * post, gate.height)
+            beams.append(_beam(role, color, ends, name if gate.height >= named_above else "", at))
     return {
         "x": f"{title} ({'mm, uphill to the right' if inclines else 'mm'})",
         "y": f"mm {protocol.drop_from}" if inclines else "mm",
@@ -150,21 +149,20 @@ def _side_view(
         "height": _HEIGHT_PT,
         "true": True,
         "ground": [0.0],
-        "boards": [{"ends": ends} for ends in boards],
-        "posts": [{"ends": _mm((x, _LOW_M), (x, top))} for x in (-post, post)],
-        "rods": _mm(*((0.0, protocol.drop.value + height) for height in chain.chain.heights)),
+        "boards": boards,
+        "posts": [{"ends": [(x, _LOW_M), (x, top)]} for x in (-post, post)],
+        "rods": [(0.0, protocol.drop.value + height) for height in chain.chain.heights],
         "mark": [(0.0, 0.0)],
         "beams": beams,
-        "names": names,
     }
 
 
-def _mm(*points: Point) -> list[Point]:
-    return [(_MM * x, _MM * y) for x, y in points]
-
-
-def _named(label: str, place: Point, color: str) -> dict[str, Any]:
-    return {"label": label, "place": _mm(place), "color": color}
+def _beam(
+    role: str, color: str, ends: list[Point], name: str, place: Point | None = None
+) -> dict[str, Any]:
+    """Draw what is straight, with its name at a place, or at its second end."""
+    places = [place or ends[1]] if name else []
+    return {"role": role, "color": color, "ends": ends, "label": name, "place": places}
 
 
 def _name(gate: Gate) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rig.measurands import Measurand
 
 MINUS = "−"
@@ -16,27 +17,16 @@ _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
 
 
 def value_of(quantity: object) -> float | None:
-    """Best estimate of a quantity, be it typed or as in JSON, or a bare number.
-
-    `None` where there is none, or none that is finite.
-    """
-    if isinstance(quantity, Mapping):
-        quantity = quantity.get("value")
-    else:
-        quantity = getattr(quantity, "value", quantity)
-    if isinstance(quantity, bool) or not isinstance(quantity, (int, float)):
-        return None
-    return float(quantity) if math.isfinite(quantity) else None
+    """Best estimate of a quantity, or a bare number; `None` where there is none that is finite."""
+    value = getattr(quantity, "value", quantity)
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
 def fixed(value: float | None, decimals: int) -> str:
     """Write a number with that many decimals and a true minus sign; nothing for `None`."""
     if value is None:
         return ""
-    text = f"{value:.{decimals}f}"
-    if not text.strip("-0."):
-        text = text.lstrip("-")
-    return text.replace("-", MINUS)
+    return f"{value:z.{decimals}f}".replace("-", MINUS)
 
 
 def signed(text: str) -> str:
@@ -63,21 +53,17 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
     Parameters
     ----------
     quantity
-        Measured, ``{"value", "u", "U95"}`` as in JSON, a bare number or `None`.
+        Measured, a bare number or `None`.
     scale
         Factor to the unit of the column, for example 100 from m to cm.
     default
         Decimals where there is no uncertainty.
     """
-    value = value_of(quantity)
-    json = quantity if isinstance(quantity, Mapping) else {}
-    uncertainty = value_of(json.get("U95", getattr(quantity, "expanded", None)))
-    if value is None:
-        return ""
-    if uncertainty is None:
-        return fixed(value * scale, default)
-    decimals = decimals_for(uncertainty * scale, default)
-    return f"{fixed(value * scale, decimals)} ± {fixed(uncertainty * scale, decimals)}"
+    value, expanded = value_of(quantity), value_of(getattr(quantity, "expanded", None))
+    if value is None or expanded is None:
+        return fixed(value and value * scale, default)
+    decimals = decimals_for(expanded * scale, default)
+    return f"{fixed(value * scale, decimals)} ± {fixed(expanded * scale, decimals)}"
 
 
 def with_unit(quantity: object, row: Measurand) -> str:
@@ -87,11 +73,7 @@ def with_unit(quantity: object, row: Measurand) -> str:
 
 def ranges(noun: str, numbers: Iterable[int]) -> str:
     """Write numbers, neighbours together: runs 3, 5–8."""
-    spans = [
-        [number for _, number in neighbours]
-        for _, neighbours in groupby(
-            enumerate(sorted(set(numbers))), lambda pair: pair[1] - pair[0]
-        )
-    ]
-    names = [f"{span[0]}–{span[-1]}" if span[1:] else f"{span[0]}" for span in spans]
-    return f"{noun}{'s' if len(names) > 1 or '–' in names[0] else ''} {', '.join(names)}"
+    places = {number: place for place, number in enumerate(sorted(set(numbers)))}
+    spans = [[*span] for _, span in groupby(places, lambda number: number - places[number])]
+    names = ["–".join(str(end) for end in dict.fromkeys((each[0], each[-1]))) for each in spans]
+    return f"{noun}{'s' * (len(places) > 1)} {', '.join(names)}"

@@ -7,15 +7,15 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.result import COUNTS
-from rig.measurands import MEASURANDS, acceleration_in, averaged
+from rig.measurands import acceleration_in, averaged
 from rig.reasons import remedies, sentences
 from rig.report.columns import table_parts
 from rig.report.numbers import degrees, signed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from rig.analysis.result import DropResult, Measured
+    from rig.analysis.result import Measured
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
     from rig.report.columns import Part
@@ -68,9 +68,11 @@ class Mean(NamedTuple):
         }
 
 
-def means_of(summary: Sequence[Incline], row: Measurand) -> list[Mean]:
-    """Return the lines that have a mean of a measurand."""
-    return [Mean(line, row) for line in summary if row.name in line.means]
+def means_of(summary: Sequence[Incline], *rows: Measurand) -> list[Mean]:
+    """Return the lines that have a mean of a measurand, for each of those named, or for all."""
+    return [
+        Mean(line, row) for row in rows or averaged() for line in summary if row.name in line.means
+    ]
 
 
 def summary_incline(line: Incline) -> str:
@@ -87,37 +89,26 @@ def tables(
     name: str, records: Iterable[Any], words: Iterable[str] = (), row: Measurand | None = None
 ) -> Iterator[Part]:
     """Yield a table of ``columns.txt`` of means, of drops, or of what both have."""
-    return table_parts(name, records, words, row, **_CELLS)
+    return table_parts(name, records, words, _CELLS, row)
 
 
 def budget_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the table of what makes the uncertainty of the means, where anything is known of it."""
-    means = [mean for row in averaged() for mean in means_of(summary, row)]
-    return tables("budget", (mean for mean in means if mean.mean.budget))
+    return tables("budget", (mean for mean in means_of(summary) if mean.mean.budget))
 
 
 def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the table of scatter."""
-    return tables(
-        "scatter",
-        (mean for line in summary for row in averaged() for mean in means_of([line], row)),
-    )
-
-
-def prior_parts(moves: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
-    """Yield the table of what means move by with each prior, see `rig analyze --priors`."""
-    rows = ({**move, "row": MEASURANDS[move["quantity"]]} for move in moves)
-    return tables("priors", rows)
-
-
-def _edges(drop: DropResult) -> str:
-    return " / ".join(str(getattr(drop.audit, name)) for name in COUNTS)
+    return tables("scatter", (mean for line in summary for mean in means_of([line])))
 
 
 _CELLS: dict[str, Callable[[Any], str]] = {
     "incline": summary_incline,
+    "prior_incline": lambda move: (
+        "" if acceleration_in([move["quantity"]]) else degrees(move["incline_deg"])
+    ),
     "run_incline": lambda drop: "" if drop.run.impact is None else degrees(drop.run.incline_deg),
-    "edges": _edges,
+    "edges": lambda drop: " / ".join(str(getattr(drop.audit, name)) for name in COUNTS),
     "reasons": lambda drop: signed(sentences(drop.reasons)),
     "remedies": lambda drop: "; ".join(remedies(drop.reasons)) if drop.verdict == "void" else "",
 }

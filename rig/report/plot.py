@@ -34,6 +34,8 @@ _GAP_PT, _RIGHT_PT, _NEAR_PT = 8.0, 9.0, 4.0
 _DIGITS = 6  # of numbers at an axis
 _PLACES = 16  # along a series, where its name may stand
 _CROWDED = 500  # points that a name may rather hide than touch another
+_AWAY, _FAR_PT = (16.0, 24.0, 32.0, 40.0, 48.0, 56.0), 20.0
+"""How far names may stand off a line, and how much farther rather than to hide a point, points."""
 _FAINT: dict[str, Any] = {"alpha": 0.2, "linewidth": 0.0}
 _PAGE = (
     (r"<metadata>.*?</metadata>|<defs>\s*<style.*?</defs>|<!--.*?-->", ""),
@@ -94,6 +96,9 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
             _set_up(axes, panel, numbered=not joined)
             for trace in panel.series:
                 _draw(axes, trace)
+            axes.autoscale_view()
+            if panel.whole and np.ptp(axes.get_xlim()) < 1.0:
+                axes.margins(x=10.0)  # of a single run
         for panel, axes in zip(panels, figure.axes, strict=True):
             _name_series(axes, panel)
     return Canvas(figure, figure.axes, chart.facts or chart.title)
@@ -154,13 +159,14 @@ def _draw(axes: Axes, trace: Trace) -> None:
             axes.barh(y, x - trace.base, 0.72, trace.base, color=color)
         case "map" | "levels":
             _draw_map(axes, trace)
-        case "words" | "cross":  # texts do not set the scale
+        case "words" | "cross":  # texts do not set the scale of y
             cross = trace.role == "cross"
             side, words = (
                 ("center", "×") if cross else ("left" if x[0] > 0 else "right", trace.label)
             )
             for place in zip(x, y, strict=True):
                 axes.text(*place, words, ha=side, va="center", color=color, clip_on=cross)
+            axes.update_datalim(np.column_stack((x, y)), updatex=cross, updatey=False)
         case _:
             options: dict[str, Any] = {"linestyle": "none"} if "marker" in look else {}
             if u.size:
@@ -195,16 +201,21 @@ def _name_series(axes: Axes, panel: Panel) -> None:
         bar, places = trace.role == "bar", _shown(axes, trace)
         wide = len(trace.label) * _LETTER
         rows = [-4.0 - row * _LINE for row in range(1, 5)] if bar else [3.0, -SIZE - 2.0, -3.0]
+        if trace.role in {"level", "limit"}:  # among bars, a name may stand off its line
+            rows += [(2 * up - 1) * away for away in _AWAY for up in (0, 1)]
         offsets = [(dx, dy) for dy in rows for dx in (-wide / 2, 5.0, -wide - 5.0)]
-        corners = (places[:: max(1, len(places) // _PLACES), None] + offsets).reshape(-1, 2)
+        step = slice(None, None, max(1, len(places) // _PLACES))
+        corners = (places[step, None] + offsets).reshape(-1, 2)
         low, high = np.subtract(corners, (0.0, 2.0)), np.add(corners, (wide, SIZE))
         inside = (low[:, 0] >= left) & (high[:, 0] <= right + 6.0) & (high[:, 1] <= top + 4.0)
         if not inside.any():
             continue
         hidden = _meet(low - 1.0, high + 1.0, taken, taken)
         crowded = _meet(low, high, names[:, :2], names[:, 2:]) + (low[:, 1] < bottom)
-        best = np.argmin(np.where(inside, hidden + _CROWDED * crowded, np.inf))
-        names = np.vstack((names, [*low[best], *high[best]]))
+        far = np.abs(corners[:, 1] - np.repeat(places[step, 1], len(offsets))) / _FAR_PT
+        best = np.argmin(np.where(inside, hidden + far + _CROWDED * crowded, np.inf))
+        apart = _LETTER, 0.0
+        names = np.vstack((names, [*low[best] - apart, *high[best] + apart]))
         place = axes.transData.inverted().transform(corners[best])
         color = COLORS[INK if bar else trace.color][0]
         axes.annotate(trace.label, tuple(place), color=color, annotation_clip=False)

@@ -6,8 +6,8 @@ It computes nothing: all numbers are those of the session's results.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from datetime import datetime
+from functools import partial
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -16,19 +16,11 @@ from rig.analysis import curves
 from rig.analysis.result import GOOD, Measured
 from rig.films import read_films
 from rig.protocol import plan
-from rig.report import (
-    attachments,
-    estimate,
-    figures,
-    finding,
-    parts,
-    timeline,
-)
+from rig.report import attachments, estimate, figures, finding, parts, timeline
 from rig.report.falls import fall_figures
 from rig.report.film import film_figure
 from rig.results import improvements, protocol_of
 from rig.results.whole import notes
-from rig.sections import Sections
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -41,6 +33,7 @@ if TYPE_CHECKING:
     from rig.report.figure import Chart
     from rig.report.parts import Bars
     from rig.results import SessionResults
+    from rig.sections import Sections
     from rig.session.reading import Reader
 
 PAPER = (
@@ -51,16 +44,20 @@ SOFTWARE = (
     f"the chainrig authors, chainrig {__version__}: lab-rig controller for falling-chain and "
     "photogate experiments (2026), MIT licence"
 )
-_NUMERICS = ("numpy", "scipy")
 
 
-@dataclass(frozen=True, slots=True)
-class Material:
-    """What a report is made from.
+def session_page(
+    session: Reader,
+    outcome: SessionResults,
+    bars: Bars,
+    estimated: SessionEstimate | None,
+    sections: Sections,
+) -> dict[str, Any]:
+    """Return what `session.html` asks for; its sections are made as they are written.
 
-    Attributes
+    Parameters
     ----------
-    outcome
+    session, outcome
         The session's results.
     bars
         What the bars on means stand for.
@@ -69,38 +66,11 @@ class Material:
     sections
         Where a section that cannot be made is noted.
     """
-
-    session: Reader
-    outcome: SessionResults
-    bars: Bars = "U95"
-    estimated: SessionEstimate | None = None
-    sections: Sections = field(default_factory=Sections)
-
-    @property
-    def drops(self) -> list[DropResult]:
-        """All attempts at all runs, in order."""
-        every = (*self.outcome.analysis.runs, *self.outcome.analysis.superseded)
-        return sorted(every, key=lambda drop: (drop.run.number, drop.attempt))
-
-    def make(self, words: str, make: Callable[..., Any], *arguments: object) -> list[Any]:
-        """Return what a section consists of, less what there is not; nothing where that fails."""
-
-        def listed() -> list[Any]:
-            made = make(*arguments)
-            many = isinstance(made, Iterable) and not isinstance(made, Mapping)
-            return [each for each in (made if many else [made]) if each is not None]
-
-        return self.sections.make(words, listed) or []
-
-
-def session_page(material: Material) -> dict[str, Any]:
-    """Return what `session.html` asks for; its sections are made as they are written."""
-    session, outcome = material.session, material.outcome
-    protocol = protocol_of(session)
+    protocol, drops = protocol_of(session), outcome.analysis.drops
     records = {(drop.run, drop.attempt): drop for drop in session.drops()}
     timed = [
         (record, outcome.clock.scale(record).hz, drop)
-        for drop in material.drops
+        for drop in drops
         if (record := records[drop.run.number, drop.attempt])
     ]
     return {
@@ -110,21 +80,34 @@ def session_page(material: Material) -> dict[str, Any]:
         "session": session,
         "outcome": outcome,
         "protocol": protocol,
-        "material": material,
+        "drops": drops,
         "timed": timed,
+        "bars": bars,
+        "estimated": estimated,
+        "sections": sections,
+        "make": partial(_make, sections),
         "good": GOOD,
         "created": datetime.fromisoformat(session.meta["created"]),
-        "free": measurands.acceleration_in(
-            {name for drop in material.drops for name in drop.quantities}
-        ),
+        "free": measurands.acceleration_in({name for drop in drops for name in drop.quantities}),
         "notes": notes(session),
         "fall": _best_fall,
         "fallen": _films,
         "paper": PAPER,
         "software": SOFTWARE,
-        "versions": {"rig": __version__} | {name: version(name) for name in _NUMERICS},
+        "versions": {"rig": __version__} | {name: version(name) for name in ("numpy", "scipy")},
         **{module.__name__.rpartition(".")[2]: module for module in _MODULES},
     }
+
+
+def _make(sections: Sections, words: str, make: Callable[..., Any], *arguments: Any) -> list[Any]:
+    """Return what a section consists of, less what there is not; nothing where that fails."""
+
+    def listed() -> list[Any]:
+        parts = make(*arguments)
+        many = isinstance(parts, Iterable) and not isinstance(parts, Mapping)
+        return [part for part in (parts if many else [parts]) if part is not None]
+
+    return sections.make(words, listed) or []
 
 
 def _best_fall(

@@ -10,7 +10,6 @@ from rig.results.whole import (
     protocol_of,
     rejected,
     results,
-    tick_rates,
 )
 
 __all__ = [
@@ -24,5 +23,4 @@ __all__ = [
     "protocol_of",
     "rejected",
     "results",
-    "tick_rates",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.cache.entry import CacheEntry
+from rig.cache.entry import recall
 from rig.estimate.session import SessionEstimate, estimate
 from rig.results.whole import complete_analysis, protocol_of
 
@@ -35,11 +35,9 @@ def session_estimate(
     InputError, SessionError
         As `rig.estimate.session.estimate` raises it; the session is blind.
     """
-    entry = CacheEntry(SessionEstimate, results.digest, fresh=fresh)
-    estimated = entry.find()
-    if estimated is None:
-        analysis = complete_analysis(session, results, progress)
-        estimated = estimate(protocol_of(session), analysis)
-        if not estimated.failed:
-            estimated = entry.keep(estimated)
-    return estimated
+    return recall(
+        SessionEstimate,
+        lambda: estimate(protocol_of(session), complete_analysis(session, results, progress)),
+        results.digest,
+        fresh=fresh,
+    )

@@ -119,7 +119,7 @@ class _JointFit(NamedTuple):
     @property
     def size(self) -> int:
         analysis = self.analysis
-        return sum(result.learned for result in (*analysis.runs, *analysis.superseded))
+        return sum(result.learned for result in analysis.drops)
 
 
 @dataclass(slots=True)

@@ -257,9 +257,3 @@ def notes(session: Reader) -> dict[Job, str]:
     last = {Job(entry.run, entry.attempt): entry for entry in session.states()}
     texts = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last.items()}
     return {job: text for job, text in texts.items() if text}
-
-
-def tick_rates(session: Reader) -> dict[int, float]:
-    """Calibrated tick rate of each run's latest drop, Hz."""
-    clock = calibration(session)
-    return {drop.run: clock.scale(drop).hz for drop in session.latest_drops()}

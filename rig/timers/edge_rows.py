@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.records import Drop, Edge
@@ -12,7 +13,7 @@ from rig.timers.table import REMARK, Row, split_cells
 from rig.timers.vocabulary import LONGEST
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator
 
     from rig.timers.problems import ProblemList
 
@@ -96,15 +97,17 @@ def make_drop(run: int, edges: list[Edge]) -> Drop:
     return Drop(run, 1, TICK_HZ, stamps, initial_state=clear)
 
 
-def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | None = None) -> str:
+def edges_text(
+    drops: Iterable[Drop], hz: Callable[[Drop], float | Fraction] = attrgetter("tick_hz")
+) -> str:
     """Write drops in the import format, of which the same edges are read again.
 
     Parameters
     ----------
     drops
         At most one a run: the format does not know of attempts.
-    rates
-        Calibrated tick rate by run, Hz; runs left out use their nominal rate.
+    hz
+        Calibrated tick rate of a drop, Hz; by default its nominal rate.
 
     Raises
     ------
@@ -116,7 +119,7 @@ def edges_text(drops: Iterable[Drop], rates: Mapping[int, float | Fraction] | No
         if drop.run in seen:
             raise ValueError(f"two drops of run {drop.run}")
         seen.add(drop.run)
-        rate = Fraction((rates or {}).get(drop.run, drop.tick_hz))
+        rate = Fraction(hz(drop))
         rows += [
             f"{drop.run},{edge.channel},{seconds(edge.tick, rate)},{int(edge.blocked)}\n"
             for edge in drop.edges

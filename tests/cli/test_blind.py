@@ -1,12 +1,47 @@
 """A blind session keeps its numbers back from every command, until it is unblinded, once."""
 
+import base64
+import io
 import json
+import re
+import zipfile
+from pathlib import Path
 
 import pytest
 
 import rig as door
 from rig.board.page import BoardPage
+from rig.measurands import MEASURANDS
 from tests.cli.lab import short
+
+
+def unpacked(path: Path) -> bytes:
+    """All bytes of a file, and of what a page carries inside itself."""
+    data = path.read_bytes()
+    for packed in re.findall(rb"base64,([\w+/=]+)", data):
+        inside = base64.b64decode(packed)
+        data += inside
+        if zipfile.is_zipfile(io.BytesIO(inside)):
+            with zipfile.ZipFile(io.BytesIO(inside)) as archive:
+                # Edges are what is measured from, and are no results.
+                results = [name for name in archive.namelist() if name != "edges.csv"]
+                data += b"".join(map(archive.read, results))
+    return data.replace("−".encode(), b"-")
+
+
+def digits(found: dict) -> set[bytes]:
+    """Write every measurand of an analysis with six digits, in each of its units."""
+    numbers = {
+        (row, record[row.name]["value"])
+        for record in found["runs"] + found["summary"]
+        for row in MEASURANDS.values()
+        if row.name in record and row.name != "release_skew_s"
+    }
+    return {
+        f"{value * scale:#.6g}".encode()
+        for row, value in numbers
+        for scale in (1.0, row.scale, row.fine_scale)
+    }
 
 
 @pytest.mark.usefixtures("analysed_once")
@@ -32,8 +67,11 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
         assert "last_passages" not in run
         assert "release_skew_s" in run
     assert not door.open(session).analyze().runs[0].quantities.keys() - {"release_skew_s"}
-    report = call("report", session, "-o", page)
+    drawn = tmp_path / "drawn"
+    report = call("report", session, "-o", page, "--figures", drawn)
     assert report.code == 0, report.err
+    hidden_from = [unpacked(path) for path in (page, *drawn.iterdir())]
+    assert len(hidden_from) > 4
     html = page.read_text("utf-8")
     assert "hidden until <code>rig unblind</code>" in html
     for absent in ("No accepted runs", "Δz", "m/s<", "separation", "end speed"):
@@ -57,3 +95,10 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
     assert "blind" not in after
     assert all("separation_m" in run for run in after["runs"])
     assert call("replay", session).code == 0
+    secret = digits(after)
+    assert len(secret) > 20
+    assert not [number for number in secret for data in hidden_from if number in data]
+    call("report", session, "-o", page)
+    assert len([number for number in secret if number in unpacked(page)]) > 10, (
+        "else none is looked for"
+    )

@@ -1,4 +1,4 @@
-"""The report in a real browser, and in print; `tests/cli/test_board_browser.py` looks at it too.
+"""The page on paper, from a browser and without; `tests/cli/test_board_browser.py` looks at it too.
 
 Of `./run bench soaks`, for a browser is large; `test_html.py` holds what can be told without one.
 """
@@ -43,12 +43,29 @@ def browse(folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
+def read_pages(paper: Path) -> list[str]:
+    written = subprocess.run(["pdftotext", paper, "-"], capture_output=True, text=True, check=True)
+    return written.stdout.split("\f")[:-1]
+
+
 def test_print_has_no_empty_page(page, tmp_path):
     paper = tmp_path / "page.pdf"
     browse(tmp_path, f"--print-to-pdf={paper}", page.as_uri())
-    text = subprocess.run(
-        ["pdftotext", str(paper), "-"], capture_output=True, text=True, check=True
-    ).stdout
-    pages = text.split("\f")[:-1]
+    pages = read_pages(paper)
     assert len(pages) > 2
-    assert all(len(one.split()) > 10 for one in pages)
+    assert all(len(text.split()) > 10 for text in pages)
+    assert "separation Δz (cm)" in pages[0], "the first figure is on the first page"
+
+
+def test_a_pdf_needs_no_browser(page, tmp_path):
+    paper, session = tmp_path / "report.pdf", page.with_name("a.session")
+    assert main(["report", str(session), "-o", str(tmp_path / "a.html"), "--pdf", str(paper)]) == 0
+    pages = read_pages(paper)
+    assert 2 < len(pages) <= 6
+    assert "Figure 1." in pages[0]
+    assert all(text.split()[-1] == str(number) for number, text in enumerate(pages, 1))
+    assert "Choose" not in "".join(pages), "nobody can click on paper"
+    listed = subprocess.run(
+        ["pdfdetach", "-list", paper], capture_output=True, text=True, check=True
+    )
+    assert {"data.zip", "method.md"} <= set(listed.stdout.split())

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import re
-import zipfile
 from dataclasses import replace
 
 from rig.analysis.result import Audit, DropResult
-from rig.bundle.archive import zipped
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
@@ -135,10 +132,3 @@ def test_a_drop_that_lasts_long_does_not_squeeze_the_others():
     long = Drop(2, 1, 1000, (*EDGES, Edge(90_000, 0, False)), fire_tick=0)
     drops = [(drop, 1000, None) for drop in (short, short, long)]
     assert lanes(GATES, drops).span_ms == 1000.0
-
-
-def test_the_same_files_are_the_same_bytes():
-    files = {"a.csv": b"run\n1\n", "b.txt": "Δz\n".encode()}
-    assert zipped(files) == zipped(files)
-    with zipfile.ZipFile(io.BytesIO(zipped(files))) as archive:
-        assert {name: archive.read(name) for name in archive.namelist()} == files

@@ -65,14 +65,6 @@ def test_a_track_is_drawn_as_it_lies():
     assert math.hypot(height, low - far) == pytest.approx(1e3 * protocol.drop.value)
 
 
-def test_check_draws_it(tmp_path):
-    file = tmp_path / "mounting.svg"
-    fence = PROTOCOLS / "picket-fence.yaml"
-    assert main(["check", str(fence), "-o", str(file)]) == 0
-    protocol = read(fence)
-    assert file.read_text("utf-8") == drawn(protocol)
-
-
 def test_without_gates_there_is_nothing_to_draw(tmp_path, capsys):
     bead = str(PROTOCOLS / "bead-chain.yaml")
     assert main(["check", bead, "-o", str(tmp_path / "m.svg")]) == 2

@@ -1,11 +1,10 @@
-"""Tables of effects and of scatter, for the page and the terminal."""
+"""Tables of effects, for the page and the terminal."""
 
 from __future__ import annotations
 
 from rig.analysis.pairs import Effects
 from rig.analysis.result import Measured
-from rig.analysis.summary import Incline
-from rig.report.parts import scatter_parts, tables
+from rig.report.parts import tables
 
 
 def test_effects_have_the_digits_that_they_deserve():
@@ -24,12 +23,3 @@ def test_effects_have_the_digits_that_they_deserve():
     assert "Δz ± U (mm)" in text
     assert "skew ± U (ms)" in text.replace("sides' skew ± U (ms)", "skew ± U (ms)")
     assert not list(tables("effects", []))
-
-
-def test_scatter_has_the_paper_s_bars():
-    means = {"separation_m": Measured(0.115, 2e-4), "speed_m_s": Measured(6.9, 1e-3)}
-    (part,) = scatter_parts([Incline(42.5, 4, means, {"separation_m": 8e-4}, {})])
-    head, _, first, second = (row.split() for row in part.table)
-    assert head[-5:] == ["SD", "SE", "u", "U95", "SD/2"]
-    assert " ".join(first) == "42.5 4 Δz (mm) 115.000 0.800 0.400 0.200 0.392 0.400"
-    assert second[-3:] == ["6900.00", "1.00", "1.96"]  # one run has no scatter

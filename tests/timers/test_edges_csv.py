@@ -178,7 +178,7 @@ def test_unreadable(tmp_path: Path, name: str) -> None:
 def test_fire_stamped_drops_use_the_calibrated_rate(tmp_path: Path) -> None:
     path = tmp_path / "edges.csv"
     drop = Drop(run=4, attempt=2, tick_hz=2_000_000, edges=(Edge(1_000_000, 0, True),), fire_tick=7)
-    path.write_text(edges_text([drop], {4: 1_999_000.5}), "utf-8")
+    path.write_text(edges_text([drop], lambda _: 1_999_000.5), "utf-8")
     time = Fraction(path.read_text().splitlines()[1].split(",")[2])
     assert abs(time - Fraction(1_000_000) / Fraction(1_999_000.5)) < Fraction(1, 10**12)
     with pytest.raises(ValueError, match="two drops"):

@@ -1,0 +1,50 @@
+"""A page as PDF, without a browser: by WeasyPrint (the extra ``pdf``)."""
+
+from __future__ import annotations
+
+import base64
+import re
+from contextlib import redirect_stdout
+from html import escape
+from io import StringIO
+from typing import TYPE_CHECKING
+
+from rig.errors import InputError
+from rig.files import replacing
+from rig.report.canvas import figure_file
+
+try:
+    with redirect_stdout(StringIO()):  # it prints links where a library is missing
+        from weasyprint import HTML
+except OSError as error:
+    raise InputError(
+        "--pdf: WeasyPrint needs the library Pango, which is not installed",
+        "Debian: sudo apt-get install libpangoft2-1.0-0 libharfbuzz-subset0; "
+        "or print the page from a browser",
+    ) from error
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rig.report.figure import Chart
+
+_DRAWN = re.compile(r'(?<=<figure class="fig">).*?(?=<figcaption>)', re.DOTALL)
+
+
+def write_pdf(path: str, html: str, figures: Sequence[Chart]) -> None:
+    """Set a page on paper: figures as in their own files, what is attached as attachments.
+
+    Parameters
+    ----------
+    html, figures
+        As `rig.report.templates.page_html` gives them.
+    """
+    charts = iter(figures)
+
+    def picture(_: re.Match[str]) -> str:
+        chart = next(charts)
+        svg = base64.b64encode(figure_file(chart, "svg")).decode()
+        return f'<img alt="{escape(chart.title)}" src="data:image/svg+xml;base64,{svg}">'
+
+    with replacing(path) as stream:
+        HTML(string=_DRAWN.sub(picture, html)).write_pdf(stream)
