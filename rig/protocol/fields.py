@@ -181,24 +181,19 @@ def read_value(
         case keys.Either(kinds), _:
             shape = isinstance(node, Sequence), isinstance(node, Mapping)
             for kind in kinds:
-                if (isinstance(kind, keys.ListOf), isinstance(kind, keys.Mapped)) == shape:
-                    return read_value(kind, node, path, table_path, faults)
-        case keys.Mapped(), Mapping():
+                if (isinstance(kind, keys.ListOf), kind is keys.Plain.MAPPED) == shape:
+                    value = read_value(kind, node, path, table_path, faults)
+                    return accepted.listed(kind, value)
+        case keys.Plain.MAPPED, Mapping():
             return Section(node, path, table_path, faults) if table_path in keys.SECTIONS else node
-        case ((keys.ListOf(each) | keys.OneOrMore(each)), Sequence(items=[_, *_] as items)):
-            kind, table_path = each or keys.Mapped(), f"{table_path}.{keys.EACH}"
+        case keys.ListOf(each), Sequence(items=[_, *_] as items):
+            kind, table_path = each or keys.Plain.MAPPED, f"{table_path}.{keys.EACH}"
             return tuple(
                 read_value(kind, item, f"{path}[{n}]", table_path, faults)
                 for n, item in enumerate(items)
             )
-        case keys.OneOrMore(each), ScalarNode():
-            value = read_value(each, node, path, table_path, faults)
-            return None if value is None else (value,)
-    empty = isinstance(node, Sequence) and not node.items
-    message = f"found {'an empty list' if empty else node}; accepted: {_form(accepted)}"
-    if isinstance(node, ScalarNode) and not isinstance(
-        accepted, keys.Either | keys.ListOf | keys.Mapped
-    ):
+    message = f"found {node}; accepted: {_form(accepted)}"
+    if isinstance(node, ScalarNode):
         try:
             return _read_scalar(accepted, node)
         except UnitError as error:
@@ -215,14 +210,12 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
     UnitError
         If it is not accepted: says what was found and what is accepted.
     """
-    refusal, close = f"found {node}", ""
+    refusal, close, form = f"found {node}", "", _form(accepted)
     match accepted:
-        case keys.Range() if node.kind in {"nothing", "a boolean"}:
-            raise UnitError(f"{refusal}; accepted: {_form(accepted)}")
-        case keys.Range():
+        case keys.Range() if node.kind not in {"nothing", "a boolean"}:
             quantity = parse(node.text, accepted.dimension)
             if quantity.value not in accepted:
-                refusal = f"found {node.text}"
+                refusal, form = f"found {node.text}", str(accepted)
             elif accepted.exact and quantity.u > 0:
                 raise UnitError(f"{refusal}; {accepted.exact}")
             else:
@@ -236,14 +229,14 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
             if node.text in words:
                 return keys.BOOLEANS.get(node.text, node.text)
             close = did_you_mean(node.text, words)
-        case keys.Text() if node.kind == "text":
+        case keys.Plain.TEXT if node.kind == "text":
             # An escape sequence in a title would act on the terminal that shows it.
             if all(character.isprintable() or character == "\n" for character in node.text):
                 return node.text
             raise UnitError(f"{refusal} with control characters; accepted: plain text")
-        case keys.Text() if node.kind != "nothing":
+        case keys.Plain.TEXT if node.kind != "nothing":
             raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
-    raise UnitError(f"{refusal}; {close}accepted: {accepted}")
+    raise UnitError(f"{refusal}; {close}accepted: {form}")
 
 
 def _form(accepted: keys.Accepted) -> str:
@@ -253,10 +246,8 @@ def _form(accepted: keys.Accepted) -> str:
             return f"{accepted.dimension.noun}, {accepted}"
         case keys.ListOf():
             return str(accepted).replace("a list", "a list [ … , … ]")
-        case keys.Mapped():
+        case keys.Plain.MAPPED:
             return "a mapping {key: value, …}"
         case keys.Either(kinds):
             return "; or ".join(map(_form, kinds))
-        case keys.OneOrMore(each):
-            return f"{_form(each)}; one or a list"
     return str(accepted)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.protocol.contact import touching_heights
@@ -101,7 +100,7 @@ def check_clear(
     for gate in filter(Section.is_sound, _sections(section)):
         height = gate["height"]
         message = f"found {_mm(height)}"
-        rod = next((rod for rod in rods if rod.low < height < rod.high), None)
+        rod = _blocking(rods, height)
         if height < lowest:
             message += "; a rod at rest on the surface would block the beam: at least "
             message += f"{_mm(math.ceil(lowest * 1e4) / 1e4)} is needed"
@@ -121,19 +120,20 @@ def check_clear(
 
 def _clear_heights(height: float, rods: Iterable[_Rod], lowest: float, top: float) -> list[float]:
     """Return the nearest heights below and above that no rod blocks, to 0.1 mm."""
-    clear = []
-    for rounding, step in ((math.floor, -1), (math.ceil, 1)):
-        # Walk from edge to edge; each step leaves at least one rod behind, so this ends.
-        tenths = rounding(height * 1e4)
-        for _ in count():
-            rod = next((rod for rod in rods if rod.low < tenths / 1e4 < rod.high), None)
-            if rod is None:
-                break
-            edge = rounding((rod.low if step < 0 else rod.high) * 1e4)
-            tenths = edge if edge != tenths else tenths + step
-        if max(lowest, 1e-4) <= tenths / 1e4 <= top:
-            clear.append(tenths / 1e4)
-    return clear
+    # A rounded edge may still be a rounding error inside its rod: the next step is outside.
+    below = {math.floor(rod.low * 1e4) - step for rod in rods for step in (0, 1)}
+    above = {math.ceil(rod.high * 1e4) + step for rod in rods for step in (0, 1)}
+    tenths = [z for z in below | above if _blocking(rods, z / 1e4) is None]
+    nearest = (
+        max((z for z in tenths if z / 1e4 < height), default=0),
+        min((z for z in tenths if z / 1e4 > height), default=0),
+    )
+    return [z / 1e4 for z in nearest if max(lowest, 1e-4) <= z / 1e4 <= top]
+
+
+def _blocking(rods: Iterable[_Rod], height: float) -> _Rod | None:
+    """Return the first rod that blocks a beam at a height."""
+    return next((rod for rod in rods if rod.low < height < rod.high), None)
 
 
 def _mm(height: float) -> str:
