@@ -116,15 +116,16 @@ def single_alphas(
     model: dict[Condition, float] = {}
     by_model = None
     if problem is not None and outcome is not None:
-        model = dict(
-            zip(map(case, problem.forms), _by_coefficients(protocol, problem, outcome), strict=True)
-        )
-        degrees = len(set(map(case, problem.forms))) - len(problem.parameters)
+        supposed = of.model(protocol, problem.parameters)
+        values = outcome.values[: len(problem.parameters)]
+        model = {
+            case(form): float(supposed.alphas(form, values)[0].mean()) for form in problem.forms
+        }
+        degrees = len(model) - len(problem.parameters)
         if problem.parameters and not problem.held and degrees > 0:
             # Without the nuisances, so that both suppose the same but for α.
             open_ = fit(problem.forms, one_alpha(problem.forms, case))
-            plain = fit(problem.forms, of.model(protocol, problem.parameters))
-            by_model = LikelihoodRatio(plain.chi2 - open_.chi2, degrees)
+            by_model = LikelihoodRatio(fit(problem.forms, supposed).chi2 - open_.chi2, degrees)
     cases = sorted(set(map(case, groups)))
     fewer, counts = len(forms) - len(cases), Counter(map(case, forms))
     return SingleAlphas(
@@ -139,14 +140,3 @@ def single_alphas(
         LikelihoodRatio(by_case.chi2 - by_run.chi2, fewer) if fewer > 0 else None,
         by_model,
     )
-
-
-def _by_coefficients(
-    protocol: Protocol, problem: CoefficientProblem, outcome: HypothesisFit
-) -> list[float]:
-    """α of each form by the model with the fitted coefficients."""
-    model = of.model(protocol, problem.parameters)
-    values = outcome.values[: len(problem.parameters)]
-    return [
-        float(model.targets(form, values)[0][: form.alphas.size].mean()) for form in problem.forms
-    ]

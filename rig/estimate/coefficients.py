@@ -40,21 +40,26 @@ class CoefficientProblem:
     ----------
     forms
         Of like drops, added up; only those that the model describes.
-    parameters
-        Coefficients that the edges tell, and those they do not, these with a prior.
-    held
-        Names of the latter.
     stated
         What the protocol says of each coefficient that is fitted, by name.
+    held
+        Names of those that the edges do not tell.
     left_out
         Sentences on what is not fitted, and why.
     """
 
     forms: tuple[QuadraticForm, ...]
-    parameters: tuple[Parameter, ...]
-    held: tuple[str, ...]
     stated: dict[str, Quantity]
     left_out: tuple[str, ...]
+    held: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Coefficients that the edges tell, and those they do not, these with a prior."""
+        return tuple(
+            Parameter(name, stated.value, (stated.value, stated.u) if name in self.held else None)
+            for name, stated in self.stated.items()
+        )
 
     @property
     def inclines(self) -> list[float]:
@@ -74,9 +79,8 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
     in_model, stated, left_out = described(
         protocol, [(form.chain, form.run.incline_deg) for form in ordered]
     )
-    parameters = [Parameter(name, quantity.value) for name, quantity in stated.items()]
     informative = tuple(form for form, fits in zip(ordered, in_model, strict=True) if fits)
-    problem = CoefficientProblem(informative, tuple(parameters), (), stated, tuple(left_out))
+    problem = CoefficientProblem(informative, stated, tuple(left_out))
     return _hold_unknown(protocol, problem) if informative else problem
 
 
@@ -159,18 +163,8 @@ def _hold_unknown(protocol: Protocol, problem: CoefficientProblem) -> Coefficien
     """Hold what the edges do not tell."""
 
     def holding(held: Mapping[str, float]) -> CoefficientProblem:
-        exact = {name for name, u in held.items() if not u}
-        priors = {name: (problem.stated[name].value, u) for name, u in held.items()}
-        return replace(
-            problem,
-            parameters=tuple(
-                parameter._replace(prior=priors.get(parameter.name))
-                for parameter in problem.parameters
-                if parameter.name not in exact
-            ),
-            held=tuple(name for name in held if name not in exact),
-            stated={name: size for name, size in problem.stated.items() if name not in exact},
-        )
+        stated = {name: q for name, q in problem.stated.items() if held.get(name) != 0.0}
+        return replace(problem, stated=stated, held=tuple(name for name in held if name in stated))
 
     def uncertainties(held: Mapping[str, float]) -> dict[str, float]:
         candidate = holding(held)
@@ -200,9 +194,12 @@ def nuisances(protocol: Protocol, problem: CoefficientProblem, inner: Hypothesis
     return with_drag(added, prior_air(protocol))
 
 
-def best(protocol: Protocol, problem: CoefficientProblem) -> HypothesisFit:
-    """Fit the coefficients with all nuisances."""
-    return fit(problem.forms, nuisances(protocol, problem, model(protocol, problem.parameters)))
+def best(
+    protocol: Protocol, problem: CoefficientProblem, parameters: Sequence[Parameter] = ()
+) -> HypothesisFit:
+    """Fit the coefficients, or these parameters instead of theirs, with all nuisances."""
+    coefficients_only = model(protocol, parameters or problem.parameters)
+    return fit(problem.forms, nuisances(protocol, problem, coefficients_only))
 
 
 def correlation(outcome: HypothesisFit, names: Sequence[str]) -> Array:

@@ -63,7 +63,7 @@ class EndCorrection:
         return self.aic["without"] - min(self.aic["open"], self.aic["eq10"])
 
     @property
-    def needed(self) -> bool | None:
+    def is_needed(self) -> bool | None:
         """Whether edges want it; `None` where they do not tell."""
         return self._worse > 0.0 if self.scale.u <= _TELLS else None
 
@@ -76,20 +76,18 @@ class EndCorrection:
         """What follows."""
         scale, worse = self.scale, self._worse
         size = f"γ is {scale.value:.3f} ± {scale.expanded:.3f} (95 %) times that of Eq. 10"
-        if self.needed is None:
+        if self.is_needed is None:
             return f"The edges do not tell whether the end correction is needed: {size}."
+        if worse <= 0.0:
+            without = f"without it AIC is {-worse:.2g} better"
+            return f"The end correction is not needed: {without}; {size}."
+        needed, by = (
+            ("The end correction is needed", f"{worse:.0f}")
+            if worse > STRONG
+            else ("The edges lean towards the end correction", f"{worse:.2g}")
+        )
         agree = f"p {self._p('eq10'):.2g} for Eq. 10"
-        if worse > STRONG:
-            return (
-                f"The end correction is needed: without it AIC is {worse:.0f} worse; {size}, "
-                f"{agree}."
-            )
-        if worse > 0.0:
-            return (
-                f"The edges lean towards the end correction: without it AIC is {worse:.2g} worse; "
-                f"{size}, {agree}."
-            )
-        return f"The end correction is not needed: without it AIC is {-worse:.2g} better; {size}."
+        return f"{needed}: without it AIC is {by} worse; {size}, {agree}."
 
     def json(self) -> dict[str, Any]:
         """``end_correction``."""
@@ -102,7 +100,7 @@ class EndCorrection:
         }
         if self.gamma is not None:
             record |= attributes(self, "gamma_eq10", "gamma")
-        return record | attributes(self, "needed", "sentence")
+        return record | {"needed": self.is_needed} | attributes(self, "sentence")
 
 
 def _above_least(values: Mapping[str, float]) -> dict[str, float]:

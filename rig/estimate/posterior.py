@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.plain_data import attributes
-from rig.estimate.coefficients import CoefficientProblem, model, nuisances
+from rig.estimate.coefficients import CoefficientProblem, best
 from rig.estimate.hypotheses import MU
-from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
+from rig.estimate.hypothesis_fit import HypothesisFit, Parameter
 
 if TYPE_CHECKING:
     from rig.arrays import Array
@@ -87,27 +87,21 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
         name: Parameter(name, centre[name][0], (stated.value, stated.u) if stated.u else None)
         for name, stated in problem.stated.items()
     }
-    names = tuple(priors)
-    if MU not in priors:
-        only = fit(problem.forms, nuisances(protocol, problem, model(protocol, [*priors.values()])))
-        pairs = np.array([only[name] for name in names])
-        return Posterior(names, np.ones(1), pairs[None, :, 0], pairs[None, :, 1])
-    nodes = _nodes(*_around(centre[MU], priors[MU].prior))
-    logs, means, sds = [], [], []
-    for mu in nodes.tolist():
-        # The node holds μ; what was known of it is counted below, not twice.
-        fixed = {**priors, MU: Parameter(MU, mu, (mu, 0.0))}
-        at = fit(problem.forms, nuisances(protocol, problem, model(protocol, [*fixed.values()])))
-        prior = priors[MU].prior
-        off = (mu - prior[0]) / prior[1] if prior else 0.0
+    names, prior = tuple(priors), priors[MU].prior if MU in priors else None
+    grid = _nodes(*_around(centre[MU], prior)) if MU in priors else np.zeros(0)
+    # A node holds μ; what was known of it is counted below, not twice.
+    nodes = [{MU: Parameter(MU, mu, (mu, 0.0))} for mu in grid.tolist()] or [{}]
+    logs, estimates = [], []
+    for node in nodes:
+        at = best(protocol, problem, [*(priors | node).values()])
+        off = (node[MU].start - prior[0]) / prior[1] if prior else 0.0
         logs.append(at.log_volume - 0.5 * (at.chi2 + off**2))
-        pairs = np.array([at[name] for name in names])
-        means.append(pairs[:, 0])
-        sds.append(pairs[:, 1])
+        estimates.append([at[name] for name in names])
     weights = np.exp(np.array(logs) - max(logs))  # of the largest: no exponent overflows
-    widths = np.array(sds)
-    widths[:, names.index(MU)] = 0.5 * (nodes[1] - nodes[0])
-    return Posterior(names, weights / weights.sum(), np.array(means), widths)
+    means, widths = np.moveaxis(np.reshape(estimates, (len(nodes), len(names), 2)), 2, 0)
+    if MU in priors:
+        widths[:, names.index(MU)] = 0.5 * (grid[1] - grid[0])
+    return Posterior(names, weights / weights.sum(), means, widths)
 
 
 def _around(

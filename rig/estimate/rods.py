@@ -145,35 +145,25 @@ def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
         rods,
         Measured(*single["α one"]),
         LikelihoodRatio(single.chi2 - open_fit.chi2, rods - 1),
-        tuple(
-            _gain(first, last, gains, covariance, model)
-            for first, last in _groups(covariance, np.abs(model))
-        ),
+        _gains(gains, covariance, model),
     )
 
 
-def _gain(first: int, last: int, gains: Array, covariance: Array, model: Array) -> Gain:
-    part = slice(first, last + 1)
-    measured = Measured(float(gains[part].sum()), _sum_u(covariance, part))
-    return Gain(first, last, measured, float(model[part].sum()))
+def _gains(gains: Array, covariance: Array, model: Array) -> tuple[Gain, ...]:
+    """Sum neighbours from the bottom until resolved; what is left joins the last group."""
 
-
-def _sum_u(covariance: Array, part: slice) -> float:
-    """Standard uncertainty of a sum."""
-    return float(np.sqrt(max(0.0, float(covariance[part, part].sum()))))
-
-
-def _groups(covariance: Array, sizes: Array) -> list[tuple[int, int]]:
-    """Neighbours whose sum is resolved, from the bottom; what is left joins the last ones."""
-    groups: list[tuple[int, int]] = []
-    first = 0
-    for last in range(sizes.size):
+    def summed(first: int, last: int) -> Gain:
         part = slice(first, last + 1)
-        u = Measured(0.0, _sum_u(covariance, part)).expanded
-        if u <= RESOLVED * sizes[part].sum():
-            groups.append((first, last))
+        u = float(np.sqrt(max(0.0, float(covariance[part, part].sum()))))
+        return Gain(first, last, Measured(float(gains[part].sum()), u), float(model[part].sum()))
+
+    groups: list[Gain] = []
+    first = 0
+    for last in range(model.size):
+        group = summed(first, last)
+        if group.measured.expanded <= RESOLVED * np.abs(model[first : last + 1]).sum():
+            groups.append(group)
             first = last + 1
-    if first < sizes.size:
-        begin = groups.pop()[0] if groups else first
-        groups.append((begin, sizes.size - 1))
-    return groups
+    if first < model.size:
+        groups.append(summed(groups.pop().first if groups else first, model.size - 1))
+    return tuple(groups)

@@ -71,15 +71,14 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class ContactPoint:
-    """Where the rods touch at an incline, m above the contact level."""
+    """Where the rods touch at an incline, m above the contact level.
+
+    `identified`: whether the edges tell it better than is supposed beforehand.
+    """
 
     incline_deg: float
     height: Measured
-
-    @property
-    def identified(self) -> bool:
-        """Whether the edges tell it better than is supposed beforehand."""
-        return self.height.u < of.FOUND * of.CONTACT_U
+    identified: bool
 
     def json(self) -> dict[str, Any]:
         """One of ``contact``."""
@@ -244,8 +243,9 @@ def _coefficients(
 ) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
     names = list(problem.stated)
-    drag = Measured(*outcome[AIR]) if AIR in outcome else None
-    spread = posterior(protocol, problem, outcome) if names else None
+    drag = Measured(*outcome[AIR])
+    spread = posterior(protocol, problem, outcome)
+    heights = {at: Measured(*outcome[f"contact {at:g}"]) for at in problem.inclines}
     return Coefficients(
         tuple(
             Coefficient(
@@ -257,15 +257,13 @@ def _coefficients(
                 problem.stated[name],
             )
             for name in names
-        )
-        if spread
-        else (),
-        of.correlation(outcome, names),
-        spread,
-        tuple(
-            ContactPoint(incline, Measured(*outcome[f"contact {incline:g}"]))
-            for incline in problem.inclines
         ),
-        drag if drag and drag.u < of.FOUND * prior_air(protocol)[1] else None,
+        of.correlation(outcome, names),
+        spread if names else None,
+        tuple(
+            ContactPoint(incline, height, height.u < of.FOUND * of.CONTACT_U)
+            for incline, height in heights.items()
+        ),
+        drag if drag.u < of.FOUND * prior_air(protocol)[1] else None,
         outcome.chi2,
     )
