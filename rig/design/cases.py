@@ -188,7 +188,7 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
         alphas = model_alphas(protocol, record, run)
         path = trajectory(protocol, record, RELEASE_S, protocol.drop.value - lower, alphas)
         trains = tuple(
-            observed(train, path.times(train.levels), train.blocks) for train in record.trains
+            with_edges(train, path.times(train.levels), train.blocks) for train in record.trains
         )
         collected.append((replace(record, trains=trains), alphas))
     return collected
@@ -244,7 +244,7 @@ def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropMo
     return model, x
 
 
-def observed(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> EdgeTrain:
+def with_edges(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> EdgeTrain:
     """Return the train of a beam that saw these edges and no flicker."""
     number = np.arange(times.size)
     return replace(train, times=times, blocked=blocked, burst=0.0 * times, edge=number)

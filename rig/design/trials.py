@@ -18,7 +18,7 @@ from rig.analysis.annealing import MISSED
 from rig.analysis.components import above, stated
 from rig.analysis.identify import Identification, deciding_gate, identify
 from rig.analysis.verdict import pattern_faults
-from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, observed, records_of, trajectory
+from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, records_of, trajectory, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -118,7 +118,7 @@ def _fallen(
         order = np.argsort(times, kind="stable")
         edges = np.full(levels.size, -1)
         edges[seen[order]] = np.arange(seen.size)
-        trains.append(observed(train, times[order], train.blocks[seen[order]]))
+        trains.append(with_edges(train, times[order], train.blocks[seen[order]]))
         truth.append(edges)
     return replace(record, trains=tuple(trains)), truth
 

@@ -141,7 +141,7 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
         if len(heights) == number or not gaps:
             break
         target = drop.value + share * rods.chain.length
-        gap = min(gaps, key=lambda gap, target=target: abs(gap - target))  # type: ignore[misc]
+        _, gap = min((abs(gap - target), gap) for gap in gaps)
         gaps.remove(gap)
         heights.append(gap)
     if len(heights) < number:
