@@ -11,8 +11,8 @@ import numpy as np
 from rig.analysis.square_root import triangle
 from rig.analysis.summary import by_case
 from rig.design.cases import BEAM, Block, Case, Cases
-from rig.estimate.coefficients import KNOWN, described, given_alphas, held_back
-from rig.estimate.hypotheses import alphas
+from rig.estimate.coefficients import KNOWN, held_back, stated_coefficients
+from rig.estimate.hypotheses import alphas, given_alphas
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -131,12 +131,19 @@ def forecast(
         _Drop.of(case, rows, layout.cases.shared)
         for case, rows in zip(layout.cases.cases, layout.rows, strict=True)
     ]
-    in_model, stated = _describe(protocol, drops)
+    stated: dict[str, Quantity] = {}
+    tied: list[_Drop] = []
+    rest: list[_Drop] = []
+    for drop in drops:
+        depends_on: dict[str, Quantity] = {}
+        if drop.case.struck:
+            depends_on, _ = stated_coefficients(protocol, *_impact(protocol, drop.case))
+        stated |= depends_on
+        (tied if depends_on else rest).append(drop)
     # What needs no α of a drop is common to coefficients and measurands.
-    tied = [drop for drop, fits in zip(drops, in_model, strict=True) if fits]
     root = _session([drop.given_alpha() for drop in tied], np.eye(size))
-    rest = [drop.given_alpha() for drop, fits in zip(drops, in_model, strict=True) if not fits]
-    session_root = _session([*rest, *(drop.own_alpha() for drop in drops)], root)
+    observations = [*map(_Drop.given_alpha, rest), *map(_Drop.own_alpha, drops)]
+    session_root = _session(observations, root)
     # Once a layout, then asked by every measurand and incline.
     inverse = np.linalg.inv(session_root)
     single: dict[str, dict[Condition, float]] = {}
@@ -237,14 +244,6 @@ def _session(observations: Sequence[tuple[Array, Index]], root: Array) -> Array:
         stack[begin:end, columns] = rows
     stack[end:] = root
     return triangle(stack)
-
-
-def _describe(protocol: Protocol, drops: Sequence[_Drop]) -> tuple[list[bool], dict[str, Quantity]]:
-    """Return which drops the model describes, and what is stated of its coefficients."""
-    if protocol.surface is None:
-        return [False] * len(drops), {}
-    in_model, stated, _ = described(protocol, [_impact(protocol, drop.case) for drop in drops])
-    return in_model, stated
 
 
 def _impact(protocol: Protocol, case: Case) -> tuple[Chain, float]:

@@ -12,24 +12,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import Components, stated
-from rig.analysis.identify import identify
 from rig.analysis.verdict import LEAD
-from rig.design.cases import CLOCK_U, beams_of, cases, perfect, with_beams
+from rig.design.cases import beams_of, cases, perfect, with_beams
 from rig.design.forecast import GateLayout, forecast
-from rig.design.trials import misread
+from rig.design.trials import read_drop
 from rig.measurands import averaged
+from rig.protocol.contact import at_contact
+from rig.protocol.gates import blocking_rod, hanging_rods
 from rig.protocol.plan import runs
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from rig.analysis.components import Components
     from rig.protocol.protocol import Protocol, Side
-
-    Index = NDArray[np.intp]
 
 COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""
@@ -56,14 +53,11 @@ class Room:
         Limits of height.
     spacing
         Least distance of two beams of one side.
-    clearance
-        Least distance of a beam from a rod of a chain that hangs.
     """
 
     lowest: float
     highest: float
     spacing: float
-    clearance: float
 
 
 def room(protocol: Protocol, lowest: float | None, highest: float | None, spacing: float) -> Room:
@@ -74,23 +68,15 @@ def room(protocol: Protocol, lowest: float | None, highest: float | None, spacin
         min(heights) if lowest is None else lowest,
         min(top, max(heights)) if highest is None else min(top, highest),
         spacing,
-        max(1e-3, protocol.drop.u),
     )
 
 
 def candidates(protocol: Protocol, limits: Room) -> list[float]:
     """Heights on a grid at which no hanging rod blocks a beam."""
-    hanging = np.array(
-        [
-            (protocol.drop.value + height, width / 2.0 + limits.clearance)
-            for rods in protocol.chains.values()
-            for height, width in zip(rods.chain.heights, rods.widths, strict=True)
-        ]
-    )
+    rods = hanging_rods(protocol.chains.values(), protocol.drop)
     n = math.floor((limits.highest - limits.lowest) / _GRID_M + 1e-9)
-    grid = limits.lowest + _GRID_M * np.arange(n + 1)
-    clear = (np.abs(grid[:, None] - hanging[:, 0]) >= hanging[:, 1]).all(axis=1)
-    return [round(float(height), 4) for height in grid[clear]]
+    grid = (limits.lowest + _GRID_M * np.arange(n + 1)).tolist()
+    return [round(height, 4) for height in grid if blocking_rod(rods, height) is None]
 
 
 @one_thread
@@ -189,15 +175,13 @@ def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
     least = MARGIN
     for incline in {min(ends), max(ends)}:
         for off in (-_OFF, _OFF):
-            records = [
-                record for record, _ in perfect(protocol, ends[incline], off * protocol.drop.u)
+            fallen = [
+                (record, [np.arange(train.rods.size) for train in record.trains])
+                for record, _ in perfect(protocol, ends[incline], off * protocol.drop.u)
             ]
-            identification = identify(protocol, records, CLOCK_U, stated(protocol))
-            all_seen: dict[str, list[Index]] = {
-                record.role: [np.arange(train.rods.size) for train in record.trains]
-                for record in records
-            }
-            if identification.fit is None or misread(identification, all_seen):
+            here = at_contact(protocol, incline, ends[incline].impact)
+            identification, unclear = read_drop(here, fallen)
+            if identification.fit is None or unclear:
                 return -math.inf
             least = min(least, identification.log_odds)
     return least

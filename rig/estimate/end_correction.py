@@ -10,8 +10,7 @@ import numpy as np
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
-from rig.estimate.coefficients import CoefficientProblem, nuisances
-from rig.estimate.hypotheses import END, one_alpha, with_end_correction
+from rig.estimate.hypotheses import END, one_alpha, with_end_correction, with_nuisances
 from rig.estimate.hypothesis_fit import fit
 from rig.model.rods import rod_impacts
 
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.arrays import Array
+    from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol
 
@@ -49,13 +49,6 @@ class EndCorrection:
     def aic(self) -> dict[str, float]:
         """Akaike's criterion of each; γ is one parameter more where it is open."""
         return {name: chi2 + (2.0 if name == "open" else 0.0) for name, chi2 in self.chi2.items()}
-
-    @property
-    def gamma(self) -> Measured | None:
-        """γ itself, where it is the same for all rods."""
-        if self.gamma_eq10 is None:
-            return None
-        return Measured(self.gamma_eq10 * self.scale.value, self.gamma_eq10 * self.scale.u)
 
     @property
     def _worse(self) -> float:
@@ -98,8 +91,9 @@ class EndCorrection:
             "p_without": self._p("without"),
             "p_eq10": self._p("eq10"),
         }
-        if self.gamma is not None:
-            record |= attributes(self, "gamma_eq10", "gamma")
+        if (gamma := self.gamma_eq10) is not None:  # the same for all rods
+            own = Measured(gamma * self.scale.value, gamma * self.scale.u)
+            record |= {"gamma_eq10": gamma, "gamma": own.json()}
         return record | {"needed": self.is_needed} | attributes(self, "sentence")
 
 
@@ -125,7 +119,7 @@ def end_correction(protocol: Protocol, problem: CoefficientProblem) -> EndCorrec
     if by_eq10 == {0.0}:
         return None
     cases = one_alpha(problem.forms, lambda form: protocol.condition(form.run))
-    inclines = nuisances(protocol, problem, cases)
+    inclines = with_nuisances(protocol, cases, problem.inclines)
     open_ = fit(problem.forms, with_end_correction(inclines, gammas, None))
     chi2 = {
         "open": open_.chi2,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.drop_model import prior_air
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
 from rig.model.rods import rod_impacts
 from rig.units import Quantity
@@ -21,25 +22,28 @@ if TYPE_CHECKING:
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.model.surface import Surface
+    from rig.protocol.protocol import Protocol
 
     Index = NDArray[np.intp]
     AlphasAndSlopes = tuple[Array, Array]
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 END, AIR = "end_correction", "drag"
+CONTACT_U = 1e-3
+"""How far the contact point may move when the board is inclined anew, m."""
 _STEP = 1e-5  # of a coefficient, for its derivative
 
 
-def coefficients(
-    surface: Surface, parameters: Sequence[Parameter], alpha_names: Mapping[Chain, str]
-) -> Hypothesis:
-    """Suppose Eqs. 8 to 13 with these of β, μ and the pile's β unknown, the others as stated.
+def given_alphas(protocol: Protocol) -> dict[Chain, str]:
+    """Name the α of each chain whose α is simply given; like chains have one."""
+    chains = {rods.chain: rods.name for rods in protocol.chains.values() if rods.chain.alpha}
+    return {chain: ALPHA if len(chains) == 1 else f"{ALPHA} {chains[chain]}" for chain in chains}
 
-    Parameters
-    ----------
-    alpha_names
-        Name of the α of each chain whose α is simply given.
-    """
+
+def by_model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
+    """Suppose Eqs. 8 to 13 with these coefficients unknown, the others as stated."""
+    surface, alpha_names = protocol.surface, given_alphas(protocol)
+    assert surface is not None
     names = [parameter.name for parameter in parameters]
 
     @cache
@@ -98,29 +102,25 @@ def with_coefficients(surface: Surface, values: Mapping[str, float]) -> Surface:
     )
 
 
-def one_alpha(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
-    """Suppose one α for all drops that share a key: an incline, or a run."""
-    return _open(forms, key, lambda rods: {"": np.arange(rods)})
-
-
-def each_rod(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
-    """Suppose an α for each rod but the top one, whose impact pulls on nothing."""
-    return _open(forms, key, lambda rods: {f", rod {k}": np.array([k]) for k in range(rods - 1)})
-
-
-def _open(
+def one_alpha(
     forms: Sequence[QuadraticForm],
     key: Callable[[QuadraticForm], object],
-    split: Callable[[int], Mapping[str, Index]],
+    *,
+    each_rod: bool = False,
 ) -> Hypothesis:
-    """Suppose an α for each of some sets of rods of all drops that share a key."""
+    """Suppose one α for all drops that share a key: an incline, or a run.
+
+    `each_rod`: one for each rod but the top one, whose impact pulls on nothing.
+    """
     parameters: list[Parameter] = []
     sets: dict[object, list[tuple[int, Index]]] = {}
     for group in dict.fromkeys(map(key, forms)):
         starts = np.array([form.alphas for form in forms if key(form) == group])
-        for name, rods in split(starts.shape[1]).items():
-            sets.setdefault(group, []).append((len(parameters), rods))
-            parameters.append(Parameter(f"α {group}{name}", float(starts[:, rods].mean())))
+        every = np.arange(starts.shape[1])
+        sets[group] = []
+        for rods in every[:-1, None] if each_rod else [every]:
+            sets[group].append((len(parameters), rods))
+            parameters.append(Parameter(f"α {group}", float(starts[:, rods].mean())))
 
     def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         slopes = np.zeros((form.alphas.size, values.size))
@@ -155,14 +155,15 @@ def with_end_correction(
     return Hypothesis((*inner.parameters, *added), alphas)
 
 
-def with_contact(
-    inner: Hypothesis, inclines: Sequence[float], prior: tuple[float, float] | None
-) -> Hypothesis:
+def with_contact(inner: Hypothesis, inclines: Sequence[float]) -> Hypothesis:
     """Suppose the contact point to be at another height at each incline."""
+    prior = 0.0, CONTACT_U
     added = (Parameter(f"contact {at:g}", 0.0, prior, "contact", at) for at in inclines)
     return inner._replace(parameters=(*inner.parameters, *added))
 
 
-def with_drag(inner: Hypothesis, prior: tuple[float, float]) -> Hypothesis:
-    """Suppose air of a κ that is known so well beforehand."""
+def with_nuisances(protocol: Protocol, inner: Hypothesis, inclines: Sequence[float]) -> Hypothesis:
+    """Suppose also air of a κ that is known as well as the protocol says."""
+    prior = prior_air(protocol)
+    inner = with_contact(inner, inclines)
     return inner._replace(parameters=(*inner.parameters, Parameter(AIR, prior[0], prior, "drag")))

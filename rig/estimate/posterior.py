@@ -58,10 +58,9 @@ class Posterior:
         variance = self.weights @ (self.sds[:, n] ** 2 + (self.means[:, n] - mean) ** 2)
         return mean, math.sqrt(float(variance))
 
-    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
-        """Ends of the probabilistically symmetric interval."""
-        tail = 0.5 * (1.0 - probability)
-        return self.quantile(name, tail), self.quantile(name, 1.0 - tail)
+    def interval(self, name: str) -> tuple[float, float]:
+        """Ends of the probabilistically symmetric interval of 95 %."""
+        return self.quantile(name, 0.025), self.quantile(name, 0.975)
 
     def quantile(self, name: str, probability: float) -> float:
         """Value that the coefficient stays below with a probability; by bisection."""
@@ -88,7 +87,7 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
         for name, stated in problem.stated.items()
     }
     names, prior = tuple(priors), priors[MU].prior if MU in priors else None
-    grid = _nodes(*_around(centre[MU], prior)) if MU in priors else np.zeros(0)
+    grid = _nodes(centre[MU], prior) if MU in priors else np.zeros(0)
     # A node holds μ; what was known of it is counted below, not twice.
     nodes = [{MU: Parameter(MU, mu, (mu, 0.0))} for mu in grid.tolist()] or [{}]
     logs, estimates = [], []
@@ -104,18 +103,9 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
     return Posterior(names, weights / weights.sum(), means, widths)
 
 
-def _around(
-    measured: tuple[float, float], prior: tuple[float, float] | None
-) -> tuple[float, float]:
-    """Mean and standard uncertainty with the prior; roughly, for it only places the nodes."""
-    if prior is None:
-        return measured
-    weights = np.array([measured[1] ** -2, prior[1] ** -2])
-    mean = float(weights @ [measured[0], prior[0]]) / weights.sum()
-    return float(mean), float(weights.sum()) ** -0.5
-
-
-def _nodes(mean: float, sd: float) -> Array:
-    """Evenly spaced; friction has no negative side."""
+def _nodes(measured: tuple[float, float], prior: tuple[float, float] | None) -> Array:
+    """Return even nodes around what edges and prior say together; friction has no negative side."""
+    values, us = np.transpose([measured, prior] if prior else [measured])
+    mean, sd = float(us**-2 @ values / (us**-2).sum()), float((us**-2).sum()) ** -0.5
     low = max(0.0, mean - _REACH * sd)
     return np.linspace(low, max(mean, low) + _REACH * sd, NODES)

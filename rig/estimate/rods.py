@@ -10,9 +10,8 @@ import numpy as np
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
-from rig.estimate.coefficients import CONTACT_U
-from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
-from rig.estimate.hypothesis_fit import Hypothesis, fit
+from rig.estimate.hypotheses import one_alpha, with_contact
+from rig.estimate.hypothesis_fit import fit
 from rig.estimate.likelihood_ratio import LikelihoodRatio
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
     Parameters
     ----------
     forms
-        Of like drops, see `rig.estimate.quadratic_forms.merged`.
+        Of like drops, see `rig.estimate.quadratic_forms.merge_like`.
 
     Returns
     -------
@@ -130,11 +129,11 @@ def resolution(impulses_by_case: Sequence[Impulses]) -> str:
 
 
 def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
-    def contact(hypothesis: Hypothesis) -> Hypothesis:
-        return with_contact(hypothesis, [condition.incline_deg], (0.0, CONTACT_U))
-
-    single = fit(forms, contact(one_alpha(forms, lambda _: "one")))
-    open_fit = fit(forms, contact(each_rod(forms, lambda _: "one")))
+    inclines = [condition.incline_deg]
+    single, open_fit = (
+        fit(forms, with_contact(one_alpha(forms, lambda _: "one", each_rod=each_rod), inclines))
+        for each_rod in (False, True)
+    )
     rods = forms[0].alphas.size - 1
     weight = forms[0].ratios[:rods] * np.mean([form.arrivals[:rods] for form in forms], axis=0)
     gains = weight * open_fit.values[:rods]

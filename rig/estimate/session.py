@@ -16,15 +16,15 @@ from rig.estimate import coefficients as of
 from rig.estimate.alphas import SingleAlphas, single_alphas
 from rig.estimate.curves import DropCurves, drop_curves
 from rig.estimate.end_correction import EndCorrection, end_correction
-from rig.estimate.hypotheses import AIR
+from rig.estimate.hypotheses import AIR, CONTACT_U
 from rig.estimate.posterior import Posterior, posterior
-from rig.estimate.quadratic_forms import merged, quadratic_form
+from rig.estimate.quadratic_forms import merge_like, quadratic_form
 from rig.estimate.rods import Impulses, impulses, resolution
 from rig.sections import Sections
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Mapping
 
     from rig.analysis.session import Analysis
     from rig.arrays import Array
@@ -199,13 +199,18 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
         analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
     )
     forms = [quadratic_form(good[key], drop, shared) for key, drop in drops.items()]
-    groups = merged(forms)
+    groups = merge_like(forms)
     results = SessionEstimate(len(forms), sum(result.edges for result in forms))
     sections = Sections()
     problem, outcome = None, None
     with sections.alone("The coefficients"):
         problem = of.coefficient_problem(protocol, groups)
-        results.left_out = (*_runs_left_out(good.keys() - drops.keys()), *problem.left_out)
+        sentence = (
+            "run {} is left out: no motion fits its edges, or not together with the other runs; "
+            "rig analyze SESSION says which"
+        )
+        lost = sorted(run for run, _ in good.keys() - drops.keys())
+        results.left_out = (*map(sentence.format, lost), *problem.left_out)
         if problem.forms:
             outcome = of.best(protocol, problem)
             results.coefficients = _coefficients(protocol, problem, outcome)
@@ -228,14 +233,6 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
         )
     results.failed = tuple(sections.failed.values())
     return results
-
-
-def _runs_left_out(keys: Iterable[tuple[int, int]]) -> Iterator[str]:
-    for run, _ in sorted(keys):
-        yield (
-            f"run {run} is left out: no motion fits its edges, or not together with the other "
-            "runs; rig analyze SESSION says which"
-        )
 
 
 def _coefficients(
@@ -261,7 +258,7 @@ def _coefficients(
         of.correlation(outcome, names),
         spread if names else None,
         tuple(
-            ContactPoint(incline, height, height.u < of.FOUND * of.CONTACT_U)
+            ContactPoint(incline, height, height.u < of.FOUND * CONTACT_U)
             for incline, height in heights.items()
         ),
         drag if drag.u < of.FOUND * prior_air(protocol)[1] else None,

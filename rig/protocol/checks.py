@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.protocol.contact import lacking_geometry
 from rig.protocol.gates import check_clear, check_sides
-from rig.protocol.keys import DEFAULTS, KEYS, example
+from rig.protocol.keys import DEFAULTS
 from rig.protocol.yamltree import Sequence
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
     count = len(chains)
     rods = tuple(filter(None, chains.values()))
     rods = rods if len(rods) == count else ()
-    _check_gravity(top, struck=struck)
+    if struck or {"gravity", "site"} <= top.keys.keys():  # without a surface it is measured
+        top.choose("gravity", "site")
     if struck or "gates" in top:
         top.need("drop")
     if not struck and count > 1:
@@ -53,7 +54,7 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
     if "contact" in top and not struck:
         top.fault("contact", "the scene has no surface; leave contact out")
     if top["plan"]:
-        _check_plan(top["plan"], struck=struck, turns=kept or count > 1)
+        _check_plan(top["plan"], struck=struck, turns=kept or count != 1)
     on_board = struck and _is_on_board(top["contact"], rods)
     if top["gates"]:
         check_sides(top["gates"], surface=struck, chains=count)
@@ -63,29 +64,13 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
             check_clear(top["gates"], rods, top["drop"], surface=struck, inclines=inclines)
 
 
-def _check_gravity(top: Section, *, struck: bool) -> None:
-    """Note two sources of gravity, or none; a scene without a surface measures it."""
-    if "gravity" in top and "site" in top:
-        first, second = sorted(("gravity", "site"), key=lambda key: top.keys[key])
-        message = f"{first} is also given, on line {top.keys[first].line}; keep one of them"
-        top.fault(second, message, at_key=True)
-    elif struck and "gravity" not in top and "site" not in top:
-        sources = (f"{name}: {example(KEYS[name])}" for name in ("gravity", "site"))
-        top.fault("gravity", f"missing; write {', or '.join(sources)}")
-
-
 def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
     """Note drag stated twice or not at all, and rods too little known for a coefficient."""
-    if ("coefficient" in drag) == ("terminal_speed" in drag):
-        keys = ("coefficient", "terminal_speed")
-        examples = (f"{name}: {example(KEYS[f'drag.{name}'])}" for name in keys)
-        if not drag.has_unknown_keys:
-            drag.refuse(f"state either {' or '.join(examples)}")
-    elif "terminal_speed" in drag:
-        if "air_density" in drag:
-            message = "not used with terminal_speed; leave air_density out"
-            drag.fault("air_density", message, at_key=True)
-    else:
+    stated = drag.choose("coefficient", "terminal_speed")
+    if stated == "terminal_speed" and "air_density" in drag:
+        message = "not used with terminal_speed; leave air_density out"
+        drag.fault("air_density", message, at_key=True)
+    if stated == "coefficient":
         for rods in chains:
             if rods.missing_keys:
                 missing = ", ".join(rods.missing_keys)

@@ -50,8 +50,6 @@ class Section:
     ----------
     values
         By key: as read, or the default; `None` where it is faulty, or missing without a default.
-    has_unknown_keys
-        Whether any key is not accepted: what seems to be missing may be that one.
     """
 
     def __init__(
@@ -68,8 +66,8 @@ class Section:
         table = keys.SECTIONS[table_path]
         self._table = table
         self._faulty: set[str] = set()
-        self.has_unknown_keys = not self.keys.keys() <= table.keys()
-        for name in self.keys.keys() - table.keys():
+        self._unknown = self.keys.keys() - table.keys()
+        for name in self._unknown:
             self.fault(name, _unknown_key(name, table), at_key=True)
         self.values = {name: self._read(name, key) for name, key in table.items()}
 
@@ -103,6 +101,19 @@ class Section:
                 message = f"missing; write for example {name}: {keys.example(self._table[name])}"
                 self.faults.add(self.node.place, self.key(name), message)
 
+    def choose(self, *names: str) -> str | None:
+        """Return which of some keys is there: there must be one of them, and no more."""
+        first, *others = sorted(self.keys.keys() & set(names), key=self.keys.__getitem__) or ("",)
+        for other in others:
+            message = f"{first} is also given, on line {self.keys[first].line}; keep one of them"
+            self.fault(other, message, at_key=True)
+        # What seems to be missing may be a key that is spelt wrongly.
+        if not first and not any(did_you_mean(name, names) for name in self._unknown):
+            examples = (f"{name}: {keys.example(self._table[name])}" for name in names)
+            message = f"missing; write {', or '.join(examples)}"
+            self.faults.add(self.node.place, self.key(names[0]), message)
+        return None if others else first or None
+
     def key(self, name: str) -> str:
         """Return the full path of one of its keys."""
         return join(self.path, name)
@@ -115,10 +126,6 @@ class Section:
         """Note a problem with the value of a key (or with the key's being there)."""
         place = self.keys[name] if at_key else self.place(name)
         self.faults.add(place, self.key(name), message)
-
-    def refuse(self, message: str) -> None:
-        """Note a problem with the mapping as a whole."""
-        self.faults.add(self.node.place, self.path, message)
 
 
 def _is_sound(value: Any) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.errors import InputError
+from rig.errors import InputError, Problem
 from rig.files import read_input
 from rig.model.surface import Pile, Surface
 from rig.protocol.chains import read_chains
@@ -72,9 +72,9 @@ def read(path: str | os.PathLike[str]) -> Protocol:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8")
-        faults = FieldFaults(source)
-        faults.add(place_at(before, len(before)), "", "not UTF-8 text; save the file as UTF-8")
-        raise InputError(problems=faults.problems.values()) from None
+        place, message = place_at(before, len(before)), "not UTF-8 text; save the file as UTF-8"
+        problem = Problem(source, place.line, place.column, "", message)
+        raise InputError(problems=[problem]) from None
     return parse(text, source)
 
 

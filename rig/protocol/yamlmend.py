@@ -20,7 +20,7 @@ MOST_PARSED = 150_000
 _PAIRS = {"[": "]", "{": "}"}
 _MARKS = "[]{},:-\"'"
 _BRACKET_OR_QUOTED = re.compile(r"\"[^\"]*(?:\"|$)|'[^']*(?:'|$)|[\[\]{}]")
-_OPEN_QUOTE = re.compile(r"(?<![^\s\[{,:])([\"'])((?!\1).)*$", re.MULTILINE)
+_QUOTE = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|(?<![^\s\[{,:])(?P<open>[\"'])[^\n]*")
 _VALUE = re.compile(r"(?<=: )(?=\S)[^\n]*?(?=\s*(?:[#\n]|$))")
 _MISSING = (
     (re.compile(r" *-"), " ", "a blank is missing after the hyphen"),
@@ -64,8 +64,7 @@ def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
     tuple of int and str
         An index in `text`, and a sentence.
     """
-    mark = error.problem_mark or error.context_mark
-    stop = min(mark.index if mark else 0, len(text))
+    stop = min(_stop(error), len(text))
     begin = error.context_mark.index if error.context_mark else stop
     farther: Mend | None = None
     for mend in islice(_mends(text, stop, begin), MOST_PARSED // (len(text) + 1)):
@@ -83,11 +82,15 @@ def _reach(text: str) -> int | None:
         for _ in yaml.parse(text, Loader=yaml.SafeLoader):
             pass
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        return mark.index if mark else 0
+        return _stop(error)
     except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
         return 0
     return None
+
+
+def _stop(error: yaml.MarkedYAMLError) -> int:
+    mark = error.problem_mark or error.context_mark
+    return mark.index if mark else 0
 
 
 def _mends(text: str, stop: int, begin: int) -> Iterator[Mend]:
@@ -123,8 +126,10 @@ def _stray(text: str, at: int, begin: int) -> Iterator[Mend]:
 
 def _open_quotes(text: str, stop: int) -> Iterator[Mend]:
     """Close a quote at the end of its line, before a comma, bracket or comment if there is one."""
-    for quote in _OPEN_QUOTE.finditer(text, 0, stop):
-        start, mark = quote.start(), quote[1]
+    for quote in _QUOTE.finditer(text, 0, stop):
+        start, mark = quote.start(), quote["open"]
+        if mark is None:
+            continue
         message = f"a quote is open from here: close it with {mark}"
         for end in re.finditer(r"\s*(?:#|[,}\]]|$)", text[start + 1 : _line_end(text, start)]):
             to = start + 1 + end.start()

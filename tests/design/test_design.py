@@ -14,7 +14,7 @@ from rig.design.search import Room, better, readable, score
 from rig.design.trials import Trials, trials, trials_text
 from rig.errors import InputError
 from rig.estimate.coefficients import best, coefficient_problem
-from rig.estimate.quadratic_forms import merged
+from rig.estimate.quadratic_forms import merge_like
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Gates, Plan, Protocol
 from rig.vocabulary import OBJECT, TWO_CHAINS
@@ -78,7 +78,7 @@ def test_the_forecast_is_what_a_session_then_states(expected):
 
 
 def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected):
-    found = best(UNIFORM, coefficient_problem(UNIFORM, merged(forms(INCLINES))))
+    found = best(UNIFORM, coefficient_problem(UNIFORM, merge_like(forms(INCLINES))))
     assert set(expected.coefficients) == {"restitution", "friction"}
     for name, u in expected.coefficients.items():
         assert u == pytest.approx(found[name][1], rel=0.2), name
@@ -103,7 +103,7 @@ def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
     protocol = replace(UNIFORM, plan=Plan((40.0,), 4))
     learned = analysis((40.0,), 4).joint.components
     found = foretold(protocol, learned)
-    problem = coefficient_problem(protocol, merged(forms((40.0,), 4)))
+    problem = coefficient_problem(protocol, merge_like(forms((40.0,), 4)))
     assert found.held == set(problem.held) == {"friction"}
     assert set(found.coefficients) == {"restitution"}
     (u,) = found.coefficients.values()
@@ -136,7 +136,7 @@ def predicted_speed_u(layout: tuple[float, ...]) -> float:
 def test_a_proposed_layout_is_better_as_predicted_and_in_fact():
     """Root mean square over sixteen drops: χ² of 16 stays within a factor 1.6 of its mean."""
     protocol = placed(SINGLE, list(BEFORE), repeats=16)
-    proposed = tuple(h for _, h in better(protocol, TRUE, Room(0.02, 0.8, 0.01, 0.002)))
+    proposed = tuple(h for _, h in better(protocol, TRUE, Room(0.02, 0.8, 0.01)))
     assert min(proposed) < 0.048
     before, after = (float(np.sqrt(np.mean(speed_errors(x) ** 2))) for x in (BEFORE, proposed))
     assert after < 0.7 * before
@@ -168,7 +168,7 @@ def test_trials_that_fail_name_the_side_and_a_gate():
 def test_proposals_respect_limits_and_are_never_worse():
     there = [0.06, 0.1, 0.35, 0.69]
     protocol = placed(SINGLE, there, repeats=4)
-    limits = Room(0.05, 0.7, 0.03, 0.002)
+    limits = Room(0.05, 0.7, 0.03)
     found = better(protocol, TRUE, limits)
     heights = sorted(height for _, height in found)
     assert limits.lowest <= heights[0]
