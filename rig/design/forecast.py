@@ -102,7 +102,7 @@ class Forecast:
         values = self.single[name].values()
         return math.sqrt(sum(u * u for u in values) / len(values))
 
-    def wanted(self) -> dict[str, float]:
+    def goals(self) -> dict[str, float]:
         """All that a layout is judged by."""
         return {name: self.typical(name) for name in self.single} | dict(self.coefficients)
 

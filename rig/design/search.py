@@ -195,7 +195,7 @@ def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
 def score(protocol: Protocol, layout: GateLayout) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
     goals = (*(row.name for row in averaged()), *COEFFICIENTS)
-    uncertainties = forecast(protocol, layout, goals, sure=True).wanted()
+    uncertainties = forecast(protocol, layout, goals, sure=True).goals()
     values = [math.log(uncertainties[name]) for name in goals if name in uncertainties]
     return sum(values) / len(values)
 

@@ -47,13 +47,13 @@ def by_model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
     names = [parameter.name for parameter in parameters]
 
     @cache
-    def computed(chain: Chain, incline_deg: float, values: tuple[float, ...]) -> AlphasAndSlopes:
+    def alphas_at(chain: Chain, incline_deg: float, values: tuple[float, ...]) -> AlphasAndSlopes:
         stated = dict(zip(names, values, strict=True))
         return alphas(surface, chain, incline_deg, stated, alpha_names.get(chain))
 
     return Hypothesis(
         tuple(parameters),
-        lambda form, values: computed(form.chain, form.run.incline_deg, tuple(values.tolist())),
+        lambda form, values: alphas_at(form.chain, form.run.incline_deg, tuple(values.tolist())),
     )
 
 

@@ -107,9 +107,6 @@ class HypothesisFit:
         n = self.names.index(name)
         return float(self.values[n]), float(np.sqrt(self.covariance[n, n]))
 
-    def __contains__(self, name: object) -> bool:
-        return name in self.names
-
 
 def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit:
     """Find the parameters at which the edges of all drops are most likely (Gauss–Newton).

@@ -82,13 +82,14 @@ class Impulses:
     gains: tuple[Gain, ...]
 
     @property
-    def resolved(self) -> int:
+    def resolved_rods(self) -> int:
         """How many rods are told from both their neighbours."""
         return sum(gain.first == gain.last for gain in self.gains)
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        record = self.condition.json() | attributes(self, "rods", "resolved", "alpha")
+        record: dict[str, Any] = {"rods": self.rods, "resolved": self.resolved_rods}
+        record = self.condition.json() | record | attributes(self, "alpha")
         return record | self.eq9.json() | {"groups": plain(self.gains)}
 
 
@@ -114,16 +115,16 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
 
 def resolution(impulses_by_case: Sequence[Impulses]) -> str:
     """Say whether each rod was resolved."""
-    if all(case.resolved == case.rods for case in impulses_by_case):
+    if all(case.resolved_rods == case.rods for case in impulses_by_case):
         return "The gates resolve the impulse of every rod at every incline."
-    counts = {(case.resolved, case.rods) for case in impulses_by_case}
+    counts = {(case.resolved_rods, case.rods) for case in impulses_by_case}
     if len(counts) == 1:
         ((resolved, rods),) = counts
         return f"{_TOGETHER} Resolved alone at every incline: {resolved} of {rods}."
     short = "; ".join(
-        f"{case.condition.incline_deg:g}°: {case.resolved} of {case.rods}"
+        f"{case.condition.incline_deg:g}°: {case.resolved_rods} of {case.rods}"
         for case in impulses_by_case
-        if case.resolved < case.rods
+        if case.resolved_rods < case.rods
     )
     return f"{_TOGETHER} Resolved alone at {short}."
 
@@ -151,7 +152,7 @@ def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
 def _gains(gains: Array, covariance: Array, model: Array) -> tuple[Gain, ...]:
     """Sum neighbours from the bottom until resolved; what is left joins the last group."""
 
-    def summed(first: int, last: int) -> Gain:
+    def group_of(first: int, last: int) -> Gain:
         part = slice(first, last + 1)
         u = float(np.sqrt(max(0.0, float(covariance[part, part].sum()))))
         return Gain(first, last, Measured(float(gains[part].sum()), u), float(model[part].sum()))
@@ -159,10 +160,10 @@ def _gains(gains: Array, covariance: Array, model: Array) -> tuple[Gain, ...]:
     groups: list[Gain] = []
     first = 0
     for last in range(model.size):
-        group = summed(first, last)
+        group = group_of(first, last)
         if group.measured.expanded <= RESOLVED * np.abs(model[first : last + 1]).sum():
             groups.append(group)
             first = last + 1
     if first < model.size:
-        groups.append(summed(groups.pop().first if groups else first, model.size - 1))
+        groups.append(group_of(groups.pop().first if groups else first, model.size - 1))
     return tuple(groups)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rig.protocol.contact import lacking_geometry
+from rig.protocol.fields import DEFAULTS
 from rig.protocol.gates import check_clear, check_sides
-from rig.protocol.keys import DEFAULTS
 from rig.protocol.yamltree import Sequence
 
 if TYPE_CHECKING:

@@ -87,7 +87,7 @@ class Section:
             return value
         if key.required:
             self.need(name)
-        return keys.DEFAULTS[key.path]
+        return DEFAULTS[key.path]
 
     def is_sound(self, *names: str) -> bool:
         """Whether nothing is faulty or missing: of these keys, or of all."""
@@ -190,7 +190,7 @@ def read_value(
             for kind in kinds:
                 if (isinstance(kind, keys.ListOf), kind is keys.Plain.MAPPED) == shape:
                     value = read_value(kind, node, path, table_path, faults)
-                    return accepted.listed(kind, value)
+                    return accepted.as_list(kind, value)
         case keys.Plain.MAPPED, Mapping():
             return Section(node, path, table_path, faults) if table_path in keys.SECTIONS else node
         case keys.ListOf(each), Sequence(items=[_, *_] as items):
@@ -258,3 +258,15 @@ def _form(accepted: keys.Accepted) -> str:
         case keys.Either(kinds):
             return "; or ".join(map(_form, kinds))
     return str(accepted)
+
+
+def _read_default(key: keys.Key) -> Any:
+    """Return the default of a key as if it stood in a file; `None` where there is none."""
+    if not key.default or key.in_words:
+        return None
+    node = ScalarNode(key.default, plain=True, place=Place(1, 1))
+    return read_value(key.accepted, node, key.path, key.path, FieldFaults("keys.txt"))
+
+
+DEFAULTS: dict[str, Any] = {path: _read_default(key) for path, key in keys.KEYS.items()}
+"""Each key that is left out, by its path, in base units; `None` where it then is not there."""

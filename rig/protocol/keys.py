@@ -13,7 +13,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rig.units import Dimension, Quantity, format_quantity, parse
+from rig.units import Dimension, Quantity, format_quantity
 
 ANY = "*"
 """Stands in a path for names that the file chooses: of chains."""
@@ -79,7 +79,7 @@ class Either(NamedTuple):
     def __str__(self) -> str:
         return "; or ".join(map(str, self.kinds))
 
-    def listed(self, kind: Accepted, value: Any) -> Any:
+    def as_list(self, kind: Accepted, value: Any) -> Any:
         """Return a value of one of these kinds; alone where a list may stand, it is one of one."""
         return (value,) if ListOf(kind) in self.kinds and value is not None else value
 
@@ -200,25 +200,6 @@ def range_of(path: str) -> Range:
     accepted = accepted.kinds[0] if isinstance(accepted, Either) else accepted
     assert isinstance(accepted, Range)
     return accepted
-
-
-def _default(accepted: Accepted, text: str) -> Any:
-    match accepted:
-        case Range(dimension, exact=exact):
-            quantity = parse(text, dimension)
-            return quantity.value if exact else quantity
-        case Either((first, *_)):
-            return accepted.listed(first, _default(first, text))
-        case Whole():
-            return int(text)
-    return BOOLEANS.get(text, text)
-
-
-DEFAULTS: dict[str, Any] = {
-    path: _default(key.accepted, key.default) if key.default and not key.in_words else None
-    for path, key in KEYS.items()
-}
-"""Each key that is left out, by its path, in base units; `None` where it then is not there."""
 
 
 _BRACKETS = (("", "{", "}"), (f".{EACH}", "[{", "}]"), (f".{ANY}", "{A: {", ", …}}"))

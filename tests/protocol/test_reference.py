@@ -83,7 +83,7 @@ def test_a_row_of_the_table_is_all_that_a_key_needs(monkeypatch):
     delay = keys.Key("release.delay", keys.range_of("plan.settle"), "2 s", "of the pulse", "5 s")
     monkeypatch.setattr(keys, "KEYS", KEYS | {delay.path: delay})
     monkeypatch.setitem(keys.SECTIONS["release"], "delay", delay)
-    monkeypatch.setitem(keys.DEFAULTS, delay.path, 2.0)
+    monkeypatch.setitem(fields.DEFAULTS, delay.path, 2.0)
 
     def release(written: str):
         faults = fields.FieldFaults("f")
