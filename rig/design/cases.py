@@ -68,8 +68,8 @@ class Case:
         A run of this kind, and how many the plan has.
     own, struck
         Number of unknowns of the drop alone, α left out, and of α: 1 where something is struck.
-    here
-        Place of each of the others in the session's vector, beams left out.
+    here, shared
+        Place of each of the others in the session's vector, beams left out; and its length.
     by_chance
         Of a drop's own unknowns those that differ from run to run: single impulses, hanging height.
     gradients
@@ -83,6 +83,7 @@ class Case:
     own: int
     struck: int
     here: Index
+    shared: int
     by_chance: Index
     gradients: dict[str, Array]
     blocks: tuple[Block, ...]
@@ -91,22 +92,6 @@ class Case:
     def core(self) -> int:
         """Number of unknowns that are no beam's."""
         return self.own + self.here.size + self.struck
-
-
-@dataclass(frozen=True, slots=True)
-class Cases:
-    """All kinds of drop of a plan.
-
-    Attributes
-    ----------
-    cases
-        In order of incline.
-    shared
-        Number of unknowns that all drops have in common, beams left out.
-    """
-
-    cases: tuple[Case, ...]
-    shared: int
 
 
 def beams_of(protocol: Protocol) -> list[tuple[Role, float]]:
@@ -133,8 +118,8 @@ def cases(
     beams: Sequence[tuple[Role, float]],
     components: Components,
     inclines: Sequence[float] | None = None,
-) -> Cases:
-    """Work out what beams at these heights say of every kind of drop.
+) -> tuple[Case, ...]:
+    """Work out what beams at these heights say of every kind of drop, in order of incline.
 
     Parameters
     ----------
@@ -160,11 +145,10 @@ def cases(
     places = np.full(len(shared), -1)
     others = np.setdiff1d(np.arange(len(shared)), _places(shared.blocks, *_BEAMS))
     places[others] = np.arange(others.size)
-    collected = (
+    return tuple(
         _case(group, model, x, shared, places)
         for group, (model, x) in zip(alike, models, strict=True)
     )
-    return Cases(tuple(collected), others.size)
 
 
 def _places(blocks: Mapping[str, slice], *names: str) -> Index:
@@ -277,6 +261,7 @@ def _case(
         own.size,
         alpha.size,
         here,
+        int(places.max(initial=-1)) + 1,
         place[_places(at.blocks, *_CHANCE)],
         {name: (measurand.slopes * sd)[order] for name, measurand in measurands(model, x).items()},
         tuple(blocks.get(n, _BLIND) for n in range(at[_BEAMS[0]].stop - at[_BEAMS[0]].start)),

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.analysis.square_root import triangle
 from rig.analysis.summary import by_case
-from rig.design.cases import BEAM, Block, Case, Cases
+from rig.design.cases import BEAM, Block, Case
 from rig.estimate.coefficients import KNOWN, held_back, stated_coefficients
 from rig.estimate.hypotheses import alphas, given_alphas
 from rig.threads import one_thread
@@ -43,18 +43,18 @@ class GateLayout:
         `BEAM` a beam.
     """
 
-    cases: Cases
+    cases: tuple[Case, ...]
     beams: int
     rows: tuple[Array, ...]
 
     @classmethod
-    def of(cls, cases: Cases, beams: Sequence[int]) -> GateLayout:
+    def of(cls, cases: tuple[Case, ...], beams: Sequence[int]) -> GateLayout:
         """Choose beams by their numbers."""
-        return cls(cases, 0, tuple(np.zeros((0, case.core)) for case in cases.cases)).plus(*beams)
+        return cls(cases, 0, tuple(np.zeros((0, case.core)) for case in cases)).plus(*beams)
 
     def plus(self, *beams: int) -> GateLayout:
         """Return the layout with more beams."""
-        pairs = zip(self.cases.cases, self.rows, strict=True)
+        pairs = zip(self.cases, self.rows, strict=True)
         rows = tuple(_stack(rows, [case.blocks[beam] for beam in beams]) for case, rows in pairs)
         return GateLayout(self.cases, self.beams + len(beams), rows)
 
@@ -126,11 +126,8 @@ def forecast(
     sure
         Whether also coefficients are kept that the edges hardly tell.
     """
-    size = layout.cases.shared + BEAM * layout.beams
-    drops = [
-        _Drop.of(case, rows, layout.cases.shared)
-        for case, rows in zip(layout.cases.cases, layout.rows, strict=True)
-    ]
+    size = layout.cases[0].shared + BEAM * layout.beams
+    drops = list(map(_Drop.of, layout.cases, layout.rows))
     stated: dict[str, Quantity] = {}
     tied: list[_Drop] = []
     rest: list[_Drop] = []
@@ -193,7 +190,7 @@ class _Drop:
     rest: Array
 
     @classmethod
-    def of(cls, case: Case, rows: Array, shared: int) -> _Drop:
+    def of(cls, case: Case, rows: Array) -> _Drop:
         """Eliminate a drop's own unknowns, and α as far as its prior goes."""
         own, size = case.own, rows.shape[1]
         # A last row of zeros: α has a row also where there is no edge.
@@ -205,7 +202,7 @@ class _Drop:
             root[own, own] = math.hypot(1.0, alpha[0])
             of_others[own] *= alpha[0] / root[own, own]
         inverse = np.linalg.inv(root).astype(np.float64, copy=False)
-        place = np.append(case.here, np.arange(shared, shared + size - case.core))
+        place = np.append(case.here, case.shared + np.arange(size - case.core))
         rest = stack[own + case.struck :, own + case.struck :]
         return cls(case, place, inverse, of_others, alpha, rest)
 
