@@ -39,7 +39,7 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
     rods = tuple(filter(None, chains.values()))
     rods = rods if len(rods) == count else ()
     if struck or {"gravity", "site"} <= top.keys.keys():  # without a surface it is measured
-        top.choose("gravity", "site")
+        top.need("gravity", "site")
     if struck or "gates" in top:
         top.need("drop")
     if not struck and count > 1:
@@ -66,7 +66,7 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
 
 def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
     """Note drag stated twice or not at all, and rods too little known for a coefficient."""
-    stated = drag.choose("coefficient", "terminal_speed")
+    stated = drag.need("coefficient", "terminal_speed")
     if stated == "terminal_speed" and "air_density" in drag:
         message = "not used with terminal_speed; leave air_density out"
         drag.fault("air_density", message, at_key=True)

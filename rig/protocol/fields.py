@@ -93,26 +93,21 @@ class Section:
         """Whether nothing is faulty or missing: of these keys, or of all."""
         return self._faulty.isdisjoint(names) if names else not self._faulty
 
-    def need(self, name: str) -> None:
-        """Note a key that is missing."""
-        if name not in self.nodes:
-            self._faulty.add(name)
-            if not self.lenient:
-                message = f"missing; write for example {name}: {keys.example(self._table[name])}"
-                self.faults.add(self.node.place, self.key(name), message)
-
-    def choose(self, *names: str) -> str | None:
+    def need(self, *names: str) -> str | None:
         """Return which of some keys is there: there must be one of them, and no more."""
         first, *others = sorted(self.keys.keys() & set(names), key=self.keys.__getitem__) or ("",)
         for other in others:
             message = f"{first} is also given, on line {self.keys[first].line}; keep one of them"
             self.fault(other, message, at_key=True)
+        if first:
+            return None if others else first
+        self._faulty.update(names)
         # What seems to be missing may be a key that is spelt wrongly.
-        if not first and not any(did_you_mean(name, names) for name in self._unknown):
+        if not self.lenient and not any(did_you_mean(name, names) for name in self._unknown):
             examples = (f"{name}: {keys.example(self._table[name])}" for name in names)
-            message = f"missing; write {', or '.join(examples)}"
+            message = f"missing; write for example {', or '.join(examples)}"
             self.faults.add(self.node.place, self.key(names[0]), message)
-        return None if others else first or None
+        return None
 
     def key(self, name: str) -> str:
         """Return the full path of one of its keys."""

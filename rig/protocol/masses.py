@@ -33,7 +33,7 @@ def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses | None:
         return masses if len(masses) == rods and chain.is_sound("masses") else None
     if masses is None:
         return None
-    profile = masses.choose("exponential", "table")
+    profile = masses.need("exponential", "table")
     if profile is None:
         return None
     if not masses.is_sound():

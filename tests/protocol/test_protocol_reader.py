@@ -103,7 +103,7 @@ def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
         ("restitution: 0.50 ± 0.05", "", "f:6:10: surface.restitution: missing"),
         ("drop: 180 mm ± 2 mm\n", "", "f:1:1: drop: missing"),
         ("drop: 180", "drop:\t180", "f:7:6: a tab; use blanks"),
-        ("gravity: 9.81 m/s^2\n", "", "f:1:1: gravity: missing; write gravity:"),
+        ("gravity: 9.81 m/s^2\n", "", "f:1:1: gravity: missing; write for example gravity:"),
         ("gravity:", "site: {latitude: 45 deg, height: 0 m}\ngravity:",
          "f:9:1: gravity: site is also given, on line 8"),
         ("  free: [{channel: 8, height: 20 mm}]\n", "", "f:10:3: gates.free: missing"),
