@@ -17,10 +17,12 @@ from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.quadratic_forms import merge_like
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Gates, Plan, Protocol
+from rig.protocol.reader import parse
 from rig.vocabulary import OBJECT, TWO_CHAINS
 from sim.dials import Dials
 from tests.analysis.drops import SINGLE, UNIFORM, Case, case
 from tests.analysis.sessions import analysis as analyzed
+from tests.analysis.test_datum_board import from_board, raised
 from tests.estimate.sessions import DIALS, analysis, forms
 
 INCLINES = (30.0, 50.0, 70.0)
@@ -105,9 +107,8 @@ def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
     found = foretold(protocol, learned)
     problem = coefficient_problem(protocol, merge_like(forms((40.0,), 4)))
     assert found.held == set(problem.held) == {"friction"}
-    assert set(found.coefficients) == {"restitution"}
-    (u,) = found.coefficients.values()
-    assert u == pytest.approx(best(protocol, problem)["restitution"][1], rel=0.2)
+    u = pytest.approx(best(protocol, problem)["restitution"][1], rel=0.2)
+    assert found.coefficients == {"restitution": u}
 
 
 BEFORE = (0.06, 0.07, 0.1, 0.13, 0.16, 0.204, 0.35, 0.69)
@@ -150,10 +151,10 @@ LOW = [("impact", h) for h in (0.02, 0.044, 0.056, 0.084)]
 def test_low_beams_alone_are_read_too():
     """No beam sees the chain before it strikes: what rods pass is enough to tell the fall."""
     assert readable(SINGLE, LOW)
-    assert readable(SINGLE, beams_of(SINGLE))
-    assert readable(UNIFORM, beams_of(UNIFORM))
-    found = trials(with_beams(SINGLE, LOW), 6)
-    assert (found.drops, found.read) == (6, 6)
+    # Counted from the board, rods touch higher where it is steep.
+    steep = parse(from_board(raised(UNIFORM.text, 25.0)).replace("10 deg, 40 deg, 50", "60"))
+    assert readable(steep, beams_of(steep))
+    assert trials(with_beams(SINGLE, LOW), 6) == Trials(6, 6)
 
 
 def test_trials_that_fail_name_the_side_and_a_gate():
