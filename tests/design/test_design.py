@@ -103,8 +103,7 @@ def test_more_runs_tell_more_but_not_of_what_is_common():
 def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
     """As `rig estimate` has it of such a session."""
     protocol = replace(UNIFORM, plan=Plan((40.0,), 4))
-    learned = analysis((40.0,), 4).joint.components
-    found = foretold(protocol, learned)
+    found = foretold(protocol, analysis((40.0,), 4).joint.components)
     problem = coefficient_problem(protocol, merge_like(forms((40.0,), 4)))
     assert found.held == set(problem.held) == {"friction"}
     u = pytest.approx(best(protocol, problem)["restitution"][1], rel=0.2)

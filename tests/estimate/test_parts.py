@@ -32,14 +32,14 @@ def test_a_little_air_by_the_exact_fall_of_a_struck_chain():
 
 
 def test_rods_that_are_not_resolved_are_taken_with_their_neighbours():
-    sizes, sure, unsure = np.ones(5), 0.1**2, 1.0
-    middle = np.diag([sure, unsure, unsure, sure, sure])
-    middle[1, 2] = middle[2, 1] = -unsure + sure
+    sizes, sure = np.ones(5), 0.01  # beside u = 1
+    middle = np.diag([sure, 1.0, 1.0, sure, sure])
+    middle[1, 2] = middle[2, 1] = sure - 1.0
     for covariance, groups in (
         (middle, [(0, 0), (1, 2), (3, 3), (4, 4)]),  # known by their sum alone
         # What is left over at the end joins the last group; if nothing is known, all are one.
-        (np.diag([sure, sure, sure, sure, unsure]), [(0, 0), (1, 1), (2, 2), (3, 4)]),
-        (unsure * np.eye(5), [(0, 4)]),
+        (np.diag([sure] * 4 + [1.0]), [(0, 0), (1, 1), (2, 2), (3, 4)]),
+        (np.eye(5), [(0, 4)]),
     ):
         gains = _gains(sizes, covariance, sizes)
         assert [(gain.first, gain.last) for gain in gains] == groups
