@@ -82,13 +82,13 @@ class Impulses:
     gains: tuple[Gain, ...]
 
     @property
-    def resolved_rods(self) -> int:
+    def resolved(self) -> int:
         """How many rods are told from both their neighbours."""
         return sum(gain.first == gain.last for gain in self.gains)
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        record: dict[str, Any] = {"rods": self.rods, "resolved": self.resolved_rods}
+        record: dict[str, Any] = {"rods": self.rods, "resolved": self.resolved}
         record = self.condition.json() | record | attributes(self, "alpha")
         return record | self.eq9.json() | {"groups": plain(self.gains)}
 
@@ -115,16 +115,16 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
 
 def resolution(impulses_by_case: Sequence[Impulses]) -> str:
     """Say whether each rod was resolved."""
-    if all(case.resolved_rods == case.rods for case in impulses_by_case):
+    if all(case.resolved == case.rods for case in impulses_by_case):
         return "The gates resolve the impulse of every rod at every incline."
-    counts = {(case.resolved_rods, case.rods) for case in impulses_by_case}
+    counts = {(case.resolved, case.rods) for case in impulses_by_case}
     if len(counts) == 1:
         ((resolved, rods),) = counts
         return f"{_TOGETHER} Resolved alone at every incline: {resolved} of {rods}."
     short = "; ".join(
-        f"{case.condition.incline_deg:g}°: {case.resolved_rods} of {case.rods}"
+        f"{case.condition.incline_deg:g}°: {case.resolved} of {case.rods}"
         for case in impulses_by_case
-        if case.resolved_rods < case.rods
+        if case.resolved < case.rods
     )
     return f"{_TOGETHER} Resolved alone at {short}."
 
