@@ -285,7 +285,7 @@ def _blocks(
     collected = {}
     for train in record.trains:
         own = [where[at[name].start + train.gate] for name in _BEAMS if name in at]
-        chosen = slopes[gate == train.gate][:, np.append(columns, own)]
+        chosen = slopes[gate == train.gate][:, [*columns, *own]]
         part = np.zeros((chosen.shape[0], columns.size + BEAM))
         part[:, : chosen.shape[1]] = chosen
         collected[train.gate] = Block(place[rows.columns[columns]], part)
