@@ -158,4 +158,6 @@ def _even(protocol: Protocol, number: int) -> list[float]:
     clear = max(body.widths) / 2.0 + max(_CLEAR, drop.u)
     first = drop.value - max(clear + _CLEAR, _FIRST * drop.value)
     last = _LAST * drop.value
-    return [last + (first - last) * n / max(1, number - 1) for n in range(number)]
+    if number == 1:
+        return [last]
+    return [first + (last - first) * n / (number - 1) for n in range(number)]
