@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -24,7 +23,7 @@ from rig.records import Drop
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -69,8 +68,8 @@ class Case:
         A run of this kind, and how many the plan has.
     own, struck
         Number of unknowns of the drop alone, α left out, and of α: 1 where something is struck.
-    here
-        Place of each of the others in the session's vector, beams left out.
+    here, shared
+        Place of each of the others in the session's vector, beams left out; and its length.
     by_chance
         Of a drop's own unknowns those that differ from run to run: single impulses, hanging height.
     gradients
@@ -84,6 +83,7 @@ class Case:
     own: int
     struck: int
     here: Index
+    shared: int
     by_chance: Index
     gradients: dict[str, Array]
     blocks: tuple[Block, ...]
@@ -92,22 +92,6 @@ class Case:
     def core(self) -> int:
         """Number of unknowns that are no beam's."""
         return self.own + self.here.size + self.struck
-
-
-@dataclass(frozen=True, slots=True)
-class Cases:
-    """All kinds of drop of a plan.
-
-    Attributes
-    ----------
-    cases
-        In order of incline.
-    shared
-        Number of unknowns that all drops have in common, beams left out.
-    """
-
-    cases: tuple[Case, ...]
-    shared: int
 
 
 def beams_of(protocol: Protocol) -> list[tuple[Role, float]]:
@@ -134,8 +118,8 @@ def cases(
     beams: Sequence[tuple[Role, float]],
     components: Components,
     inclines: Sequence[float] | None = None,
-) -> Cases:
-    """Work out what beams at these heights say of every kind of drop.
+) -> tuple[Case, ...]:
+    """Work out what beams at these heights say of every kind of drop, in order of incline.
 
     Parameters
     ----------
@@ -151,22 +135,26 @@ def cases(
     """
     protocol = with_beams(protocol, beams)
     planned = [run for run in runs(protocol) if inclines is None or run.incline_deg in inclines]
-    kinds = Counter((run.incline_deg, run.impact, run.free) for run in planned)
-    first = {(run.incline_deg, run.impact, run.free): run for run in reversed(planned)}
-    models = {kind: _model(protocol, first[kind], components) for kind in sorted(kinds, key=str)}
-    shared = SharedUnknowns(model for model, _ in models.values())
-    shared_kept = np.ones(len(shared), dtype=np.bool_)
-    for name in _BEAMS:
-        if name in shared.blocks:
-            shared_kept[shared.blocks[name]] = False
+    kinds: dict[tuple[object, ...], list[Run]] = {}
+    for run in planned:
+        kinds.setdefault((run.incline_deg, run.impact, run.free), []).append(run)
+    alike = sorted(kinds.values(), key=lambda group: (group[0].incline_deg, str(group[0].impact)))
+    models = [_model(protocol, group[0], components) for group in alike]
+    shared = SharedUnknowns(model for model, _ in models)
     # Beams are left out here and added by each layout: the rest is worked out once for all.
-    number = np.cumsum(shared_kept) - 1
-    collected = [
-        _case(first[kind], kinds[kind], model, x, shared, shared_kept, number)
-        for kind, (model, x) in models.items()
-    ]
-    collected.sort(key=lambda case: case.run.incline_deg)
-    return Cases(tuple(collected), int(shared_kept.sum()))
+    places = np.full(len(shared), -1)
+    others = np.setdiff1d(np.arange(len(shared)), _places(shared.blocks, *_BEAMS))
+    places[others] = np.arange(others.size)
+    return tuple(
+        _case(group, model, x, shared, places)
+        for group, (model, x) in zip(alike, models, strict=True)
+    )
+
+
+def _places(blocks: Mapping[str, slice], *names: str) -> Index:
+    """Return the places of the unknowns whose block's name ends so."""
+    every = [np.arange(at.start, at.stop) for name, at in blocks.items() if name.endswith(names)]
+    return np.concatenate([np.zeros(0, dtype=np.intp), *every])
 
 
 def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[ChainRecord, Array]]:
@@ -188,7 +176,7 @@ def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[Chai
         alphas = model_alphas(protocol, record, run)
         path = trajectory(protocol, record, RELEASE_S, protocol.drop.value - lower, alphas)
         trains = tuple(
-            observed(train, path.times(train.levels), train.blocks) for train in record.trains
+            with_edges(train, path.times(train.levels), train.blocks) for train in record.trains
         )
         collected.append((replace(record, trains=trains), alphas))
     return collected
@@ -244,45 +232,37 @@ def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropMo
     return model, x
 
 
-def observed(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> EdgeTrain:
+def with_edges(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> EdgeTrain:
     """Return the train of a beam that saw these edges and no flicker."""
     number = np.arange(times.size)
     return replace(train, times=times, blocked=blocked, burst=0.0 * times, edge=number)
 
 
 def _case(
-    run: Run,
-    count: int,
-    model: DropModel,
-    x: Array,
-    shared: SharedUnknowns,
-    shared_kept: NDArray[np.bool_],
-    number: Index,
+    alike: Sequence[Run], model: DropModel, x: Array, shared: SharedUnknowns, places: Index
 ) -> Case:
+    """Work out one kind of drop; `places` are those of shared unknowns without beams, else −1."""
     at, sd = model.unknowns, model.unknowns.sd
-    common_places, shared_places = shared.places(model)
-    beam = np.zeros(len(at), dtype=np.bool_)
-    for name in _BEAMS:
-        if name in at:
-            beam[at[name]] = True
-    alpha = np.arange(at["alpha"].start, at["alpha"].stop) if "alpha" in at else np.zeros(0, int)
+    common, shared_places = shared.places(model)
+    here = places[shared_places]
+    common, here = common[here >= 0], here[here >= 0]
+    alpha, beams = _places(at.blocks, "alpha"), _places(at.blocks, *_BEAMS)
     # Own first, then α, then common, as `Case` has them: eliminated from the front.
-    common = common_places[shared_kept[shared_places]]
-    own = np.setdiff1d(np.flatnonzero(~beam), np.append(common, alpha))
+    own = np.setdiff1d(np.arange(len(at)), np.concatenate([common, alpha, beams]))
     order = np.concatenate([own, alpha, common])
     place = np.full(len(at), -1)
     place[order] = np.arange(order.size)
     blocks: dict[int, Block] = {}
     for role, record in model.records.items():
         blocks |= _blocks(model, record, role, x, place)
-    chance = [place[at[name]] for name in at.blocks if name.endswith(_CHANCE)]
     return Case(
-        run,
-        count,
+        alike[0],
+        len(alike),
         own.size,
         alpha.size,
-        number[shared_places[shared_kept[shared_places]]],
-        np.concatenate(chance),
+        here,
+        int(places.max(initial=-1)) + 1,
+        place[_places(at.blocks, *_CHANCE)],
         {name: (measurand.slopes * sd)[order] for name, measurand in measurands(model, x).items()},
         tuple(blocks.get(n, _BLIND) for n in range(at[_BEAMS[0]].stop - at[_BEAMS[0]].start)),
     )
@@ -305,9 +285,8 @@ def _blocks(
     collected = {}
     for train in record.trains:
         own = [where[at[name].start + train.gate] for name in _BEAMS if name in at]
-        rows_of_beam = slopes[gate == train.gate]
-        part = np.zeros((rows_of_beam.shape[0], columns.size + BEAM))
-        part[:, : columns.size] = rows_of_beam[:, columns]
-        part[:, columns.size : columns.size + len(own)] = rows_of_beam[:, own]
+        chosen = slopes[gate == train.gate][:, [*columns, *own]]
+        part = np.zeros((chosen.shape[0], columns.size + BEAM))
+        part[:, : chosen.shape[1]] = chosen
         collected[train.gate] = Block(place[rows.columns[columns]], part)
     return collected

@@ -10,9 +10,9 @@ import numpy as np
 
 from rig.analysis.square_root import triangle
 from rig.analysis.summary import by_case
-from rig.design.cases import BEAM, Block, Case, Cases
-from rig.estimate.coefficients import KNOWN, described, given_alphas, held_back
-from rig.estimate.hypotheses import alphas
+from rig.design.cases import BEAM, Block, Case
+from rig.estimate.coefficients import KNOWN, held_back, stated_coefficients
+from rig.estimate.hypotheses import alphas, given_alphas
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -43,18 +43,18 @@ class GateLayout:
         `BEAM` a beam.
     """
 
-    cases: Cases
+    cases: tuple[Case, ...]
     beams: int
     rows: tuple[Array, ...]
 
     @classmethod
-    def of(cls, cases: Cases, beams: Sequence[int]) -> GateLayout:
+    def of(cls, cases: tuple[Case, ...], beams: Sequence[int]) -> GateLayout:
         """Choose beams by their numbers."""
-        return cls(cases, 0, tuple(np.zeros((0, case.core)) for case in cases.cases)).plus(*beams)
+        return cls(cases, 0, tuple(np.zeros((0, case.core)) for case in cases)).plus(*beams)
 
     def plus(self, *beams: int) -> GateLayout:
         """Return the layout with more beams."""
-        pairs = zip(self.cases.cases, self.rows, strict=True)
+        pairs = zip(self.cases, self.rows, strict=True)
         rows = tuple(_stack(rows, [case.blocks[beam] for beam in beams]) for case, rows in pairs)
         return GateLayout(self.cases, self.beams + len(beams), rows)
 
@@ -102,7 +102,7 @@ class Forecast:
         values = self.single[name].values()
         return math.sqrt(sum(u * u for u in values) / len(values))
 
-    def wanted(self) -> dict[str, float]:
+    def goals(self) -> dict[str, float]:
         """All that a layout is judged by."""
         return {name: self.typical(name) for name in self.single} | dict(self.coefficients)
 
@@ -126,17 +126,21 @@ def forecast(
     sure
         Whether also coefficients are kept that the edges hardly tell.
     """
-    size = layout.cases.shared + BEAM * layout.beams
-    drops = [
-        _Drop.of(case, rows, layout.cases.shared)
-        for case, rows in zip(layout.cases.cases, layout.rows, strict=True)
-    ]
-    in_model, stated = _describe(protocol, drops)
+    size = layout.cases[0].shared + BEAM * layout.beams
+    drops = list(map(_Drop.of, layout.cases, layout.rows))
+    stated: dict[str, Quantity] = {}
+    tied: list[_Drop] = []
+    rest: list[_Drop] = []
+    for drop in drops:
+        depends_on: dict[str, Quantity] = {}
+        if drop.case.struck:
+            depends_on, _ = stated_coefficients(protocol, *_impact(protocol, drop.case))
+        stated |= depends_on
+        (tied if depends_on else rest).append(drop)
     # What needs no α of a drop is common to coefficients and measurands.
-    tied = [drop for drop, fits in zip(drops, in_model, strict=True) if fits]
     root = _session([drop.given_alpha() for drop in tied], np.eye(size))
-    rest = [drop.given_alpha() for drop, fits in zip(drops, in_model, strict=True) if not fits]
-    session_root = _session([*rest, *(drop.own_alpha() for drop in drops)], root)
+    observations = [*map(_Drop.given_alpha, rest), *map(_Drop.own_alpha, drops)]
+    session_root = _session(observations, root)
     # Once a layout, then asked by every measurand and incline.
     inverse = np.linalg.inv(session_root)
     single: dict[str, dict[Condition, float]] = {}
@@ -186,7 +190,7 @@ class _Drop:
     rest: Array
 
     @classmethod
-    def of(cls, case: Case, rows: Array, shared: int) -> _Drop:
+    def of(cls, case: Case, rows: Array) -> _Drop:
         """Eliminate a drop's own unknowns, and α as far as its prior goes."""
         own, size = case.own, rows.shape[1]
         # A last row of zeros: α has a row also where there is no edge.
@@ -198,7 +202,7 @@ class _Drop:
             root[own, own] = math.hypot(1.0, alpha[0])
             of_others[own] *= alpha[0] / root[own, own]
         inverse = np.linalg.inv(root).astype(np.float64, copy=False)
-        place = np.append(case.here, np.arange(shared, shared + size - case.core))
+        place = np.append(case.here, case.shared + np.arange(size - case.core))
         rest = stack[own + case.struck :, own + case.struck :]
         return cls(case, place, inverse, of_others, alpha, rest)
 
@@ -237,14 +241,6 @@ def _session(observations: Sequence[tuple[Array, Index]], root: Array) -> Array:
         stack[begin:end, columns] = rows
     stack[end:] = root
     return triangle(stack)
-
-
-def _describe(protocol: Protocol, drops: Sequence[_Drop]) -> tuple[list[bool], dict[str, Quantity]]:
-    """Return which drops the model describes, and what is stated of its coefficients."""
-    if protocol.surface is None:
-        return [False] * len(drops), {}
-    in_model, stated, _ = described(protocol, [_impact(protocol, drop.case) for drop in drops])
-    return in_model, stated
 
 
 def _impact(protocol: Protocol, case: Case) -> tuple[Chain, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from rig.design.cases import beams_of
 from rig.errors import InputError
 from rig.protocol.protocol import SIDES, Protocol, Side
 from rig.protocol.reader import parse
@@ -36,9 +37,9 @@ def with_heights(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> str
     changes: list[tuple[int, int, float]] = []
     for side in SIDES:
         own = protocol.gates.on(side)
-        order = sorted(range(len(own)), key=lambda n, own=own: own[n].height)  # type: ignore[misc]
+        order = sorted((gate.height, n) for n, gate in enumerate(own))
         heights = sorted(height for where, height in beams if where == side)
-        for n, height in zip(order, heights, strict=True):
+        for (_, n), height in zip(order, heights, strict=True):
             place = place_of(root, "gates", side, n, "height")
             changes.append((place.line - 1, place.column - 1, height))
     for line, column, height in sorted(changes, reverse=True):  # from behind: places stay true
@@ -47,9 +48,7 @@ def with_heights(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> str
         if value is not None:
             lines[line] = f"{text[:column]}{height * 1e3:.1f} mm{text[value.end() :]}"
     text = "".join(lines)
-    gates = parse(text, protocol.source).gates
-    assert gates is not None
-    written = sorted((gate.side, gate.height) for gate in gates.gates)
+    written = sorted(beams_of(parse(text, protocol.source)))
     if any(
         side != wanted_side or abs(height - meant) > _ROUNDED
         for (side, height), (wanted_side, meant) in zip(written, sorted(beams), strict=True)

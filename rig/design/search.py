@@ -6,29 +6,27 @@ Beams that tell most must also be read: a layout whose edges could be given to w
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import Components, stated
-from rig.analysis.identify import identify
 from rig.analysis.verdict import LEAD
-from rig.design.cases import CLOCK_U, cases, perfect, with_beams
+from rig.design.cases import beams_of, cases, perfect, with_beams
 from rig.design.forecast import GateLayout, forecast
-from rig.design.trials import misread
+from rig.design.trials import read_drop
 from rig.measurands import averaged
+from rig.protocol.contact import at_contact
+from rig.protocol.gates import blocking_rod, hanging_rods
 from rig.protocol.plan import runs
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from rig.analysis.components import Components
     from rig.protocol.protocol import Protocol, Side
-
-    Index = NDArray[np.intp]
 
 COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""
@@ -38,6 +36,7 @@ MARGIN = 2.0 * LEAD
 """Log odds that perfect edges must have: real ones are missed, and flicker."""
 _OFF = 2.0  # standard uncertainties that the drop may be off
 _GRID_M = 4e-3  # between candidates
+_ROUNDING_M = 1e-9
 _COARSE = 5  # every so many of them are tried first, then those about the best
 _SWEEPS = 4
 _BEFORE = 2  # beams of a side above the chain's lower end that stay there
@@ -54,42 +53,30 @@ class Room:
         Limits of height.
     spacing
         Least distance of two beams of one side.
-    clearance
-        Least distance of a beam from a rod of a chain that hangs.
     """
 
     lowest: float
     highest: float
     spacing: float
-    clearance: float
 
 
 def room(protocol: Protocol, lowest: float | None, highest: float | None, spacing: float) -> Room:
     """Take limits as they are given, else from the gates that are there and the chains."""
-    assert protocol.gates is not None
-    heights = [gate.height for gate in protocol.gates.gates]
+    heights = [height for _, height in beams_of(protocol)]
     top = min(protocol.drop.value + rods.chain.length for rods in protocol.chains.values())
     return Room(
         min(heights) if lowest is None else lowest,
         min(top, max(heights)) if highest is None else min(top, highest),
         spacing,
-        max(1e-3, protocol.drop.u),
     )
 
 
 def candidates(protocol: Protocol, limits: Room) -> list[float]:
     """Heights on a grid at which no hanging rod blocks a beam."""
-    hanging = np.array(
-        [
-            (protocol.drop.value + height, width / 2.0 + limits.clearance)
-            for rods in protocol.chains.values()
-            for height, width in zip(rods.chain.heights, rods.widths, strict=True)
-        ]
-    )
+    rods = hanging_rods(protocol.chains.values(), protocol.drop)
     n = math.floor((limits.highest - limits.lowest) / _GRID_M + 1e-9)
-    grid = limits.lowest + _GRID_M * np.arange(n + 1)
-    clear = (np.abs(grid[:, None] - hanging[:, 0]) >= hanging[:, 1]).all(axis=1)
-    return [round(float(height), 4) for height in grid[clear]]
+    grid = (limits.lowest + _GRID_M * np.arange(n + 1)).tolist()
+    return [round(height, 4) for height in grid if blocking_rod(rods, height) is None]
 
 
 @one_thread
@@ -119,27 +106,26 @@ def better(
     list
         Side and height of each beam, in the protocol's order.
     """
-    assert protocol.gates is not None
-    gates = protocol.gates.gates
+    present = beams_of(protocol)
     heights = candidates(protocol, limits)
-    sides = list(dict.fromkeys(gate.side for gate in gates))
-    beams: list[tuple[Side, float]] = [(gate.side, gate.height) for gate in gates]
-    beams += [(side, height) for side in sides for height in heights]
+    sides = dict.fromkeys(side for side, _ in present)
+    beams = [*present, *((side, height) for side in sides for height in heights)]
     all_cases = cases(protocol, beams, components, _few(protocol.plan.inclines))
-    layout = list(range(len(gates)))
+    layout = list(range(len(present)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
-    floor = min(MARGIN, margin(protocol, beams[: len(gates)]))
+    floor = min(MARGIN, margin(protocol, present))
     best = score(protocol, GateLayout.of(all_cases, layout))
     for sweep in range(1, _SWEEPS + 1):
         before = best
-        for slot, gate in enumerate(gates):
+        for slot, (side, _) in enumerate(present):
             stay = [n for other, n in enumerate(layout) if other != slot]
-            neighbours = [beams[n] for n in stay]
             fixed = GateLayout.of(all_cases, stay).triangles()
+            taken = np.array([beams[n][1] for n in stay if beams[n][0] == side])
             places = [
                 n
-                for n in range(len(gates), len(beams))
-                if beams[n][0] == gate.side and not _too_close(beams[n], neighbours, limits.spacing)
+                for n in range(len(present), len(beams))
+                if beams[n][0] == side
+                and (np.abs(beams[n][1] - taken) >= limits.spacing - _ROUNDING_M).all()
             ]
             for stride, reach in ((_COARSE, len(places)), (1, _COARSE - 1)):
                 centre = places.index(layout[slot]) if layout[slot] in places else len(places) // 2
@@ -150,7 +136,7 @@ def better(
                         continue
                     # Only now: whether it can be read takes a few drops to be read.
                     proposed = [beams[beam] for beam in (*layout[:slot], n, *layout[slot + 1 :])]
-                    if _held(protocol, proposed) and margin(protocol, proposed) >= floor:
+                    if _see_before(protocol, proposed) and margin(protocol, proposed) >= floor:
                         best, layout[slot] = trial, n
         say(f"sweep {sweep}: uncertainties × {math.exp(best):.3g} in the geometric mean")
         if before - best < _WORTH:
@@ -158,20 +144,17 @@ def better(
     return _sort_sides([beams[n] for n in layout])
 
 
-def _held(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
+def _see_before(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
     """Whether enough beams of each side still see the chain before anything strikes.
 
     With fewer, one missed edge too many leaves the fall open.
     """
-    assert protocol.gates is not None
-    start = protocol.drop.value
-    if protocol.surface is None:
-        return True
-    for side in dict.fromkeys(side for side, _ in beams):
-        present = sum(gate.height > start for gate in protocol.gates.on(side))
-        if sum(height > start for where, height in beams if where == side) < min(present, _BEFORE):
-            return False
-    return True
+    before, after = (
+        Counter(side for side, height in layout if height > protocol.drop.value)
+        for layout in (beams_of(protocol), beams)
+    )
+    enough = (after[side] >= min(number, _BEFORE) for side, number in before.items())
+    return protocol.surface is None or all(enough)
 
 
 def _few(inclines: Sequence[float]) -> list[float]:
@@ -179,13 +162,6 @@ def _few(inclines: Sequence[float]) -> list[float]:
     if len(ordered) <= FEW:
         return ordered
     return [ordered[round(n * (len(ordered) - 1) / (FEW - 1))] for n in range(FEW)]
-
-
-def _too_close(
-    beam: tuple[Side, float], neighbours: Sequence[tuple[Side, float]], spacing: float
-) -> bool:
-    side, height = beam
-    return any(side == where and abs(height - at) < spacing - 1e-9 for where, at in neighbours)
 
 
 def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
@@ -199,15 +175,13 @@ def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
     least = MARGIN
     for incline in {min(ends), max(ends)}:
         for off in (-_OFF, _OFF):
-            records = [
-                record for record, _ in perfect(protocol, ends[incline], off * protocol.drop.u)
+            fallen = [
+                (record, [np.arange(train.rods.size) for train in record.trains])
+                for record, _ in perfect(protocol, ends[incline], off * protocol.drop.u)
             ]
-            identification = identify(protocol, records, CLOCK_U, stated(protocol))
-            all_seen: dict[str, list[Index]] = {
-                record.role: [np.arange(train.rods.size) for train in record.trains]
-                for record in records
-            }
-            if identification.fit is None or misread(identification, all_seen):
+            here = at_contact(protocol, incline, ends[incline].impact)
+            identification, unclear = read_drop(here, fallen)
+            if identification.fit is None or unclear:
                 return -math.inf
             least = min(least, identification.log_odds)
     return least
@@ -221,15 +195,14 @@ def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
 def score(protocol: Protocol, layout: GateLayout) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
     goals = (*(row.name for row in averaged()), *COEFFICIENTS)
-    uncertainties = forecast(protocol, layout, goals, sure=True).wanted()
+    uncertainties = forecast(protocol, layout, goals, sure=True).goals()
     values = [math.log(uncertainties[name]) for name in goals if name in uncertainties]
     return sum(values) / len(values)
 
 
 def _sort_sides(beams: Sequence[tuple[Side, float]]) -> list[tuple[Side, float]]:
     """Sort each side's beams upwards, sides staying where they are."""
-    in_order = []
-    rest = {side: sorted(h for s, h in beams if s == side) for side, _ in beams}
-    for side, _ in beams:
-        in_order.append((side, rest[side].pop(0)))
-    return in_order
+    heights = {
+        side: iter(sorted(height for other, height in beams if other == side)) for side, _ in beams
+    }
+    return [(side, next(heights[side])) for side, _ in beams]

@@ -14,23 +14,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.annealing import MISSED
+from rig.analysis.annealing import EVER, MISSED
 from rig.analysis.components import above, stated
 from rig.analysis.identify import Identification, deciding_gate, identify
 from rig.analysis.verdict import pattern_faults
-from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, observed, records_of, trajectory
+from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, records_of, trajectory, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.trajectory import Trajectory
-    from rig.arrays import Array
     from rig.protocol.protocol import Protocol, Run
     from rig.vocabulary import Vocabulary
 
@@ -82,10 +80,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
             _fallen(protocol_here, record, run, start, rng)
             for record in records_of(protocol_here, run)
         ]
-        identification = identify(
-            protocol_here, [record for record, _ in fallen], CLOCK_U, stated(protocol_here), _WINDOW
-        )
-        wrong = misread(identification, {record.role: truth for record, truth in fallen})
+        identification, wrong = read_drop(protocol_here, fallen, _WINDOW)
         read += not wrong
         failing.update(wrong)
         if (
@@ -101,12 +96,21 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
 def _fallen(
     protocol: Protocol, record: ChainRecord, run: Run, start: float, rng: np.random.Generator
 ) -> tuple[ChainRecord, list[Index]]:
-    """Let one chain fall; with it, for each train, which edge each expected edge is."""
+    """Let one chain fall that hangs and is let go a little off, with impulses that scatter.
+
+    With it, for each train, which edge each expected edge is.
+    """
     assert protocol.gates is not None
     chain = record.chain
     rods = chain.position_u * rng.standard_normal(chain.chain.rods)
     wider = chain.width_u * rng.standard_normal()
-    path = _path(protocol, record, run, start, rods, rng)
+    start += protocol.priors.hang * rng.standard_normal()
+    release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
+    alphas = model_alphas(protocol, record, run)
+    if alphas.size:
+        scatter = stated(protocol).impulses(alphas.mean(), above(chain.chain))
+        alphas += scatter * rng.standard_normal(alphas.size)
+    path = trajectory(protocol, record, release, start, alphas, rods)
     datum = protocol.gates.datum_u * rng.standard_normal()
     trains, truth = [], []
     for train in record.trains:
@@ -118,46 +122,37 @@ def _fallen(
         order = np.argsort(times, kind="stable")
         edges = np.full(levels.size, -1)
         edges[seen[order]] = np.arange(seen.size)
-        trains.append(observed(train, times[order], train.blocks[seen[order]]))
+        trains.append(with_edges(train, times[order], train.blocks[seen[order]]))
         truth.append(edges)
     return replace(record, trains=tuple(trains)), truth
 
 
-def _path(
+def read_drop(
     protocol: Protocol,
-    record: ChainRecord,
-    run: Run,
-    start: float,
-    rods: Array,
-    rng: np.random.Generator,
-) -> Trajectory:
-    """Where a chain is that hangs and is let go a little off, with impulses that scatter."""
-    start += protocol.priors.hang * rng.standard_normal()
-    release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
-    alphas = model_alphas(protocol, record, run)
-    if alphas.size:
-        scatter = stated(protocol).impulses(alphas.mean(), above(record.chain.chain))
-        alphas += scatter * rng.standard_normal(alphas.size)
-    return trajectory(protocol, record, release, start, alphas, rods)
-
-
-def misread(identification: Identification, truth: Mapping[str, Sequence[Index]]) -> list[str]:
-    """Return the sides of which no fall, or the wrong one, was found.
+    fallen: Sequence[tuple[ChainRecord, Sequence[Index]]],
+    window: tuple[float, float] = EVER,
+) -> tuple[Identification, list[str]]:
+    """Read a drop; with it return the sides of which no fall, or the wrong one, was found.
 
     Parameters
     ----------
-    truth
-        For each train of each side which edge every expected edge is, −1 for a missed one.
+    protocol
+        With heights counted from the contact point.
+    fallen
+        Each chain, and for each of its trains which edge every expected edge is, −1 if missed.
     """
+    records = [record for record, _ in fallen]
+    identification = identify(protocol, records, CLOCK_U, stated(protocol), window)
     unlike = list(pattern_faults(identification))
     if unlike or identification.fit is None:
-        return unlike or list(truth)
-    return [
-        role
-        for role, matches in identification.fit.matches.items()
+        return identification, unlike or [record.role for record in records]
+    matches = identification.fit.matches
+    return identification, [
+        record.role
+        for record, truth in fallen
         if any(
             np.any((match >= 0) & (match != true))
-            for match, true in zip(matches, truth[role], strict=True)
+            for match, true in zip(matches[record.role], truth, strict=True)
         )
     ]
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
-from rig.estimate import coefficients as of
-from rig.estimate.hypotheses import one_alpha
+from rig.estimate.hypotheses import by_model, one_alpha
 from rig.estimate.hypothesis_fit import HypothesisFit, fit
 from rig.estimate.likelihood_ratio import LikelihoodRatio
 
@@ -114,17 +113,18 @@ def single_alphas(
     by_run = fit(forms, one_alpha(forms, lambda form: form.run.number))
     by_case = fit(groups, one_alpha(groups, case))
     model: dict[Condition, float] = {}
-    by_model = None
+    against_model = None
     if problem is not None and outcome is not None:
-        model = dict(
-            zip(map(case, problem.forms), _by_coefficients(protocol, problem, outcome), strict=True)
-        )
-        degrees = len(set(map(case, problem.forms))) - len(problem.parameters)
+        supposed = by_model(protocol, problem.parameters)
+        values = outcome.values[: len(problem.parameters)]
+        model = {
+            case(form): float(supposed.alphas(form, values)[0].mean()) for form in problem.forms
+        }
+        degrees = len(model) - len(problem.parameters)
         if problem.parameters and not problem.held and degrees > 0:
             # Without the nuisances, so that both suppose the same but for α.
             open_ = fit(problem.forms, one_alpha(problem.forms, case))
-            plain = fit(problem.forms, of.model(protocol, problem.parameters))
-            by_model = LikelihoodRatio(plain.chi2 - open_.chi2, degrees)
+            against_model = LikelihoodRatio(fit(problem.forms, supposed).chi2 - open_.chi2, degrees)
     cases = sorted(set(map(case, groups)))
     fewer, counts = len(forms) - len(cases), Counter(map(case, forms))
     return SingleAlphas(
@@ -137,16 +137,5 @@ def single_alphas(
             for form in forms
         ),
         LikelihoodRatio(by_case.chi2 - by_run.chi2, fewer) if fewer > 0 else None,
-        by_model,
+        against_model,
     )
-
-
-def _by_coefficients(
-    protocol: Protocol, problem: CoefficientProblem, outcome: HypothesisFit
-) -> list[float]:
-    """α of each form by the model with the fitted coefficients."""
-    model = of.model(protocol, problem.parameters)
-    values = outcome.values[: len(problem.parameters)]
-    return [
-        float(model.targets(form, values)[0][: form.alphas.size].mean()) for form in problem.forms
-    ]

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.drop_model import prior_air
-from rig.estimate.hypotheses import ALPHA, BETA, MU, PILE, coefficients, with_contact, with_drag
-from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit, Parameter, fit
+from rig.estimate.hypotheses import BETA, MU, PILE, by_model, given_alphas, with_nuisances
+from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
 from rig.model.impact import impact_on
 
 if TYPE_CHECKING:
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
     from rig.units import Quantity
 
-CONTACT_U = 1e-3
-"""How far the contact point may move when the board is inclined anew, m."""
 KNOWN = 0.2
 """A coefficient less sure than this is not identified: all of them are within about one."""
 FOUND = 0.5
@@ -40,21 +37,26 @@ class CoefficientProblem:
     ----------
     forms
         Of like drops, added up; only those that the model describes.
-    parameters
-        Coefficients that the edges tell, and those they do not, these with a prior.
-    held
-        Names of the latter.
     stated
         What the protocol says of each coefficient that is fitted, by name.
+    held
+        Names of those that the edges do not tell.
     left_out
         Sentences on what is not fitted, and why.
     """
 
     forms: tuple[QuadraticForm, ...]
-    parameters: tuple[Parameter, ...]
-    held: tuple[str, ...]
     stated: dict[str, Quantity]
     left_out: tuple[str, ...]
+    held: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Coefficients that the edges tell, and those they do not, these with a prior."""
+        return tuple(
+            Parameter(name, stated.value, (stated.value, stated.u) if name in self.held else None)
+            for name, stated in self.stated.items()
+        )
 
     @property
     def inclines(self) -> list[float]:
@@ -68,56 +70,40 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
     Parameters
     ----------
     forms
-        Of like drops, see `rig.estimate.quadratic_forms.merged`.
+        Of like drops, see `rig.estimate.quadratic_forms.merge_like`.
     """
     ordered = sorted(forms, key=lambda form: form.run.incline_deg)
-    in_model, stated, left_out = described(
-        protocol, [(form.chain, form.run.incline_deg) for form in ordered]
-    )
-    parameters = [Parameter(name, quantity.value) for name, quantity in stated.items()]
-    informative = tuple(form for form, fits in zip(ordered, in_model, strict=True) if fits)
-    problem = CoefficientProblem(informative, tuple(parameters), (), stated, tuple(left_out))
-    return _hold_unknown(protocol, problem) if informative else problem
+    stated: dict[str, Quantity] = {}
+    left_out, in_model = [], []
+    for form in ordered:
+        depends_on, notes = stated_coefficients(protocol, form.chain, form.run.incline_deg)
+        stated |= depends_on
+        if depends_on:
+            in_model.append(form)
+        else:
+            left_out.append(f"{form.run.incline_deg:g}° tells no coefficient: {'; '.join(notes)}")
+    problem = CoefficientProblem(tuple(in_model), stated, tuple(dict.fromkeys(left_out)))
+    return _hold_unknown(protocol, problem) if in_model else problem
 
 
-def described(
-    protocol: Protocol, drops: Sequence[tuple[Chain, float]]
-) -> tuple[list[bool], dict[str, Quantity], list[str]]:
-    """Find the coefficients that drops of these chains at these inclines depend on.
+def stated_coefficients(
+    protocol: Protocol, chain: Chain, incline_deg: float
+) -> tuple[dict[str, Quantity], Sequence[str]]:
+    """Return the protocol's coefficients that a drop depends on by the model, by name.
 
-    Returns
-    -------
-    kept, stated, left_out
-        Whether the model describes each; the protocol's coefficients by name; and sentences on
-        inclines outside its domain.
+    Where the model does not describe it there are none, but sentences that say why.
     """
     surface = protocol.surface
     assert surface is not None
-    stated: dict[str, Quantity] = {}
-    left_out: list[str] = []
-    in_model = []
-    alpha_names = given_alphas(protocol)
-    for chain, incline in drops:
-        impact = impact_on(surface, chain, incline)
-        in_model.append(impact.basis == "given" or not impact.notes)
-        if not in_model[-1]:
-            sentence = f"{incline:g}° tells no coefficient: {'; '.join(impact.notes)}"
-            left_out += [sentence] if sentence not in left_out else []
-        elif chain.alpha is not None:
-            stated[alpha_names[chain]] = chain.alpha
-        elif impact.basis == "pile" and surface.pile is not None:
-            stated[PILE] = surface.pile.restitution
-        else:
-            stated[BETA] = surface.restitution
-            if impact.basis == "surface":
-                stated[MU] = surface.friction
-    return in_model, stated, left_out
-
-
-def given_alphas(protocol: Protocol) -> dict[Chain, str]:
-    """Name the α of each chain whose α is simply given; like chains have one."""
-    chains = {rods.chain: rods.name for rods in protocol.chains.values() if rods.chain.alpha}
-    return {chain: ALPHA if len(chains) == 1 else f"{ALPHA} {chains[chain]}" for chain in chains}
+    impact = impact_on(surface, chain, incline_deg)
+    if chain.alpha is not None:
+        return {given_alphas(protocol)[chain]: chain.alpha}, ()
+    if impact.notes:
+        return {}, impact.notes
+    if impact.basis == "pile" and surface.pile is not None:
+        return {PILE: surface.pile.restitution}, ()
+    friction = {MU: surface.friction} if impact.basis == "surface" else {}
+    return {BETA: surface.restitution, **friction}, ()
 
 
 def words(name: str) -> str:
@@ -159,18 +145,8 @@ def _hold_unknown(protocol: Protocol, problem: CoefficientProblem) -> Coefficien
     """Hold what the edges do not tell."""
 
     def holding(held: Mapping[str, float]) -> CoefficientProblem:
-        exact = {name for name, u in held.items() if not u}
-        priors = {name: (problem.stated[name].value, u) for name, u in held.items()}
-        return replace(
-            problem,
-            parameters=tuple(
-                parameter._replace(prior=priors.get(parameter.name))
-                for parameter in problem.parameters
-                if parameter.name not in exact
-            ),
-            held=tuple(name for name in held if name not in exact),
-            stated={name: size for name, size in problem.stated.items() if name not in exact},
-        )
+        stated = {name: q for name, q in problem.stated.items() if held.get(name) != 0.0}
+        return replace(problem, stated=stated, held=tuple(name for name in held if name in stated))
 
     def uncertainties(held: Mapping[str, float]) -> dict[str, float]:
         candidate = holding(held)
@@ -188,21 +164,12 @@ def _hold_unknown(protocol: Protocol, problem: CoefficientProblem) -> Coefficien
     return replace(holding(held), left_out=(*problem.left_out, *left_out))
 
 
-def model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
-    """Suppose the model with these parameters unknown, and nothing of contact or air."""
-    assert protocol.surface is not None
-    return coefficients(protocol.surface, parameters, given_alphas(protocol))
-
-
-def nuisances(protocol: Protocol, problem: CoefficientProblem, inner: Hypothesis) -> Hypothesis:
-    """Add where the contact point is at each incline, and the air."""
-    added = with_contact(inner, problem.inclines, (0.0, CONTACT_U))
-    return with_drag(added, prior_air(protocol))
-
-
-def best(protocol: Protocol, problem: CoefficientProblem) -> HypothesisFit:
-    """Fit the coefficients with all nuisances."""
-    return fit(problem.forms, nuisances(protocol, problem, model(protocol, problem.parameters)))
+def best(
+    protocol: Protocol, problem: CoefficientProblem, parameters: Sequence[Parameter] = ()
+) -> HypothesisFit:
+    """Fit the coefficients, or these parameters instead of theirs, with all nuisances."""
+    supposed = by_model(protocol, parameters or problem.parameters)
+    return fit(problem.forms, with_nuisances(protocol, supposed, problem.inclines))
 
 
 def correlation(outcome: HypothesisFit, names: Sequence[str]) -> Array:

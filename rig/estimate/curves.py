@@ -102,15 +102,14 @@ def drop_curves(
     heights = np.linspace(hanging - 1e-6, 0.0, POINTS)
     lasted = adjusted.hit - adjusted.release("impact")
     times = np.linspace(0.0, float(lasted.value), POINTS)
-    separation = None
+    motion, separation = motion_by_model(protocol, run), None
     if "free" in drop.model.records:
-        by_model = _separations_by_model(protocol, run, times)
+        moments = np.minimum(times, motion.end_s).tolist()
+        by_model = np.array([motion.at(moment).separation_m for moment in moments])
         separation = with_band(_separations(adjusted, times), by_model)
-    length = drop.model.records["impact"].chain.chain.length
-    by_model = _squares_by_model(protocol, run, heights, length)
-    return DropCurves(
-        run, heights, with_band(_squares(adjusted, heights), by_model), times, separation
-    )
+    fallen = drop.model.records["impact"].chain.chain.length - heights
+    squares = with_band(_squares(adjusted, heights), _squares_by_model(motion, fallen))
+    return DropCurves(run, heights, squares, times, separation)
 
 
 def _squares(drop: Adjusted, heights: Array) -> Dual:
@@ -145,18 +144,12 @@ def motion_by_model(protocol: Protocol, run: Run) -> Motion:
     return Motion(chain, gains, drop.value, protocol.gravity.value, start)
 
 
-def _squares_by_model(protocol: Protocol, run: Run, heights: Array, top: float) -> Array:
-    """V² by the model; `top` is the top rod's height above the bottom one."""
-    motion = motion_by_model(protocol, run)
-    begin, gravity = motion.at(0.0), protocol.gravity.value
+def _squares_by_model(motion: Motion, fallen: Array) -> Array:
+    """V² by the model when the chain has come down so far below where its bottom rod strikes."""
+    begin = motion.at(0.0)
     before = np.array([-begin.height_m, *motion.chain.heights[:-1]])
     after = np.array([begin.speed_m_s, *(hit.speed_after for hit in motion.hits[:-1])])
-    fallen = top - heights
     leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)
-    squares: Array = np.maximum(after[leg] ** 2 + 2.0 * gravity * (fallen - before[leg]), 0.0)
+    gained = 2.0 * motion.gravity * (fallen - before[leg])
+    squares: Array = np.maximum(after[leg] ** 2 + gained, 0.0)
     return squares
-
-
-def _separations_by_model(protocol: Protocol, run: Run, times: Array) -> Array:
-    motion = motion_by_model(protocol, run)
-    return np.array([motion.at(min(time, motion.end_s)).separation_m for time in times.tolist()])

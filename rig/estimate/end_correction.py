@@ -10,8 +10,7 @@ import numpy as np
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
-from rig.estimate.coefficients import CoefficientProblem, nuisances
-from rig.estimate.hypotheses import END, one_alpha, with_end_correction
+from rig.estimate.hypotheses import END, one_alpha, with_end_correction, with_nuisances
 from rig.estimate.hypothesis_fit import fit
 from rig.model.rods import rod_impacts
 
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rig.arrays import Array
+    from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol
 
@@ -51,19 +51,12 @@ class EndCorrection:
         return {name: chi2 + (2.0 if name == "open" else 0.0) for name, chi2 in self.chi2.items()}
 
     @property
-    def gamma(self) -> Measured | None:
-        """γ itself, where it is the same for all rods."""
-        if self.gamma_eq10 is None:
-            return None
-        return Measured(self.gamma_eq10 * self.scale.value, self.gamma_eq10 * self.scale.u)
-
-    @property
     def _worse(self) -> float:
         """By how much AIC is larger without the correction than with the better of both."""
         return self.aic["without"] - min(self.aic["open"], self.aic["eq10"])
 
     @property
-    def needed(self) -> bool | None:
+    def is_needed(self) -> bool | None:
         """Whether edges want it; `None` where they do not tell."""
         return self._worse > 0.0 if self.scale.u <= _TELLS else None
 
@@ -76,20 +69,18 @@ class EndCorrection:
         """What follows."""
         scale, worse = self.scale, self._worse
         size = f"γ is {scale.value:.3f} ± {scale.expanded:.3f} (95 %) times that of Eq. 10"
-        if self.needed is None:
+        if self.is_needed is None:
             return f"The edges do not tell whether the end correction is needed: {size}."
+        if worse <= 0.0:
+            without = f"without it AIC is {-worse:.2g} better"
+            return f"The end correction is not needed: {without}; {size}."
+        needed, by = (
+            ("The end correction is needed", f"{worse:.0f}")
+            if worse > STRONG
+            else ("The edges lean towards the end correction", f"{worse:.2g}")
+        )
         agree = f"p {self._p('eq10'):.2g} for Eq. 10"
-        if worse > STRONG:
-            return (
-                f"The end correction is needed: without it AIC is {worse:.0f} worse; {size}, "
-                f"{agree}."
-            )
-        if worse > 0.0:
-            return (
-                f"The edges lean towards the end correction: without it AIC is {worse:.2g} worse; "
-                f"{size}, {agree}."
-            )
-        return f"The end correction is not needed: without it AIC is {-worse:.2g} better; {size}."
+        return f"{needed}: without it AIC is {by} worse; {size}, {agree}."
 
     def json(self) -> dict[str, Any]:
         """``end_correction``."""
@@ -100,9 +91,10 @@ class EndCorrection:
             "p_without": self._p("without"),
             "p_eq10": self._p("eq10"),
         }
-        if self.gamma is not None:
-            record |= attributes(self, "gamma_eq10", "gamma")
-        return record | attributes(self, "needed", "sentence")
+        if (gamma := self.gamma_eq10) is not None:  # the same for all rods
+            own = Measured(gamma * self.scale.value, gamma * self.scale.u)
+            record |= {"gamma_eq10": gamma, "gamma": own.json()}
+        return record | {"needed": self.is_needed} | attributes(self, "sentence")
 
 
 def _above_least(values: Mapping[str, float]) -> dict[str, float]:
@@ -127,7 +119,7 @@ def end_correction(protocol: Protocol, problem: CoefficientProblem) -> EndCorrec
     if by_eq10 == {0.0}:
         return None
     cases = one_alpha(problem.forms, lambda form: protocol.condition(form.run))
-    inclines = nuisances(protocol, problem, cases)
+    inclines = with_nuisances(protocol, cases, problem.inclines)
     open_ = fit(problem.forms, with_end_correction(inclines, gammas, None))
     chi2 = {
         "open": open_.chi2,

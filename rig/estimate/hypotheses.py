@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.drop_model import prior_air
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
-from rig.estimate.quadratic_forms import EXTRA, QuadraticForm
 from rig.model.rods import rod_impacts
 from rig.units import Quantity
 
@@ -18,38 +19,42 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.arrays import Array
+    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.model.surface import Surface
+    from rig.protocol.protocol import Protocol
 
     Index = NDArray[np.intp]
+    AlphasAndSlopes = tuple[Array, Array]
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 END, AIR = "end_correction", "drag"
+CONTACT_U = 1e-3
+"""How far the contact point may move when the board is inclined anew, m."""
 _STEP = 1e-5  # of a coefficient, for its derivative
 
 
-def coefficients(
-    surface: Surface, parameters: Sequence[Parameter], alpha_names: Mapping[Chain, str]
-) -> Hypothesis:
-    """Suppose Eqs. 8 to 13 with these of β, μ and the pile's β unknown, the others as stated.
+def given_alphas(protocol: Protocol) -> dict[Chain, str]:
+    """Name the α of each chain whose α is simply given; like chains have one."""
+    chains = {rods.chain: rods.name for rods in protocol.chains.values() if rods.chain.alpha}
+    return {chain: ALPHA if len(chains) == 1 else f"{ALPHA} {chains[chain]}" for chain in chains}
 
-    Parameters
-    ----------
-    alpha_names
-        Name of the α of each chain whose α is simply given.
-    """
+
+def by_model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
+    """Suppose Eqs. 8 to 13 with these coefficients unknown, the others as stated."""
+    surface, alpha_names = protocol.surface, given_alphas(protocol)
+    assert surface is not None
     names = [parameter.name for parameter in parameters]
-    computed: dict[tuple[float, int, tuple[float, ...]], tuple[Array, Array]] = {}
 
-    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
-        key = form.run.incline_deg, id(form.chain), tuple(values.tolist())
-        if key not in computed:
-            current = dict(zip(names, values.tolist(), strict=True))
-            name, incline_deg = alpha_names.get(form.chain), form.run.incline_deg
-            computed[key] = _with_extras(*alphas(surface, form.chain, incline_deg, current, name))
-        return computed[key]
+    @cache
+    def alphas_at(chain: Chain, incline_deg: float, values: tuple[float, ...]) -> AlphasAndSlopes:
+        stated = dict(zip(names, values, strict=True))
+        return alphas(surface, chain, incline_deg, stated, alpha_names.get(chain))
 
-    return Hypothesis(tuple(parameters), targets)
+    return Hypothesis(
+        tuple(parameters),
+        lambda form, values: alphas_at(form.chain, form.run.incline_deg, tuple(values.tolist())),
+    )
 
 
 def alphas(
@@ -97,37 +102,33 @@ def with_coefficients(surface: Surface, values: Mapping[str, float]) -> Surface:
     )
 
 
-def one_alpha(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
-    """Suppose one α for all drops that share a key: an incline, or a run."""
-    return _open(forms, key, lambda rods: {"": np.arange(rods)})
-
-
-def each_rod(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
-    """Suppose an α for each rod but the top one, whose impact pulls on nothing."""
-    return _open(forms, key, lambda rods: {f", rod {k}": np.array([k]) for k in range(rods - 1)})
-
-
-def _open(
+def one_alpha(
     forms: Sequence[QuadraticForm],
     key: Callable[[QuadraticForm], object],
-    split: Callable[[int], Mapping[str, Index]],
+    *,
+    each_rod: bool = False,
 ) -> Hypothesis:
-    """Suppose an α for each of some sets of rods of all drops that share a key."""
+    """Suppose one α for all drops that share a key: an incline, or a run.
+
+    `each_rod`: one for each rod but the top one, whose impact pulls on nothing.
+    """
     parameters: list[Parameter] = []
     sets: dict[object, list[tuple[int, Index]]] = {}
     for group in dict.fromkeys(map(key, forms)):
-        alphas = np.array([form.alphas for form in forms if key(form) == group])
-        for name, rods in split(alphas.shape[1]).items():
-            sets.setdefault(group, []).append((len(parameters), rods))
-            parameters.append(Parameter(f"α {group}{name}", float(alphas[:, rods].mean())))
+        starts = np.array([form.alphas for form in forms if key(form) == group])
+        every = np.arange(starts.shape[1])
+        sets[group] = []
+        for rods in every[:-1, None] if each_rod else [every]:
+            sets[group].append((len(parameters), rods))
+            parameters.append(Parameter(f"α {group}", float(starts[:, rods].mean())))
 
-    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
+    def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         slopes = np.zeros((form.alphas.size, values.size))
         for place, rods in sets[key(form)]:
             slopes[rods, place] = 1.0
-        return _with_extras(slopes @ values, slopes)
+        return slopes @ values, slopes
 
-    return Hypothesis(tuple(parameters), targets)
+    return Hypothesis(tuple(parameters), alphas)
 
 
 def with_end_correction(
@@ -140,60 +141,29 @@ def with_end_correction(
     gammas
         γ of Eq. 10 for every rod of a drop, shape ``(rods,)``.
     """
-    size = len(inner.parameters)
 
-    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
-        target, slopes = inner.targets(form, values[:size])
-        rods = form.alphas.size
-        factor = float(values[size]) if scale is None else scale
+    def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
+        factor, values = (values[-1], values[:-1]) if scale is None else (scale, values)
+        target, slopes = inner.alphas(form, values)
         # m/(M + γm) is here r/(1 + (γ − γ₀)r), with r = m/(M + γ₀m) as in the form.
         change = gammas(form) * form.ratios
         ratio = 1.0 / (1.0 + (factor - 1.0) * change)
-        target, slopes = target.copy(), slopes.copy()
-        by_scale = np.zeros(target.size)
-        by_scale[:rods] = -target[:rods] * change * ratio**2
-        target[:rods] *= ratio
-        slopes[:rods] *= ratio[:, None]
-        return target, np.column_stack([slopes, by_scale]) if scale is None else slopes
+        by_scale = [-target * change * ratio**2] if scale is None else []
+        return target * ratio, np.column_stack([slopes * ratio[:, None], *by_scale])
 
     added = (Parameter(END, 1.0),) if scale is None else ()
-    return Hypothesis((*inner.parameters, *added), targets)
+    return Hypothesis((*inner.parameters, *added), alphas)
 
 
-def with_contact(
-    inner: Hypothesis, inclines: Sequence[float], prior: tuple[float, float] | None
-) -> Hypothesis:
+def with_contact(inner: Hypothesis, inclines: Sequence[float]) -> Hypothesis:
     """Suppose the contact point to be at another height at each incline."""
-    parameters = tuple(Parameter(f"contact {incline:g}", 0.0, prior) for incline in inclines)
-    return _with(inner, parameters, 0, lambda form: inclines.index(form.run.incline_deg))
+    prior = 0.0, CONTACT_U
+    added = (Parameter(f"contact {at:g}", 0.0, prior, "contact", at) for at in inclines)
+    return inner._replace(parameters=(*inner.parameters, *added))
 
 
-def with_drag(inner: Hypothesis, prior: tuple[float, float]) -> Hypothesis:
-    """Suppose air of a κ that is known so well beforehand."""
-    return _with(inner, (Parameter(AIR, prior[0], prior),), 1, lambda _: 0)
-
-
-def _with(
-    inner: Hypothesis,
-    added: tuple[Parameter, ...],
-    extra: int,
-    which: Callable[[QuadraticForm], int],
-) -> Hypothesis:
-    size = len(inner.parameters)
-
-    def targets(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
-        target, slopes = inner.targets(form, values[:size])
-        row, n = form.alphas.size + extra, which(form)
-        target = target.copy()
-        target[row] += values[size + n]
-        wider = np.column_stack([slopes, np.zeros((target.size, len(added)))])
-        wider[row, size + n] = 1.0
-        return target, wider
-
-    return Hypothesis((*inner.parameters, *added), targets)
-
-
-def _with_extras(target: Array, slopes: Array) -> tuple[Array, Array]:
-    """Add the extras, which are nothing unless supposed."""
-    none = np.zeros((len(EXTRA), slopes.shape[1]))
-    return np.append(target, np.zeros(len(EXTRA))), np.vstack([slopes, none])
+def with_nuisances(protocol: Protocol, inner: Hypothesis, inclines: Sequence[float]) -> Hypothesis:
+    """Suppose also air of a κ that is known as well as the protocol says."""
+    prior = prior_air(protocol)
+    inner = with_contact(inner, inclines)
+    return inner._replace(parameters=(*inner.parameters, Parameter(AIR, prior[0], prior, "drag")))

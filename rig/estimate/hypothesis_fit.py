@@ -11,6 +11,7 @@ from rig.analysis.adjust import least_squares
 from rig.analysis.equations import Linearization, scaled
 from rig.analysis.square_root import EquationRows
 from rig.errors import RigError
+from rig.estimate.quadratic_forms import EXTRA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,11 +37,17 @@ class Parameter(NamedTuple):
     prior
         What is known of it without the edges: mean and standard uncertainty, 0 where it is exact;
         `None` if nothing (see `ANYTHING`).
+    extra
+        Which of `rig.estimate.quadratic_forms.EXTRA` it is; of what α depends on `None`.
+    incline_deg
+        The only incline that it belongs to, if there is one.
     """
 
     name: str
     start: float
     prior: tuple[float, float] | None = None
+    extra: str | None = None
+    incline_deg: float | None = None
 
 
 class Hypothesis(NamedTuple):
@@ -49,15 +56,27 @@ class Hypothesis(NamedTuple):
     Attributes
     ----------
     parameters
-        Their vector is the argument of `targets`.
-    targets
-        From a drop and the parameters, α of every rod and the extras of
-        `rig.estimate.quadratic_forms`, shape ``(n,)``, with the derivatives, shape
-        ``(n, parameters)``.
+        Of all that is supposed.
+    alphas
+        From a drop and those parameters that are no extra, α of every rod, shape ``(rods,)``, with
+        the derivatives, shape ``(rods, parameters)``.
     """
 
     parameters: tuple[Parameter, ...]
-    targets: Callable[[QuadraticForm, Array], tuple[Array, Array]]
+    alphas: Callable[[QuadraticForm, Array], tuple[Array, Array]]
+
+    def targets(self, form: QuadraticForm, values: Array) -> tuple[Array, Array]:
+        """Return α of every rod and the extras, shape ``(n,)``, with their derivatives."""
+        rods, size = form.alphas.size, form.alphas.size + len(EXTRA)
+        target, slopes = np.zeros(size), np.zeros((size, values.size))
+        of_alpha = [n for n, parameter in enumerate(self.parameters) if parameter.extra is None]
+        target[:rods], slopes[:rods, of_alpha] = self.alphas(form, values[of_alpha])
+        for n, (_, _, _, extra, incline) in enumerate(self.parameters):
+            if extra is not None and incline in {None, form.run.incline_deg}:
+                row = rods + EXTRA.index(extra)
+                target[row] += values[n]
+                slopes[row, n] = 1.0
+        return target, slopes
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +106,6 @@ class HypothesisFit:
         """Value and standard uncertainty of a parameter."""
         n = self.names.index(name)
         return float(self.values[n]), float(np.sqrt(self.covariance[n, n]))
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.names
 
 
 def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.analysis.plain_data import attributes
-from rig.estimate.coefficients import CoefficientProblem, model, nuisances
+from rig.estimate.coefficients import CoefficientProblem, best
 from rig.estimate.hypotheses import MU
-from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
+from rig.estimate.hypothesis_fit import HypothesisFit, Parameter
 
 if TYPE_CHECKING:
     from rig.arrays import Array
@@ -58,10 +58,9 @@ class Posterior:
         variance = self.weights @ (self.sds[:, n] ** 2 + (self.means[:, n] - mean) ** 2)
         return mean, math.sqrt(float(variance))
 
-    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
-        """Ends of the probabilistically symmetric interval."""
-        tail = 0.5 * (1.0 - probability)
-        return self.quantile(name, tail), self.quantile(name, 1.0 - tail)
+    def interval(self, name: str) -> tuple[float, float]:
+        """Ends of the probabilistically symmetric interval of 95 %."""
+        return self.quantile(name, 0.025), self.quantile(name, 0.975)
 
     def quantile(self, name: str, probability: float) -> float:
         """Value that the coefficient stays below with a probability; by bisection."""
@@ -87,41 +86,26 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
         name: Parameter(name, centre[name][0], (stated.value, stated.u) if stated.u else None)
         for name, stated in problem.stated.items()
     }
-    names = tuple(priors)
-    if MU not in priors:
-        only = fit(problem.forms, nuisances(protocol, problem, model(protocol, [*priors.values()])))
-        pairs = np.array([only[name] for name in names])
-        return Posterior(names, np.ones(1), pairs[None, :, 0], pairs[None, :, 1])
-    nodes = _nodes(*_around(centre[MU], priors[MU].prior))
-    logs, means, sds = [], [], []
-    for mu in nodes.tolist():
-        # The node holds μ; what was known of it is counted below, not twice.
-        fixed = {**priors, MU: Parameter(MU, mu, (mu, 0.0))}
-        at = fit(problem.forms, nuisances(protocol, problem, model(protocol, [*fixed.values()])))
-        prior = priors[MU].prior
-        off = (mu - prior[0]) / prior[1] if prior else 0.0
+    names, prior = tuple(priors), priors[MU].prior if MU in priors else None
+    grid = _nodes(centre[MU], prior) if MU in priors else np.zeros(0)
+    # A node holds μ; what was known of it is counted below, not twice.
+    nodes = [{MU: Parameter(MU, mu, (mu, 0.0))} for mu in grid.tolist()] or [{}]
+    logs, estimates = [], []
+    for node in nodes:
+        at = best(protocol, problem, [*(priors | node).values()])
+        off = (node[MU].start - prior[0]) / prior[1] if prior else 0.0
         logs.append(at.log_volume - 0.5 * (at.chi2 + off**2))
-        pairs = np.array([at[name] for name in names])
-        means.append(pairs[:, 0])
-        sds.append(pairs[:, 1])
+        estimates.append([at[name] for name in names])
     weights = np.exp(np.array(logs) - max(logs))  # of the largest: no exponent overflows
-    widths = np.array(sds)
-    widths[:, names.index(MU)] = 0.5 * (nodes[1] - nodes[0])
-    return Posterior(names, weights / weights.sum(), np.array(means), widths)
+    means, widths = np.moveaxis(np.reshape(estimates, (len(nodes), len(names), 2)), 2, 0)
+    if MU in priors:
+        widths[:, names.index(MU)] = 0.5 * (grid[1] - grid[0])
+    return Posterior(names, weights / weights.sum(), means, widths)
 
 
-def _around(
-    measured: tuple[float, float], prior: tuple[float, float] | None
-) -> tuple[float, float]:
-    """Mean and standard uncertainty with the prior; roughly, for it only places the nodes."""
-    if prior is None:
-        return measured
-    weights = np.array([measured[1] ** -2, prior[1] ** -2])
-    mean = float(weights @ [measured[0], prior[0]]) / weights.sum()
-    return float(mean), float(weights.sum()) ** -0.5
-
-
-def _nodes(mean: float, sd: float) -> Array:
-    """Evenly spaced; friction has no negative side."""
+def _nodes(measured: tuple[float, float], prior: tuple[float, float] | None) -> Array:
+    """Return even nodes around what edges and prior say together; friction has no negative side."""
+    values, us = np.transpose([measured, prior] if prior else [measured])
+    mean, sd = float(us**-2 @ values / (us**-2).sum()), float((us**-2).sum()) ** -0.5
     low = max(0.0, mean - _REACH * sd)
     return np.linspace(low, max(mean, low) + _REACH * sd, NODES)

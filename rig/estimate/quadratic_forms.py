@@ -158,7 +158,7 @@ def _extra(model: DropModel, role: str, path: Trajectory, times: Array) -> tuple
     return -slopes[:, COMMON + rods :].sum(axis=1), slopes[:, DRAG]
 
 
-def merged(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
+def merge_like(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
     """Add up the forms of like drops: all that is wanted of them is the same function of them.
 
     Drops are alike where the same chain strikes at the same incline. The run kept is the first.

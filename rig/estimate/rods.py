@@ -10,9 +10,8 @@ import numpy as np
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
-from rig.estimate.coefficients import CONTACT_U
-from rig.estimate.hypotheses import each_rod, one_alpha, with_contact
-from rig.estimate.hypothesis_fit import Hypothesis, fit
+from rig.estimate.hypotheses import one_alpha, with_contact
+from rig.estimate.hypothesis_fit import fit
 from rig.estimate.likelihood_ratio import LikelihoodRatio
 
 if TYPE_CHECKING:
@@ -89,7 +88,8 @@ class Impulses:
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        record = self.condition.json() | attributes(self, "rods", "resolved", "alpha")
+        record: dict[str, Any] = {"rods": self.rods, "resolved": self.resolved}
+        record = self.condition.json() | record | attributes(self, "alpha")
         return record | self.eq9.json() | {"groups": plain(self.gains)}
 
 
@@ -102,7 +102,7 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
     Parameters
     ----------
     forms
-        Of like drops, see `rig.estimate.quadratic_forms.merged`.
+        Of like drops, see `rig.estimate.quadratic_forms.merge_like`.
 
     Returns
     -------
@@ -130,11 +130,11 @@ def resolution(impulses_by_case: Sequence[Impulses]) -> str:
 
 
 def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
-    def contact(hypothesis: Hypothesis) -> Hypothesis:
-        return with_contact(hypothesis, [condition.incline_deg], (0.0, CONTACT_U))
-
-    single = fit(forms, contact(one_alpha(forms, lambda _: "one")))
-    open_fit = fit(forms, contact(each_rod(forms, lambda _: "one")))
+    inclines = [condition.incline_deg]
+    single, open_fit = (
+        fit(forms, with_contact(one_alpha(forms, lambda _: "one", each_rod=each_rod), inclines))
+        for each_rod in (False, True)
+    )
     rods = forms[0].alphas.size - 1
     weight = forms[0].ratios[:rods] * np.mean([form.arrivals[:rods] for form in forms], axis=0)
     gains = weight * open_fit.values[:rods]
@@ -145,35 +145,25 @@ def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
         rods,
         Measured(*single["α one"]),
         LikelihoodRatio(single.chi2 - open_fit.chi2, rods - 1),
-        tuple(
-            _gain(first, last, gains, covariance, model)
-            for first, last in _groups(covariance, np.abs(model))
-        ),
+        _gains(gains, covariance, model),
     )
 
 
-def _gain(first: int, last: int, gains: Array, covariance: Array, model: Array) -> Gain:
-    part = slice(first, last + 1)
-    measured = Measured(float(gains[part].sum()), _sum_u(covariance, part))
-    return Gain(first, last, measured, float(model[part].sum()))
+def _gains(gains: Array, covariance: Array, model: Array) -> tuple[Gain, ...]:
+    """Sum neighbours from the bottom until resolved; what is left joins the last group."""
 
-
-def _sum_u(covariance: Array, part: slice) -> float:
-    """Standard uncertainty of a sum."""
-    return float(np.sqrt(max(0.0, float(covariance[part, part].sum()))))
-
-
-def _groups(covariance: Array, sizes: Array) -> list[tuple[int, int]]:
-    """Neighbours whose sum is resolved, from the bottom; what is left joins the last ones."""
-    groups: list[tuple[int, int]] = []
-    first = 0
-    for last in range(sizes.size):
+    def group_of(first: int, last: int) -> Gain:
         part = slice(first, last + 1)
-        u = Measured(0.0, _sum_u(covariance, part)).expanded
-        if u <= RESOLVED * sizes[part].sum():
-            groups.append((first, last))
+        u = float(np.sqrt(max(0.0, float(covariance[part, part].sum()))))
+        return Gain(first, last, Measured(float(gains[part].sum()), u), float(model[part].sum()))
+
+    groups: list[Gain] = []
+    first = 0
+    for last in range(model.size):
+        group = group_of(first, last)
+        if group.measured.expanded <= RESOLVED * np.abs(model[first : last + 1]).sum():
+            groups.append(group)
             first = last + 1
-    if first < sizes.size:
-        begin = groups.pop()[0] if groups else first
-        groups.append((begin, sizes.size - 1))
-    return groups
+    if first < model.size:
+        groups.append(group_of(groups.pop().first if groups else first, model.size - 1))
+    return tuple(groups)

@@ -16,15 +16,15 @@ from rig.estimate import coefficients as of
 from rig.estimate.alphas import SingleAlphas, single_alphas
 from rig.estimate.curves import DropCurves, drop_curves
 from rig.estimate.end_correction import EndCorrection, end_correction
-from rig.estimate.hypotheses import AIR
+from rig.estimate.hypotheses import AIR, CONTACT_U
 from rig.estimate.posterior import Posterior, posterior
-from rig.estimate.quadratic_forms import merged, quadratic_form
+from rig.estimate.quadratic_forms import merge_like, quadratic_form
 from rig.estimate.rods import Impulses, impulses, resolution
 from rig.sections import Sections
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Mapping
 
     from rig.analysis.session import Analysis
     from rig.arrays import Array
@@ -71,15 +71,14 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class ContactPoint:
-    """Where the rods touch at an incline, m above the contact level."""
+    """Where the rods touch at an incline, m above the contact level.
+
+    `identified`: whether the edges tell it better than is supposed beforehand.
+    """
 
     incline_deg: float
     height: Measured
-
-    @property
-    def identified(self) -> bool:
-        """Whether the edges tell it better than is supposed beforehand."""
-        return self.height.u < of.FOUND * of.CONTACT_U
+    identified: bool
 
     def json(self) -> dict[str, Any]:
         """One of ``contact``."""
@@ -200,13 +199,18 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
         analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
     )
     forms = [quadratic_form(good[key], drop, shared) for key, drop in drops.items()]
-    groups = merged(forms)
+    groups = merge_like(forms)
     results = SessionEstimate(len(forms), sum(result.edges for result in forms))
     sections = Sections()
     problem, outcome = None, None
     with sections.alone("The coefficients"):
         problem = of.coefficient_problem(protocol, groups)
-        results.left_out = (*_runs_left_out(good.keys() - drops.keys()), *problem.left_out)
+        sentence = (
+            "run {} is left out: no motion fits its edges, or not together with the other runs; "
+            "rig analyze SESSION says which"
+        )
+        lost = sorted(run for run, _ in good.keys() - drops.keys())
+        results.left_out = (*map(sentence.format, lost), *problem.left_out)
         if problem.forms:
             outcome = of.best(protocol, problem)
             results.coefficients = _coefficients(protocol, problem, outcome)
@@ -231,21 +235,14 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     return results
 
 
-def _runs_left_out(keys: Iterable[tuple[int, int]]) -> Iterator[str]:
-    for run, _ in sorted(keys):
-        yield (
-            f"run {run} is left out: no motion fits its edges, or not together with the other "
-            "runs; rig analyze SESSION says which"
-        )
-
-
 def _coefficients(
     protocol: Protocol, problem: CoefficientProblem, outcome: HypothesisFit
 ) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
     names = list(problem.stated)
-    drag = Measured(*outcome[AIR]) if AIR in outcome else None
-    spread = posterior(protocol, problem, outcome) if names else None
+    drag = Measured(*outcome[AIR])
+    spread = posterior(protocol, problem, outcome)
+    heights = {at: Measured(*outcome[f"contact {at:g}"]) for at in problem.inclines}
     return Coefficients(
         tuple(
             Coefficient(
@@ -257,15 +254,13 @@ def _coefficients(
                 problem.stated[name],
             )
             for name in names
-        )
-        if spread
-        else (),
-        of.correlation(outcome, names),
-        spread,
-        tuple(
-            ContactPoint(incline, Measured(*outcome[f"contact {incline:g}"]))
-            for incline in problem.inclines
         ),
-        drag if drag and drag.u < of.FOUND * prior_air(protocol)[1] else None,
+        of.correlation(outcome, names),
+        spread if names else None,
+        tuple(
+            ContactPoint(incline, height, height.u < of.FOUND * CONTACT_U)
+            for incline, height in heights.items()
+        ),
+        drag if drag.u < of.FOUND * prior_air(protocol)[1] else None,
         outcome.chi2,
     )

@@ -7,7 +7,8 @@ from collections.abc import Collection
 
 from rig.model.chain import XI, Chain
 from rig.protocol.fields import FieldFaults, Section, did_you_mean, join, read_value, unique_entries
-from rig.protocol.keys import Mapped
+from rig.protocol.keys import Plain
+from rig.protocol.masses import place_masses
 from rig.protocol.protocol import RodChain
 from rig.protocol.rods import are_apart, list_rods, place_rods
 from rig.protocol.yamltree import Mapping, Node, ScalarNode, Sequence
@@ -17,14 +18,14 @@ _LONGEST_NAME = 32
 
 
 def read_chains(
-    node: Mapping, faults: FieldFaults, *, seen_by_gates: bool, struck: bool
-) -> dict[str, RodChain] | None:
+    node: Mapping | None, faults: FieldFaults, *, seen_by_gates: bool, struck: bool
+) -> dict[str, RodChain | None]:
     """Read the ``chains`` mapping.
 
     Parameters
     ----------
     node
-        The value of ``chains``.
+        The value of ``chains``; `None` where it is faulty or missing, which has been noted.
     faults
         Where problems go.
     seen_by_gates
@@ -34,9 +35,11 @@ def read_chains(
 
     Returns
     -------
-    dict of str to RodChain, or None
-        In file order; ``None`` if any chain is faulty.
+    dict of str to RodChain or None
+        In file order; ``None`` for a faulty chain.
     """
+    if node is None:
+        return {}
     places, nodes = unique_entries(node, "chains", faults)
     if not 1 <= len(nodes) <= 2:
         faults.add(node.place, "chains", f"found {len(nodes)} chains; one or two are accepted")
@@ -45,10 +48,18 @@ def read_chains(
             message = "this name needs to be one word of letters and digits, such as A"
             faults.add(place, join("chains", name), message)
     described: dict[str, Mapping | None] = {
-        name: read_value(Mapped(), own, join("chains", name), "chains", faults)
+        name: read_value(Plain.MAPPED, own, join("chains", name), "chains", faults)
         for name, own in nodes.items()
     }
-    bases = {name: like for name, own in described.items() if (like := _base(own)) is not None}
+    keys = {
+        name: unique_entries(own, join("chains", name), faults)[1] if own else {}
+        for name, own in described.items()
+    }
+    bases = {
+        name: like
+        for name, own in keys.items()
+        if isinstance(like := own.get("like"), ScalarNode) and like.kind == "text"
+    }
     chains: dict[str, RodChain | None] = {}
     for name in sorted(nodes, key=lambda name: name in bases):
         path, own, lenient = join("chains", name), described[name], False
@@ -60,25 +71,12 @@ def read_chains(
             message = _base_problem(base, chains, [chain for chain in nodes if chain != name])
             if message:
                 faults.add(bases[name].place, f"{path}.like", message)
-            own = _inherit(own, described.get(base) or own)
+            if inherited := described.get(base):
+                own = _inherit(own, inherited, keys[name], keys[base])
             lenient = chains.get(base) is None
         section = Section(own, path, "chains.*", faults, lenient=lenient)
         chains[name] = _build_chain(name, section, seen_by_gates=seen_by_gates, struck=struck)
-    sound = {name: chain for name in nodes if (chain := chains.get(name)) is not None}
-    return sound if sound and len(sound) == len(nodes) else None
-
-
-def _base(own: Mapping | None) -> ScalarNode | None:
-    """Return the name behind ``like``, if a chain has one."""
-    node = _by_name(own).get("like") if own else None
-    return node if isinstance(node, ScalarNode) and node.kind == "text" else None
-
-
-def _by_name(chain: Mapping) -> dict[str, Node]:
-    """Return the values of a chain's keys; of a repeated key the first."""
-    return {
-        key.text: value for key, value in reversed(chain.entries) if isinstance(key, ScalarNode)
-    }
+    return {name: chains[name] for name in nodes}
 
 
 def _base_problem(base: str, read: Collection[str], candidates: list[str]) -> str:
@@ -89,9 +87,10 @@ def _base_problem(base: str, read: Collection[str], candidates: list[str]) -> st
     return "" if base in read else "like refers back to itself; describe one chain in full"
 
 
-def _inherit(own: Mapping, base: Mapping) -> Mapping:
+def _inherit(
+    own: Mapping, base: Mapping, own_keys: dict[str, Node], base_keys: dict[str, Node]
+) -> Mapping:
     """Return a chain's own entries, then those of its base that it does not override."""
-    own_keys, base_keys = _by_name(own), _by_name(base)
     hidden = {*own_keys, "like"}
     if "mass" in own_keys or "masses" in own_keys:
         hidden |= {"mass", "masses"}
@@ -130,8 +129,6 @@ def _build_chain(
         return None
     masses: tuple[float, ...] | None = rods.masses
     if "masses" in section:
-        from rig.protocol.masses import place_masses  # noqa: PLC0415 - few chains list theirs
-
         masses = place_masses(section, heights)
     if masses is None or not section.is_sound():
         return None

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.protocol.keys import DEFAULTS, example, key_at
+from rig.protocol.contact import lacking_geometry
+from rig.protocol.fields import DEFAULTS
+from rig.protocol.gates import check_clear, check_sides
 from rig.protocol.yamltree import Sequence
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from rig.protocol.fields import Section
     from rig.protocol.protocol import RodChain
@@ -20,9 +22,7 @@ if TYPE_CHECKING:
 MOST_RUNS = 100_000
 
 
-def check_scene(
-    top: Section, chains: dict[str, RodChain] | None, *, count: int, kept: bool
-) -> None:
+def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bool) -> None:
     """Note whatever in a file does not suit the scene that it describes.
 
     Parameters
@@ -30,15 +30,16 @@ def check_scene(
     top
         The root of the file.
     chains
-        As read; `None` if any is faulty.
-    count
-        How many the file names.
+        By name, as read; `None` where one is faulty.
     kept
         Whether a session keeps this file, see `rig.protocol.reader.parse`.
     """
     struck = "surface" in top
-    rods = tuple((chains or {}).values())
-    _check_gravity(top, struck=struck)
+    count = len(chains)
+    rods = tuple(filter(None, chains.values()))
+    rods = rods if len(rods) == count else ()
+    if struck or {"gravity", "site"} <= top.keys.keys():  # without a surface it is measured
+        top.need("gravity", "site")
     if struck or "gates" in top:
         top.need("drop")
     if not struck and count > 1:
@@ -53,11 +54,9 @@ def check_scene(
     if "contact" in top and not struck:
         top.fault("contact", "the scene has no surface; leave contact out")
     if top["plan"]:
-        _check_plan(top["plan"], struck=struck, turns=kept or count > 1)
+        _check_plan(top["plan"], struck=struck, turns=kept or count != 1)
     on_board = struck and _is_on_board(top["contact"], rods)
     if top["gates"]:
-        from rig.protocol.gates import check_clear, check_sides  # noqa: PLC0415 - see the reader
-
         check_sides(top["gates"], surface=struck, chains=count)
         if rods and "drop" in top and top.is_sound("drop"):
             inclines = top["plan"]["incline"] if top["plan"] else DEFAULTS["plan.incline"]
@@ -65,29 +64,13 @@ def check_scene(
             check_clear(top["gates"], rods, top["drop"], surface=struck, inclines=inclines)
 
 
-def _check_gravity(top: Section, *, struck: bool) -> None:
-    """Note two sources of gravity, or none; a scene without a surface measures it."""
-    if "gravity" in top and "site" in top:
-        first, second = sorted(("gravity", "site"), key=lambda key: top.keys[key])
-        message = f"{first} is also given, on line {top.keys[first].line}; keep one of them"
-        top.fault(second, message, at_key=True)
-    elif struck and "gravity" not in top and "site" not in top:
-        sources = (f"{name}: {example(key_at(name))}" for name in ("gravity", "site"))
-        top.fault("gravity", f"missing; write {', or '.join(sources)}")
-
-
 def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
     """Note drag stated twice or not at all, and rods too little known for a coefficient."""
-    if ("coefficient" in drag) == ("terminal_speed" in drag):
-        keys = ("coefficient", "terminal_speed")
-        examples = (f"{name}: {example(key_at(f'drag.{name}'))}" for name in keys)
-        if not drag.has_unknown_keys:
-            drag.refuse(f"state either {' or '.join(examples)}")
-    elif "terminal_speed" in drag:
-        if "air_density" in drag:
-            message = "not used with terminal_speed; leave air_density out"
-            drag.fault("air_density", message, at_key=True)
-    else:
+    stated = drag.need("coefficient", "terminal_speed")
+    if stated == "terminal_speed" and "air_density" in drag:
+        message = "not used with terminal_speed; leave air_density out"
+        drag.fault("air_density", message, at_key=True)
+    if stated == "coefficient":
         for rods in chains:
             if rods.missing_keys:
                 missing = ", ".join(rods.missing_keys)
@@ -119,8 +102,6 @@ def _is_on_board(contact: Section | None, chains: Iterable[RodChain]) -> bool:
     """Whether heights are measured from a board; note what chains then lack."""
     if contact is None or contact["datum"] != "board":
         return False
-    from rig.protocol.contact import lacking_geometry  # noqa: PLC0415 - see the reader
-
     lacking = {rods.name: keys for rods in chains if (keys := lacking_geometry(rods))}
     for name, keys in lacking.items():
         contact.fault("datum", f"datum: board needs chains.{name}.{keys[0]}; state it")

@@ -9,7 +9,8 @@ from itertools import pairwise
 from rig.boards import BOARDS
 from rig.model.chain import XI
 from rig.protocol.contact import touching_heights
-from rig.protocol.keys import DEFAULTS, SECTIONS, range_of
+from rig.protocol.fields import DEFAULTS
+from rig.protocol.keys import SECTIONS, range_of
 from rig.protocol.measurable import (
     lacking,
     longest_fall,

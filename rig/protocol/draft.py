@@ -10,7 +10,7 @@ from string import Template
 from typing import TYPE_CHECKING, Literal, get_args
 
 from rig.errors import InputError
-from rig.protocol.keys import key_at
+from rig.protocol.keys import KEYS
 from rig.protocol.reader import parse
 
 if TYPE_CHECKING:
@@ -91,17 +91,9 @@ def _text(draft: Draft, gates: str) -> str:
     scenes = ((line[:_WIDTH].split(), line[_WIDTH:]) for line in _LINES)
     lines = [text for scenes_of_line, text in scenes if draft.scene in (scenes_of_line or SCENES)]
     values = {name: str(getattr(draft, name)) for name in Draft.__slots__}
-    values |= {f"usual_{name}": key_at(path).default for name, path in _USUAL.items()}
+    values |= {path.replace(".", "_"): key.default for path, key in KEYS.items() if "." in path}
     values |= {"title": json.dumps(draft.title, ensure_ascii=False), "gates": gates}
     return Template("\n".join(lines) + "\n").substitute(values)
-
-
-_USUAL = {
-    "channel": "release.channel",
-    "pulse": "release.pulse",
-    "order": "plan.order",
-    "settle": "plan.settle",
-}
 
 
 def _gates(protocol: Protocol, draft: Draft) -> str:
@@ -148,7 +140,7 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
         if len(heights) == number or not gaps:
             break
         target = drop.value + share * rods.chain.length
-        gap = min(gaps, key=lambda gap, target=target: abs(gap - target))  # type: ignore[misc]
+        _, gap = min((abs(gap - target), gap) for gap in gaps)
         gaps.remove(gap)
         heights.append(gap)
     if len(heights) < number:

@@ -50,8 +50,6 @@ class Section:
     ----------
     values
         By key: as read, or the default; `None` where it is faulty, or missing without a default.
-    has_unknown_keys
-        Whether any key is not accepted: what seems to be missing may be that one.
     """
 
     def __init__(
@@ -68,8 +66,8 @@ class Section:
         table = keys.SECTIONS[table_path]
         self._table = table
         self._faulty: set[str] = set()
-        self.has_unknown_keys = not self.keys.keys() <= table.keys()
-        for name in self.keys.keys() - table.keys():
+        self._unknown = self.keys.keys() - table.keys()
+        for name in self._unknown:
             self.fault(name, _unknown_key(name, table), at_key=True)
         self.values = {name: self._read(name, key) for name, key in table.items()}
 
@@ -89,19 +87,27 @@ class Section:
             return value
         if key.required:
             self.need(name)
-        return keys.DEFAULTS[key.path]
+        return DEFAULTS[key.path]
 
     def is_sound(self, *names: str) -> bool:
         """Whether nothing is faulty or missing: of these keys, or of all."""
         return self._faulty.isdisjoint(names) if names else not self._faulty
 
-    def need(self, name: str) -> None:
-        """Note a key that is missing."""
-        if name not in self.nodes:
-            self._faulty.add(name)
-            if not self.lenient:
-                message = f"missing; write for example {name}: {keys.example(self._table[name])}"
-                self.faults.add(self.node.place, self.key(name), message)
+    def need(self, *names: str) -> str | None:
+        """Return which of some keys is there: there must be one of them, and no more."""
+        first, *others = sorted(self.keys.keys() & set(names), key=self.keys.__getitem__) or ("",)
+        for other in others:
+            message = f"{first} is also given, on line {self.keys[first].line}; keep one of them"
+            self.fault(other, message, at_key=True)
+        if first:
+            return None if others else first
+        self._faulty.update(names)
+        # What seems to be missing may be a key that is spelt wrongly.
+        if not self.lenient and not any(did_you_mean(name, names) for name in self._unknown):
+            examples = (f"{name}: {keys.example(self._table[name])}" for name in names)
+            message = f"missing; write for example {', or '.join(examples)}"
+            self.faults.add(self.node.place, self.key(names[0]), message)
+        return None
 
     def key(self, name: str) -> str:
         """Return the full path of one of its keys."""
@@ -115,10 +121,6 @@ class Section:
         """Note a problem with the value of a key (or with the key's being there)."""
         place = self.keys[name] if at_key else self.place(name)
         self.faults.add(place, self.key(name), message)
-
-    def refuse(self, message: str) -> None:
-        """Note a problem with the mapping as a whole."""
-        self.faults.add(self.node.place, self.path, message)
 
 
 def _is_sound(value: Any) -> bool:
@@ -181,24 +183,19 @@ def read_value(
         case keys.Either(kinds), _:
             shape = isinstance(node, Sequence), isinstance(node, Mapping)
             for kind in kinds:
-                if (isinstance(kind, keys.ListOf), isinstance(kind, keys.Mapped)) == shape:
-                    return read_value(kind, node, path, table_path, faults)
-        case keys.Mapped(), Mapping():
+                if (isinstance(kind, keys.ListOf), kind is keys.Plain.MAPPED) == shape:
+                    value = read_value(kind, node, path, table_path, faults)
+                    return accepted.as_list(kind, value)
+        case keys.Plain.MAPPED, Mapping():
             return Section(node, path, table_path, faults) if table_path in keys.SECTIONS else node
-        case ((keys.ListOf(each) | keys.OneOrMore(each)), Sequence(items=[_, *_] as items)):
-            kind, table_path = each or keys.Mapped(), f"{table_path}.{keys.EACH}"
+        case keys.ListOf(each), Sequence(items=[_, *_] as items):
+            kind, table_path = each or keys.Plain.MAPPED, f"{table_path}.{keys.EACH}"
             return tuple(
                 read_value(kind, item, f"{path}[{n}]", table_path, faults)
                 for n, item in enumerate(items)
             )
-        case keys.OneOrMore(each), ScalarNode():
-            value = read_value(each, node, path, table_path, faults)
-            return None if value is None else (value,)
-    empty = isinstance(node, Sequence) and not node.items
-    message = f"found {'an empty list' if empty else node}; accepted: {_form(accepted)}"
-    if isinstance(node, ScalarNode) and not isinstance(
-        accepted, keys.Either | keys.ListOf | keys.Mapped
-    ):
+    message = f"found {node}; accepted: {_form(accepted)}"
+    if isinstance(node, ScalarNode):
         try:
             return _read_scalar(accepted, node)
         except UnitError as error:
@@ -215,14 +212,12 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
     UnitError
         If it is not accepted: says what was found and what is accepted.
     """
-    refusal, close = f"found {node}", ""
+    refusal, close, form = f"found {node}", "", _form(accepted)
     match accepted:
-        case keys.Range() if node.kind in {"nothing", "a boolean"}:
-            raise UnitError(f"{refusal}; accepted: {_form(accepted)}")
-        case keys.Range():
+        case keys.Range() if node.kind not in {"nothing", "a boolean"}:
             quantity = parse(node.text, accepted.dimension)
             if quantity.value not in accepted:
-                refusal = f"found {node.text}"
+                refusal, form = f"found {node.text}", str(accepted)
             elif accepted.exact and quantity.u > 0:
                 raise UnitError(f"{refusal}; {accepted.exact}")
             else:
@@ -236,14 +231,14 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
             if node.text in words:
                 return keys.BOOLEANS.get(node.text, node.text)
             close = did_you_mean(node.text, words)
-        case keys.Text() if node.kind == "text":
+        case keys.Plain.TEXT if node.kind == "text":
             # An escape sequence in a title would act on the terminal that shows it.
             if all(character.isprintable() or character == "\n" for character in node.text):
                 return node.text
             raise UnitError(f"{refusal} with control characters; accepted: plain text")
-        case keys.Text() if node.kind != "nothing":
+        case keys.Plain.TEXT if node.kind != "nothing":
             raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
-    raise UnitError(f"{refusal}; {close}accepted: {accepted}")
+    raise UnitError(f"{refusal}; {close}accepted: {form}")
 
 
 def _form(accepted: keys.Accepted) -> str:
@@ -253,10 +248,20 @@ def _form(accepted: keys.Accepted) -> str:
             return f"{accepted.dimension.noun}, {accepted}"
         case keys.ListOf():
             return str(accepted).replace("a list", "a list [ … , … ]")
-        case keys.Mapped():
+        case keys.Plain.MAPPED:
             return "a mapping {key: value, …}"
         case keys.Either(kinds):
             return "; or ".join(map(_form, kinds))
-        case keys.OneOrMore(each):
-            return f"{_form(each)}; one or a list"
     return str(accepted)
+
+
+def _read_default(key: keys.Key) -> Any:
+    """Return the default of a key as if it stood in a file; `None` where there is none."""
+    if not key.default or key.in_words:
+        return None
+    node = ScalarNode(key.default, plain=True, place=Place(1, 1))
+    return read_value(key.accepted, node, key.path, key.path, FieldFaults("keys.txt"))
+
+
+DEFAULTS: dict[str, Any] = {path: _read_default(key) for path, key in keys.KEYS.items()}
+"""Each key that is left out, by its path, in base units; `None` where it then is not there."""

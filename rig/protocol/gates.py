@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.protocol.contact import touching_heights
@@ -55,13 +54,29 @@ def _sections(section: Section) -> Iterator[Section]:
     return (gate for side in SIDES for gate in section[side] or () if gate)
 
 
-class _Rod(NamedTuple):
+class HangingRod(NamedTuple):
     """A rod before the release: the heights between which it blocks a beam, m."""
 
     low: float
     high: float
     number: int
     chain: str
+
+
+def hanging_rods(chains: Iterable[RodChain], drop: Quantity) -> list[HangingRod]:
+    """Return all rods that hang there, by the height where they begin to block a beam."""
+    rods = []
+    for chain in chains:
+        places = zip(chain.chain.heights, chain.widths, strict=True)
+        for number, (height, width) in enumerate(places, start=1):
+            z, half = drop.value + height, width / 2 + max(CLEARANCE_M, drop.u)
+            rods.append(HangingRod(z - half, z + half, number, chain.name))
+    return sorted(rods)
+
+
+def blocking_rod(rods: Iterable[HangingRod], height: float) -> HangingRod | None:
+    """Return the first of some rods that blocks a beam at a height."""
+    return next((rod for rod in rods if rod.low < height < rod.high), None)
 
 
 def check_clear(
@@ -83,13 +98,7 @@ def check_clear(
     inclines
         Of the board, where heights are measured from it.
     """
-    rods = []
-    for chain in chains:
-        places = zip(chain.chain.heights, chain.widths, strict=True)
-        for number, (height, width) in enumerate(places, start=1):
-            z, half = drop.value + height, width / 2 + max(CLEARANCE_M, drop.u)
-            rods.append(_Rod(z - half, z + half, number, chain.name))
-    rods.sort()
+    rods = hanging_rods(chains, drop)
     lowest = max(width for chain in chains for width in chain.widths) / 2 if surface else 0.0
     lowest += max(
         (max(touching_heights(chain, incline)) for chain in chains for incline in inclines),
@@ -101,7 +110,7 @@ def check_clear(
     for gate in filter(Section.is_sound, _sections(section)):
         height = gate["height"]
         message = f"found {_mm(height)}"
-        rod = next((rod for rod in rods if rod.low < height < rod.high), None)
+        rod = blocking_rod(rods, height)
         if height < lowest:
             message += "; a rod at rest on the surface would block the beam: at least "
             message += f"{_mm(math.ceil(lowest * 1e4) / 1e4)} is needed"
@@ -119,21 +128,19 @@ def check_clear(
         gate.fault("height", message)
 
 
-def _clear_heights(height: float, rods: Iterable[_Rod], lowest: float, top: float) -> list[float]:
+def _clear_heights(
+    height: float, rods: Iterable[HangingRod], lowest: float, top: float
+) -> list[float]:
     """Return the nearest heights below and above that no rod blocks, to 0.1 mm."""
-    clear = []
-    for rounding, step in ((math.floor, -1), (math.ceil, 1)):
-        # Walk from edge to edge; each step leaves at least one rod behind, so this ends.
-        tenths = rounding(height * 1e4)
-        for _ in count():
-            rod = next((rod for rod in rods if rod.low < tenths / 1e4 < rod.high), None)
-            if rod is None:
-                break
-            edge = rounding((rod.low if step < 0 else rod.high) * 1e4)
-            tenths = edge if edge != tenths else tenths + step
-        if max(lowest, 1e-4) <= tenths / 1e4 <= top:
-            clear.append(tenths / 1e4)
-    return clear
+    # A rounded edge may still be a rounding error inside its rod: the next step is outside.
+    below = {math.floor(rod.low * 1e4) - step for rod in rods for step in (0, 1)}
+    above = {math.ceil(rod.high * 1e4) + step for rod in rods for step in (0, 1)}
+    tenths = [z for z in below | above if blocking_rod(rods, z / 1e4) is None]
+    nearest = (
+        max((z for z in tenths if z / 1e4 < height), default=0),
+        min((z for z in tenths if z / 1e4 > height), default=0),
+    )
+    return [z / 1e4 for z in nearest if max(lowest, 1e-4) <= z / 1e4 <= top]
 
 
 def _mm(height: float) -> str:

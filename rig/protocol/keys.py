@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rig.units import Dimension, Quantity, format_quantity, parse
+from rig.units import Dimension, Quantity, format_quantity
 
 ANY = "*"
 """Stands in a path for names that the file chooses: of chains."""
@@ -70,15 +71,6 @@ class OneOf(NamedTuple):
         return ", ".join(self.words)
 
 
-class OneOrMore(NamedTuple):
-    """One value or a list of them."""
-
-    each: Range
-
-    def __str__(self) -> str:
-        return f"{self.each}; one or a list"
-
-
 class Either(NamedTuple):
     """A value of one of these kinds, which are written differently."""
 
@@ -87,31 +79,28 @@ class Either(NamedTuple):
     def __str__(self) -> str:
         return "; or ".join(map(str, self.kinds))
 
+    def as_list(self, kind: Accepted, value: Any) -> Any:
+        """Return a value of one of these kinds; alone where a list may stand, it is one of one."""
+        return (value,) if ListOf(kind) in self.kinds and value is not None else value
+
 
 class ListOf(NamedTuple):
     """A list, whose items have keys of their own or are values."""
 
-    each: Range | None = None
+    each: Accepted | None = None
 
     def __str__(self) -> str:
         return "a list" if self.each is None else f"a list of values, {self.each}"
 
 
-class Mapped(NamedTuple):
-    """Keys with values: those of the table, or names that the file chooses."""
+class Plain(StrEnum):
+    """Keys with values, those of the table or names that the file chooses; or any text."""
 
-    def __str__(self) -> str:
-        return "keys"
-
-
-class Text(NamedTuple):
-    """Any text."""
-
-    def __str__(self) -> str:
-        return "text"
+    MAPPED = "keys"
+    TEXT = "text"
 
 
-Accepted = Range | Whole | OneOf | OneOrMore | Either | ListOf | Mapped | Text
+Accepted = Range | Whole | OneOf | Either | ListOf | Plain
 
 
 class Key(NamedTuple):
@@ -166,18 +155,14 @@ def _read_accepted(text: str) -> Accepted:
         return Either(tuple(map(_read_accepted, text.split(" / "))))
     kind, _, rest = text.partition(" ")
     match kind:
-        case "keys":
-            return Mapped()
-        case "text":
-            return Text()
+        case "keys" | "text":
+            return Plain(kind)
         case "whole":
             return Whole(*map(int, rest.split()))
         case "words":
             return OneOf(tuple(rest.split()))
         case "list":
             return ListOf(_read_range(rest.removeprefix("of ")) if rest else None)
-        case "several":
-            return OneOrMore(_read_range(rest))
     return _read_range(text)
 
 
@@ -198,47 +183,23 @@ def _read_key(row: str) -> Key:
 
 
 _LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-KEYS = tuple(_read_key(line) for line in _LINES if line and not line.startswith("#"))
-"""In the order in which a file is written."""
+_ROWS = (_read_key(line) for line in _LINES if line and not line.startswith("#"))
+KEYS = {key.path: key for key in _ROWS}
+"""By path, in the order in which a file is written."""
 
 SECTIONS: dict[str, dict[str, Key]] = {}
 """The keys of each mapping, by the mapping's path and their own names."""
-for _key in KEYS:
+for _key in KEYS.values():
     _section, _, _name = _key.path.rpartition(".")
     SECTIONS.setdefault(_section, {})[_name] = _key
 
 
-def key_at(path: str) -> Key:
-    """Return the key at a path of the table."""
-    section, _, name = path.rpartition(".")
-    return SECTIONS[section][name]
-
-
 def range_of(path: str) -> Range:
     """Return the accepted values of a key that is a quantity, or of each in its list."""
-    accepted = key_at(path).accepted
-    accepted = accepted.each if isinstance(accepted, OneOrMore) else accepted
+    accepted = KEYS[path].accepted
+    accepted = accepted.kinds[0] if isinstance(accepted, Either) else accepted
     assert isinstance(accepted, Range)
     return accepted
-
-
-def _default(key: Key) -> Any:
-    if not key.default or key.in_words:
-        return None
-    match key.accepted:
-        case Range(dimension, exact=exact):
-            quantity = parse(key.default, dimension)
-            return quantity.value if exact else quantity
-        case OneOrMore(each):
-            return (parse(key.default, each.dimension).value,)
-        case Whole():
-            return int(key.default)
-        case _:
-            return BOOLEANS.get(key.default, key.default)
-
-
-DEFAULTS: dict[str, Any] = {key.path: _default(key) for key in KEYS}
-"""Each key that is left out, by its path, in base units; `None` where it then is not there."""
 
 
 _BRACKETS = (("", "{", "}"), (f".{EACH}", "[{", "}]"), (f".{ANY}", "{A: {", ", …}}"))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from rig.protocol.keys import SECTIONS, example
-
 if TYPE_CHECKING:
     from rig.protocol.fields import Section
 
@@ -35,15 +33,12 @@ def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses | None:
         return masses if len(masses) == rods and chain.is_sound("masses") else None
     if masses is None:
         return None
-    profiles = SECTIONS["chains.*.masses"]
-    if sum(name in masses for name in profiles) != 1:
-        examples = (f"{name}: {example(profile)}" for name, profile in profiles.items())
-        if not masses.has_unknown_keys:
-            masses.refuse(f"state one profile, {' or '.join(examples)}")
+    profile = masses.need("exponential", "table")
+    if profile is None:
         return None
     if not masses.is_sound():
         return None
-    if "table" in masses:
+    if profile == "table":
         return _interpolate(masses, heights)
     if rods == 1:
         masses.fault("exponential", "one object has one mass; state it as mass", at_key=True)
@@ -58,7 +53,7 @@ def _interpolate(masses: Section, heights: tuple[float, ...]) -> Masses | None:
     points = [(point["height"], point["mass"]) for point in masses["table"]]
     for n, ((low, _), (high, _)) in enumerate(pairwise(points), start=1):
         if low >= high:
-            masses["table"][n].refuse("heights must increase from point to point")
+            masses["table"][n].fault("height", "heights must increase from point to point")
             return None
     lowest, highest = points[0][0], points[-1][0]
     # A height that sums up from rods is a rounding above what was written.

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from rig.protocol.keys import DEFAULTS
+from rig.protocol.fields import DEFAULTS
 from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 

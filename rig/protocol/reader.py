@@ -1,7 +1,7 @@
 """From a protocol file to a checked `Protocol`, or to every problem in it at once.
 
 `rig.protocol.keys` says what each key may be, `rig.protocol.checks` what keys have to do with each
-other. What a file does not name is not loaded either: what builds its parts is imported where used.
+other.
 """
 
 from __future__ import annotations
@@ -9,12 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.errors import InputError
+from rig.errors import InputError, Problem
 from rig.files import read_input
+from rig.model.surface import Pile, Surface
 from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
-from rig.protocol.fields import FieldFaults, Section, read_value, unique_entries
-from rig.protocol.keys import Mapped
+from rig.protocol.fields import FieldFaults, Section, read_value
+from rig.protocol.keys import Plain
 from rig.protocol.protocol import (
     SIDES,
     Accept,
@@ -28,13 +29,12 @@ from rig.protocol.protocol import (
     Protocol,
     ReleasePulse,
 )
-from rig.protocol.yamltree import Node, load, place_at
+from rig.protocol.site import gravity_at
+from rig.protocol.yamltree import load, place_at
 from rig.units import Quantity
 
 if TYPE_CHECKING:
     import os
-
-    from rig.model.surface import Surface
 
 MAX_BYTES = 1_000_000
 
@@ -72,9 +72,9 @@ def read(path: str | os.PathLike[str]) -> Protocol:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8")
-        faults = FieldFaults(source)
-        faults.add(place_at(before, len(before)), "", "not UTF-8 text; save the file as UTF-8")
-        raise InputError(problems=faults.problems.values()) from None
+        place, message = place_at(before, len(before)), "not UTF-8 text; save the file as UTF-8"
+        problem = Problem(source, place.line, place.column, "", message)
+        raise InputError(problems=[problem]) from None
     return parse(text, source)
 
 
@@ -104,31 +104,22 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
     if len(text) > MAX_BYTES:
         raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
     faults = FieldFaults(source)
-    protocol = _protocol(load(text, source), faults, text, kept=kept)
-    if faults.problems or protocol is None:
-        raise InputError(problems=faults.problems.values())
-    return protocol
-
-
-def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Protocol | None:
-    """Build the protocol from its root; `None` (and faults) if anything is wrong."""
-    top: Section | None = read_value(Mapped(), node, "", "", faults)
+    top: Section | None = read_value(Plain.MAPPED, load(text, source), "", "", faults)
     if top is None:
-        return None
-    chains, count = None, 1
-    if top["chains"]:
-        struck, measured = "surface" in top, "gates" in top
-        chains = read_chains(top["chains"], faults, seen_by_gates=measured, struck=struck)
-        count = len(unique_entries(top["chains"], "chains", faults)[1])
-    check_scene(top, chains, count=count, kept=kept)
-    if faults.problems or chains is None:
-        return None
+        raise InputError(problems=faults.problems.values())
+    struck, measured = "surface" in top, "gates" in top
+    chains = read_chains(top["chains"], faults, seen_by_gates=measured, struck=struck)
+    check_scene(top, chains, kept=kept)
+    if faults.problems:
+        raise InputError(problems=faults.problems.values())
     track = top["track"] and InclinedTrack(**_arguments(top["track"], incline="incline_deg"))
-    gravity = _gravity(top)
+    gravity, site = top["gravity"], top["site"]
+    if site is not None:
+        gravity = gravity_at(site["latitude"], site["height"])
     contact = top["contact"]
     return Protocol(
-        title=top["title"] if "title" in top else Path(faults.source).stem,
-        chains=chains,
+        title=top["title"] if "title" in top else Path(source).stem,
+        chains={name: chain for name, chain in chains.items() if chain is not None},
         gravity=gravity if track is None else track.along(gravity),
         drop=top["drop"],
         surface=top["surface"] and _surface(top["surface"]),
@@ -147,7 +138,7 @@ def _protocol(node: Node, faults: FieldFaults, text: str, *, kept: bool) -> Prot
         blind=top["blind"],
         notes=top["notes"] or "",
         text=text,
-        source=faults.source,
+        source=source,
     )
 
 
@@ -157,20 +148,8 @@ def _arguments(section: Section | None, **names: str) -> dict[str, Any]:
     return {names.get(name, name): value for name, value in values.items()}
 
 
-def _gravity(top: Section) -> Quantity:
-    """Return the ``gravity`` of a file, or that of its ``site``."""
-    if top["site"] is None:
-        gravity: Quantity = top["gravity"]
-        return gravity
-    from rig.protocol.site import gravity_at  # noqa: PLC0415 - see above
-
-    return gravity_at(top["site"]["latitude"], top["site"]["height"])
-
-
 def _surface(section: Section) -> Surface:
     """Return the surface; without a restitution, which no chain then needs, its is 0."""
-    from rig.model.surface import Pile, Surface  # noqa: PLC0415 - see above
-
     pile = section["pile"]
     return Surface(
         section["restitution"] or Quantity(0.0),

@@ -27,7 +27,7 @@ def page() -> str:
         "| key | accepted | without it | meaning | example |",
         "|---|---|---|---|---|",
     ]
-    for key in keys.KEYS:
+    for key in keys.KEYS.values():
         name = f"**`{key.path}`**" if key.required else f"`{key.path}`"
         example = f"`{key.example}`" if key.example else ""
         lines.append(f"| {name} | {key.accepted} | {key.default} | {key.meaning} | {example} |")
@@ -66,9 +66,9 @@ def _object(path: str, description: str) -> dict[str, Any]:
 
 def _property(key: keys.Key) -> dict[str, Any]:
     """Return the schema of a key."""
-    words = (
-        [key.meaning] if isinstance(key.accepted, keys.Mapped) else [key.meaning, str(key.accepted)]
-    )
+    words = [key.meaning]
+    if key.accepted is not keys.Plain.MAPPED:
+        words.append(str(key.accepted))
     if key.default:
         words.append(f"without it: {key.default}")
     examples = {"examples": [key.example]} if key.example else {}
@@ -88,13 +88,11 @@ def _values(path: str, accepted: keys.Accepted) -> dict[str, Any]:
             # YAML reads a bare true as a boolean.
             booleans = dict.fromkeys(keys.BOOLEANS[word] for word in words if word in keys.BOOLEANS)
             return {"enum": [*words, *booleans]}
-        case keys.OneOrMore(each):
-            return {"anyOf": [_values(path, each), _values(path, keys.ListOf(each))]}
         case keys.Either(kinds):
             return {"anyOf": [_values(path, kind) for kind in kinds]}
         case keys.ListOf(each):
             items = _values(path, each) if each else _object(f"{path}.{keys.EACH}", "an item")
             return {"type": "array", "items": items, "minItems": 1}
-        case keys.Mapped():
+        case keys.Plain.MAPPED:
             return _object(path, "")
     return {"type": "string"}

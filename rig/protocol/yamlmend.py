@@ -19,8 +19,19 @@ MOST_PARSED = 150_000
 """Characters parsed in search of a change: about a second, and fifty changes of a page."""
 _PAIRS = {"[": "]", "{": "}"}
 _MARKS = "[]{},:-\"'"
-_KEY = re.compile(r"\s*(?:- )?[\w.]+")
+_BRACKET_OR_QUOTED = re.compile(r"\"[^\"]*(?:\"|$)|'[^']*(?:'|$)|[\[\]{}]")
+_QUOTE = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|(?<![^\s\[{,:])(?P<open>[\"'])[^\n]*")
 _VALUE = re.compile(r"(?<=: )(?=\S)[^\n]*?(?=\s*(?:[#\n]|$))")
+_MISSING = (
+    (re.compile(r" *-"), " ", "a blank is missing after the hyphen"),
+    (
+        re.compile(r"\s*(?:- )?([\w.]++):(?=[^\s#])"),
+        " ",
+        "a blank is missing after the colon of {}",
+    ),
+    (re.compile(r"\s*(?:- )?([\w.]++)(?! *:)"), ": ", "a colon is missing after {}"),
+)
+"""What a line may begin with, what is then inserted behind it, and a sentence."""
 NOT_READABLE = "this line cannot be read from here on: see its quotes, brackets, colons and indent"
 
 
@@ -53,8 +64,7 @@ def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
     tuple of int and str
         An index in `text`, and a sentence.
     """
-    mark = error.problem_mark or error.context_mark
-    stop = min(mark.index if mark else 0, len(text))
+    stop = min(_stop(error), len(text))
     begin = error.context_mark.index if error.context_mark else stop
     farther: Mend | None = None
     for mend in islice(_mends(text, stop, begin), MOST_PARSED // (len(text) + 1)):
@@ -72,11 +82,15 @@ def _reach(text: str) -> int | None:
         for _ in yaml.parse(text, Loader=yaml.SafeLoader):
             pass
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        return mark.index if mark else 0
+        return _stop(error)
     except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
         return 0
     return None
+
+
+def _stop(error: yaml.MarkedYAMLError) -> int:
+    mark = error.problem_mark or error.context_mark
+    return mark.index if mark else 0
 
 
 def _mends(text: str, stop: int, begin: int) -> Iterator[Mend]:
@@ -112,24 +126,14 @@ def _stray(text: str, at: int, begin: int) -> Iterator[Mend]:
 
 def _open_quotes(text: str, stop: int) -> Iterator[Mend]:
     """Close a quote at the end of its line, before a comma, bracket or comment if there is one."""
-    starts: list[int] = []
-    try:
-        starts.extend(
-            token.start_mark.index
-            for token in yaml.scan(text[:stop], Loader=yaml.SafeLoader)
-            if getattr(token, "style", None) and token.start_mark.line < token.end_mark.line
-        )
-    except yaml.MarkedYAMLError as error:
-        if error.context_mark:
-            starts.insert(0, error.context_mark.index)
-    for start in starts:
-        quote = text[start : start + 1]
-        if quote not in {'"', "'"}:
+    for quote in _QUOTE.finditer(text, 0, stop):
+        start, mark = quote.start(), quote["open"]
+        if mark is None:
             continue
-        message = f"a quote is open from here: close it with {quote}"
+        message = f"a quote is open from here: close it with {mark}"
         for end in re.finditer(r"\s*(?:#|[,}\]]|$)", text[start + 1 : _line_end(text, start)]):
             to = start + 1 + end.start()
-            yield Mend(start, message, to, to, quote)
+            yield Mend(start, message, to, to, mark)
         yield Mend(start, f"{message}, or leave it out", start, start + 1, "")
 
 
@@ -137,29 +141,19 @@ def _colons(text: str, start: int) -> Iterator[Mend]:
     """Give the first word of a line a colon, and a blank behind it; likewise the line before."""
     before = _line_start(text, max(start - 1, 0))
     for line in dict.fromkeys((start, before)):
-        hyphen = line + _indent(text, line)
-        if text[hyphen : hyphen + 1] == "-":
-            message = "a blank is missing after the hyphen"
-            yield Mend(hyphen + 1, message, hyphen + 1, hyphen + 1, " ")
-        key = _KEY.match(text, line)
-        if key is None:
-            continue
-        end, word = key.end(), quoted(key.group().strip().removeprefix("- "))
-        rest = text[end : _line_end(text, end)].partition("#")[0]
-        if rest.startswith(":") and rest[1:].strip() and not rest.startswith(": "):
-            yield Mend(end + 1, f"a blank is missing after the colon of {word}", end + 1, end + 1,
-                       " ")  # fmt: skip
-        elif not rest.lstrip().startswith(":"):
-            yield Mend(end, f"a colon is missing after {word}", end, end, ":" + " " * bool(rest))
+        for pattern, new, message in _MISSING:
+            if match := pattern.match(text, line):
+                end, word = match.end(), quoted(match[match.lastindex or 0])
+                yield Mend(end, message.format(word), end, end, new)
 
 
 def _brackets(text: str, at: int, begin: int) -> Iterator[Mend]:
     """Close or open a bracket, or put a comma between two values."""
     opened: list[int] = []
-    for n in _bare(text, _line_start(text, begin), at):
-        if text[n] in "[{":
-            opened.append(n)
-        elif text[n] in "]}" and opened:
+    for mark in _BRACKET_OR_QUOTED.finditer(text, _line_start(text, begin), at):
+        if mark.group() in _PAIRS:
+            opened.append(mark.start())
+        elif mark.group() in _PAIRS.values() and opened:
             opened.pop()
     character = text[at : at + 1]
     if text[begin : begin + 1] in _PAIRS and begin not in opened:
@@ -211,7 +205,7 @@ def _indents(text: str, at: int) -> Iterator[Mend]:
     before = _line_start(text, max(line_start - 1, 0))
     starts = [n + 1 for n in range(line_start) if text[n] == "\n"]
     for start in dict.fromkeys((before, line_start)):
-        indent = _indent(text, start)
+        indent = len(_lead(text, start).removesuffix("- "))
         leads = {_lead(text, line): line for line in (0, *starts) if line != start}
         for lead, line in reversed(leads.items()):
             if lead == _lead(text, start) or text[line + len(lead) : line + len(lead) + 1] == "#":
@@ -229,23 +223,6 @@ def _lead(text: str, start: int) -> str:
     """Return the blanks that a line begins with, and the hyphen of an item of a list."""
     lead = re.compile(r" *(?:- )?").match(text, start)
     return lead.group() if lead else ""
-
-
-def _bare(text: str, begin: int, end: int) -> Iterator[int]:
-    """Indices outside quotes."""
-    quote = ""
-    for n in range(begin, end):
-        if quote:
-            quote = "" if text[n] == quote else quote
-        elif text[n] in "\"'":
-            quote = text[n]
-        else:
-            yield n
-
-
-def _indent(text: str, start: int) -> int:
-    line = text[start : _line_end(text, start)]
-    return len(line) - len(line.lstrip(" "))
 
 
 def _line_start(text: str, index: int) -> int:

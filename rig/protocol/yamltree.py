@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 
@@ -76,7 +76,7 @@ class Sequence:
     size: int
 
     def __str__(self) -> str:
-        return "a list"
+        return "a list" if self.items else "an empty list"
 
 
 @dataclass(slots=True)
@@ -133,7 +133,7 @@ def load(text: str, source: str) -> Node:
     body = "\n".join(_BREAK.split(text.removeprefix("\ufeff")))
     try:
         _refuse_tabs(body)
-        return _Builder().build(yaml.parse(body, Loader=yaml.SafeLoader))
+        return _Builder(body).build()
     except _RefusalError as refusal:
         place, message = refusal.place, refusal.message
     except yaml.reader.ReaderError as error:
@@ -183,72 +183,60 @@ def _refuse_tabs(text: str) -> None:
             raise _RefusalError(Place(number, column + 1), "a tab; use blanks")
 
 
-class _Frame(NamedTuple):
-    """A list or mapping that is not closed yet; of a mapping keys and values take turns."""
-
-    place: Place
-    anchor: str | None
-    is_list: bool
-    parts: list[Node]
-
-
 class _Builder:
-    """Builds the tree from parser events with a stack of its own, so nothing recurses."""
+    """Builds the tree from parser events, no deeper than `MAX_DEPTH` levels."""
 
-    def __init__(self) -> None:
-        # Below everything that is open lies the file, a list of documents.
-        self.stack = [_Frame(Place(1, 1), None, is_list=True, parts=[])]
+    def __init__(self, text: str) -> None:
+        self.events: Iterator[Any] = yaml.parse(text, Loader=yaml.SafeLoader)
         self.anchors: dict[str, Node] = {}
         self.nodes = 0
 
-    def build(self, events: Iterator[Any]) -> Node:
-        documents = 0
-        for event in events:
-            place = Place(event.start_mark.line + 1, event.start_mark.column + 1)
-            if isinstance(event, yaml.DocumentStartEvent):
-                documents += 1
-                if documents > 1:
-                    raise _RefusalError(place, "a second document; a file has one protocol")
-            elif isinstance(event, yaml.NodeEvent):
-                self._node(event, place)
-            elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
-                self._close()
-        if not self.stack[0].parts:
+    def build(self) -> Node:
+        documents = self._list(yaml.StreamEndEvent, -1)
+        if not documents:
             raise _RefusalError(Place(1, 1), "the file is empty; begin with protocol: 1")
-        return self.stack[0].parts[0]
+        return documents[0]
 
-    def _node(self, event: Any, place: Place) -> None:
+    def _list(self, end: type[Any], depth: int) -> list[Node]:
+        """Return the nodes up to the event that closes them."""
+        nodes: list[Node] = []
+        for event in self.events:
+            place = Place(event.start_mark.line + 1, event.start_mark.column + 1)
+            if isinstance(event, end):
+                break
+            if isinstance(event, yaml.DocumentStartEvent) and nodes:
+                raise _RefusalError(place, "a second document; a file has one protocol")
+            if isinstance(event, yaml.NodeEvent):
+                nodes.append(self._node(event, place, depth + 1))
+        return nodes
+
+    def _node(self, event: Any, place: Place, depth: int) -> Node:
+        node: Node
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
                 name = quoted(str(event.anchor))
                 raise _RefusalError(place, f"no anchor stands before the alias {name}")
             node = self.anchors[event.anchor]
-            self._add(node, place, event.anchor, node.size)
         elif event.tag is not None:
             raise _RefusalError(place, f"the tag {quoted(event.tag)} is not accepted; leave it out")
         elif isinstance(event, yaml.ScalarEvent):
             # "\uD800" in double quotes makes half a character, which no file or database takes.
             if any("\ud800" <= character <= "\udfff" for character in event.value):
                 raise _RefusalError(place, "half of a surrogate pair; write the character itself")
-            self._add(ScalarNode(event.value, event.style is None, place), place, event.anchor)
-        elif len(self.stack) > MAX_DEPTH:
+            node = ScalarNode(event.value, event.style is None, place)
+        elif depth >= MAX_DEPTH:
             raise _RefusalError(place, f"more than {MAX_DEPTH} levels of brackets or indents")
+        elif isinstance(event, yaml.SequenceStartEvent):
+            items = self._list(yaml.SequenceEndEvent, depth)
+            node = Sequence(place, items, 1 + sum(item.size for item in items))
         else:
-            is_list = isinstance(event, yaml.SequenceStartEvent)
-            self.stack.append(_Frame(place, event.anchor, is_list, []))
-
-    def _close(self) -> None:
-        place, anchor, is_list, parts = self.stack.pop()
-        size = 1 + sum(part.size for part in parts)
-        entries = list(zip(parts[::2], parts[1::2], strict=not is_list))
-        node = Sequence(place, parts, size) if is_list else Mapping(place, entries, size)
-        self._add(node, place, anchor)
-
-    def _add(self, node: Node, place: Place, anchor: str | None, count: int = 1) -> None:
-        """Append a node to what is open; its parts were counted as they came, but for an alias."""
-        self.nodes += count
+            parts = self._list(yaml.MappingEndEvent, depth)
+            entries = list(zip(parts[::2], parts[1::2], strict=True))
+            node = Mapping(place, entries, 1 + sum(part.size for part in parts))
+        # The parts of a list were counted as they came, but for those of an alias.
+        self.nodes += node.size if isinstance(event, yaml.AliasEvent) else 1
         if self.nodes > MAX_NODES:
             raise _RefusalError(place, f"more than {MAX_NODES} values, aliases expanded")
-        if anchor:
-            self.anchors[anchor] = node
-        self.stack[-1].parts.append(node)
+        if event.anchor:
+            self.anchors[event.anchor] = node
+        return node

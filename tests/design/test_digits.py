@@ -99,15 +99,15 @@ def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
     kinds = cases(protocol, beams, replace(stated(protocol), floor=floor))
     found = forecast(protocol, GateLayout.of(kinds, range(len(beams))), sure=True)
     # All unknowns of the session: each drop's own and its α, what is common, beams.
-    common = sum(case.own + case.struck for case in kinds.cases)
+    common = sum(case.own + case.struck for case in kinds)
     size, first, rows, at_alpha, gradients = (
-        common + kinds.shared + BEAM * len(beams),
+        common + kinds[0].shared + BEAM * len(beams),
         0,
         [],
         [],
         [],
     )
-    for case in kinds.cases:
+    for case in kinds:
         place = np.append(first + np.arange(case.own + case.struck), common + case.here)
         at_alpha.append(first + case.own)
         first += case.own + case.struck
@@ -115,21 +115,19 @@ def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
             gradients.append(np.zeros(size))
             gradients[-1][place] = gradient
         for n, block in enumerate(case.blocks):
-            beam = common + kinds.shared + BEAM * n + np.arange(BEAM)
+            beam = common + kinds[0].shared + BEAM * n + np.arange(BEAM)
             for slopes in block.slopes:
                 rows.append(np.zeros(size))
                 rows[-1][np.append(place[block.columns], beam)] = slopes
     now = {"restitution": surface.restitution.value, "friction": surface.friction.value}
     chain = protocol.chains["A"].chain
-    ties = [
-        alphas(surface, chain, case.run.incline_deg, now)[1].mean(axis=0) for case in kinds.cases
-    ]
+    ties = [alphas(surface, chain, case.run.incline_deg, now)[1].mean(axis=0) for case in kinds]
     with localcontext(prec=60):
         slopes = exact(np.array(rows))
         u = [float(x.sqrt()) for x in variances(slopes, exact(np.array(gradients)))]
         said = [
             found.single[quantity][protocol.condition(case.run)]
-            for case in kinds.cases
+            for case in kinds
             for quantity in case.gradients
         ]
         assert said == pytest.approx(u, rel=1e-9)

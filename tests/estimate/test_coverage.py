@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimate.coefficients import best, coefficient_problem
-from rig.estimate.quadratic_forms import merged
+from rig.estimate.quadratic_forms import merge_like
 from tests.analysis.drops import UNIFORM
 from tests.estimate.sessions import BETA, MU, forms
 
@@ -17,7 +17,7 @@ def test_restitution_and_friction_from_one_nine_incline_session():
     inclines = UNIFORM.plan.inclines
     ratios = []
     for seed in SEEDS:
-        every = merged(forms(inclines, UNIFORM.plan.repeats, seed))
+        every = merge_like(forms(inclines, UNIFORM.plan.repeats, seed))
         outcome = best(UNIFORM, coefficient_problem(UNIFORM, every))
         for name, truth, wanted in (("restitution", BETA, 0.01), ("friction", MU, 0.02)):
             value, u = outcome[name]

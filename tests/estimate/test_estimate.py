@@ -12,7 +12,7 @@ from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import one_alpha
 from rig.estimate.hypothesis_fit import fit
 from rig.estimate.posterior import Posterior, posterior
-from rig.estimate.quadratic_forms import merged
+from rig.estimate.quadratic_forms import merge_like
 from rig.estimate.session import estimate
 from rig.model.impact import alpha_inclined
 from rig.protocol.plan import runs
@@ -122,7 +122,7 @@ def test_without_priors_the_posterior_is_the_least_squares_fit():
     vague = replace(
         UNIFORM, surface=replace(surface, restitution=Quantity(0.5), friction=Quantity(0.2))
     )
-    found = coefficient_problem(vague, merged(forms(SURFACE)))
+    found = coefficient_problem(vague, merge_like(forms(SURFACE)))
     centre = best(vague, found)
     spread = posterior(vague, found, centre)
     for name in ("restitution", "friction"):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rig.analysis.trajectory import DRAG, free_trajectory, struck_trajectory
-from rig.estimate.rods import _groups
+from rig.estimate.rods import _gains
 from rig.model.chain import Chain
 from rig.model.drag import drag_hits, fallen
 from tests.analysis.drops import UNIFORM, impact_ratios
@@ -32,13 +32,14 @@ def test_a_little_air_by_the_exact_fall_of_a_struck_chain():
 
 
 def test_rods_that_are_not_resolved_are_taken_with_their_neighbours():
-    sizes = np.ones(5)
-    sure, unsure = 0.1**2, 1.0
-    assert _groups(np.diag([sure] * 5), sizes) == [(n, n) for n in range(5)]
-    # The two in the middle are known by their sum alone.
-    covariance = np.diag([sure, unsure, unsure, sure, sure])
-    covariance[1, 2] = covariance[2, 1] = -unsure + sure
-    assert _groups(covariance, sizes) == [(0, 0), (1, 2), (3, 3), (4, 4)]
-    # What is left over at the end joins the last group; if nothing is known, all are one.
-    assert _groups(np.diag([sure, sure, sure, sure, unsure]), sizes)[-1] == (3, 4)
-    assert _groups(unsure * np.eye(5), sizes) == [(0, 4)]
+    sizes, sure = np.ones(5), 0.01  # beside u = 1
+    middle = np.diag([sure, 1.0, 1.0, sure, sure])
+    middle[1, 2] = middle[2, 1] = sure - 1.0
+    for covariance, groups in (
+        (middle, [(0, 0), (1, 2), (3, 3), (4, 4)]),  # known by their sum alone
+        # What is left over at the end joins the last group; if nothing is known, all are one.
+        (np.diag([sure] * 4 + [1.0]), [(0, 0), (1, 1), (2, 2), (3, 4)]),
+        (np.eye(5), [(0, 4)]),
+    ):
+        gains = _gains(sizes, covariance, sizes)
+        assert [(gain.first, gain.last) for gain in gains] == groups

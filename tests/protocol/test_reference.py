@@ -20,7 +20,7 @@ from tests.protocol.keys import BARE, around, put, value
 
 ROOT = Path(__file__).parents[2]
 READY = sorted((ROOT / "protocols").glob("*.yaml"))
-BY_PATH = {key.path: key for key in KEYS}
+BY_PATH = {key.path: key for key in KEYS.values()}
 
 
 def text(data: dict) -> str:
@@ -35,7 +35,7 @@ def test_the_table_knows_what_boards_have():
     assert BY_PATH["chains.*.rods.[].count"].accepted == keys.Whole(1, keys.MOST_RODS)
 
 
-VALUED = [key for key in KEYS if key.example]
+VALUED = [key for key in KEYS.values() if key.example]
 
 
 @pytest.mark.parametrize("key", VALUED, ids=lambda key: key.path)
@@ -57,7 +57,7 @@ IN_WORDS = {
 """Defaults that follow from something else."""
 
 
-STATED = [key for key in KEYS if key.default and key.path not in IN_WORDS]
+STATED = [key for key in KEYS.values() if key.default and key.path not in IN_WORDS]
 
 
 @pytest.mark.parametrize("key", STATED, ids=lambda key: key.path)
@@ -81,9 +81,9 @@ def test_a_default_written_is_as_left_out(key):
 def test_a_row_of_the_table_is_all_that_a_key_needs(monkeypatch):
     """The reader, its hints, the page and the schema follow."""
     delay = keys.Key("release.delay", keys.range_of("plan.settle"), "2 s", "of the pulse", "5 s")
-    monkeypatch.setattr(keys, "KEYS", (*KEYS, delay))
+    monkeypatch.setattr(keys, "KEYS", KEYS | {delay.path: delay})
     monkeypatch.setitem(keys.SECTIONS["release"], "delay", delay)
-    monkeypatch.setitem(keys.DEFAULTS, delay.path, 2.0)
+    monkeypatch.setitem(fields.DEFAULTS, delay.path, 2.0)
 
     def release(written: str):
         faults = fields.FieldFaults("f")
