@@ -15,6 +15,7 @@ from rig.link.messages import (
     Fire,
     Fired,
     pack,
+    pack_events,
     pack_label,
 )
 from rig.link.transcript import Transcript
@@ -38,7 +39,7 @@ def frames(count: int) -> list[bytes]:
         events = tuple(
             Event((first + n) * TICKS % 2**32, (first + n + 1) % 2) for n in range(EVENTS_PER_FRAME)
         )
-        made.append(_framed(EventsFrame(LABEL, first, events), number % 255 + 1))
+        made.append(_framed(EventsFrame(LABEL, first, pack_events(events)), number % 255 + 1))
     return made
 
 

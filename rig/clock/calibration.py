@@ -44,12 +44,23 @@ class ClockLog(Protocol):
     """What a session has of clocks; `rig.session.reading.Reader` says what each of these is."""
 
     @property
-    def simulated(self) -> bool: ...  # noqa: D102
-    def identities(self) -> Sequence[tuple[int, Mapping[str, Any]]]: ...  # noqa: D102
-    def pings(self, after: int = 0) -> Sequence[ClockSample]: ...  # noqa: D102
-    def pulses(self) -> Sequence[Pulse]: ...  # noqa: D102
-    def host_breaks(self) -> Sequence[HostBreak]: ...  # noqa: D102
-    def fired_ns(self) -> Mapping[tuple[int, int], int]: ...  # noqa: D102
+    def simulated(self) -> bool:
+        """Whether the host's clock is exact."""
+
+    def identities(self) -> Sequence[tuple[int, Mapping[str, Any]]]:
+        """Host time and content of every identity."""
+
+    def pings(self, after: int = 0) -> Sequence[ClockSample]:
+        """Clock samples, all but the first so many."""
+
+    def pulses(self) -> Sequence[Pulse]:
+        """Pulses of the 1 Hz reference."""
+
+    def host_breaks(self) -> Sequence[HostBreak]:
+        """When the host slept or its clock was set."""
+
+    def fired_ns(self) -> Mapping[tuple[int, int], int]:
+        """When each run and attempt was fired."""
 
 
 @dataclass(frozen=True, slots=True)

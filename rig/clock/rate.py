@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
+from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs
 from rig.clock.samples import RECV, SEND, TICK, Samples
 from rig.clock.wander import Readings, Track
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rig.arrays import Array
-    from rig.records import ClockSample, Pulse
+    from rig.records import Pulse
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
 _PASSES = 5
@@ -70,23 +70,6 @@ class TickRate:
         if self.track is None:
             return Rate(self.hz, self.u_hz)
         return _least(self.nominal_hz, self.track.rate(seconds))
-
-
-def tick_rate(
-    pings: Iterable[ClockSample] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
-) -> TickRate:
-    """Measure the device's tick rate from clock samples in any order, see `ping_rate`.
-
-    Parameters
-    ----------
-    pings
-        Clock samples.
-    nominal_hz
-        What the device says its rate is.
-    cuts_ns
-        See `rig.clock.epochs.epochs`.
-    """
-    return ping_rate(epochs(pings, nominal_hz, cuts_ns))
 
 
 def ping_rate(split: Epochs) -> TickRate:

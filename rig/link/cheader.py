@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.link import frames
 from rig.link import messages as wire
-from rig.link.wiretypes import Chars, Field, Raw, Tail, Unsigned
+from rig.link.messages import Chars, Field, Raw, Tail, Unsigned
 
 if TYPE_CHECKING:
     from enum import IntEnum

@@ -10,14 +10,14 @@ from rig.link import messages as wire
 from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Received, Record
 from rig.reasons import make_error
-from rig.records import ClockSample, Drop
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rig.link.assembly import Assembly
+    from rig.link.transcript import Received
+    from rig.records import ClockSample, Drop
 
 BOOT_WAIT_S = 2.0
 """The Mega's boot loader listens this long before it starts the firmware."""
@@ -42,21 +42,8 @@ class Device(Exchange):
     is never behind what was acted upon; for the parameters see `rig.link.exchange.Exchange`.
     """
 
-    _sample: ClockSample | None = None
     _armed: tuple[int, int] = (0, 0)
     """Label and recording time, ms, of the drop that was armed last."""
-    _disarmed: wire.DisarmReason | None = None
-    """Why it disarmed itself since it was armed."""
-
-    def _note(self, record: Record) -> None:
-        match record:
-            case ClockSample():
-                self._sample = record
-            case Received(message=wire.Armed()):
-                self._disarmed = None
-            case Received(message=wire.Disarmed(reason=reason)):
-                self._disarmed = reason
-        super()._note(record)
 
     def connect(self, boot_wait_s: float = BOOT_WAIT_S) -> wire.Identity:
         """Find out who is there.
@@ -117,9 +104,9 @@ class Device(Exchange):
         ClockSample or None
             `None` when the request had to be repeated: such a sample would be ambiguous.
         """
-        self._sample = None
+        self.transcript.sample = None
         self.request(wire.Ping(), wire.Pong)
-        return self._sample
+        return self.transcript.sample
 
     def status(self) -> wire.State:
         """Ask what the device is doing."""
@@ -156,9 +143,9 @@ class Device(Exchange):
             of range, the emergency stop is open.
         """
         request = wire.Arm(label, gates, release, pulse_us, timeout_ms, record_ms)
-        token = self.request(request, wire.Armed).token
+        armed = self.request(request, wire.Armed)
         self._armed = label, record_ms
-        return token
+        return armed.token
 
     def fire(self, token: int) -> int:
         """Let go; from now until `collect` returns the host stays silent.
@@ -180,12 +167,12 @@ class Device(Exchange):
             was released.
         """
         try:
-            tick = self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
+            return self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
         except DeviceRefusedError as refused:
             if refused.reason is not wire.RefusalReason.NOT_ARMED:
                 raise
-            raise DeviceRefusedError(refused.reason, refused.detail, self._disarmed) from None
-        return tick
+            disarmed = self.transcript.disarmed
+            raise DeviceRefusedError(refused.reason, refused.detail, disarmed) from None
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""

@@ -87,8 +87,7 @@ class RecordedDrop:
     @property
     def crc32(self) -> int:
         """CRC-32 over the events that came."""
-        frame = wire.EventsFrame(self.certificate.label, 0, self.events)
-        return zlib.crc32(wire.pack(frame)[1][6:])
+        return zlib.crc32(wire.pack_events(self.events))
 
 
 class BoardUnderTest:
@@ -256,8 +255,8 @@ class BoardUnderTest:
         while (left_ns := deadline - self.clock.now_ns()) > 0:
             heard = self.wait_unasked(left_ns * 1e-9, wire.EventsFrame, wire.DropCertificate)
             match heard and heard.message:
-                case wire.EventsFrame(events=more_events):
-                    events += more_events
+                case wire.EventsFrame(snapshots=snapshots):
+                    events += snapshots
                 case wire.DropCertificate() as certificate:
                     return RecordedDrop(fired, tuple(events), certificate)
         raise CheckFailedError("no_certificate")

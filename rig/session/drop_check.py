@@ -11,15 +11,13 @@ from enum import StrEnum
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
 
-from rig.link.messages import TEST_RUN
-from rig.link.transcript import Received, Record, Transcript
-from rig.link.wiretypes import EVENTS
+from rig.link.messages import TEST_RUN, pack_events
+from rig.link.transcript import Received, Record, Restart, Transcript
 from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from rig.link.restarts import Restart
 
 _U32 = (1 << 32) - 1
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
@@ -152,4 +150,4 @@ def _crc32(drop: Drop, fire_tick: int, events: Iterable[tuple[int, list[Edge]]])
         for _, channel, blocked in edges:
             state = state | 1 << channel if blocked else state & ~(1 << channel)
         snapshots.append(((fire_tick + tick) & _U32, state))
-    return zlib.crc32(EVENTS.pack(snapshots))
+    return zlib.crc32(pack_events(snapshots))

@@ -26,9 +26,8 @@ from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
-from rig.session.reason_rows import write_reasons
 from rig.session.rows import edge_rows, row_of
-from rig.session.schema import TABLES, RunState, insert_statement
+from rig.session.schema import TABLES, RunState, insert_statement, write_reasons
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -187,7 +186,7 @@ class Session(Reader):
         A reader that is at it may keep the last of it back until the next time.
         """
         with translate_errors(self.path):
-            self._open_connection().execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+            self.connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         self.require_presence()
 
     def _rescue(self, trouble: str) -> SessionError:
@@ -239,7 +238,7 @@ class Session(Reader):
     def _fold_in(self) -> None:
         """Leave one file to copy, even while a reader keeps the log from being removed."""
         with suppress(sqlite3.Error):
-            self._open_connection().execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            self.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def __enter__(self) -> Self:
         return self
@@ -298,8 +297,8 @@ class Session(Reader):
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
         """Add one line to the log of run states."""
-        text = encodable(write_reasons(reasons))
-        self.add_rows("run_state", [(run, attempt, str(state), text, host_ns)])
+        row = run, attempt, str(state), write_reasons(reasons), host_ns
+        self.add_rows("run_state", [row])
 
     def attach(self, name: str, data: bytes) -> None:
         """Add a file, such as a photograph of the rig."""
@@ -319,7 +318,7 @@ class Session(Reader):
         self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
 
     def _writable(self) -> Journal:
-        self._open_connection()
+        _ = self.connection
         if self._loss is not None:
             raise self._loss
         if self.readonly:

@@ -3,7 +3,7 @@
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
-from rig.link.wiretypes import Chars, Event, Raw, Tail, Unsigned
+from rig.link.messages import Chars, Raw, Tail, Unsigned
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 
@@ -19,8 +19,8 @@ def values(field) -> st.SearchStrategy:
         case Chars(limit=limit):
             return st.text(max_size=limit // 4)
         case Tail():
-            event = st.builds(Event, LONG, WORD)
-            return st.lists(event, max_size=wire.EVENTS_PER_FRAME).map(tuple)
+            events = st.lists(st.tuples(LONG, WORD), max_size=wire.EVENTS_PER_FRAME)
+            return events.map(wire.pack_events)
     raise AssertionError(field)
 
 

@@ -98,5 +98,5 @@ class Wire:
         """Arm and fire; return what came of it."""
         self.say(wire.Fire(self.ask(order(**changes), 201).token), 202)
         heard = [message for _, message in self.hear_drop()]
-        events = [e for m in heard if isinstance(m, wire.EventsFrame) for e in m.events]
+        events = [e for m in heard if isinstance(m, wire.EventsFrame) for e in m.snapshots]
         return events, heard[-1]

@@ -19,8 +19,7 @@ from rig.link.exchange import STRANGE_BYTES
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.restarts import Restart
-from rig.link.transcript import Received, Transcript
+from rig.link.transcript import Received, Restart, Transcript
 from rig.reasons import make_reason
 from rig.records import ClockSample
 from tests.link.strategies import MESSAGES
@@ -213,7 +212,7 @@ class Liar(FakePort):
 
     def __init__(self, clock, held, *events):
         super().__init__(clock, {wire.Identify: [IDENTITY]})
-        self.held, self.events = held, wire.EventsFrame(1, 0, events)
+        self.held, self.events = held, events_frame(0, *events)
 
     def write(self, data):
         (frame,) = Decoder().feed(data)
@@ -223,7 +222,7 @@ class Liar(FakePort):
 
 
 def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
-    port = Liar(clock, 1, wire.Event(150, 1))
+    port = Liar(clock, 1, (150, 1))
     drop = Device(port, clock).fetch(1)
     assert len(port.written) == 3  # certificate, events, events once more
     assert make_reason("crc_mismatch") in drop.faults
@@ -242,7 +241,7 @@ class Forgetful(FakePort):
     def write(self, data):
         for frame in Decoder().feed(data):
             if isinstance(read := wire.unpack(frame.type, frame.payload), wire.Read):
-                event = wire.EventsFrame(1, read.first, (wire.Event(100 + read.first, 1),))
+                event = events_frame(read.first, (100 + read.first, 1))
                 kept = event if read.first >= self.kept else self.refusal()
                 self.answers[wire.Read] = [kept if read.count else certificate(1, self.total)]
         return super().write(data)
@@ -279,7 +278,7 @@ def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(cl
     one = Device(port, clock)
     one.connect(boot_wait_s=0)
     for n in range(5):
-        code, payload = wire.pack(wire.EventsFrame(1, n, (wire.Event(100 + n, n % 2),)))
+        code, payload = wire.pack(events_frame(n, (100 + n, n % 2)))
         port.out += encode(Frame(code, 1, 0, payload))
     while port.out:
         one.receive()
@@ -344,13 +343,13 @@ def heard(*messages) -> Transcript:
     return transcript
 
 
-def frame(first, *events) -> wire.EventsFrame:
-    return wire.EventsFrame(1, first, tuple(wire.Event(*event) for event in events))
+def events_frame(first, *events) -> wire.EventsFrame:
+    return wire.EventsFrame(1, first, wire.pack_events(events))
 
 
 def test_a_gap_in_the_events_invents_no_edge():
     transcript = heard(
-        IDENTITY, frame(0, (110, 1)), frame(3, (140, 2), (150, 3)), certificate(1, 5)
+        IDENTITY, events_frame(0, (110, 1)), events_frame(3, (140, 2), (150, 3)), certificate(1, 5)
     )
     drop = transcript.pending(1)
     assert drop.edges == ((10, 0, True), (50, 0, True))
@@ -383,7 +382,7 @@ def test_arming_again_begins_anew_but_a_repeated_answer_does_not():
     order = wire.Arm(1, 0x00FF, 0, 0, 1, 1)
     say(transcript, "tx", order, seq=1)
     say(transcript, "rx", wire.Armed(9), ack=1)
-    say(transcript, "rx", wire.EventsFrame(1, 0, (wire.Event(110, 1),)))
+    say(transcript, "rx", events_frame(0, (110, 1)))
     say(transcript, "rx", wire.Armed(9), ack=1)
     assert transcript.assembly(1).begun
     say(transcript, "tx", order, seq=2)
@@ -407,7 +406,7 @@ def test_half_a_frame_before_a_reconnect_swallows_nothing():
     ],
 )
 def test_snapshots_become_edges_since_the_fire_stamp(events, edges):
-    transcript = heard(frame(0, *events), certificate(1, len(events)))
+    transcript = heard(events_frame(0, *events), certificate(1, len(events)))
     assert list(transcript.pending(1).edges) == edges
 
 
@@ -419,7 +418,7 @@ def test_the_release_sense_counts_from_the_fire_stamp(tick, sense):
 
 
 def test_without_identity_or_certificate_the_drop_says_so():
-    drop = heard(frame(0, (110, 1))).pending(1)
+    drop = heard(events_frame(0, (110, 1))).pending(1)
     assert (drop.edges, len(drop.faults)) == ((), 2)
 
 
