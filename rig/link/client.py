@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rig.link.assembly import Assembly
-    from rig.link.transcript import Received
+    from rig.link.transcript import Incoming
     from rig.records import ClockSample, Drop
 
 BOOT_WAIT_S = 2.0
@@ -31,7 +31,7 @@ _ABORT_WAIT_S = 0.03
 """Five ABORTs leave within the 250 ms after which everything shall be off."""
 
 
-def _is_boot(got: Received) -> bool:
+def _is_boot(got: Incoming) -> bool:
     return isinstance(got.message, wire.Boot)
 
 
@@ -42,8 +42,8 @@ class Device(Exchange):
     is never behind what was acted upon; for the parameters see `rig.link.exchange.Exchange`.
     """
 
-    _armed: tuple[int, int] = (0, 0)
-    """Label and recording time, ms, of the drop that was armed last."""
+    _order: wire.Arm | None = None
+    """Of the drop that was armed last."""
 
     def connect(self, boot_wait_s: float = BOOT_WAIT_S) -> wire.Identity:
         """Find out who is there.
@@ -116,17 +116,8 @@ class Device(Exchange):
         """Ask for the latest pulse of the 1 Hz reference; its count is 0 when none is wired."""
         return self.request(wire.Reference(), wire.ReferencePulse)
 
-    def arm(
-        self,
-        *,
-        label: int,
-        gates: int,
-        release: int,
-        pulse_us: int,
-        timeout_ms: int,
-        record_ms: int,
-    ) -> int:
-        """Prepare a drop; the parameters are those of `rig.link.messages.Arm`.
+    def arm(self, order: wire.Arm) -> int:
+        """Prepare a drop.
 
         From now until `fire` the device wants to hear a request, any request, every
         `HOST_SILENCE_MS`: else it disarms itself.
@@ -142,10 +133,9 @@ class Device(Exchange):
             A gate is blocked, the release is too warm, another drop is held, a parameter is out
             of range, the emergency stop is open.
         """
-        request = wire.Arm(label, gates, release, pulse_us, timeout_ms, record_ms)
-        armed = self.request(request, wire.Armed)
-        self._armed = label, record_ms
-        return armed.token
+        token = self.request(order, wire.Armed).token
+        self._order = order
+        return token
 
     def fire(self, token: int) -> int:
         """Let go; from now until `collect` returns the host stays silent.
@@ -220,8 +210,8 @@ class Device(Exchange):
             The board restarted, lost the drop, or fell silent.
         """
         if timeout is None:
-            armed, record_ms = self._armed
-            timeout = (record_ms / 1000 if label == armed else 0.0) + _LATE_S
+            order = self._order
+            timeout = (order.record_ms / 1000 if order and order.label == label else 0.0) + _LATE_S
         drop = self.transcript.assembly(label)
         now_ns = self.clock.now_ns
         hopeless = now_ns() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)

@@ -11,7 +11,7 @@ from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Direction, Received, Record, Restart, Transcript
+from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class Exchange:
                 raise make_error(DeviceError, "device_confused", **names)
         raise make_error(DeviceTimeoutError, "device_silent", request=type(message).__name__)
 
-    def wait_for(self, seconds: float, wanted: Callable[[Received], bool]) -> wire.Message | None:
+    def wait_for(self, seconds: float, wanted: Callable[[Incoming], bool]) -> wire.Message | None:
         """Read until a message comes that is waited for, or the time is over.
 
         Parameters
@@ -162,7 +162,7 @@ class Exchange:
         while self.clock.now_ns() < until:
             self.give_way()
             for record in self.receive():
-                if isinstance(record, Received) and wanted(record):
+                if isinstance(record, Incoming) and wanted(record):
                     return record.message
         return None
 

@@ -62,7 +62,7 @@ def pack_events(events: Iterable[tuple[int, int]]) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
-class Unsigned:
+class UnsignedInt:
     """An unsigned little-endian integer by its `struct` code."""
 
     code: str
@@ -134,11 +134,11 @@ class Tail:
         return self.pack(payload[at:]), len(payload)
 
 
-_BYTE = Unsigned("B")
+_BYTE = UnsignedInt("B")
 
 U8: TypeAlias = Annotated[int, _BYTE]
-U16: TypeAlias = Annotated[int, Unsigned("H")]
-U32: TypeAlias = Annotated[int, Unsigned("I")]
+U16: TypeAlias = Annotated[int, UnsignedInt("H")]
+U32: TypeAlias = Annotated[int, UnsignedInt("I")]
 UniqueId: TypeAlias = Annotated[bytes, Raw(8)]
 Name: TypeAlias = Annotated[str, Chars(24)]
 Line: TypeAlias = Annotated[str, Chars(96)]
@@ -150,7 +150,7 @@ class Field(NamedTuple):
 
     name: str
     python: type
-    wire: Unsigned | Chars | Raw | Tail
+    wire: UnsignedInt | Chars | Raw | Tail
 
 
 class Phase(IntEnum):
@@ -501,7 +501,7 @@ def _wire_fields(message: type[Any]) -> tuple[Field, ...]:
 
 def _payload_reader(message: Sequence[Field]) -> Callable[[bytes], list[Any]]:
     """Make what reads a whole payload: numbers at its beginning at once, the rest one by one."""
-    numbers = [*takewhile(lambda field: isinstance(field.wire, Unsigned), message)]
+    numbers = [*takewhile(lambda field: isinstance(field.wire, UnsignedInt), message)]
     head = struct.Struct("<" + "".join(getattr(field.wire, "code", "") for field in numbers))
     enums = [(n, field.python) for n, field in enumerate(numbers) if field.python is not int]
     rest = [field.wire for field in message[len(numbers) :]]

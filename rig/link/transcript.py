@@ -21,7 +21,7 @@ _CAUSES = {1: "power", 2: "reset pin", 4: "brown-out", 8: "watchdog"}
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
+class Incoming:
     """One message from the device; `ack` is the request's seq, 0 when it answers none."""
 
     host_ns: int
@@ -69,7 +69,7 @@ def causes(mask: int) -> str:
     return ", ".join(word for bit, word in _CAUSES.items() if mask & bit)
 
 
-Record: TypeAlias = Received | ClockSample | Pulse | Drop | Restart
+Record: TypeAlias = Incoming | ClockSample | Pulse | Drop | Restart
 
 
 class Transcript:
@@ -77,7 +77,7 @@ class Transcript:
 
     A drop is given out when the host's ACKNOWLEDGE for it goes over the wire: the one moment
     that shows in the bytes alone that the host has read enough. A drop that was never
-    acknowledged is in `unfinished`.
+    acknowledged is in `unfinished_drops`.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ class Transcript:
         self._given.discard(label)
         return self._drops.setdefault(label, Assembly(label))
 
-    def unfinished(self) -> list[Drop]:
+    def unfinished_drops(self) -> list[Drop]:
         """Give the drops that began and were never acknowledged.
 
         Returns
@@ -217,7 +217,7 @@ class Transcript:
         return []
 
     def _got(self, host_ns: int, frame: Frame, message: wire.Message) -> list[Record]:
-        records: list[Record] = [Received(host_ns, frame.ack, message)]
+        records: list[Record] = [Incoming(host_ns, frame.ack, message)]
         seq, request = self._request
         # Only the first answer counts: a repeated ARMED must not begin the drop a second time.
         asked = request if seq and frame.ack == seq and not self._answered else None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
-from rig.link.transcript import Received, Record
+from rig.link.transcript import Incoming, Record
 from rig.reasons import Reason, published_reasons
 from rig.session.schema import RunState
 
@@ -47,7 +47,7 @@ class StateFeed:
 
     def know(self, record: Record) -> None:
         """Take what became known on the line."""
-        if not isinstance(record, Received):
+        if not isinstance(record, Incoming):
             return
         match record.message:
             case wire.Identity() as identity:

@@ -120,7 +120,7 @@ def test_a_drifting_clock_gives_each_run_its_own_rate(measure, tmp_path, fence):
         true = -1300.0 + 600.0 * when / 3600.0
         used = run["calibration"]
         assert abs(used["rate_ppm"] - true) < 4.0 * used["u_ppm"] < 16.0
-    lost = clock.used(replace(last, attempt=7))  # nobody logged when
+    lost = clock.describe(replace(last, attempt=7))  # nobody logged when
     assert lost["rate_ppm"] == pytest.approx(found["calibration"]["rate_ppm"])
     assert lost["u_ppm"] > 10.0
 

@@ -3,16 +3,16 @@
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
-from rig.link.messages import Chars, Raw, Tail, Unsigned
+from rig.link.messages import Chars, Raw, Tail, UnsignedInt
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 
 
 def values(field) -> st.SearchStrategy:
     match field.wire:
-        case Unsigned() if field.python is not int:
+        case UnsignedInt() if field.python is not int:
             return st.sampled_from(list(field.python))
-        case Unsigned(size=size):
+        case UnsignedInt(size=size):
             return st.integers(0, 2 ** (8 * size) - 1)
         case Raw(size=size):
             return st.binary(min_size=size, max_size=size)

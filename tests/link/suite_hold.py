@@ -85,7 +85,7 @@ class HoldSuite(Suite):
         said = r"restarted about \d+ ms after FIRE: is its supply shared with the magnets\?"
         with pytest.raises(DeviceError, match=said):
             device.collect(LABEL)
-        (drop,) = device.transcript.unfinished()
+        (drop,) = device.transcript.unfinished_drops()
         assert drop == device.transcript.pending(LABEL)
         assert "restarted" in {fault.code for fault in drop.faults}
         device.connect(boot_wait_s=0)

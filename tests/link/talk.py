@@ -11,7 +11,7 @@ ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "
 
 
 def arm(device: Device, label: int = LABEL, **changes: int) -> int:
-    return device.arm(label=label, **(ORDER | changes))
+    return device.arm(wire.Arm(**{"label": label} | ORDER | changes))
 
 
 def order(**changes: int) -> wire.Arm:

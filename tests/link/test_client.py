@@ -19,7 +19,7 @@ from rig.link.exchange import STRANGE_BYTES
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Received, Restart, Transcript
+from rig.link.transcript import Incoming, Restart, Transcript
 from rig.reasons import make_reason
 from rig.records import ClockSample
 from tests.link.strategies import MESSAGES
@@ -259,7 +259,7 @@ def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
     assert len(port.written) == 2 + 4  # delimiter and IDENTIFY; certificate, 0, 3, 4
     for chunk in chunks:
         offline.feed(*chunk)
-    assert offline.unfinished() == [drop], "the replay knows it, too"
+    assert offline.unfinished_drops() == [drop], "the replay knows it, too"
 
 
 def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(clock):
@@ -297,13 +297,13 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
         },
     )
     one = Device(port, clock)
-    token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
+    token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
     with pytest.raises(DeviceRefusedError, match="disarmed itself") as caught:
         one.fire(token)
     assert caught.value.disarmed is reason
     assert "arm again" in caught.value.hint
     port.answers[wire.Arm] = [wire.Armed(10)]
-    token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
+    token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
     with pytest.raises(DeviceRefusedError, match="is not armed"):
         one.fire(token)
 
@@ -360,11 +360,11 @@ def test_a_gap_in_the_events_invents_no_edge():
 def test_a_drop_is_given_out_once_when_acknowledged():
     transcript = heard(IDENTITY, certificate(1, 0))
     pending = transcript.pending(1)
-    assert transcript.unfinished() == [pending]
+    assert transcript.unfinished_drops() == [pending]
     assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == [pending]
     assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == []
     say(transcript, "rx", certificate(1, 0))  # a late repeat
-    assert transcript.unfinished() == []
+    assert transcript.unfinished_drops() == []
     with pytest.raises(KeyError):
         transcript.pending(1)
 
@@ -395,7 +395,7 @@ def test_half_a_frame_before_a_reconnect_swallows_nothing():
     code, payload = wire.pack(certificate(1, 0))
     transcript.feed("rx", 0, encode(Frame(code, 1, 0, payload))[:9])
     transcript.feed("tx", 1, b"\0")
-    assert say(transcript, "rx", IDENTITY, ack=1) == [Received(0, 1, IDENTITY)]
+    assert say(transcript, "rx", IDENTITY, ack=1) == [Incoming(0, 1, IDENTITY)]
 
 
 @pytest.mark.parametrize(
@@ -426,7 +426,7 @@ def test_what_is_no_message_is_counted():
     transcript = Transcript()
     assert transcript.feed("rx", 0, encode(Frame(0xEE, 1, 0, b""))) == []
     assert transcript.unreadable == 1
-    assert say(transcript, "rx", wire.Done(), ack=3, ns=8) == [Received(8, 3, wire.Done())]
+    assert say(transcript, "rx", wire.Done(), ack=3, ns=8) == [Incoming(8, 3, wire.Done())]
 
 
 @given(st.lists(st.tuples(st.sampled_from(["tx", "rx"]), MESSAGES, SMALL, SMALL), max_size=30))
@@ -434,7 +434,7 @@ def test_any_conversation_is_survived(said):
     transcript = Transcript()
     for direction, message, seq, ack in said:
         say(transcript, direction, message, seq=seq, ack=ack)
-    for drop in transcript.unfinished():
+    for drop in transcript.unfinished_drops():
         assert drop == transcript.pending(drop.run | drop.attempt << 16)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rig.link import frames
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
-from rig.link.messages import Chars, Raw, Tail, Unsigned, pack_events
+from rig.link.messages import Chars, Raw, Tail, UnsignedInt, pack_events
 from rig.link.port import BAUDRATE
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
@@ -57,7 +57,7 @@ def expected_rows(kind: type) -> list[list[str]]:
     for field in wire.FIELDS[kind]:
         size = None
         match field.wire:
-            case Unsigned(size=size):
+            case UnsignedInt(size=size):
                 name = f"u{8 * size}"
             case Raw(size=size):
                 name = f"{size} bytes"

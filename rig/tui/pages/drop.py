@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 from rig.reasons import notes_in
 from rig.tui.desk import Face
 from rig.tui.drop_words import (
