@@ -198,31 +198,37 @@ class PulseEnd(IntEnum):
     DEVICE = 3  # the device, to be safe: its main loop stood still, or the pin did not obey
 
 
-class HostMessage:
+class Message:
+    """A request or an answer."""
+
+    __slots__ = ()
+
+
+class HostMessage(Message):
     """A request."""
 
     __slots__ = ()
 
 
-class DeviceMessage:
+class DeviceMessage(Message):
     """An answer, or what the device says of its own accord."""
 
     __slots__ = ()
 
 
-Message: TypeAlias = HostMessage | DeviceMessage
 TABLE: dict[int, type[Message]] = {}
 """Every message by its code."""
-_Kind = TypeVar("_Kind", bound=type[Any])
+_Kind = TypeVar("_Kind", bound=Message)
 
 
 @dataclass_transform(frozen_default=True)
-def _message(code: int) -> Callable[[_Kind], _Kind]:
+def _message(code: int) -> Callable[[type[_Kind]], type[_Kind]]:
     """Enter a message into the table."""
 
-    def enter(kind: _Kind) -> _Kind:
-        TABLE[code] = dataclass(frozen=True, slots=True)(kind)
-        return TABLE[code]  # type: ignore[return-value]
+    def enter(kind: type[_Kind]) -> type[_Kind]:
+        entry = dataclass(frozen=True, slots=True)(kind)
+        TABLE[code] = entry
+        return entry
 
     return enter
 

@@ -199,7 +199,7 @@ class Recorder:
         """Take one clock sample, now and then one of the 1 Hz reference; not while armed."""
         with self.interrupts.held():
             if self._host is not None and (gap := self._host.look()) is not None:
-                self.session.add_host_break(gap)
+                self.session.add_timing(gap)
             with self._unless(self.interrupts.check, self._go_on):
                 self._sample = self.device.ping()
                 if self.clock.now_ns() >= self._reference_ns:
@@ -366,10 +366,8 @@ class Recorder:
                 raise
 
     def _note(self, record: Record) -> None:
-        if isinstance(record, ClockSample):
-            self.session.add_ping(record)
-        elif isinstance(record, Pulse):
-            self.session.add_pulse(record)
+        if isinstance(record, ClockSample | Pulse):
+            self.session.add_timing(record)
         if isinstance(record, Incoming) and isinstance(record.message, Disarmed):
             self.lapsed = record.message.reason
         if self._feed is not None:

@@ -74,23 +74,27 @@ class Reader:
         For messages.
     connection
         Checked to be a session.
+
+    Attributes
+    ----------
+    readonly
+        Whether nothing can be added.
+    meta
+        Facts fixed when the file was made: created, rig_version, origin and more.
     """
+
+    readonly = True
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
         self._connection: sqlite3.Connection | None = connection
-        self._meta: Mapping[str, str] = MappingProxyType(
+        self.meta: Mapping[str, str] = MappingProxyType(
             {str(key): str(value) for key, value in self._rows("meta")}
         )
-        if missing := sorted(_ALWAYS - self._meta.keys()):
+        if missing := sorted(_ALWAYS - self.meta.keys()):
             raise self._damage(f"it does not say {missing[0]}")
-        if self._meta["simulated"] not in {"true", "false"}:
+        if self.meta["simulated"] not in {"true", "false"}:
             raise self._damage("it does not say whether it is simulated")
-
-    @property
-    def readonly(self) -> bool:
-        """Whether nothing can be added."""
-        return True
 
     @contextmanager
     def snapshot(self) -> Iterator[None]:
@@ -113,11 +117,6 @@ class Reader:
             raise make_error(SessionError, "session_closed", path=self.path)
         return self._connection
 
-    @property
-    def meta(self) -> Mapping[str, str]:
-        """Facts fixed when the file was made: created, rig_version, origin and more."""
-        return self._meta
-
     def digest(self) -> str | None:
         """Return the SHA-256 of all records as they stand; `None` where they are not the file's."""
         with translate_errors(self.path):
@@ -126,18 +125,18 @@ class Reader:
     @property
     def simulated(self) -> bool:
         """Whether the data come from a simulation."""
-        return self._meta["simulated"] == "true"
+        return self.meta["simulated"] == "true"
 
     @property
     def unblinded(self) -> str:
         """When the numbers of a blind session were shown; empty before."""
-        return self._meta.get(UNBLINDED, "")
+        return self.meta.get(UNBLINDED, "")
 
     @property
     def protocol_text(self) -> str:
         """The protocol file word for word."""
         text = str(self._protocol()[2])
-        if hashlib.sha256(text.encode()).hexdigest() != self._meta["protocol_sha256"]:
+        if hashlib.sha256(text.encode()).hexdigest() != self.meta["protocol_sha256"]:
             raise self._damage("its protocol was altered")
         return text
 

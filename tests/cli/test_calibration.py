@@ -65,10 +65,10 @@ def test_looking_again_and_again_gives_what_looking_once_gives(measure, tmp_path
         for host_ns, identity in identities:
             grows.add_identity(identity, host_ns)
         for n, ping in enumerate(pings):
-            grows.add_ping(ping)
+            grows.add_timing(ping)
             if n == len(pings) // 2:
                 for pulse in pulses:
-                    grows.add_pulse(pulse)
+                    grows.add_timing(pulse)
             if n % 5 == 0:
                 seen, afresh = calibrator.look(grows, PPS_U), calibration(grows)
                 assert (seen.said, seen.device) == (afresh.said, afresh.device)
