@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from bench.frame import Findings
@@ -14,6 +14,7 @@ from rig.commands.output import say
 from rig.protocol.protocol import PPS_U
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
+from rig.records import Pulse
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.clock.rate import TickRate
-    from rig.records import ClockSample, Pulse
+    from rig.records import ClockSample
 
 TICK_HZ = 16_000_000
 CLOCK_PPM = -1300.0
@@ -35,14 +36,11 @@ SOURCES = {"pings": 0.0, "reference": PPS_U}
 class _Kept(NullSink):
     """A record of clock samples only."""
 
-    pings: list[ClockSample] = field(default_factory=list)
-    pulses: list[Pulse] = field(default_factory=list)
+    pings: list[Any] = field(default_factory=list)
+    pulses: list[Any] = field(default_factory=list)
 
-    def add_ping(self, ping: ClockSample) -> None:
-        self.pings.append(ping)
-
-    def add_pulse(self, pulse: Pulse) -> None:
-        self.pulses.append(pulse)
+    def add_timing(self, record: ClockSample | Pulse) -> None:
+        (self.pulses if isinstance(record, Pulse) else self.pings).append(record)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,11 @@ from rig.link.messages import (
     EVENTS_PER_FRAME,
     Arm,
     Armed,
-    Event,
     EventsFrame,
     Fire,
     Fired,
     pack,
+    pack_events,
     pack_label,
 )
 from rig.link.transcript import Transcript
@@ -35,9 +35,8 @@ def frames(count: int) -> list[bytes]:
     made = []
     for number in range(count):
         first = number * EVENTS_PER_FRAME
-        events = tuple(
-            Event((first + n) * TICKS % 2**32, (first + n + 1) % 2) for n in range(EVENTS_PER_FRAME)
-        )
+        numbers = range(first, first + EVENTS_PER_FRAME)
+        events = pack_events((n * TICKS % 2**32, (n + 1) % 2) for n in numbers)
         made.append(_framed(EventsFrame(LABEL, first, events), number % 255 + 1))
     return made
 

@@ -29,7 +29,7 @@ from rig.daemon.server import Server
 from rig.link.exchange import Exchange
 from rig.link.messages import EVENTS_PER_FRAME, Fired
 from rig.link.port import open_port
-from rig.link.transcript import Received
+from rig.link.transcript import Incoming
 from rig.recorder.feed import StateFeed
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -161,7 +161,7 @@ def _read(folder: Path, server: Server, terminal: PtyWriter, count: int) -> None
     ) as session:
         view = StateFeed(server.published)
         view.state(1, 1, RunState.ARMED, ())
-        view.know(Received(0, 1, Fired(0)))
+        view.know(Incoming(0, 1, Fired(0)))
         port = open_port(terminal.path)
         line = Exchange(port, SystemClock(), session.log_bytes, view.know, 1)
         terminal.start()

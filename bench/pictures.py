@@ -11,8 +11,7 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from bench.frame import Findings
-from rig.campaign.events import Stage
-from rig.campaign.machine import Flow
+from rig.campaign.machine import Flow, Stage
 from rig.files import make_folder, require_file
 from rig.results.live import LiveAnalysis
 from rig.tui.app import RigApp

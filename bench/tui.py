@@ -27,7 +27,7 @@ from rig.commands.output import say
 from rig.daemon.client import Client
 from rig.daemon.server import Server
 from rig.link.messages import Fired
-from rig.link.transcript import Received
+from rig.link.transcript import Incoming
 from rig.recorder.feed import StateFeed
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -193,7 +193,7 @@ def _feed(server: Server, sent: list[tuple[float, int]]) -> None:
     """Let a drop's edges come as a stream; note how many there were when, s (monotonic)."""
     view = StateFeed(server.published)
     view.state(1, 1, RunState.ARMED, ())
-    view.know(Received(0, 1, Fired(0)))
+    view.know(Incoming(0, 1, Fired(0)))
     begun, count = time.monotonic(), 0
     while (now := time.monotonic() - begun) < _LASTING_S:
         wanted = int(now * RATE)

@@ -7,9 +7,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.campaign import events
-from rig.campaign.events import Effect, Event, Stage
-from rig.campaign.machine import Flow, step
+from rig.campaign import machine
+from rig.campaign.machine import Effect, Event, Flow, Stage, step
 from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
 from rig.campaign.voids import voids_of
 from rig.daemon.connecting import connect
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 
-_FALL = (events.FireRelease, events.Collect, events.Stop)
+_FALL = (machine.FireRelease, machine.Collect, machine.Stop)
 _VALUE = 17  # characters, as of −3.2076 ± 0.0017
 
 
@@ -175,14 +174,14 @@ class Campaign:
     def _next(self) -> Event:
         """Say what the operator would: at each stage where the campaign waits for one."""
         if self.flow.stage is Stage.COUNTDOWN:
-            return events.Tick(0.0)
+            return machine.Tick(0.0)
         if self._unjudged and self.flow.stage is not Stage.RESULT:
-            return events.Found(self._unjudged.popleft())
+            return machine.Found(self._unjudged.popleft())
         job = self._unjudged[0] if self._unjudged else self._next_job()
         if self.flow.stage is not Stage.PREPARE or job is None:
-            return events.GoOn(job)
+            return machine.GoOn(job)
         self._request(job)
-        return events.GoOn(job, self._rest_s())
+        return machine.GoOn(job, self._rest_s())
 
     def _next_job(self) -> Job | None:
         """Name the next attempt; runs before it are done for good."""
@@ -231,9 +230,9 @@ class Campaign:
         """Carry out what is wanted, and what comes of that, until nothing is."""
         while self._effects:
             match self._effects[0]:
-                case events.FireRelease():
+                case machine.FireRelease():
                     self._fall()
-                case events.GiveUp():
+                case machine.GiveUp():
                     assert self._failed is not None
                     raise self._failed
                 case effect:
@@ -255,21 +254,21 @@ class Campaign:
         token = None
         try:
             match effect:
-                case events.Stop(reason):
+                case machine.Stop(reason):
                     self._stop(reason)
                     return
-                case events.Wait(seconds):
+                case machine.Wait(seconds):
                     self.rig.wait(seconds)
-                case events.ArmRelease(job):
+                case machine.ArmRelease(job):
                     token = self.rig.arm(*job)
-                case events.FireRelease(armed):
+                case machine.FireRelease(armed):
                     self.rig.fire(armed)
-                case events.Collect(job):
+                case machine.Collect(job):
                     self._drop = self.rig.collect(*job)
-                case events.Judge(job):
+                case machine.Judge(job):
                     self._judge(job)
                     return
-                case events.Log(job, state, reasons):
+                case machine.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
                     if self.operator.judged is None:
@@ -278,15 +277,15 @@ class Campaign:
                         self.operator.judged(self._result, len(self.plan))
         except DeviceRefusedError as refusal:
             self._failed = refusal
-            self._take(events.effect_failed(self.flow.ticket, refusal))
+            self._take(machine.effect_failure(self.flow.ticket, refusal))
         else:
-            self._take(events.Answered(self.flow.ticket, token))
+            self._take(machine.EffectDone(self.flow.ticket, token))
 
     def _judge(self, job: Job) -> None:
         if self._drop is None or job != (self._drop.run, self._drop.attempt):
             self._drop = self.rig.collect(*job)
         result = self._result = self.live.judge(self.session, self._drop)
-        self._take(events.Judged(self.flow.ticket, result.verdict, result.reasons))
+        self._take(machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons))
 
     def _stop(self, why: str) -> None:
         with suppress(DeviceError):

@@ -262,7 +262,7 @@ class VirtualBoard:
         drop = self._controller.drop
         if drop is not None:
             part = drop.part(drop.sent, wire.EVENTS_PER_FRAME)
-            drop.sent += len(part.events)
+            drop.sent += len(part.snapshots)
             self._oldest_ns = self._now_ns
             self._send(part)
 

@@ -74,7 +74,7 @@ class GlassVirtualBoard(VirtualBoard):
         drop = self._controller.drop
         assert drop is not None
         events: list[tuple[int, int]] = []
-        while part := drop.part(len(events), 40).events:
+        while part := drop.part(len(events), 40).snapshots:
             events += [(event.tick, event.state) for event in part]
         certificate = drop.certificate()
         return {name: getattr(certificate, name) for name in HELD}, events

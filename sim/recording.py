@@ -5,8 +5,14 @@ from __future__ import annotations
 import zlib
 from typing import TYPE_CHECKING
 
-from rig.link.messages import EVENTS_PER_FRAME, DropCertificate2, EventsFrame, PulseEnd
-from rig.link.wiretypes import Event
+from rig.link.messages import (
+    EVENTS_PER_FRAME,
+    DropCertificate2,
+    Event,
+    EventsFrame,
+    PulseEnd,
+    pack_events,
+)
 
 if TYPE_CHECKING:
     from rig.link.messages import Arm, Identity
@@ -84,21 +90,18 @@ class Recording:
 
     def part(self, first: int, count: int) -> EventsFrame:
         """Give some events, at most a frame full."""
-        count = min(count, EVENTS_PER_FRAME)
-        return EventsFrame(self.order.label, first, tuple(self._events[first : first + count]))
+        events = self._events[first : first + min(count, EVENTS_PER_FRAME)]
+        return EventsFrame(self.order.label, first, pack_events(events))
 
     def certificate(self) -> DropCertificate2:
         """Account for the drop."""
-        packed = b"".join(
-            tick.to_bytes(4, "little") + state.to_bytes(2, "little") for tick, state in self._events
-        )
         return DropCertificate2(
             label=self.order.label,
             fire_tick=self._fire_tick,
             gates=self.order.gates,
             initial_state=0,
             events=len(self._events),
-            crc32=zlib.crc32(packed),
+            crc32=zlib.crc32(pack_events(self._events)),
             overflows=self._overflows,
             glitches=self._glitches,
             late=self._late,

@@ -199,7 +199,7 @@ class DropCase(NamedTuple):
         assert components is not None
         records = self._records()
         audit = _blank_audit(drop, records)
-        rough, reading = scale.rounded(), readings.get(aside)
+        rough, reading = scale.coarse(), readings.get(aside)
         if reading is None or reading.scale != rough:
             reading = identified(protocol, run, drop, rough, components, aside)
             readings[aside] = reading

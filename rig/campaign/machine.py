@@ -2,21 +2,226 @@
 
 Nothing here knows of screens, sockets or clocks. Whoever drives it carries the effects out and
 returns what came of them, with the ticket of the effect: an answer to what was stopped meanwhile
-has an old ticket and changes nothing.
+has an old ticket and changes nothing. Stages, events and effects come first, then the steps.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from enum import StrEnum
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from rig.campaign import events
-from rig.campaign.events import Effect, Event, Stage
 from rig.campaign.voids import VoidRow, after, why_halted
 from rig.link.messages import RefusalReason
+from rig.link.refusals import DeviceRefusedError
 from rig.reasons import Reason, plain_reason
 from rig.records import Job
 from rig.wordings import NOTE, OPERATOR
+
+if TYPE_CHECKING:
+    from rig.errors import RigError
+
+
+class Stage(StrEnum):
+    """Where the campaign is."""
+
+    PROTOCOL = "protocol"
+    DEVICE = "device"
+    TESTING = "testing"
+    PREPARE = "prepare"
+    SETTLING = "settling"
+    ARMING = "arming"
+    COUNTDOWN = "countdown"
+    FIRING = "firing"
+    LIVE = "live"
+    JUDGING = "judging"
+    RESULT = "result"
+    HALTED = "halted"
+    DONE = "done"
+
+
+# ---------------------------------------------------------------- events
+
+
+class SessionOpen(NamedTuple):
+    """A session is open at the daemon."""
+
+
+class SessionClose(NamedTuple):
+    """The session was closed."""
+
+
+class GoOn(NamedTuple):
+    """The operator wants the next step; `job` is the attempt it would be at."""
+
+    job: Job | None
+    settle_s: float = 0.0
+
+
+class Try(NamedTuple):
+    """The operator wants the release driven once, with nothing hung."""
+
+
+class EffectDone(NamedTuple):
+    """An effect was carried out; `token` is of an `Arm`."""
+
+    ticket: int
+    token: int | None = None
+
+
+class DropVerdict(NamedTuple):
+    """The drop was analysed.
+
+    Attributes
+    ----------
+    row
+        Voids in a row before it by the session's log, to which others may have added; `None` for
+        those that were counted here.
+    """
+
+    ticket: int
+    verdict: str
+    reasons: tuple[Reason, ...]
+    row: VoidRow | None = None
+
+
+class EffectFailure(NamedTuple):
+    """An effect failed; see `effect_failure`.
+
+    Attributes
+    ----------
+    trouble
+        Why, and on a second line what to do.
+    reason, detail
+        The device's own, where it is the device that refused.
+    """
+
+    ticket: int
+    trouble: str
+    reason: RefusalReason | None = None
+    detail: int = 0
+
+
+def effect_failure(ticket: int, error: RigError) -> EffectFailure:
+    """Make the event of an error."""
+    trouble = f"{error.message}\n{error.hint}"
+    if isinstance(error, DeviceRefusedError):
+        return EffectFailure(ticket, trouble, error.reason, error.detail)
+    return EffectFailure(ticket, trouble)
+
+
+class Tick(NamedTuple):
+    """Time went by."""
+
+    seconds: float
+
+
+class StopRequest(NamedTuple):
+    """STOP, or any key before the release."""
+
+
+class Lost(NamedTuple):
+    """The daemon is out of reach, or control is somebody else's."""
+
+    trouble: str
+
+
+class Notice(NamedTuple):
+    """Something went wrong that changes nothing here."""
+
+    trouble: str
+
+
+class Found(NamedTuple):
+    """The session has a recorded drop that nobody has judged."""
+
+    job: Job
+
+
+class Reject(NamedTuple):
+    """The operator rejects the drop."""
+
+    cause: str
+
+
+class Restore(NamedTuple):
+    """The operator takes the rejection back."""
+
+
+class Note(NamedTuple):
+    """The operator has something to say about the drop."""
+
+    text: str
+
+
+class Again(NamedTuple):
+    """The operator wants another attempt."""
+
+    job: Job
+
+
+_Wish: TypeAlias = GoOn | Try | StopRequest | Reject | Restore | Note | Again
+_News: TypeAlias = EffectDone | DropVerdict | EffectFailure | Tick | Lost | Notice | Found
+Event: TypeAlias = SessionOpen | SessionClose | _Wish | _News
+
+# ---------------------------------------------------------------- effects
+
+
+class Wait(NamedTuple):
+    """Let the chains come to rest."""
+
+    seconds: float
+
+
+class ArmRelease(NamedTuple):
+    """Prepare the release."""
+
+    job: Job
+
+
+class FireRelease(NamedTuple):
+    """Let go."""
+
+    token: int
+
+
+class Drive(NamedTuple):
+    """Let go of nothing: a test."""
+
+
+class Collect(NamedTuple):
+    """Wait until the drop is in the session file."""
+
+    job: Job
+
+
+class Judge(NamedTuple):
+    """Analyse the drop."""
+
+    job: Job
+
+
+class Log(NamedTuple):
+    """Put a verdict into the session file."""
+
+    job: Job
+    state: str
+    reasons: tuple[Reason, ...]
+
+
+class Stop(NamedTuple):
+    """Everything off."""
+
+    reason: str = "stopped by the operator"
+
+
+class GiveUp(NamedTuple):
+    """Go no further by yourself: only who drives this can say what is to be done."""
+
+
+Effect: TypeAlias = Wait | ArmRelease | FireRelease | Drive | Collect | Judge | Log | Stop | GiveUp
+
+# ---------------------------------------------------------------- steps
 
 COUNTDOWN_S = 3.0
 """From armed to fired: time to take a hand away, or to press a key."""
@@ -24,9 +229,8 @@ LOOKS = 5
 """How often what a device refuses is tried when nobody is there to help."""
 LOOK_S = 1.0
 
-BEFORE_RELEASE = (
-    Stage.TESTING, Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING
-)  # fmt: skip
+_LET_GO = (Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
+BEFORE_RELEASE = (Stage.TESTING, Stage.SETTLING, *_LET_GO)
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 _VERDICT = (Stage.RESULT, Stage.HALTED)
@@ -103,42 +307,42 @@ class Flow:
 def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an event
     """Take one event."""
     match event:
-        case events.Stopped():
+        case StopRequest():
             return _stop(flow)
-        case events.Lost(trouble):
+        case Lost(trouble):
             return _lost(flow, trouble)
-        case events.Warned(trouble):
+        case Notice(trouble):
             return replace(flow, trouble=flow.trouble or trouble), ()
-        case events.Answered(ticket, token):
+        case EffectDone(ticket, token):
             return _take_answer(flow, ticket, token)
-        case events.EffectFailed():
+        case EffectFailure():
             return _effect_failed(flow, event)
-        case events.Tick(seconds):
+        case Tick(seconds):
             return _tick(flow, seconds)
-        case events.Judged():
+        case DropVerdict():
             return _take_verdict(flow, event)
-        case events.GoOn(job, settle_s):
+        case GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
-        case events.Try() if flow.stage in _IDLE:
-            return replace(flow.to(Stage.TESTING), home=flow.stage), (events.Drive(),)
-        case events.Opened() if flow.stage is Stage.PROTOCOL:
+        case Try() if flow.stage in _IDLE:
+            return replace(flow.to(Stage.TESTING), home=flow.stage), (Drive(),)
+        case SessionOpen() if flow.stage is Stage.PROTOCOL:
             return flow.to(Stage.DEVICE), ()
-        case events.Closed() if flow.stage in {*_IDLE, *_VERDICT}:
+        case SessionClose() if flow.stage in {*_IDLE, *_VERDICT}:
             return replace(flow.to(Stage.PROTOCOL), job=None, row=()), ()
-        case events.Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
-            return replace(flow, job=job).to(Stage.JUDGING), (events.Judge(job),)
-        case events.Again(job) if flow.stage in {*_IDLE, *_VERDICT}:
+        case Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
+            return replace(flow, job=job).to(Stage.JUDGING), (Judge(job),)
+        case Again(job) if flow.stage in {*_IDLE, *_VERDICT}:
             return _onward(flow, job)
-        case events.Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
+        case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
             if flow.verdict != "rejected":
                 flow = replace(flow, judged=(flow.verdict, flow.reasons))
             return _log_again(
                 flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow))
             )
-        case events.Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
+        case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
             verdict, reasons = flow.judged
             return _log_again(flow, verdict, (*_noteless(reasons), *_notes(flow)))
-        case events.Note(text) if flow.stage is Stage.RESULT:
+        case Note(text) if flow.stage is Stage.RESULT:
             note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
             if note != _notes(flow):  # what was noted before stays in the log
                 return _log_again(flow, flow.verdict, (*_noteless(flow.reasons), *note))
@@ -158,14 +362,14 @@ def _stop(flow: Flow) -> Outcome:
         message = "stopped: the release is off"
         if flow.stage is not Stage.TESTING:
             message = "stopped: nothing fell"
-        return flow.to(flow.home, message), (events.Stop(),)
-    return flow, (events.Stop(),)
+        return flow.to(flow.home, message), (Stop(),)
+    return flow, (Stop(),)
 
 
 def _lost(flow: Flow, trouble: str) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
         # Where it is only late, it must not go on with what was armed.
-        return flow.to(flow.home, trouble), (events.Stop(trouble.partition("\n")[0]),)
+        return flow.to(flow.home, trouble), (Stop(trouble.partition("\n")[0]),)
     if flow.stage in {Stage.LIVE, Stage.JUDGING}:
         # A chain that fell is recorded by the daemon, and found when it is back.
         return flow.to(flow.home, trouble), ()
@@ -175,25 +379,25 @@ def _lost(flow: Flow, trouble: str) -> Outcome:
 def _take_answer(flow: Flow, ticket: int, token: int | None) -> Outcome:
     if ticket != flow.ticket:
         # What was stopped while the device was arming must not stay armed.
-        return flow, () if token is None else (events.Stop(),)
+        return flow, () if token is None else (Stop(),)
     if flow.stage is Stage.TESTING:
         return flow.to(flow.home), ()
     job = flow.job
     if job is None:
         return flow, ()
     if flow.stage is Stage.SETTLING:
-        return flow.to(Stage.ARMING), (events.ArmRelease(job),)
+        return flow.to(Stage.ARMING), (ArmRelease(job),)
     if flow.stage is Stage.ARMING:
         armed = replace(flow.to(Stage.COUNTDOWN), not_armed=0)
         return replace(armed, token=token or 0, left_s=flow.countdown_s), ()
     if flow.stage is Stage.FIRING:
-        return replace(flow.to(Stage.LIVE), not_fired=0), (events.Collect(job),)
+        return replace(flow.to(Stage.LIVE), not_fired=0), (Collect(job),)
     if flow.stage is Stage.LIVE:
-        return flow.to(Stage.JUDGING), (events.Judge(job),)
+        return flow.to(Stage.JUDGING), (Judge(job),)
     return replace(flow, logged=True), ()
 
 
-def _effect_failed(flow: Flow, event: events.EffectFailed) -> Outcome:
+def _effect_failed(flow: Flow, event: EffectFailure) -> Outcome:
     if event.ticket != flow.ticket:
         return flow, ()
     if flow.stage is Stage.ARMING:
@@ -201,28 +405,28 @@ def _effect_failed(flow: Flow, event: events.EffectFailed) -> Outcome:
     if flow.stage is Stage.FIRING:
         return _not_fired(flow, event)
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
-        return flow.to(flow.home, event.trouble), (events.GiveUp(),)
-    unlogged = () if flow.logged else (events.GiveUp(),)
+        return flow.to(flow.home, event.trouble), (GiveUp(),)
+    unlogged = () if flow.logged else (GiveUp(),)
     return replace(flow, trouble=event.trouble, logged=True), unlogged
 
 
-def _not_armed(flow: Flow, event: events.EffectFailed) -> Outcome:
+def _not_armed(flow: Flow, event: EffectFailure) -> Outcome:
     refusals = flow.not_armed + 1
     if event.reason not in _PASSING or (not flow.attended and refusals >= LOOKS):
-        return flow.to(flow.home, event.trouble), (events.GiveUp(),)
+        return flow.to(flow.home, event.trouble), (GiveUp(),)
     if flow.attended:  # who has been asked, and arms again when all is well
         return flow.to(flow.home, event.trouble), ()
     pause = event.detail / 1000 if event.reason is RefusalReason.COOLING else LOOK_S
-    return replace(flow.to(Stage.SETTLING), not_armed=refusals), (events.Wait(pause),)
+    return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
 
 
-def _not_fired(flow: Flow, event: events.EffectFailed) -> Outcome:
+def _not_fired(flow: Flow, event: EffectFailure) -> Outcome:
     refusals = flow.not_fired + 1
     flow = replace(flow.to(Stage.PREPARE, event.trouble), not_fired=refusals)
     # Whether it was let go is not known for sure when the answer is an error.
-    stop = events.Stop(event.trouble.partition("\n")[0])
+    stop = Stop(event.trouble.partition("\n")[0])
     if event.reason not in _DISTURBED or (not flow.attended and refusals >= LOOKS):
-        return flow, (stop, events.GiveUp())
+        return flow, (stop, GiveUp())
     return flow, (stop,)
 
 
@@ -232,10 +436,10 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
     seconds_left = flow.left_s - seconds
     if seconds_left > 0.0:
         return replace(flow, left_s=seconds_left), ()
-    return replace(flow.to(Stage.FIRING), left_s=0.0), (events.FireRelease(flow.token),)
+    return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
 
 
-def _take_verdict(flow: Flow, event: events.Judged) -> Outcome:
+def _take_verdict(flow: Flow, event: DropVerdict) -> Outcome:
     if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
         return flow, ()
     job, verdict, reasons = flow.job, event.verdict, event.reasons
@@ -243,12 +447,12 @@ def _take_verdict(flow: Flow, event: events.Judged) -> Outcome:
     flow = replace(flow, verdict=verdict, reasons=reasons, logged=False)
     before = flow.row if event.row is None else event.row
     row = after(before, job, verdict, reasons)
-    return replace(flow.to(Stage.RESULT), row=row), (events.Log(job, verdict, reasons),)
+    return replace(flow.to(Stage.RESULT), row=row), (Log(job, verdict, reasons),)
 
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
-        return replace(flow, job=job, not_armed=0).to(Stage.SETTLING), (events.Wait(settle_s),)
+        return replace(flow, job=job, not_armed=0).to(Stage.SETTLING), (Wait(settle_s),)
     if flow.stage is Stage.RESULT and not flow.logged:
         return flow, ()  # what comes next depends on it
     if flow.stage is Stage.HALTED and flow.job is not None:
@@ -275,4 +479,4 @@ def _log_again(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
     flow = replace(flow, verdict=state, reasons=reasons, logged=False)
     row = after(flow.row, job, state, reasons)
     flow = replace(flow, ticket=flow.ticket + 1, trouble="", row=row)
-    return flow, (events.Log(job, state, reasons),)
+    return flow, (Log(job, state, reasons),)

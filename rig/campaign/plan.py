@@ -56,7 +56,7 @@ def again(runs: Sequence[RunLine], run: int) -> Job | None:
     return next((_again(line) for line in runs if line.run == run), None)
 
 
-def unjudged(runs: Iterable[RunLine]) -> Job | None:
+def job_to_judge(runs: Iterable[RunLine]) -> Job | None:
     """Name a drop that was recorded and never judged."""
     return next((Job(line.run, line.attempt) for line in runs if line.state == "recorded"), None)
 

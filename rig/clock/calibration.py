@@ -34,7 +34,7 @@ class TimeScale(NamedTuple):
     hz: float
     u: float
 
-    def rounded(self) -> TimeScale:
+    def coarse(self) -> TimeScale:
         """Return a scale near by, good enough to tell rods apart: further samples leave it."""
         step = 2.0 ** floor(log2(_ROUGH * self.hz))
         return TimeScale(step * round(self.hz / step), max(self.u, _ROUGH))
@@ -44,12 +44,23 @@ class ClockLog(Protocol):
     """What a session has of clocks; `rig.session.reading.Reader` says what each of these is."""
 
     @property
-    def simulated(self) -> bool: ...  # noqa: D102
-    def identities(self) -> Sequence[tuple[int, Mapping[str, Any]]]: ...  # noqa: D102
-    def pings(self, after: int = 0) -> Sequence[ClockSample]: ...  # noqa: D102
-    def pulses(self) -> Sequence[Pulse]: ...  # noqa: D102
-    def host_breaks(self) -> Sequence[HostBreak]: ...  # noqa: D102
-    def fired_ns(self) -> Mapping[tuple[int, int], int]: ...  # noqa: D102
+    def simulated(self) -> bool:
+        """Whether the host's clock is exact."""
+
+    def identities(self) -> Sequence[tuple[int, Mapping[str, Any]]]:
+        """Host time and content of every identity."""
+
+    def pings(self, after: int = 0) -> Sequence[ClockSample]:
+        """Clock samples, all but the first so many."""
+
+    def pulses(self) -> Sequence[Pulse]:
+        """Pulses of the 1 Hz reference."""
+
+    def host_breaks(self) -> Sequence[HostBreak]:
+        """When the host slept or its clock was set."""
+
+    def fired_ns(self) -> Mapping[tuple[int, int], int]:
+        """When each run and attempt was fired."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +140,6 @@ class Calibration:
     ----------
     device
         Mean of drops from the device; `None` where there was none.
-    source
-        In words.
     details
         For reports: numbers by name.
     said
@@ -144,7 +153,6 @@ class Calibration:
     """
 
     device: TimeScale | None
-    source: str
     details: dict[str, Any]
     said: dict[str, Any]
     timer_u: float = _UNKNOWN
@@ -155,7 +163,7 @@ class Calibration:
         """Time scale of one drop; edges from another timer keep that timer's."""
         return self._scale_of(drop)[1]
 
-    def used(self, drop: Drop) -> dict[str, Any]:
+    def describe(self, drop: Drop) -> dict[str, Any]:
         """Say which calibration a drop has: where from, ppm off nominal, and how well known."""
         name, (hz, u) = self._scale_of(drop)
         return {"source": name, "rate_ppm": (hz / drop.tick_hz - 1.0) * 1e6, "u_ppm": u * 1e6}
@@ -200,10 +208,14 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
     nominal = next((board["tick_hz"] for _, board in identities if "tick_hz" in board), None)
     u = next((board["clock_u"] for _, board in identities if "clock_u" in board), _UNKNOWN)
     if nominal is None:
-        words = "times as the file gives them"
-        stated: dict[str, Any] = {"source": "stated", "rate_ppm": 0.0, "u_ppm": u * 1e6}
-        details = {"source": words, "relative_u": u}
-        return Calibration(None, words, details, stated | {"notes": []}, u)
+        details = {"source": "times as the file gives them", "relative_u": u}
+        stated: dict[str, Any] = {
+            "source": "stated",
+            "rate_ppm": 0.0,
+            "u_ppm": u * 1e6,
+            "notes": [],
+        }
+        return Calibration(None, details, stated, u)
     breaks = session.host_breaks()
     axis = one_axis(pings, [ns for ns, _ in identities], breaks)
     split = epochs(axis.pings, nominal, axis.cuts_ns)
@@ -227,13 +239,11 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
         "host_breaks": len(breaks),
         "notes": _notes(sources, len(breaks)),
     }
-    words = _words(sources)
     best = sources[0].rate if sources else by_host.rate
     return Calibration(
         scale,
-        words,
         {
-            "source": words,
+            "source": _words(sources),
             "tick_hz": scale.hz,
             "nominal_tick_hz": nominal,
             "error_ppm": said["rate_ppm"],

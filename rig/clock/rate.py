@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
+from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs
 from rig.clock.samples import RECV, SEND, TICK, Samples
 from rig.clock.wander import Readings, Track
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rig.arrays import Array
-    from rig.records import ClockSample, Pulse
+    from rig.records import Pulse
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
 _PASSES = 5
@@ -72,23 +72,6 @@ class TickRate:
         return _least(self.nominal_hz, self.track.rate(seconds))
 
 
-def tick_rate(
-    pings: Iterable[ClockSample] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
-) -> TickRate:
-    """Measure the device's tick rate from clock samples in any order, see `ping_rate`.
-
-    Parameters
-    ----------
-    pings
-        Clock samples.
-    nominal_hz
-        What the device says its rate is.
-    cuts_ns
-        See `rig.clock.epochs.epochs`.
-    """
-    return ping_rate(epochs(pings, nominal_hz, cuts_ns))
-
-
 def ping_rate(split: Epochs) -> TickRate:
     """Measure the tick rate by the host's clock.
 
@@ -131,7 +114,7 @@ def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
         The rate; the nominal one when there are not two pulses of one stretch. A pulse that was
         missed or one too many begins a new stretch.
     """
-    pieces: list[_Piece] = []
+    pieces: list[Array] = []
     stretch: list[tuple[int, int]] = []  # count and wide tick
     began_ns, epoch = 0, -1
     for pulse in sorted(pulses):
@@ -153,19 +136,11 @@ def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
         stretch = [(pulse.number, moment.tick)]
         began_ns, epoch = moment.at_ns, moment.epoch
     pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
-    return _fit_track([piece for piece in pieces if len(piece.at) > 1], split.nominal_hz)
+    return _fit_track([piece for piece in pieces if piece.shape[1] > 1], split.nominal_hz)
 
 
-class _Piece(NamedTuple):
-    """Readings of one intercept: s, s beyond nominal, s."""
-
-    at: Array
-    phase: Array
-    sigma: Array
-
-
-def _ping_piece(pings: Samples, nominal_hz: int) -> _Piece:
-    """Turn samples of one epoch into numbers small enough for floats."""
+def _ping_piece(pings: Samples, nominal_hz: int) -> Array:
+    """Turn samples of one epoch into readings small enough for floats, as `_fit_track` wants."""
     begin_ns = int(pings[0, SEND])
     trip_ns = pings[:, RECV] - pings[:, SEND]
     # The fastest trip is the line's own; what a trip takes beyond it is delay on one unknown
@@ -180,33 +155,31 @@ def _ping_piece(pings: Samples, nominal_hz: int) -> _Piece:
     excess = pings[:, TICK] - pings[0, TICK] - nominal_hz * seconds
     at = begin_ns * 1e-9 + middle_ns2 / 2e9
     sigma: Array = np.sqrt(sigma_ns**2 * 1e-18 + 1 / (12 * nominal_hz**2))
-    return _Piece(at, excess / nominal_hz - rest_ns2 * 0.5e-9, sigma)
+    return np.array([at, excess / nominal_hz - rest_ns2 * 0.5e-9, sigma])
 
 
-def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: int) -> _Piece:
+def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: int) -> Array:
     """Turn a stretch of pulses, none missed, into readings."""
     sigma = sqrt(_EDGE_S**2 + 1 / (12 * nominal_hz**2))
-    seconds = [count - stretch[0][0] for count, _ in stretch]
-    excess = [
-        tick - stretch[0][1] - nominal_hz * passed
-        for (_, tick), passed in zip(stretch, seconds, strict=True)
-    ]
-    return _Piece(
-        np.array([began_ns * 1e-9 + passed for passed in seconds]),
-        np.array([ticks / nominal_hz for ticks in excess]),
-        np.full(len(stretch), sigma),
-    )
+    columns = np.array(stretch, np.int64).reshape(-1, 2)
+    seconds, ticks = (columns - columns[:1]).T
+    excess = (ticks - nominal_hz * seconds) / nominal_hz
+    return np.array([began_ns * 1e-9 + seconds, excess, np.full(len(stretch), sigma)])
 
 
-def _fit_track(pieces: Sequence[_Piece], nominal_hz: int) -> TickRate:
-    """Fit a track, leave out what is far off even for its own scatter, and fit again."""
-    at, phase, sigma = (np.concatenate([[], *(piece[n] for piece in pieces)]) for n in range(3))
-    everything = Readings(
-        at,
-        phase,
-        sigma,
-        np.repeat(np.arange(len(pieces)), [len(piece.at) for piece in pieces]),
-    )
+def _fit_track(pieces: Sequence[Array], nominal_hz: int) -> TickRate:
+    """Fit a track, leave out what is far off even for its own scatter, and fit again.
+
+    Parameters
+    ----------
+    pieces
+        Readings of one intercept each, shape (3, n): when, s; s beyond nominal; their scatter, s.
+    nominal_hz
+        What the device says its rate is.
+    """
+    epoch = np.repeat(np.arange(len(pieces)), [piece.shape[1] for piece in pieces])
+    at, phase, sigma = np.concatenate([np.empty((3, 0)), *pieces], axis=1)
+    everything = Readings(at, phase, sigma, epoch)
     nominal = TickRate(*_least(nominal_hz), 0, 0.0, nominal_hz=nominal_hz)
     # A walk can follow stray samples, and a steady rate takes a walk's ends for stray: what
     # little strays from a steady rate is left out first, and the rest asked whether it wanders.

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 from rig.flash.boards import UNSEEN
 from rig.flash.image import shipped_firmware
 from rig.link.client import Device
-from rig.link.gatewatch import GateStates, listed, watch_gates
+from rig.link.gatewatch import GateStates, name_gates, watch_gates
 from rig.link.messages import (
     HOST_SILENCE_MS,
     TEST_RUN,
+    Arm,
     Identity,
     Phase,
     RefusalReason,
@@ -114,10 +115,10 @@ def _record_gates(device: Device, gates: int, facts: BoardFacts) -> BoardFacts:
     A board fires only when all its gates are clear and keep still. One that flickers with the
     mains does so for some milliseconds between two pulses, so a few tries in a row get there.
     """
-    order = {"timeout_ms": 1000, "record_ms": round(facts.watched_s * 1000)}
+    order = Arm(_LABEL, gates, 0, 0, timeout_ms=1000, record_ms=round(facts.watched_s * 1000))
     for _ in range(_TRIES):
         try:
-            device.fire(device.arm(label=_LABEL, gates=gates, release=0, pulse_us=0, **order))
+            device.fire(device.arm(order))
         except DeviceRefusedError as refusal:
             stopped = refusal.reason is RefusalReason.STOPPED
             facts = replace(facts, unwatched=refusal.message, stopped=stopped)
@@ -170,7 +171,7 @@ def _emergency_stop(board: BoardFacts) -> str:
 def _stuck_gates(board: BoardFacts) -> str:
     """See that no gate is blocked all the time."""
     if board.states.stuck:
-        raise CheckFailedError("gates_blocked", gates_listed=listed(board.states.stuck))
+        raise CheckFailedError("gates_blocked", gates_listed=name_gates(board.states.stuck))
     return "none"
 
 
@@ -178,7 +179,7 @@ def _flickering_gates(board: BoardFacts) -> str:
     """See that no gate changes while nothing moves, and whether the mains do it if one does."""
     if not board.edges:
         if seen := board.states.flickering:
-            raise CheckFailedError("gates_flicker", gates_listed=listed(seen))
+            raise CheckFailedError("gates_flicker", gates_listed=name_gates(seen))
         if board.edges is None:
             return f"none seen at a glance; not recorded: {board.unwatched}"
         return f"none within {board.watched_s:g} s"

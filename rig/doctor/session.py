@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from rig.link.messages import unpack_label
-from rig.link.restarts import Restart, causes
+from rig.link.transcript import Restart, causes
 from rig.records import Drop, Job
 from rig.recover.examine import ExaminedFile, examine
 from rig.selftest.findings import CheckFailedError, Finding, make_check

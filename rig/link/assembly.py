@@ -9,6 +9,7 @@ from typing import Any
 
 from rig.boards import GATES
 from rig.link.messages import (
+    EVENT,
     EVENTS_PER_FRAME,
     DropCertificate,
     DropCertificate2,
@@ -16,7 +17,6 @@ from rig.link.messages import (
     PulseEnd,
     unpack_label,
 )
-from rig.link.wiretypes import EVENTS
 from rig.reasons import Reason, make_reason
 from rig.records import Certificate, Drop, Edge
 
@@ -69,10 +69,10 @@ class Assembly:
 
     def add(self, frame: EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
-        first, raw = frame.first, EVENTS.pack(frame.events)
-        end = first + len(frame.events)
+        first, raw = frame.first, frame.events
+        end = first + len(raw) // EVENT.size
         self._reserve(end)
-        self._raw[first * EVENTS.size : end * EVENTS.size] = raw
+        self._raw[first * EVENT.size : end * EVENT.size] = raw
         self._mask[first:end] = b"\1" * (end - first)
 
     def missing(
@@ -108,7 +108,7 @@ class Assembly:
     def forget_events(self, latest: int | None = None) -> None:
         """Drop the events, to read them again; only the latest so many, when said."""
         first = max(0, self._mask.count(1) - latest) if latest is not None else 0
-        del self._mask[first:], self._raw[first * EVENTS.size :]
+        del self._mask[first:], self._raw[first * EVENT.size :]
 
     def drop(self, tick_hz: int) -> Drop:
         """Make the raw record of what is known now.
@@ -148,7 +148,7 @@ class Assembly:
         """Make room for the events before a number."""
         lacking = max(0, end - len(self._mask))
         self._mask += bytes(lacking)
-        self._raw += bytes(lacking * EVENTS.size)
+        self._raw += bytes(lacking * EVENT.size)
 
     def _stretches(self, value: int, first: int, end: int) -> Iterator[tuple[int, int]]:
         """List from where to where events are there (1) or not (0)."""
@@ -160,7 +160,7 @@ class Assembly:
 
     def _crc(self) -> int:
         """CRC-32 over all events; none is missing."""
-        return zlib.crc32(self._raw[: self._end * EVENTS.size])
+        return zlib.crc32(self._raw[: self._end * EVENT.size])
 
     def _edges(self, initial: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
@@ -168,8 +168,8 @@ class Assembly:
         gates = self.certificate.gates if self.certificate else self.gates
         rows: list[tuple[int, int, bool]] = []
         for first, end in self._stretches(1, 0, min(self._end, len(self._mask))):
-            raw = self._raw[first * EVENTS.size : end * EVENTS.size]
-            events, state = EVENTS.layout.iter_unpack(raw), initial
+            raw = self._raw[first * EVENT.size : end * EVENT.size]
+            events, state = EVENT.iter_unpack(raw), initial
             if first:
                 # Behind a gap it is not known when the gates changed: no edge is better than a
                 # wrong one.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.link import frames
 from rig.link import messages as wire
-from rig.link.wiretypes import Chars, Field, Raw, Tail, Unsigned
+from rig.link.messages import Chars, Field, Raw, Tail, UnsignedInt
 
 if TYPE_CHECKING:
     from enum import IntEnum
@@ -60,7 +60,7 @@ def _message(code: int, name: str, fields: tuple[Field, ...]) -> list[str]:
         if fixed:
             lines.append(_define(f"{prefix}_{_upper(field.name)}", offset))
         match field.wire:
-            case Unsigned(size=size) | Raw(size=size):
+            case UnsignedInt(size=size) | Raw(size=size):
                 offset += size
             case Chars(limit=limit):
                 lines.append(_define(f"{prefix}_{_upper(field.name)}_LIMIT", limit))

@@ -13,14 +13,14 @@ from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
 from rig.link.port import BAUDRATE
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Received, Record
 from rig.reasons import make_error
-from rig.records import ClockSample, Drop
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rig.link.assembly import Assembly
+    from rig.link.transcript import Incoming
+    from rig.records import ClockSample, Drop
 
 BOOT_WAIT_S = 2.0
 """In which every boot loader starts the firmware, if it hears nothing: the Mega's after 0.83 s."""
@@ -39,7 +39,7 @@ _ABORT_WAIT_S = 0.03
 """Five ABORTs leave within the 250 ms after which everything shall be off."""
 
 
-def _is_boot(got: Received) -> bool:
+def _is_boot(got: Incoming) -> bool:
     return isinstance(got.message, wire.Boot)
 
 
@@ -50,21 +50,8 @@ class Device(Exchange):
     is never behind what was acted upon; for the parameters see `rig.link.exchange.Exchange`.
     """
 
-    _sample: ClockSample | None = None
-    _armed: tuple[int, int] = (0, 0)
-    """Label and recording time, ms, of the drop that was armed last."""
-    _disarmed: wire.DisarmReason | None = None
-    """Why it disarmed itself since it was armed."""
-
-    def _note(self, record: Record) -> None:
-        match record:
-            case ClockSample():
-                self._sample = record
-            case Received(message=wire.Armed()):
-                self._disarmed = None
-            case Received(message=wire.Disarmed(reason=reason)):
-                self._disarmed = reason
-        super()._note(record)
+    _order: wire.Arm | None = None
+    """Of the drop that was armed last."""
 
     def connect(self, boot_wait_s: float = BOOT_WAIT_S) -> wire.Identity:
         """Find out who is there.
@@ -137,9 +124,9 @@ class Device(Exchange):
         ClockSample or None
             `None` when the request had to be repeated: such a sample would be ambiguous.
         """
-        self._sample = None
+        self.transcript.sample = None
         self.request(wire.Ping(), wire.Pong)
-        return self._sample
+        return self.transcript.sample
 
     def status(self) -> wire.State:
         """Ask what the device is doing."""
@@ -149,17 +136,8 @@ class Device(Exchange):
         """Ask for the latest pulse of the 1 Hz reference; its count is 0 when none is wired."""
         return self.request(wire.Reference(), wire.ReferencePulse)
 
-    def arm(
-        self,
-        *,
-        label: int,
-        gates: int,
-        release: int,
-        pulse_us: int,
-        timeout_ms: int,
-        record_ms: int,
-    ) -> int:
-        """Prepare a drop; the parameters are those of `rig.link.messages.Arm`.
+    def arm(self, order: wire.Arm) -> int:
+        """Prepare a drop.
 
         From now until `fire` the device wants to hear a request, any request, every
         `HOST_SILENCE_MS`: else it disarms itself.
@@ -175,9 +153,8 @@ class Device(Exchange):
             A gate is blocked, the release is too warm, another drop is held, a parameter is out
             of range, the emergency stop is open.
         """
-        request = wire.Arm(label, gates, release, pulse_us, timeout_ms, record_ms)
-        token = self.request(request, wire.Armed).token
-        self._armed = label, record_ms
+        token = self.request(order, wire.Armed).token
+        self._order = order
         return token
 
     def fire(self, token: int) -> int:
@@ -200,12 +177,12 @@ class Device(Exchange):
             was released.
         """
         try:
-            tick = self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
+            return self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
         except DeviceRefusedError as refused:
             if refused.reason is not wire.RefusalReason.NOT_ARMED:
                 raise
-            raise DeviceRefusedError(refused.reason, refused.detail, self._disarmed) from None
-        return tick
+            disarmed = self.transcript.disarmed
+            raise DeviceRefusedError(refused.reason, refused.detail, disarmed) from None
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""
@@ -253,8 +230,8 @@ class Device(Exchange):
             The board restarted, lost the drop, or fell silent.
         """
         if timeout is None:
-            armed, record_ms = self._armed
-            timeout = (record_ms / 1000 if label == armed else 0.0) + _LATE_S
+            order = self._order
+            timeout = (order.record_ms / 1000 if order and order.label == label else 0.0) + _LATE_S
         drop = self.transcript.assembly(label)
         now_ns = self.clock.now_ns
         hopeless = now_ns() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)

@@ -11,8 +11,7 @@ from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.refusals import DeviceRefusedError
-from rig.link.restarts import Restart
-from rig.link.transcript import Direction, Received, Record, Transcript
+from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
@@ -72,8 +71,8 @@ class Exchange:
         self,
         port: Port,
         clock: Clock,
-        tap: Tap | None = None,
-        on_record: OnRecord | None = None,
+        tap: Tap = lambda *_: None,
+        on_record: OnRecord = lambda _: None,
         tries: int = 8,
         give_way: Callable[[], None] = lambda: None,
     ) -> None:
@@ -144,7 +143,7 @@ class Exchange:
                 raise make_error(DeviceError, "device_confused", **names)
         raise make_error(DeviceTimeoutError, "device_silent", request=type(message).__name__)
 
-    def wait_for(self, seconds: float, wanted: Callable[[Received], bool]) -> wire.Message | None:
+    def wait_for(self, seconds: float, wanted: Callable[[Incoming], bool]) -> wire.Message | None:
         """Read until a message comes that is waited for, or the time is over.
 
         Parameters
@@ -163,7 +162,7 @@ class Exchange:
         while self.clock.now_ns() < until:
             self.give_way()
             for record in self.receive():
-                if isinstance(record, Received) and wanted(record):
+                if isinstance(record, Incoming) and wanted(record):
                     return record.message
         return None
 
@@ -194,10 +193,12 @@ class Exchange:
         self._part += data
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE
-        records = self._take() if ended else []
+        records = self._log_part() if ended else []
         restarts = (record for record in records if isinstance(record, Restart))
         if not self.expect_boot and (restart := next(restarts, None)):
-            raise _restart_error(restart)
+            if restart.label is None:
+                raise make_error(DeviceError, "board_restarted")
+            raise make_error(DeviceError, "board_restarted_in_drop", moment=restart.when)
         return records
 
     def write(self, data: bytes) -> None:
@@ -214,7 +215,7 @@ class Exchange:
             The connection broke.
         """
         if self._part:
-            self._take()
+            self._log_part()
         self.tx_bytes += len(data)
         self._log("tx", data)
         try:
@@ -261,7 +262,7 @@ class Exchange:
         except OSError as error:
             raise _lost(error) from error
 
-    def _take(self) -> list[Record]:
+    def _log_part(self) -> list[Record]:
         part, self._part = self._part, b""
         return self._log("rx", part)
 
@@ -275,23 +276,11 @@ class Exchange:
         return self._feed(direction, self.clock.now_ns(), data)
 
     def _feed(self, direction: Direction, now_ns: int, data: bytes) -> list[Record]:
-        if self._tap is not None:
-            self._tap(direction, now_ns, data)
+        self._tap(direction, now_ns, data)
         records = self.transcript.feed(direction, now_ns, data)
         for record in records:
-            self._note(record)
-        return records
-
-    def _note(self, record: Record) -> None:
-        """Take note of what became known."""
-        if self._on_record is not None:
             self._on_record(record)
-
-
-def _restart_error(restart: Restart) -> DeviceError:
-    if restart.label is None:
-        return make_error(DeviceError, "board_restarted")
-    return make_error(DeviceError, "board_restarted_in_drop", moment=restart.when)
+        return records
 
 
 def _lost(error: OSError) -> DeviceError:

@@ -16,7 +16,6 @@ OVERHEAD = 7
 """type, seq, ack, CRC (2), the COBS code byte and the delimiter."""
 PAYLOAD_LIMIT = FRAME_LIMIT - OVERHEAD
 DELIMITER = b"\0"
-_BLOCK = 254  # the longest run a COBS code byte can announce
 
 
 class FrameError(ValueError):
@@ -60,73 +59,55 @@ def crc16(data: bytes) -> int:
     return crc_hqx(data, 0xFFFF)
 
 
-def cobs_encode(data: bytes) -> bytes:
-    """Stuff bytes so that no zero is left.
+def cobs_encode(body: bytes) -> bytes:
+    """Stuff the body of a frame so that no zero is left.
 
     Parameters
     ----------
-    data
-        Any bytes, of any length.
+    body
+        At most 253 bytes: COBS begins another block behind 254 without a zero, and no frame is
+        as long as that.
 
     Returns
     -------
     bytes
-        Zero-free, without delimiter; longer by 1 + at most one in 254.
+        Zero-free, without delimiter; longer by 1.
     """
-    out = bytearray()
-    groups = data.split(DELIMITER)
-    last = len(groups) - 1
-    for index, group in enumerate(groups):
-        rest = group
-        while len(rest) >= _BLOCK:
-            out.append(0xFF)
-            out += rest[:_BLOCK]
-            rest = rest[_BLOCK:]
-            if not rest and index == last:
-                return bytes(out)  # a full block at the very end needs no empty one behind it
-        out.append(len(rest) + 1)
-        out += rest
-    return bytes(out)
+    return b"".join([bytes((len(block) + 1,)) + block for block in body.split(DELIMITER)])
 
 
-def cobs_decode(data: bytes) -> bytes:
+def cobs_decode(stuffed: bytes) -> bytes:
     """Undo `cobs_encode`.
 
     Parameters
     ----------
-    data
-        Stuffed bytes without their delimiter.
+    stuffed
+        A frame without its delimiter.
 
     Returns
     -------
     bytes
-        The original bytes.
+        Its body.
 
     Raises
     ------
     FrameError
-        When the bytes contain a zero, are empty, or end within a block.
+        When the bytes contain a zero, are empty, too many, or end within a block.
     """
-    if not data or 0 in data:
+    if len(stuffed) >= FRAME_LIMIT:
+        raise FrameError("longer than a frame can be")
+    if not stuffed or 0 in stuffed:
         raise FrameError("not COBS: empty, or with a zero inside")
-    # In place: every code byte but the first stands where a zero was, or, behind the longest
-    # block, where nothing was. This loop is most of what reading a frame takes.
-    out = bytearray(data)
-    joints = [0]
-    at = code = data[0]
-    end = len(data)
+    # In place: every code byte but the first stands where a zero was. This loop is most of what
+    # reading a frame takes.
+    body = bytearray(stuffed)
+    at, end = stuffed[0], len(stuffed)
     while at < end:
-        if code == 0xFF:
-            joints.append(at)
-        else:
-            out[at] = 0
-        code = data[at]
-        at += code
+        body[at] = 0
+        at += stuffed[at]
     if at > end:
         raise FrameError("not COBS: the last block is cut short")
-    for joint in reversed(joints):
-        del out[joint]
-    return bytes(out)
+    return bytes(body[1:])
 
 
 def encode(frame: Frame) -> bytes:
@@ -174,8 +155,6 @@ def decode(stuffed: bytes) -> Frame:
     FrameError
         When COBS, length or CRC is wrong.
     """
-    if len(stuffed) >= FRAME_LIMIT:
-        raise FrameError("longer than a frame can be")
     body = cobs_decode(stuffed)
     if len(body) < 5 or crc16(body[:-2]) != int.from_bytes(body[-2:], "little"):
         raise FrameError("too short, or wrong CRC")

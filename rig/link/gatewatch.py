@@ -21,7 +21,7 @@ class GateStates(NamedTuple):
     flickering: int
 
 
-def listed(mask: int) -> str:
+def name_gates(mask: int) -> str:
     """Name the gates of a mask, as in ``gates 1, 8``."""
     numbers = [str(n) for n in range(GATES) if mask >> n & 1]
     return f"gate{'s' * (len(numbers) > 1)} {', '.join(numbers)}"

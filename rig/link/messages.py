@@ -20,31 +20,17 @@ armed gates is 0; the other gates are left out of every event.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+import struct
+import typing
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
-from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
+from itertools import takewhile
+from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar, dataclass_transform
 
 from rig.boards import Capabilities
+from rig.errors import DeviceError
 from rig.link.frames import PAYLOAD_LIMIT
-from rig.link.wiretypes import (
-    BYTE_ENUM,
-    U8,
-    U16,
-    U32,
-    Event,
-    EventList,
-    Field,
-    Line,
-    MessageError,
-    Name,
-    UniqueId,
-    payload_reader,
-    wire_fields,
-    write_field,
-)
-
-__all__ = ["Event", "MessageError"]  # besides what is defined here
 
 PROTOCOL_VERSION = 2
 EVENTS_PER_FRAME = (PAYLOAD_LIMIT - 6) // 6
@@ -53,6 +39,118 @@ HOST_SILENCE_MS = 250
 """An armed device that heard no request for so long disarms itself."""
 TEST_RUN = 0
 """The run in the labels of drops that belong to no session: plans count from 1."""
+
+
+class MessageError(DeviceError, ValueError):
+    """A payload that does not fit its message, or a value that does not fit its field."""
+
+
+class Event(NamedTuple):
+    """One snapshot: the device's tick (u32) and the gates' state after the change (1 = blocked)."""
+
+    tick: int
+    state: int
+
+
+EVENT = struct.Struct("<IH")
+"""An `Event` on the wire."""
+
+
+def pack_events(events: Iterable[tuple[int, int]]) -> bytes:
+    """Write ticks and states as they stand in a frame; one that does not fit is a struct.error."""
+    return b"".join([EVENT.pack(*event) for event in events])
+
+
+@dataclass(frozen=True, slots=True)
+class UnsignedInt:
+    """An unsigned little-endian integer by its `struct` code."""
+
+    code: str
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return struct.calcsize("<" + self.code)
+
+    def pack(self, value: int) -> bytes:
+        """Write a value."""
+        return struct.pack("<" + self.code, value)
+
+    def unpack(self, payload: bytes, at: int) -> tuple[int, int]:
+        """Read a value; give where the next one starts, too."""
+        return struct.unpack_from("<" + self.code, payload, at)[0], at + self.size
+
+
+@dataclass(frozen=True, slots=True)
+class Raw:
+    """Exactly `size` bytes."""
+
+    size: int
+
+    def pack(self, value: bytes) -> bytes:
+        """Write a value."""
+        if len(value) != self.size:
+            raise ValueError(f"{len(value)} bytes, not {self.size}")
+        return bytes(value)
+
+    def unpack(self, payload: bytes, at: int) -> tuple[bytes, int]:
+        """Read a value."""
+        end = at + self.size
+        return self.pack(payload[at:end]), end
+
+
+@dataclass(frozen=True, slots=True)
+class Chars:
+    """UTF-8 behind a length byte, at most `limit` bytes."""
+
+    limit: int
+
+    def pack(self, value: str) -> bytes:
+        """Write a value."""
+        if len(text := value.encode()) > self.limit:
+            raise ValueError(f"{len(text)} bytes, at most {self.limit} fit")
+        return bytes((len(text),)) + text
+
+    def unpack(self, payload: bytes, at: int) -> tuple[str, int]:
+        """Read a value."""
+        text, end = Raw(payload[at]).unpack(payload, at + 1)
+        return text.decode(), end
+
+
+@dataclass(frozen=True, slots=True)
+class Tail:
+    """Records of `size` bytes up to the end of the payload; only ever the last field."""
+
+    size: int
+
+    def pack(self, value: bytes) -> bytes:
+        """Write whole records."""
+        if len(value) % self.size:
+            raise ValueError(f"the last of the {self.size}-byte records is cut short")
+        return bytes(value)
+
+    def unpack(self, payload: bytes, at: int) -> tuple[bytes, int]:
+        """Read all that is left."""
+        return self.pack(payload[at:]), len(payload)
+
+
+_BYTE = UnsignedInt("B")
+
+U8: TypeAlias = Annotated[int, _BYTE]
+U16: TypeAlias = Annotated[int, UnsignedInt("H")]
+U32: TypeAlias = Annotated[int, UnsignedInt("I")]
+UniqueId: TypeAlias = Annotated[bytes, Raw(8)]
+Name: TypeAlias = Annotated[str, Chars(24)]
+Line: TypeAlias = Annotated[str, Chars(96)]
+EventRecords: TypeAlias = Annotated[bytes, Tail(EVENT.size)]
+
+
+class Field(NamedTuple):
+    """One field of a message: its name, Python type and wire type."""
+
+    name: str
+    python: type
+    wire: UnsignedInt | Chars | Raw | Tail
 
 
 class Phase(IntEnum):
@@ -100,31 +198,37 @@ class PulseEnd(IntEnum):
     DEVICE = 3  # the device, to be safe: its main loop stood still, or the pin did not obey
 
 
-class HostMessage:
+class Message:
+    """A request or an answer."""
+
+    __slots__ = ()
+
+
+class HostMessage(Message):
     """A request."""
 
     __slots__ = ()
 
 
-class DeviceMessage:
+class DeviceMessage(Message):
     """An answer, or what the device says of its own accord."""
 
     __slots__ = ()
 
 
-Message: TypeAlias = HostMessage | DeviceMessage
 TABLE: dict[int, type[Message]] = {}
 """Every message by its code."""
-_Kind = TypeVar("_Kind", bound=type[Any])
+_Kind = TypeVar("_Kind", bound=Message)
 
 
 @dataclass_transform(frozen_default=True)
-def _message(code: int) -> Callable[[_Kind], _Kind]:
+def _message(code: int) -> Callable[[type[_Kind]], type[_Kind]]:
     """Enter a message into the table."""
 
-    def enter(kind: _Kind) -> _Kind:
-        TABLE[code] = dataclass(frozen=True, slots=True)(kind)
-        return TABLE[code]  # type: ignore[return-value]
+    def enter(kind: type[_Kind]) -> type[_Kind]:
+        entry = dataclass(frozen=True, slots=True)(kind)
+        TABLE[code] = entry
+        return entry
 
     return enter
 
@@ -269,7 +373,7 @@ class Pong(DeviceMessage):
 class State(DeviceMessage):
     """What the device is doing; `label` 0 and `events` 0 when idle."""
 
-    phase: Annotated[Phase, BYTE_ENUM]
+    phase: Annotated[Phase, _BYTE]
     gates: U16
     label: U32
     events: U16
@@ -293,7 +397,7 @@ class Fired(DeviceMessage):
 class Refused(DeviceMessage):
     """The request was understood and not executed."""
 
-    reason: Annotated[RefusalReason, BYTE_ENUM]
+    reason: Annotated[RefusalReason, _BYTE]
     detail: U16
 
 
@@ -307,11 +411,17 @@ class EventsFrame(DeviceMessage):
     """Events number `first` and on. Stamps are already corrected for the board's mean latency.
 
     An event with the state of the one before it is a glitch: a pulse over before it was looked at.
+    They stay as they are on the wire: a drop is made of many frames and needs few of their numbers.
     """
 
     label: U32
     first: U16
-    events: EventList
+    events: EventRecords
+
+    @property
+    def snapshots(self) -> tuple[Event, ...]:
+        """The events, one by one."""
+        return tuple(map(Event._make, EVENT.iter_unpack(self.events)))
 
 
 @_message(0x89)
@@ -348,7 +458,7 @@ class Disarmed(DeviceMessage):
     """The device disarmed by itself."""
 
     label: U32
-    reason: Annotated[DisarmReason, BYTE_ENUM]
+    reason: Annotated[DisarmReason, _BYTE]
 
 
 @_message(0x8B)
@@ -386,15 +496,45 @@ class DropCertificate2(DropCertificate):
     """
 
     pulse_ticks: U32
-    pulse_end: Annotated[PulseEnd, BYTE_ENUM]
+    pulse_end: Annotated[PulseEnd, _BYTE]
     restarts: U8
     supply_mv: U16
     lowest_mv: U16
 
 
+def _wire_fields(message: type[Any]) -> tuple[Field, ...]:
+    """List a message's fields in wire order."""
+    hints = typing.get_type_hints(message, include_extras=True)
+    return tuple(
+        Field(field.name, *typing.get_args(hints[field.name])[:2]) for field in fields(message)
+    )
+
+
+def _payload_reader(message: Sequence[Field]) -> Callable[[bytes], list[Any]]:
+    """Make what reads a whole payload: numbers at its beginning at once, the rest one by one."""
+    numbers = [*takewhile(lambda field: isinstance(field.wire, UnsignedInt), message)]
+    head = struct.Struct("<" + "".join(getattr(field.wire, "code", "") for field in numbers))
+    enums = [(n, field.python) for n, field in enumerate(numbers) if field.python is not int]
+    rest = [field.wire for field in message[len(numbers) :]]
+
+    def read(payload: bytes) -> list[Any]:
+        values: list[Any] = [*head.unpack_from(payload)]
+        for number, enum in enums:
+            values[number] = enum(values[number])
+        at = head.size
+        for wire in rest:
+            value, at = wire.unpack(payload, at)
+            values.append(value)
+        if at != len(payload):
+            raise ValueError(f"{len(payload) - at} bytes too many")
+        return values
+
+    return read
+
+
 CODES = {message: code for code, message in TABLE.items()}
-FIELDS: dict[type[Any], tuple[Field, ...]] = {kind: wire_fields(kind) for kind in TABLE.values()}
-_READERS = {kind: payload_reader(fields) for kind, fields in FIELDS.items()}
+FIELDS = {message: _wire_fields(message) for message in CODES}
+_READERS = {message: _payload_reader(fields) for message, fields in FIELDS.items()}
 
 
 def pack(message: Message) -> tuple[int, bytes]:
@@ -415,9 +555,14 @@ def pack(message: Message) -> tuple[int, bytes]:
     MessageError
         When a value does not fit its field.
     """
-    kind: type[Any] = type(message)
-    payload = b"".join(write_field(f, getattr(message, f.name)) for f in FIELDS[kind])
-    return CODES[kind], payload
+    payload = b""
+    for name, _, wire in FIELDS[type(message)]:
+        value = getattr(message, name)
+        try:
+            payload += wire.pack(value)
+        except (struct.error, ValueError) as error:
+            raise MessageError(f"{name}={value!r} does not fit: {error}") from error
+    return CODES[type(message)], payload
 
 
 def unpack(code: int, payload: bytes) -> Message:
@@ -438,11 +583,13 @@ def unpack(code: int, payload: bytes) -> Message:
     MessageError
         When the code is unknown or the payload does not fit it exactly.
     """
-    kind: type[Any] | None = TABLE.get(code)
+    kind = TABLE.get(code)
     if kind is None:
         raise MessageError(f"unknown message code 0x{code:02X}")
-    message: Message = kind(*_READERS[kind](payload))
-    return message
+    try:
+        return kind(*_READERS[kind](payload))
+    except (struct.error, IndexError, ValueError) as error:
+        raise MessageError(f"bad {kind.__name__}: {error}") from error
 
 
 def pack_label(run: int, attempt: int) -> int:

@@ -8,31 +8,68 @@ times of clock samples and for the lone delimiter with which a client begins a c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
 from rig.link.frames import DELIMITER, Decoder, Frame
-from rig.link.restarts import Restart
 from rig.records import ClockSample, Drop, Pulse
-
-if TYPE_CHECKING:
-    from rig.link.messages import Identity, Message
 
 Direction: TypeAlias = Literal["tx", "rx"]
 """``tx``: host to device."""
+_CAUSES = {1: "power", 2: "reset pin", 4: "brown-out", 8: "watchdog"}
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
+class Incoming:
     """One message from the device; `ack` is the request's seq, 0 when it answers none."""
 
     host_ns: int
     ack: int
-    message: Message
+    message: wire.Message
 
 
-Record: TypeAlias = Received | ClockSample | Pulse | Drop | Restart
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """A restart of the board that the opening of the port does not explain.
+
+    Attributes
+    ----------
+    host_ns
+        When the board was back.
+    cause
+        As BOOT has it.
+    label
+        Of the drop that was recorded; `None` when nothing fell.
+    back_s
+        How long after FIRE it was back, s; 0 when nothing fell.
+    start_up_s
+        From a reset to BOOT, boot loader and all, as seen when the port was opened, s; `None` when
+        that was not seen.
+    """
+
+    host_ns: int
+    cause: int
+    label: int | None = None
+    back_s: float = 0.0
+    start_up_s: float | None = None
+
+    @property
+    def when(self) -> str:
+        """When it was, by what is known of the drop and of the board's boot loader."""
+        if self.label is None:
+            return "while nothing fell"
+        if self.start_up_s is None or self.back_s < self.start_up_s:
+            return f"within {self.back_s * 1e3:.0f} ms of FIRE"
+        return f"about {(self.back_s - self.start_up_s) * 1e3:.0f} ms after FIRE"
+
+
+def causes(mask: int) -> str:
+    """Name the causes in a mask as BOOT has it; empty where a boot loader has cleared it."""
+    return ", ".join(word for bit, word in _CAUSES.items() if mask & bit)
+
+
+Record: TypeAlias = Incoming | ClockSample | Pulse | Drop | Restart
 
 
 class Transcript:
@@ -40,7 +77,7 @@ class Transcript:
 
     A drop is given out when the host's ACKNOWLEDGE for it goes over the wire: the one moment
     that shows in the bytes alone that the host has read enough. A drop that was never
-    acknowledged is in `unfinished`.
+    acknowledged is in `unfinished_drops`.
 
     Attributes
     ----------
@@ -52,17 +89,23 @@ class Transcript:
         Frames with a good CRC whose payload was no message.
     misreading
         Why the last of them was none.
+    sample
+        The latest clock sample, or `None`.
+    disarmed
+        Why the device disarmed itself since it was armed, or `None`.
     """
 
     def __init__(self) -> None:
-        self.identity: Identity | None = None
+        self.identity: wire.Identity | None = None
+        self.sample: ClockSample | None = None
+        self.disarmed: wire.DisarmReason | None = None
         self.unreadable = 0
         self.misreading = ""
         self._tx = Decoder()
         self.rx = Decoder()
-        self._request: tuple[int, Message] = (0, wire.Status())
+        self._request: tuple[int, wire.Message] = (0, wire.Status())
         self._answered = False
-        self._sample_sent: tuple[int, int] | None = None  # seq and host time of the open sample
+        self._asked_ns: dict[int, int] = {}  # of the open sample, by its seq
         self._tokens: dict[int, int] = {}
         self._drops: dict[int, Assembly] = {}
         self._given: set[int] = set()
@@ -91,7 +134,7 @@ class Transcript:
             # A client begins a connection with this. Half a frame from the connection before
             # must not swallow the first of this one: live, each connection starts afresh.
             self.rx.feed(DELIMITER)
-            self._sample_sent = self._fired = None
+            self._asked_ns, self._fired = {}, None
             self._opened_ns = host_ns
         decoder, take = (self._tx, self._sent) if direction == "tx" else (self.rx, self._got)
         records: list[Record] = []
@@ -141,7 +184,7 @@ class Transcript:
         self._given.discard(label)
         return self._drops.setdefault(label, Assembly(label))
 
-    def unfinished(self) -> list[Drop]:
+    def unfinished_drops(self) -> list[Drop]:
         """Give the drops that began and were never acknowledged.
 
         Returns
@@ -155,7 +198,7 @@ class Transcript:
     def _tick_hz(self) -> int:
         return self.identity.tick_hz if self.identity else 0
 
-    def _sent(self, host_ns: int, frame: Frame, message: Message) -> list[Record]:
+    def _sent(self, host_ns: int, frame: Frame, message: wire.Message) -> list[Record]:
         if isinstance(message, wire.Abort):
             return []  # it may go past a request whose answer is still to come
         repeated = self._request == (frame.seq, message)
@@ -164,7 +207,7 @@ class Transcript:
         match message:
             case wire.Ping() | wire.Reference():
                 # It cannot be told which of two equal requests an answer belongs to.
-                self._sample_sent = None if repeated else (frame.seq, host_ns)
+                self._asked_ns = {} if repeated else {frame.seq: host_ns}
             case wire.Read(label=label) if not repeated:
                 self.assembly(label)  # asking for it means wanting it, even once given out
             case wire.Acknowledge(label=label) if label in self._drops:
@@ -173,8 +216,8 @@ class Transcript:
                 return [drop.drop(self._tick_hz)] if drop.begun else []
         return []
 
-    def _got(self, host_ns: int, frame: Frame, message: Message) -> list[Record]:
-        records: list[Record] = [Received(host_ns, frame.ack, message)]
+    def _got(self, host_ns: int, frame: Frame, message: wire.Message) -> list[Record]:
+        records: list[Record] = [Incoming(host_ns, frame.ack, message)]
         seq, request = self._request
         # Only the first answer counts: a repeated ARMED must not begin the drop a second time.
         asked = request if seq and frame.ack == seq and not self._answered else None
@@ -183,16 +226,17 @@ class Transcript:
             case wire.Identity():
                 self.identity = message
                 self._opened_ns = None
-            case wire.Pong(tick=tick) if self._sample_sent and self._sample_sent[0] == frame.ack:
-                records.append(ClockSample(self._sample_sent[1], host_ns, tick))
-                self._sample_sent = None
-            case wire.ReferencePulse(count=count, tick=tick) if (
-                count and self._sample_sent and self._sample_sent[0] == frame.ack
-            ):
-                records.append(Pulse(self._sample_sent[1], host_ns, count, tick))
-                self._sample_sent = None
-            case wire.Armed(token=token) if isinstance(asked, wire.Arm):
-                self._begin_drop(token, asked)
+            case wire.Pong(tick) if frame.ack in self._asked_ns:
+                self.sample = ClockSample(self._asked_ns.pop(frame.ack), host_ns, tick)
+                records.append(self.sample)
+            case wire.ReferencePulse(count, tick) if count and frame.ack in self._asked_ns:
+                records.append(Pulse(self._asked_ns.pop(frame.ack), host_ns, count, tick))
+            case wire.Armed(token):
+                self.disarmed = None
+                if isinstance(asked, wire.Arm):
+                    self._begin_drop(token, asked)
+            case wire.Disarmed(_, reason):
+                self.disarmed = reason
             case wire.Fired(tick=tick) if isinstance(asked, wire.Fire):
                 label = self._tokens.get(asked.token)
                 if label in self._drops:
@@ -205,14 +249,14 @@ class Transcript:
             case wire.DropCertificate(label=label) if label not in self._given:
                 self.assembly(label).certificate = message
                 self._fired = None
-            case wire.Boot(cause=cause):
-                self._sample_sent = None
-                for drop in self._drops.values():
-                    drop.reset = True
-                records += self._restart_records(host_ns, cause)
+            case wire.Boot(cause):
+                records += self._take_boot(host_ns, cause)
         return records
 
-    def _restart_records(self, host_ns: int, cause: int) -> list[Record]:
+    def _take_boot(self, host_ns: int, cause: int) -> list[Restart]:
+        self._asked_ns = {}
+        for drop in self._drops.values():
+            drop.reset = True
         opened_ns, fired = self._opened_ns, self._fired
         self._opened_ns = self._fired = None
         if opened_ns is not None:

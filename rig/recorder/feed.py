@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
-from rig.link.transcript import Received, Record
-from rig.link.wiretypes import EVENTS
+from rig.link.transcript import Incoming, Record
 from rig.reasons import Reason, published_reasons
 from rig.session.schema import RunState
 
@@ -48,7 +47,7 @@ class StateFeed:
 
     def know(self, record: Record) -> None:
         """Take what became known on the line."""
-        if not isinstance(record, Received):
+        if not isinstance(record, Incoming):
             return
         match record.message:
             case wire.Identity() as identity:
@@ -116,7 +115,7 @@ class StateFeed:
     def _events(self, frame: wire.EventsFrame) -> None:
         if frame.first < self._next or self._fire_tick is None:
             return
-        events = list(EVENTS.rows(frame.events))
+        events = list(wire.EVENT.iter_unpack(frame.events))
         state = self._state
         if frame.first > self._next and events:
             state = events[0][1]  # it is not known when the gates changed

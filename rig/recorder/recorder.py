@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Self
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.messages import Disarmed, DisarmReason, Identity, Phase, pack_label, unpack_label
+from rig.link.messages import Arm, Disarmed, DisarmReason, Identity, Phase, pack_label, unpack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Direction, Received, Record
+from rig.link.transcript import Direction, Incoming, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.reasons import Reason, make_error, sentences
@@ -199,7 +199,7 @@ class Recorder:
         """Take one clock sample, now and then one of the 1 Hz reference; not while armed."""
         with self.interrupts.held():
             if self._host is not None and (gap := self._host.look()) is not None:
-                self.session.add_host_break(gap)
+                self.session.add_timing(gap)
             with self._unless(self.interrupts.check, self._go_on):
                 self._sample = self.device.ping()
                 if self.clock.now_ns() >= self._reference_ns:
@@ -235,17 +235,18 @@ class Recorder:
             A gate is blocked, or the device cannot do what the protocol asks.
         """
         gates, release = protocol.gates, protocol.release
+        order = Arm(
+            label=pack_label(run, attempt),
+            gates=gates.mask if gates else 0,
+            release=1 << release.channel,
+            pulse_us=round(release.pulse * 1e6),
+            timeout_ms=ARM_TIMEOUT_MS,
+            record_ms=record_ms(protocol),
+        )
         with self.interrupts.held():
             try:
                 with self._unless(self.interrupts.check, self._go_on):
-                    token = self.device.arm(
-                        label=pack_label(run, attempt),
-                        gates=gates.mask if gates else 0,
-                        release=1 << release.channel,
-                        pulse_us=round(release.pulse * 1e6),
-                        timeout_ms=ARM_TIMEOUT_MS,
-                        record_ms=record_ms(protocol),
-                    )
+                    token = self.device.arm(order)
             except (StoppedError, KeyboardInterrupt):
                 self.abort()  # the device may have heard what it did not answer
                 raise
@@ -365,11 +366,9 @@ class Recorder:
                 raise
 
     def _note(self, record: Record) -> None:
-        if isinstance(record, ClockSample):
-            self.session.add_ping(record)
-        elif isinstance(record, Pulse):
-            self.session.add_pulse(record)
-        if isinstance(record, Received) and isinstance(record.message, Disarmed):
+        if isinstance(record, ClockSample | Pulse):
+            self.session.add_timing(record)
+        if isinstance(record, Incoming) and isinstance(record.message, Disarmed):
             self.lapsed = record.message.reason
         if self._feed is not None:
             self._feed.know(record)

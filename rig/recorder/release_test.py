@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError
-from rig.link.messages import TEST_RUN, Phase, pack_label
+from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
 from rig.reasons import make_error
 from rig.recorder.interrupts import StoppedError
 
@@ -48,7 +48,7 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
     device, release = recorder.device, protocol.release
     pulse_ms = round(release.pulse * 1e3)
     with recorder.interrupts.held():
-        token = device.arm(
+        order = Arm(
             label=_LABEL,
             gates=protocol.gates.mask if protocol.gates else 0,
             release=1 << release.channel,
@@ -56,6 +56,7 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
             timeout_ms=_TIMEOUT_MS,
             record_ms=pulse_ms + _AFTER_MS,
         )
+        token = device.arm(order)
         try:
             recorder.interrupts.check()
             _insist(not halted())

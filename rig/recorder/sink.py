@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_FORGOTTEN = (
-    "log_bytes", "add_identity", "add_ping", "add_pulse", "add_host_break", "drop", "commit"
-)  # fmt: skip
+_FORGOTTEN = ("log_bytes", "add_identity", "add_timing", "drop", "commit")
 
 
 class NullSink:

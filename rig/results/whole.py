@@ -196,7 +196,7 @@ def _analyze(
     edges: list[str] = []
 
     def scale(drop: Drop) -> TimeScale:
-        scales[drop.run, drop.attempt] = clock.used(drop)
+        scales[drop.run, drop.attempt] = clock.describe(drop)
         edges.extend([edges_digest(drop)] if drop.edges else [])
         return clock.scale(drop)
 

@@ -12,7 +12,7 @@ from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.gatewatch import GateStates, watch_gates
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
-from rig.link.transcript import Received
+from rig.link.transcript import Incoming
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
 if TYPE_CHECKING:
@@ -87,8 +87,7 @@ class RecordedDrop:
     @property
     def crc32(self) -> int:
         """CRC-32 over the events that came."""
-        frame = wire.EventsFrame(self.certificate.label, 0, self.events)
-        return zlib.crc32(wire.pack(frame)[1][6:])
+        return zlib.crc32(wire.pack_events(self.events))
 
 
 class BoardUnderTest:
@@ -123,8 +122,8 @@ class BoardUnderTest:
         self.foreign = 0
         self.slowest_s = 0.0
         self._seq = 0
-        self._waiting: deque[Received] = deque()  # came together with what somebody waited for
-        self._unasked: deque[Received] = deque()
+        self._waiting: deque[Incoming] = deque()  # came together with what somebody waited for
+        self._unasked: deque[Incoming] = deque()
         self._may_release = False
         self._gates: GateStates | None = None
 
@@ -181,7 +180,7 @@ class BoardUnderTest:
         insist(name, answer, wire.Refused(reason, answer.detail if detail is None else detail))
         return answer
 
-    def wait(self, seconds: float, accepts: Callable[[Received], bool]) -> Received | None:
+    def wait(self, seconds: float, accepts: Callable[[Incoming], bool]) -> Incoming | None:
         """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
         transcript, end_ns = self.line.transcript, self.clock.now_ns() + round(seconds * 1e9)
         while True:
@@ -194,11 +193,11 @@ class BoardUnderTest:
             if self.clock.now_ns() >= end_ns:
                 return None
             before, records = transcript.unreadable, self.line.receive()
-            self._waiting += [record for record in records if isinstance(record, Received)]
+            self._waiting += [record for record in records if isinstance(record, Incoming)]
             if transcript.unreadable > before:
                 raise CheckFailedError("invalid_message", text=transcript.misreading)
 
-    def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Received | None:
+    def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Incoming | None:
         """Give the next message of some kinds that came, or comes in time, of its own accord."""
         while self._unasked:
             heard = self._unasked.popleft()
@@ -256,8 +255,8 @@ class BoardUnderTest:
         while (left_ns := deadline - self.clock.now_ns()) > 0:
             heard = self.wait_unasked(left_ns * 1e-9, wire.EventsFrame, wire.DropCertificate)
             match heard and heard.message:
-                case wire.EventsFrame(events=more_events):
-                    events += more_events
+                case wire.EventsFrame(snapshots=snapshots):
+                    events += snapshots
                 case wire.DropCertificate() as certificate:
                     return RecordedDrop(fired, tuple(events), certificate)
         raise CheckFailedError("no_certificate")

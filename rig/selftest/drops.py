@@ -69,7 +69,7 @@ def read_again(board: BoardUnderTest) -> str:
     insist("Read", again, recorded.certificate)
     if count:
         part = board.answer(wire.Read(LABEL, 0, 1), wire.EventsFrame)
-        insist("Read of the first event", part.events, recorded.events[:1])
+        insist("Read of the first event", part.snapshots, recorded.events[:1])
     board.refuse(wire.Read(LABEL, count, 1), RefusalReason.BAD_PARAMETER)
     board.refuse(wire.Read(OTHER_LABEL, 0, 0), RefusalReason.NO_SUCH_DROP)
     return f"{count} events"

@@ -6,8 +6,8 @@ import random
 from collections.abc import Sequence
 from statistics import median
 
-from rig.clock.epochs import RESONATOR_TOLERANCE
-from rig.clock.rate import tick_rate
+from rig.clock.epochs import RESONATOR_TOLERANCE, epochs
+from rig.clock.rate import ping_rate
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
@@ -53,7 +53,7 @@ def judge_clock(pings: Sequence[ClockSample], nominal_hz: int) -> str:
     CheckFailedError
         It is not, or that is not known.
     """
-    rate = tick_rate(pings, nominal_hz)
+    rate = ping_rate(epochs(pings, nominal_hz))
     if not rate.n:
         raise CheckFailedError("clock_unknown", pings=len(pings))
     off, u = rate.hz / nominal_hz - 1, rate.u_hz / nominal_hz

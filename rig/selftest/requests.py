@@ -9,7 +9,7 @@ from rig.boards import GATES, RELEASES
 from rig.link import messages as wire
 from rig.link.client import BOOT_WAIT_S
 from rig.link.frames import DELIMITER
-from rig.link.gatewatch import listed
+from rig.link.gatewatch import name_gates
 from rig.link.messages import PROTOCOL_VERSION, Phase, RefusalReason
 from rig.selftest.board import LABEL, BoardUnderTest, RawRequest
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
@@ -89,14 +89,14 @@ def look_at_gates(board: BoardUnderTest) -> str:
     in_use = board.options.gates
     counted = fitted if in_use is None else in_use
     if absent := counted & ~fitted:
-        raise CheckFailedError("gates_not_fitted", gates_listed=listed(absent))
-    if states.flickering & counted:
-        raise CheckFailedError("gates_flicker", gates_listed=listed(states.flickering & counted))
-    stuck = listed(states.stuck) if states.stuck else ""
+        raise CheckFailedError("gates_not_fitted", gates_listed=name_gates(absent))
+    if restless := states.flickering & counted:
+        raise CheckFailedError("gates_flicker", gates_listed=name_gates(restless))
+    stuck = name_gates(states.stuck) if states.stuck else ""
     if in_use is None and stuck:
         raise NotPossibleError("gates_unused", gates_listed=stuck)
     if states.stuck & counted:
-        raise CheckFailedError("gates_blocked", gates_listed=listed(states.stuck & counted))
+        raise CheckFailedError("gates_blocked", gates_listed=name_gates(states.stuck & counted))
     unused = f"; not in use and blocked: {stuck}" if stuck else ""
     return f"{counted.bit_count()} gates clear{unused}"
 
@@ -111,7 +111,7 @@ def arm_blocked_gate(board: BoardUnderTest) -> str:
     if board.ask(order) == wire.Refused(RefusalReason.STOPPED, 0):
         raise NotPossibleError("refused_stopped")
     board.refuse(order, RefusalReason.GATE_BLOCKED, gate)
-    return listed(gate)
+    return name_gates(gate)
 
 
 def arm_and_abort(board: BoardUnderTest) -> None:

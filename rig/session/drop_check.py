@@ -11,15 +11,13 @@ from enum import StrEnum
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
 
-from rig.link.messages import TEST_RUN
-from rig.link.transcript import Received, Record, Transcript
-from rig.link.wiretypes import EVENTS
+from rig.link.messages import TEST_RUN, pack_events
+from rig.link.transcript import Incoming, Record, Restart, Transcript
 from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from rig.link.restarts import Restart
 
 _U32 = (1 << 32) - 1
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
@@ -62,7 +60,7 @@ class ByteReplay:
         for host_ns, direction, data in chunks:
             self.fed += 1
             records: Iterable[Record] = self._transcript.feed(direction, host_ns, data)
-            self.records += [record for record in records if not isinstance(record, Received)]
+            self.records += [record for record in records if not isinstance(record, Incoming)]
 
     def acknowledged_drops(self) -> list[Drop]:
         """List the drops that the host has read enough of, without those of no plan."""
@@ -71,7 +69,7 @@ class ByteReplay:
 
     def unfinished_drops(self) -> list[Drop]:
         """List the drops that were never acknowledged, as far as they are there."""
-        return [drop for drop in self._transcript.unfinished() if drop.run != TEST_RUN]
+        return [drop for drop in self._transcript.unfinished_drops() if drop.run != TEST_RUN]
 
     def drops(self) -> dict[Job, Drop]:
         """Give every drop once, as it was told last."""
@@ -152,4 +150,4 @@ def _crc32(drop: Drop, fire_tick: int, events: Iterable[tuple[int, list[Edge]]])
         for _, channel, blocked in edges:
             state = state | 1 << channel if blocked else state & ~(1 << channel)
         snapshots.append(((fire_tick + tick) & _U32, state))
-    return zlib.crc32(EVENTS.pack(snapshots))
+    return zlib.crc32(pack_events(snapshots))

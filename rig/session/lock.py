@@ -11,6 +11,7 @@ from pathlib import Path
 from rig.errors import SessionError
 from rig.reasons import make_error
 
+_POLL_S = 0.0025
 _LOOK_S = 0.01  # whoever looks for a writer has the lock for microseconds
 _NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
 
@@ -33,9 +34,8 @@ class WriterLock:
 
         self.path = _place(session)
         self._lock = FileLock(
-            self.path, _LOOK_S, thread_local=False, poll_interval=_LOOK_S / 4,
-            fallback_to_soft=False,
-        )  # fmt: skip
+            self.path, _LOOK_S, thread_local=False, poll_interval=_POLL_S, fallback_to_soft=False
+        )
         try:
             _refuse_second_name(session)
             session.parent.stat()  # filelock would make it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import deque
 from contextlib import contextmanager
 from itertools import chain
 from types import MappingProxyType
@@ -15,9 +16,8 @@ from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
-from rig.session.reason_rows import read_reasons
 from rig.session.rows import RowError, check_row, drop_of, named_values
-from rig.session.schema import TABLES, RunState, read_identity
+from rig.session.schema import TABLES, RunState, read_identity, read_reasons
 
 if TYPE_CHECKING:
     import sqlite3
@@ -74,33 +74,36 @@ class Reader:
         For messages.
     connection
         Checked to be a session.
+
+    Attributes
+    ----------
+    readonly
+        Whether nothing can be added.
+    meta
+        Facts fixed when the file was made: created, rig_version, origin and more.
     """
+
+    readonly = True
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
         self._connection: sqlite3.Connection | None = connection
-        self._meta: Mapping[str, str] = MappingProxyType(
+        self.meta: Mapping[str, str] = MappingProxyType(
             {str(key): str(value) for key, value in self._rows("meta")}
         )
-        if missing := sorted(_ALWAYS - self._meta.keys()):
+        if missing := sorted(_ALWAYS - self.meta.keys()):
             raise self._damage(f"it does not say {missing[0]}")
-        if self._meta["simulated"] not in {"true", "false"}:
+        if self.meta["simulated"] not in {"true", "false"}:
             raise self._damage("it does not say whether it is simulated")
-
-    @property
-    def readonly(self) -> bool:
-        """Whether nothing can be added."""
-        return True
 
     @contextmanager
     def snapshot(self) -> Iterator[None]:
         """See the records as they stand at the first question, whatever another adds meanwhile."""
-        if (
-            not self.readonly or self._open_connection().in_transaction
-        ):  # it alone writes, or has one
+        connection = self.connection
+        if not self.readonly or connection.in_transaction:  # it alone writes, or has one
             yield
             return
-        self._open_connection().execute("BEGIN")
+        connection.execute("BEGIN")
         try:
             yield
         finally:
@@ -109,34 +112,31 @@ class Reader:
 
     @property
     def connection(self) -> sqlite3.Connection:
-        """The open file, for another way to read it."""
-        return self._open_connection()
-
-    @property
-    def meta(self) -> Mapping[str, str]:
-        """Facts fixed when the file was made: created, rig_version, origin and more."""
-        return self._meta
+        """The open file, for another way to read it too."""
+        if self._connection is None:
+            raise make_error(SessionError, "session_closed", path=self.path)
+        return self._connection
 
     def digest(self) -> str | None:
         """Return the SHA-256 of all records as they stand; `None` where they are not the file's."""
         with translate_errors(self.path):
-            return hashlib.sha256(self._open_connection().serialize()).hexdigest()
+            return hashlib.sha256(self.connection.serialize()).hexdigest()
 
     @property
     def simulated(self) -> bool:
         """Whether the data come from a simulation."""
-        return self._meta["simulated"] == "true"
+        return self.meta["simulated"] == "true"
 
     @property
     def unblinded(self) -> str:
         """When the numbers of a blind session were shown; empty before."""
-        return self._meta.get(UNBLINDED, "")
+        return self.meta.get(UNBLINDED, "")
 
     @property
     def protocol_text(self) -> str:
         """The protocol file word for word."""
         text = str(self._protocol()[2])
-        if hashlib.sha256(text.encode()).hexdigest() != self._meta["protocol_sha256"]:
+        if hashlib.sha256(text.encode()).hexdigest() != self.meta["protocol_sha256"]:
             raise self._damage("its protocol was altered")
         return text
 
@@ -227,17 +227,11 @@ class Reader:
         """
         for table in TABLES:
             if table not in {"drop", "edge"}:
-                for _ in self._rows(table):
-                    pass
+                deque(self._rows(table), maxlen=0)
         for drop in self.drops():
             if drop.damage:
                 raise self._damage(f"{drop.job}: {drop.damage}")
         _ = self.protocol_text
-
-    def _open_connection(self) -> sqlite3.Connection:
-        if self._connection is None:
-            raise make_error(SessionError, "session_closed", path=self.path)
-        return self._connection
 
     def _raw(self, table: str, which: str, *values: object) -> Iterator[tuple[Any, ...]]:
         """Read rows as they are; `table` and `which` are of this module only."""
@@ -247,10 +241,9 @@ class Reader:
                 return cursor.fetchmany(_AT_ONCE)
 
         with translate_errors(self.path):
-            connection = self._open_connection()
             if self.readonly:
-                limit_steps(connection)
-            cursor = connection.execute(f'SELECT * FROM "{table}" {which}', values)  # noqa: S608
+                limit_steps(self.connection)
+            cursor = self.connection.execute(f'SELECT * FROM "{table}" {which}', values)  # noqa: S608
         # No generator: where one is left half read, Python ends it by its own hand, and a Ctrl-C
         # that comes meanwhile is shown and lost.
         return chain.from_iterable(iter(fetch, []))

@@ -8,8 +8,7 @@ from typing import Any
 
 from rig.printable import encodable
 from rig.records import Certificate, Drop, Edge
-from rig.session.reason_rows import read_reasons, write_reasons
-from rig.session.schema import TABLES
+from rig.session.schema import TABLES, read_reasons, write_reasons
 
 _DROP = TABLES["drop"].names()
 _ACCOUNT = [field.name for field in fields(Certificate)]
@@ -75,7 +74,7 @@ def row_of(drop: Drop, number: int, host_ns: int | None, provenance: str) -> lis
     """Return the row of a drop; without a certificate its columns are empty."""
     values = {
         "id": number,
-        "faults": encodable(write_reasons(drop.faults)),
+        "faults": write_reasons(drop.faults),
         "host_ns": host_ns,
         "provenance": encodable(provenance),
         **{name: getattr(drop.certificate, name, None) for name in _ACCOUNT},

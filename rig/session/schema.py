@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rig.boards import GATES
-from rig.session.reason_rows import read_reasons
+from rig.printable import encodable
+from rig.reasons import Reason, make_reason, plain_reason, read_record
+from rig.wordings import NOTE
 
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
@@ -23,6 +25,7 @@ SCHEMA_VERSION = 5
 
 OLDER = "older"
 """In place of a table in the chain of hashes: rows were there before it began."""
+_OLD_NOTE = "note: "
 
 
 class RunState(StrEnum):
@@ -88,6 +91,31 @@ def read_identity(record: str) -> dict[str, Any]:
         if name in members and not accepts(members[name]):
             raise ValueError(f"{name} {members[name]!r:.40} cannot be")
     return members
+
+
+def write_reasons(reasons: Iterable[Reason]) -> str:
+    """Write reasons as a row has them."""
+    return encodable(json.dumps([reason.record() for reason in reasons], ensure_ascii=False))
+
+
+def read_reasons(text: str) -> tuple[Reason, ...]:
+    """Read what `write_reasons` wrote, or the list of sentences of an old file.
+
+    Raises
+    ------
+    TypeError, ValueError
+        It is something else.
+    """
+    rows = json.loads(text)
+    if not isinstance(rows, list):
+        raise TypeError(f"{text:.40} is no list of reasons")
+    return tuple(_read_sentence(row) if isinstance(row, str) else read_record(row) for row in rows)
+
+
+def _read_sentence(text: str) -> Reason:
+    if text.startswith(_OLD_NOTE):
+        return make_reason(NOTE, text=text.removeprefix(_OLD_NOTE))
+    return plain_reason(text)
 
 
 _U32, _INT64 = (1 << 32) - 1, (1 << 63) - 1

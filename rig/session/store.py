@@ -20,23 +20,24 @@ from rig.errors import InputError, SessionError
 from rig.files import make_folder, state_folder
 from rig.printable import encodable
 from rig.reasons import Reason, make_error
+from rig.records import ClockSample, HostBreak, Pulse
 from rig.session.database import build, check_place, connect
 from rig.session.faults import translate_errors
 from rig.session.journal import Journal, Statement
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
-from rig.session.reason_rows import write_reasons
 from rig.session.rows import edge_rows, row_of
-from rig.session.schema import TABLES, RunState, insert_statement
+from rig.session.schema import TABLES, RunState, insert_statement, write_reasons
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from rig.records import ClockSample, Drop, HostBreak, Pulse
+    from rig.records import Drop
 
 
 log = logging.getLogger(__name__)
+_TIMINGS = {ClockSample: "ping", Pulse: "reference", HostBreak: "host_break"}
 
 
 class Session(Reader):
@@ -48,7 +49,7 @@ class Session(Reader):
     """
 
     def __init__(self, path: Path, connection: sqlite3.Connection, lock: WriterLock | None) -> None:
-        self._lock = lock
+        self._lock, self.readonly = lock, lock is None
         super().__init__(path, connection)
         self._journal = Journal(connection, path)
         self._presence = Presence(path)
@@ -136,11 +137,6 @@ class Session(Reader):
     # ------------------------------------------------------------------ life
 
     @property
-    def readonly(self) -> bool:
-        """Whether nothing can be added."""
-        return self._lock is None
-
-    @property
     def pending(self) -> int:
         """Number of records that no `commit` has made durable yet."""
         return len(self._journal)
@@ -159,14 +155,12 @@ class Session(Reader):
             If the disk is full or fails: the records are kept in memory; call again. If the file
             was moved, deleted, replaced or cut: all is saved beside it, and this one is over.
         """
-        failure = None
         try:
             self._writable().commit()
-        except SessionError as error:
-            failure = error
+        except SessionError:
+            self.require_presence()
+            raise
         self.require_presence()
-        if failure is not None:
-            raise failure
 
     def require_presence(self) -> None:
         """See that the file is still at its place; save what there is where it is not.
@@ -187,7 +181,7 @@ class Session(Reader):
         A reader that is at it may keep the last of it back until the next time.
         """
         with translate_errors(self.path):
-            self._open_connection().execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+            self.connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         self.require_presence()
 
     def _rescue(self, trouble: str) -> SessionError:
@@ -239,7 +233,7 @@ class Session(Reader):
     def _fold_in(self) -> None:
         """Leave one file to copy, even while a reader keeps the log from being removed."""
         with suppress(sqlite3.Error):
-            self._open_connection().execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            self.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
     def __enter__(self) -> Self:
         return self
@@ -262,17 +256,9 @@ class Session(Reader):
         """Add what a device said it is, each time it says so."""
         self.add_rows("identity", [(host_ns, json.dumps(dict(identity)))])
 
-    def add_ping(self, ping: ClockSample) -> None:
-        """Add one clock sample."""
-        self.add_rows("ping", [ping])
-
-    def add_pulse(self, pulse: Pulse) -> None:
-        """Add what the device said of its 1 Hz reference."""
-        self.add_rows("reference", [pulse])
-
-    def add_host_break(self, pause: HostBreak) -> None:
-        """Add that the host slept or its clock was set."""
-        self.add_rows("host_break", [pause])
+    def add_timing(self, record: ClockSample | Pulse | HostBreak) -> None:
+        """Add a clock sample, a pulse of the 1 Hz reference or a break of the host's clock."""
+        self.add_rows(_TIMINGS[type(record)], [record])
 
     def add_drop(self, drop: Drop, *, host_ns: int | None = None, provenance: str = "") -> None:
         """Add the raw record of one drop with its edges, all or nothing.
@@ -298,8 +284,8 @@ class Session(Reader):
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
         """Add one line to the log of run states."""
-        text = encodable(write_reasons(reasons))
-        self.add_rows("run_state", [(run, attempt, str(state), text, host_ns)])
+        row = run, attempt, str(state), write_reasons(reasons), host_ns
+        self.add_rows("run_state", [row])
 
     def attach(self, name: str, data: bytes) -> None:
         """Add a file, such as a photograph of the rig."""
@@ -316,10 +302,10 @@ class Session(Reader):
         now = _now()
         self.add_rows("meta", [(UNBLINDED, now)])
         self.commit()
-        self._meta = MappingProxyType({**self._meta, UNBLINDED: now})
+        self.meta = MappingProxyType({**self.meta, UNBLINDED: now})
 
     def _writable(self) -> Journal:
-        self._open_connection()
+        _ = self.connection
         if self._loss is not None:
             raise self._loss
         if self.readonly:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from textual.content import Content
 
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

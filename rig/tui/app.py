@@ -13,8 +13,16 @@ from textual.css.query import NoMatches
 from textual.theme import Theme
 from textual.widgets import Input
 
-from rig.campaign.events import EffectFailed, GoOn, Stage, Stopped, Tick, Warned
-from rig.campaign.machine import BEFORE_RELEASE, Flow
+from rig.campaign.machine import (
+    BEFORE_RELEASE,
+    EffectFailure,
+    Flow,
+    GoOn,
+    Notice,
+    Stage,
+    StopRequest,
+    Tick,
+)
 from rig.tui import commands
 from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, possible
 from rig.tui.client import ReconnectingClient
@@ -412,7 +420,7 @@ class RigApp(App[None], inherit_bindings=False):
         """Stop what is on its way to a release; say whether anything was."""
         if self.flow.stage not in BEFORE_RELEASE:
             return False
-        self.driver.take(Stopped())
+        self.driver.take(StopRequest())
         return True
 
     def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
@@ -443,7 +451,7 @@ class RigApp(App[None], inherit_bindings=False):
             model = self.model
             self.driver.take(GoOn(model.next_job, model.settle_s))
         else:
-            self.driver.take(Warned(_NOT_MEANT))
+            self.driver.take(Notice(_NOT_MEANT))
 
     def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
@@ -451,7 +459,7 @@ class RigApp(App[None], inherit_bindings=False):
         if self.possible(action):
             commands.do(self, name)
         elif self.client is not None and action.driving and not self.driving:
-            self.driver.take(EffectFailed(self.flow.ticket, _WATCHING))
+            self.driver.take(EffectFailure(self.flow.ticket, _WATCHING))
 
     def possible(self, action: Action) -> bool:
         """Say whether an action makes sense now."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
-from rig.campaign.events import Again, GoOn, Note, Reject, Restore, Stage, Stopped, Try, Warned
+from rig.campaign.machine import Again, GoOn, Note, Notice, Reject, Restore, Stage, StopRequest, Try
 from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
@@ -57,7 +57,7 @@ def _go_on(app: RigApp) -> None:
     """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp.arm`."""
     stage = app.driver.flow.stage
     if stage is Stage.PREPARE and app.page == "run":
-        app.driver.take(Warned("only the Enter key arms the release\n"
+        app.driver.take(Notice("only the Enter key arms the release\n"
                                "press it half a second after any other key"))  # fmt: skip
     elif stage is Stage.PREPARE:
         app.turn("run")
@@ -336,7 +336,7 @@ def _unblind(app: RigApp) -> None:
     client = app.client
     assert client is not None
     if not app.model.blind:
-        app.driver.take(Warned("this session is not blind\nwrite blind: true in its protocol"))
+        app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
         return
     question = "This shows all results. It is recorded and cannot be undone."
     _confirm(app, "Unblind the session?", question, "show results",
@@ -357,7 +357,7 @@ def _palette(app: RigApp) -> None:
 
 
 _DO: dict[str, Callable[[RigApp], object]] = {
-    "stop": lambda app: app.driver.take(Stopped()),
+    "stop": lambda app: app.driver.take(StopRequest()),
     "reject": _reject,
     "note": _note,
     "again": _repeat,

@@ -5,30 +5,29 @@ from __future__ import annotations
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from rig.campaign.events import (
-    Answered,
+from rig.campaign.machine import (
     ArmRelease,
     Collect,
     Drive,
+    DropVerdict,
+    EffectDone,
     FireRelease,
     GiveUp,
     Judge,
-    Judged,
     Log,
     Stage,
     Stop,
     Wait,
-    effect_failed,
+    effect_failure,
+    step,
 )
-from rig.campaign.machine import step
 from rig.errors import DeviceTimeoutError, RigError
 from rig.tui.model import StopAnswer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
-    from rig.campaign.events import Effect, Event
-    from rig.campaign.machine import Flow
+    from rig.campaign.machine import Effect, Event, Flow
     from rig.tui.client import ReconnectingClient
     from rig.tui.follow import Follower
 
@@ -85,7 +84,7 @@ class Driver:
 
     def refuse(self, error: RigError) -> None:
         """Say what is wrong and what to do."""
-        self.take(effect_failed(self.flow.ticket, error))
+        self.take(effect_failure(self.flow.ticket, error))
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Have the daemon open a session, now and whenever it had to be started again."""
@@ -128,12 +127,12 @@ class Driver:
                 case Judge(job):
                     result = (await self._follower.read()).results[job]
                     row = self._follower.voids.row
-                    self.take(Judged(ticket, result.verdict, result.reasons, row))
+                    self.take(DropVerdict(ticket, result.verdict, result.reasons, row))
                     return
         except RigError as error:
-            self.take(effect_failed(ticket, error))
+            self.take(effect_failure(ticket, error))
         else:
-            self.take(Answered(ticket, token))
+            self.take(EffectDone(ticket, token))
 
     async def _switch_off(self, client: ReconnectingClient, reason: str) -> None:
         """Have everything switched off, and ask on until it is known whether it is.

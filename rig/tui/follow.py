@@ -6,9 +6,16 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.campaign.events import Closed, Found, Lost, Opened, Stage, Warned
-from rig.campaign.machine import BEFORE_RELEASE
-from rig.campaign.plan import unjudged
+from rig.campaign.machine import (
+    BEFORE_RELEASE,
+    Found,
+    Lost,
+    Notice,
+    SessionClose,
+    SessionOpen,
+    Stage,
+)
+from rig.campaign.plan import job_to_judge
 from rig.campaign.voids import Voids, voids_of
 from rig.errors import RigError
 from rig.records import Job
@@ -18,7 +25,7 @@ from rig.tui.state import DaemonState, state_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Iterator, Mapping
 
-    from rig.campaign.events import Event
+    from rig.campaign.machine import Event
     from rig.results.live import LiveAnalysis, SessionView
     from rig.tui.client import ReconnectingClient
 
@@ -120,15 +127,15 @@ class Follower:
         session = state.section("session")
         if session:
             self._look_at_session(session, state, now)
-            events.append(Opened())
+            events.append(SessionOpen())
         elif before.section("session") and not reopens:
             self._forget()
-            events.append(Closed())
+            events.append(SessionClose())
         if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
             events.append(
                 Lost("another client took control of the rig\npress c to take it when it is free")
             )
-        missed = unjudged(state.runs)
+        missed = job_to_judge(state.runs)
         if missed and missed not in self.judged and client.driving:
             events.append(Found(missed))
         return events
@@ -224,7 +231,7 @@ def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
         return
     lost, client.lost = client.lost, {}
     if lost:
-        yield Warned(f"the port was lost and is back: {lost['message']}\n{lost['hint']}")
+        yield Notice(f"the port was lost and is back: {lost['message']}\n{lost['hint']}")
 
 
 def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:

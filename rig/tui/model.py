@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.campaign import plan
-from rig.campaign.events import Stage
-from rig.campaign.machine import BEFORE_RELEASE
+from rig.campaign.machine import BEFORE_RELEASE, Stage
 from rig.campaign.voids import Voids
 from rig.records import Job
 from rig.vocabulary import ANY_SCENE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 from rig.tui.widgets.gates import named
 from rig.tui.widgets.text import duration, plain
 

@@ -2,13 +2,13 @@
 
 from bench import decoding
 from rig.link.messages import EVENTS_PER_FRAME
-from rig.link.transcript import Received, Transcript
+from rig.link.transcript import Incoming, Transcript
 
 
 def test_the_stream_is_what_a_board_sends():
     transcript = Transcript()
     found = transcript.feed("rx", 0, b"".join(decoding.frames(3)))
-    assert all(isinstance(one, Received) for one in found)
+    assert all(isinstance(one, Incoming) for one in found)
     assert [one.message.first for one in found] == [0, EVENTS_PER_FRAME, 2 * EVENTS_PER_FRAME]
     assert transcript.unreadable == 0
 

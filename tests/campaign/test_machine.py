@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.campaign import events as on
-from rig.campaign.events import Stage
-from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, step
+from rig.campaign import machine as on
+from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, Stage, step
 from rig.link.messages import RefusalReason
 from rig.reasons import make_reason, plain_reason
 from rig.records import Job
@@ -20,7 +19,7 @@ NEXT = Job(2, 1)
 
 def ticketed(flow, event):
     """Give an answer that has no ticket the current one."""
-    if isinstance(event, (on.Answered, on.Judged, on.EffectFailed)) and event.ticket < 0:
+    if isinstance(event, (on.EffectDone, on.DropVerdict, on.EffectFailure)) and event.ticket < 0:
         return event._replace(ticket=flow.ticket)
     return event
 
@@ -34,11 +33,11 @@ def through(flow, *events):
     return flow, effects
 
 
-DONE = on.Answered(-1)
+DONE = on.EffectDone(-1)
 WARM = plain_reason("warm", NOTE)
 TO_RESULT = (
-    on.Opened(), on.GoOn(JOB), on.GoOn(JOB, 5.0), DONE, on.Answered(-1, 99), on.Tick(3.1), DONE,
-    DONE, on.Judged(-1, "accepted", ()),
+    on.SessionOpen(), on.GoOn(JOB), on.GoOn(JOB, 5.0), DONE, on.EffectDone(-1, 99), on.Tick(3.1),
+    DONE, DONE, on.DropVerdict(-1, "accepted", ()),
 )  # fmt: skip
 
 
@@ -61,7 +60,7 @@ def test_a_run_takes_two_keys():
 def test_a_verdict_stays_until_it_is_in_the_file_and_acknowledged():
     flow, _ = through(Flow(), *TO_RESULT)
     assert step(flow, on.GoOn(NEXT))[0].stage is Stage.RESULT
-    flow, _ = through(flow, DONE, on.Tick(1e9), on.Opened(), on.Found(NEXT))
+    flow, _ = through(flow, DONE, on.Tick(1e9), on.SessionOpen(), on.Found(NEXT))
     assert flow.stage is Stage.RESULT
     assert step(flow, on.GoOn(NEXT))[0].stage is Stage.PREPARE
     assert step(flow, on.GoOn(None))[0].stage is Stage.DONE
@@ -93,14 +92,14 @@ def test_arming_that_comes_after_stop_is_undone():
     flow, _ = through(Flow(), *TO_RESULT[:4])
     assert flow.stage is Stage.ARMING
     late = flow.ticket
-    flow, effects = through(flow, on.Stopped(), on.Answered(late, 99))
+    flow, effects = through(flow, on.StopRequest(), on.EffectDone(late, 99))
     assert flow.stage is Stage.PREPARE
     assert effects == [on.Stop(), on.Stop()]
 
 
 @pytest.mark.parametrize("stage", list(Stage))
 def test_stop_is_carried_out_at_every_stage(stage):
-    flow, effects = step(Flow(stage=stage, job=JOB), on.Stopped())
+    flow, effects = step(Flow(stage=stage, job=JOB), on.StopRequest())
     assert effects == (on.Stop(),)
     assert flow.stage is (Stage.PREPARE if stage in BEFORE_RELEASE else stage)
 
@@ -108,7 +107,7 @@ def test_stop_is_carried_out_at_every_stage(stage):
 @pytest.mark.parametrize("stage", [Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.LIVE])
 def test_what_fails_says_why_and_can_be_tried_again(stage):
     flow, _ = through(
-        Flow(stage=stage, job=JOB), on.EffectFailed(-1, "a gate is blocked\nclear it")
+        Flow(stage=stage, job=JOB), on.EffectFailure(-1, "a gate is blocked\nclear it")
     )
     assert (flow.stage, flow.trouble) == (Stage.PREPARE, "a gate is blocked\nclear it")
     flow, _ = through(flow, on.GoOn(JOB))
@@ -124,11 +123,13 @@ def test_a_drop_that_nobody_judged_is_judged():
 tickets = st.integers(-1, 12)
 jobs = st.builds(Job, st.integers(1, 3), st.integers(1, 3))
 happenings = st.one_of(
-    st.just(on.Opened()), st.just(on.Closed()), st.just(on.Stopped()),
+    st.just(on.SessionOpen()), st.just(on.SessionClose()), st.just(on.StopRequest()),
     st.builds(on.GoOn, st.none() | jobs),
-    st.builds(on.Answered, tickets, st.none() | st.integers(0, 5)),
-    st.builds(on.Judged, tickets, st.sampled_from(["accepted", "void"]), st.just(())),
-    st.builds(on.EffectFailed, tickets, st.just("no"), st.sampled_from(RefusalReason)),
+    st.builds(on.EffectDone, tickets, st.none() | st.integers(0, 5)),
+    st.builds(
+        on.DropVerdict, tickets, st.sampled_from(["accepted", "void"]), st.just(()), st.none()
+    ),
+    st.builds(on.EffectFailure, tickets, st.just("no"), st.sampled_from(RefusalReason)),
     st.builds(on.Tick, st.floats(0.0, 2.0)),
     st.just(on.Lost("gone")), st.builds(on.Found, jobs), st.builds(on.Reject, st.just("x")),
     st.builds(on.Note, st.just("y")), st.builds(on.Again, jobs),
@@ -142,7 +143,7 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
     for event in happening:
         before = flow
         flow, effects = step(flow, ticketed(flow, event))
-        if isinstance(event, (on.Stopped, on.Lost)):
+        if isinstance(event, (on.StopRequest, on.Lost)):
             armed = None
         if flow.stage is Stage.COUNTDOWN and before.stage is not Stage.COUNTDOWN:
             armed, waited = event.token or 0, 0.0
@@ -150,12 +151,12 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
             waited += event.seconds
         for effect in effects:
             if isinstance(effect, on.ArmRelease) and attended:
-                assert isinstance(event, on.Answered), "nothing is armed by itself"
+                assert isinstance(event, on.EffectDone), "nothing is armed by itself"
             if isinstance(effect, on.FireRelease):
                 assert effect.token == armed
                 assert waited >= flow.countdown_s - 1e-9
                 armed = None
-        if isinstance(event, on.Stopped):
+        if isinstance(event, on.StopRequest):
             assert on.Stop() in effects
             assert flow.stage not in BEFORE_RELEASE
         assert flow.ticket >= before.ticket
@@ -163,7 +164,7 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
 
 def test_the_countdown_is_as_long_as_it_was_set():
     flow = replace(Flow(stage=Stage.ARMING, job=JOB), countdown_s=0.5)
-    flow, effects = through(flow, on.Answered(0, 7), on.Tick(0.4))
+    flow, effects = through(flow, on.EffectDone(0, 7), on.Tick(0.4))
     assert effects == []
     assert step(flow, on.Tick(0.11))[1] == (on.FireRelease(7),)
 
@@ -177,10 +178,10 @@ def arming(**more):
 
 @pytest.mark.parametrize("reason", [None, *RefusalReason])
 def test_whoever_is_there_begins_every_arming(reason):
-    flow, effects = through(arming(), on.EffectFailed(-1, "no\ndo this", reason, 100))
+    flow, effects = through(arming(), on.EffectFailure(-1, "no\ndo this", reason, 100))
     assert (flow.stage, flow.trouble, flow.job) == (Stage.PREPARE, "no\ndo this", JOB)
     assert effects == ([] if reason in PASSING else [on.GiveUp()])
-    assert through(flow, DONE, on.Tick(9.0), on.Opened()) == (flow, [])
+    assert through(flow, DONE, on.Tick(9.0), on.SessionOpen()) == (flow, [])
 
 
 @pytest.mark.parametrize("reason", PASSING)
@@ -188,9 +189,9 @@ def test_alone_what_passes_is_waited_for_a_few_times(reason):
     flow = arming(attended=False)
     pause = 0.7 if reason is RefusalReason.COOLING else LOOK_S
     for _ in range(LOOKS - 1):
-        flow, effects = through(flow, on.EffectFailed(-1, "no", reason, 700), DONE)
+        flow, effects = through(flow, on.EffectFailure(-1, "no", reason, 700), DONE)
         assert effects == [on.Wait(pause), on.ArmRelease(JOB)]
-    flow, effects = through(flow, on.EffectFailed(-1, "no", reason, 700))
+    flow, effects = through(flow, on.EffectFailure(-1, "no", reason, 700))
     assert (flow.stage, effects) == (Stage.PREPARE, [on.GiveUp()])
 
 
@@ -203,9 +204,9 @@ def test_what_is_not_let_go_is_switched_off_first(reason, attended):
             flow,
             on.GoOn(JOB),
             DONE,
-            on.Answered(-1, 7),
+            on.EffectDone(-1, 7),
             on.Tick(9.0),
-            on.EffectFailed(-1, "a gate moved\nhint", reason),
+            on.EffectFailure(-1, "a gate moved\nhint", reason),
         )
         assert (flow.stage, effects[3]) == (Stage.PREPARE, on.Stop("a gate moved"))
         again = {
@@ -230,8 +231,8 @@ def void(number, reason=SKEW):
     """ArmRelease and judge one drop, which is void."""
     job = Job(1, number)
     return (
-        *(on.GoOn(job), on.GoOn(job), DONE, on.Answered(-1, 7), on.Tick(9.0), DONE, DONE),
-        *(on.Judged(-1, "void", (skewed(number, reason),)), DONE),
+        *(on.GoOn(job), on.GoOn(job), DONE, on.EffectDone(-1, 7), on.Tick(9.0), DONE, DONE),
+        *(on.DropVerdict(-1, "void", (skewed(number, reason),)), DONE),
     )
 
 
@@ -248,7 +249,7 @@ def test_three_voids_of_a_kind_halt_it(attended):
     assert (flow.stage, effects) == (Stage.HALTED, [])
     assert "the last 3 drops are void for the same reason: release skew" in flow.trouble
     assert "run 1 is tried again" in flow.trouble
-    assert through(flow, DONE, on.Tick(9.0), on.Opened()) == (flow, []), "it waits"
+    assert through(flow, DONE, on.Tick(9.0), on.SessionOpen()) == (flow, []), "it waits"
     flow, effects = through(flow, on.GoOn(NEXT))
     assert (flow.stage, flow.job, flow.trouble, effects) == (Stage.PREPARE, Job(1, 4), "", [])
     flow, _ = through(flow, *void(4)[1:], on.GoOn(NEXT))
@@ -270,7 +271,7 @@ def test_two_of_a_kind_or_three_of_others_do_not():
 
 def test_voids_that_others_logged_count_too():
     row = voids(SKEW, SKEW).row
-    judged = on.Judged(-1, "void", (skewed(9),), row)
+    judged = on.DropVerdict(-1, "void", (skewed(9),), row)
     flow, _ = through(Flow(stage=Stage.PREPARE), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
     assert flow.stage is Stage.HALTED
     judged = judged._replace(row=())

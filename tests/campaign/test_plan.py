@@ -6,9 +6,9 @@ from rig.campaign.plan import (
     RunLine,
     again,
     describe_setup,
+    job_to_judge,
     next_job,
     rest_s,
-    unjudged,
 )
 from rig.protocol.protocol import Run
 from rig.records import Job
@@ -25,7 +25,7 @@ def test_runs_come_in_order_until_each_is_settled_or_void_too_often():
     assert next_job(lines("accepted"), {}) is None
     assert next_job(lines("interrupted", "planned"), {}) == Job(1, 2)
     assert again(runs, 1) == Job(1, 2)
-    assert unjudged(lines("accepted", "recorded")) == Job(2, 1)
+    assert job_to_judge(lines("accepted", "recorded")) == Job(2, 1)
 
 
 def test_chains_rest_longer_while_the_clock_is_not_known():

@@ -65,10 +65,10 @@ def test_looking_again_and_again_gives_what_looking_once_gives(measure, tmp_path
         for host_ns, identity in identities:
             grows.add_identity(identity, host_ns)
         for n, ping in enumerate(pings):
-            grows.add_ping(ping)
+            grows.add_timing(ping)
             if n == len(pings) // 2:
                 for pulse in pulses:
-                    grows.add_pulse(pulse)
+                    grows.add_timing(pulse)
             if n % 5 == 0:
                 seen, afresh = calibrator.look(grows, PPS_U), calibration(grows)
                 assert (seen.said, seen.device) == (afresh.said, afresh.device)
@@ -120,7 +120,7 @@ def test_a_drifting_clock_gives_each_run_its_own_rate(measure, tmp_path, fence):
         true = -1300.0 + 600.0 * when / 3600.0
         used = run["calibration"]
         assert abs(used["rate_ppm"] - true) < 4.0 * used["u_ppm"] < 16.0
-    lost = clock.used(replace(last, attempt=7))  # nobody logged when
+    lost = clock.describe(replace(last, attempt=7))  # nobody logged when
     assert lost["rate_ppm"] == pytest.approx(found["calibration"]["rate_ppm"])
     assert lost["u_ppm"] > 10.0
 

@@ -38,9 +38,9 @@ def sound(tmp_path_factory):
         begun_ns, second = session.identities()[-1][0], 10**9
         for number in range(1, 9):
             at_ns, tick = begun_ns + number * second, number * HZ
-            session.add_ping(ClockSample(at_ns, at_ns + 1000, tick))
-            session.add_pulse(Pulse(at_ns, at_ns + 1000, number, tick))
-        session.add_host_break(HostBreak(begun_ns + 20 * second, second, 0))
+            session.add_timing(ClockSample(at_ns, at_ns + 1000, tick))
+            session.add_timing(Pulse(at_ns, at_ns + 1000, number, tick))
+        session.add_timing(HostBreak(begun_ns + 20 * second, second, 0))
     return path
 
 

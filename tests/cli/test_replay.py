@@ -62,7 +62,7 @@ def test_what_is_recorded_meanwhile_is_no_difference(fenced, monkeypatch):
 
         def late(self, after=0):
             yield from read(self, after)
-            writer.add_ping(ClockSample(1, 2, 3))
+            writer.add_timing(ClockSample(1, 2, 3))
             writer.commit()
 
         monkeypatch.setattr(Session, "byte_log", late)

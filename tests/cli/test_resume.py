@@ -147,7 +147,7 @@ def run(call, tmp_path, protocol):
 
 
 @pytest.mark.parametrize(
-    ("record", "which"), [("log_bytes", 2), ("add_ping", 1), ("add_identity", 1), ("add_drop", 1)]
+    ("record", "which"), [("log_bytes", 2), ("add_timing", 1), ("add_identity", 1), ("add_drop", 1)]
 )
 def test_a_signal_between_a_byte_and_what_it_means_waits(run, tmp_path, monkeypatch, record, which):
     number, store = count(1), getattr(Session, record)

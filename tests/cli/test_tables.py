@@ -44,7 +44,7 @@ def session(tmp_path: Path):
         session.add_state(
             1, 1, RunState.VOID, 10, [plain_reason("lost edges"), plain_reason("twice")]
         )
-        session.add_ping(ClockSample(1, 2, 3))
+        session.add_timing(ClockSample(1, 2, 3))
         yield session
 
 

@@ -3,8 +3,8 @@ import random
 import pytest
 
 from rig.clock.host import SystemClock
-from rig.clock.rate import tick_rate
 from rig.records import ClockSample
+from tests.clock.clocks import tick_rate
 
 HZ = 16_000_000
 BASE_S = 0.4e-3

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.clock.rate import tick_rate
 from rig.records import ClockSample
-from tests.clock.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled
+from tests.clock.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled, tick_rate
 from tests.examples import examples
 
 TRIALS = 300

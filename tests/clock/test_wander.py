@@ -4,9 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from rig.clock.rate import tick_rate
 from rig.clock.wander import Readings, Track
-from tests.clock.clocks import HZ, Clock, compared, ppm
+from tests.clock.clocks import HZ, Clock, compared, ppm, tick_rate
 
 
 def readings(seed: int, n: int, span: float, walk: float = 0.0, epochs: int = 1) -> Readings:

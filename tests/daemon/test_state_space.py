@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from rig.link.messages import TEST_RUN, Phase, pack_label
+from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
 from rig.recorder.controller import Controller
 from tests.daemon.rig_in_a_box import Box, Trouble
 
@@ -135,7 +135,7 @@ def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(tmp_path
     box.board.lab.drop = lambda _label: []
     device, label = box.worker.controller.recorder.device, pack_label(TEST_RUN, 1)
     order = {"gates": 3, "release": 1, "pulse_us": 80_000, "timeout_ms": 1000, "record_ms": 180}
-    device.fire(device.arm(label=label, **order))
+    device.fire(device.arm(Arm(label, **order)))
     box.clock.sleep(1.0)
     assert box.phase is Phase.HOLDING
     assert not box.worker.controller.has_unsaved()

@@ -10,7 +10,7 @@ import pytest
 from rig.doctor.board import BOARD_CHECKS, BoardFacts, mains_ripple
 from rig.doctor.session import check_restarts, check_whole, describe_supply
 from rig.link.gatewatch import GateStates
-from rig.link.restarts import Restart
+from rig.link.transcript import Restart
 from rig.records import Certificate, ClockSample, Drop, Edge
 from rig.selftest.findings import make_check
 from sim.board import VirtualBoard

@@ -17,7 +17,7 @@ from rig.doctor.computer import PORT_CHECKS, PortPlace, check_packages, check_ro
 from rig.doctor.session import check_session
 from rig.errors import DeviceError
 from rig.link.client import Device
-from rig.link.messages import Phase, pack_label
+from rig.link.messages import Arm, Phase, pack_label
 from rig.selftest.findings import make_check
 from rig.session.store import Session
 from tests.flash.pty_board import PtyBoard
@@ -156,7 +156,7 @@ def test_a_drop_of_a_session_is_not_touched():
     device.connect()
     label = pack_label(3, 1)
     order = {"gates": 8, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    device.fire(device.arm(label=label, **order))
+    device.fire(device.arm(Arm(label, **order)))
     device.collect(label)
     facts = look_at_board(port, port.clock)
     assert facts.held == (3, 1)
@@ -213,7 +213,7 @@ def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp
         device.connect()
         label = pack_label(3, 1)
         order = {"gates": 8, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-        device.fire(device.arm(label=label, **order))
+        device.fire(device.arm(Arm(label, **order)))
         port.clock.sleep(0.004)
         port.board.brown_out(port.clock.now_ns())
         said = (

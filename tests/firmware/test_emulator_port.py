@@ -39,7 +39,7 @@ def url(protocol: Path = FENCE, **settings: object) -> str:
 
 def drop_from(device: Device, gates: int = 0b11, record_ms: int = 600):
     label = pack_label(1, 1)
-    device.fire(device.arm(label=label, gates=gates, record_ms=record_ms, **ORDER))
+    device.fire(device.arm(wire.Arm(label=label, gates=gates, record_ms=record_ms, **ORDER)))
     drop = device.collect(label)
     device.acknowledge(label, drop.certificate.crc32)
     return drop

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.link.client import Device
-from rig.link.messages import Phase
+from rig.link.messages import Arm, Phase
 from rig.link.port import open_port, port_clock
 from rig.selftest.findings import Verdict
 from tests.firmware.toolchain import FIRMWARE, need
@@ -110,7 +110,7 @@ def test_its_drop_is_read_by_this_project_and_by_the_client(built):
         with closing(open_port(path)) as port:
             device = Device(port, port_clock(port))
             device.connect()
-            device.fire(device.arm(label=LABEL, **ORDER))
+            device.fire(device.arm(Arm(label=LABEL, **ORDER)))
             drop = device.collect(LABEL)
             assert drop.faults == ()
             assert [edge.tick for edge in drop.edges] == FALL

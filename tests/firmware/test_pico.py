@@ -7,7 +7,7 @@ import pytest
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.errors import InputError
 from rig.link.client import Device
-from rig.link.messages import Phase, pack_label
+from rig.link.messages import Arm, Phase, pack_label
 from rig.link.port import open_port, port_clock
 from rig_emulator import boards_bench
 from rig_emulator.controller import EmulatorError
@@ -147,7 +147,7 @@ def test_chains_fall_before_it_by_its_url(tmp_path):
     identity = device.connect()
     label = pack_label(1, 1)
     order = {"release": 1, "pulse_us": 80_000, "timeout_ms": 5000}
-    device.fire(device.arm(label=label, gates=0b11, record_ms=600, **order))
+    device.fire(device.arm(Arm(label=label, gates=0b11, record_ms=600, **order)))
     drop = device.collect(label)
     port.close()
     assert drop.faults == ()

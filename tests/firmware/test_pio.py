@@ -121,7 +121,9 @@ def test_the_emulator_stamps_as_the_model_does(words):
     device.connect()
     pulse = {"release": 0b11, "pulse_us": 1000}
     label = wire.pack_label(1, 1)
-    device.fire(device.arm(label=label, gates=0xFFFF, record_ms=5, timeout_ms=900, **pulse))
+    device.fire(
+        device.arm(wire.Arm(label=label, gates=0xFFFF, record_ms=5, timeout_ms=900, **pulse))
+    )
     told = device.collect(label)
     port.close()
     assert told.faults == ()

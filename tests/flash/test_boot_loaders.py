@@ -11,7 +11,7 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig.boards import FLASHED
 from rig.flash.boards import TARGETS
 from rig.link.client import Device
-from rig.link.messages import Phase
+from rig.link.messages import Arm, Phase
 from rig.link.port import open_port
 from rig_emulator.board import EmulatedBoard
 from rig_emulator.bootloader import LOADERS, BoughtBoard, behind_loader
@@ -132,7 +132,7 @@ def drop(there: BoughtBoard, wiring: Wiring):
         device = Device(port, BoardTime(there))
         device.connect()
         order = {"release": 1, "pulse_us": 20_000, "timeout_ms": 2000, "record_ms": 200}
-        device.fire(device.arm(label=LABEL, gates=1, **order))
+        device.fire(device.arm(Arm(label=LABEL, gates=1, **order)))
         with there.lock:
             for n in range(40):
                 there.avr.edge(there.avr.cycle + 1000 * (n + 1), wiring.gates[0], n % 2 == 0)

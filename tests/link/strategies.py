@@ -3,24 +3,24 @@
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
-from rig.link.wiretypes import Chars, Event, Raw, Tail, Unsigned
+from rig.link.messages import Chars, Raw, Tail, UnsignedInt
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 
 
 def values(field) -> st.SearchStrategy:
     match field.wire:
-        case Unsigned() if field.python is not int:
+        case UnsignedInt() if field.python is not int:
             return st.sampled_from(list(field.python))
-        case Unsigned(size=size):
+        case UnsignedInt(size=size):
             return st.integers(0, 2 ** (8 * size) - 1)
         case Raw(size=size):
             return st.binary(min_size=size, max_size=size)
         case Chars(limit=limit):
             return st.text(max_size=limit // 4)
         case Tail():
-            event = st.builds(Event, LONG, WORD)
-            return st.lists(event, max_size=wire.EVENTS_PER_FRAME).map(tuple)
+            events = st.lists(st.tuples(LONG, WORD), max_size=wire.EVENTS_PER_FRAME)
+            return events.map(wire.pack_events)
     raise AssertionError(field)
 
 

@@ -7,7 +7,7 @@ from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Received
+from rig.link.transcript import Incoming
 from rig.records import Drop
 from tests.link.bench import GATES, LABEL, Bench, ScriptedLab, falling_rods
 from tests.link.talk import arm
@@ -78,7 +78,7 @@ class Suite:
         """Listen in silence to what the device says of its own accord."""
         end, messages = bench.clock().now_ns() + seconds * 1e9, []
         while bench.clock().now_ns() < end:
-            messages += [r.message for r in device.receive() if isinstance(r, Received)]
+            messages += [r.message for r in device.receive() if isinstance(r, Incoming)]
         return messages
 
     def restart(self, bench: Bench, device: Device) -> None:

@@ -28,11 +28,11 @@ class HoldSuite(Suite):
         for seq, (first, count) in enumerate([(0, 1), (5, 3), (len(events) - 2, 40)], start=3):
             answer = line.ask(wire.Read(LABEL, first, count), seq)
             assert (answer.label, answer.first) == (LABEL, first)
-            assert list(answer.events) == events[first : first + count]
+            assert list(answer.snapshots) == events[first : first + count]
         many = line.ask(wire.Read(LABEL, 0, 255), 9)
         assert many.first == 0
-        assert 0 < len(many.events) <= wire.EVENTS_PER_FRAME
-        assert list(many.events) == events[: len(many.events)]
+        assert 0 < len(many.snapshots) <= wire.EVENTS_PER_FRAME
+        assert list(many.snapshots) == events[: len(many.snapshots)]
         assert line.ask(wire.Read(LABEL, 0, 0), 10) == certificate
         answer = line.ask(wire.Read(LABEL, len(events), 1), 11)
         assert answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0)
@@ -85,7 +85,7 @@ class HoldSuite(Suite):
         said = r"restarted about \d+ ms after FIRE: is its supply shared with the magnets\?"
         with pytest.raises(DeviceError, match=said):
             device.collect(LABEL)
-        (drop,) = device.transcript.unfinished()
+        (drop,) = device.transcript.unfinished_drops()
         assert drop == device.transcript.pending(LABEL)
         assert "restarted" in {fault.code for fault in drop.faults}
         device.connect(boot_wait_s=0)

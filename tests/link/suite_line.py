@@ -98,4 +98,4 @@ class LineSuite(Suite):
         assert [r for r in records if isinstance(r, Drop)] == [pending]
         assert any(isinstance(r, ClockSample) for r in records)
         assert isinstance(pending.edges[0], Edge)
-        assert offline.unfinished() == []
+        assert offline.unfinished_drops() == []

@@ -58,7 +58,7 @@ class MemorySuite(Suite):
                 RefusalReason.NOT_KEPT, 60
             )
         for seq, first in enumerate([60, count - 1], start=3):
-            assert line.ask(wire.Read(LABEL, first, 1), seq).events == (events[first],)
+            assert line.ask(wire.Read(LABEL, first, 1), seq).snapshots == (events[first],)
         assert line.ask(wire.Read(LABEL, 0, 0), 5) == certificate
         assert line.ask(wire.Acknowledge(LABEL, certificate.crc32), 6) == wire.Done()
 

@@ -11,7 +11,7 @@ ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "
 
 
 def arm(device: Device, label: int = LABEL, **changes: int) -> int:
-    return device.arm(label=label, **(ORDER | changes))
+    return device.arm(wire.Arm(**{"label": label} | ORDER | changes))
 
 
 def order(**changes: int) -> wire.Arm:
@@ -98,5 +98,5 @@ class Wire:
         """Arm and fire; return what came of it."""
         self.say(wire.Fire(self.ask(order(**changes), 201).token), 202)
         heard = [message for _, message in self.hear_drop()]
-        events = [e for m in heard if isinstance(m, wire.EventsFrame) for e in m.events]
+        events = [e for m in heard if isinstance(m, wire.EventsFrame) for e in m.snapshots]
         return events, heard[-1]

@@ -19,8 +19,7 @@ from rig.link.exchange import STRANGE_BYTES
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.restarts import Restart
-from rig.link.transcript import Received, Transcript
+from rig.link.transcript import Incoming, Restart, Transcript
 from rig.reasons import make_reason
 from rig.records import ClockSample
 from tests.link.strategies import MESSAGES
@@ -213,7 +212,7 @@ class Liar(FakePort):
 
     def __init__(self, clock, held, *events):
         super().__init__(clock, {wire.Identify: [IDENTITY]})
-        self.held, self.events = held, wire.EventsFrame(1, 0, events)
+        self.held, self.events = held, events_frame(0, *events)
 
     def write(self, data):
         (frame,) = Decoder().feed(data)
@@ -223,7 +222,7 @@ class Liar(FakePort):
 
 
 def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
-    port = Liar(clock, 1, wire.Event(150, 1))
+    port = Liar(clock, 1, (150, 1))
     drop = Device(port, clock).fetch(1)
     assert len(port.written) == 3  # certificate, events, events once more
     assert make_reason("crc_mismatch") in drop.faults
@@ -242,7 +241,7 @@ class Forgetful(FakePort):
     def write(self, data):
         for frame in Decoder().feed(data):
             if isinstance(read := wire.unpack(frame.type, frame.payload), wire.Read):
-                event = wire.EventsFrame(1, read.first, (wire.Event(100 + read.first, 1),))
+                event = events_frame(read.first, (100 + read.first, 1))
                 kept = event if read.first >= self.kept else self.refusal()
                 self.answers[wire.Read] = [kept if read.count else certificate(1, self.total)]
         return super().write(data)
@@ -260,7 +259,7 @@ def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
     assert len(port.written) == 2 + 4  # delimiter and IDENTIFY; certificate, 0, 3, 4
     for chunk in chunks:
         offline.feed(*chunk)
-    assert offline.unfinished() == [drop], "the replay knows it, too"
+    assert offline.unfinished_drops() == [drop], "the replay knows it, too"
 
 
 def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(clock):
@@ -279,7 +278,7 @@ def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(cl
     one = Device(port, clock)
     one.connect(boot_wait_s=0)
     for n in range(5):
-        code, payload = wire.pack(wire.EventsFrame(1, n, (wire.Event(100 + n, n % 2),)))
+        code, payload = wire.pack(events_frame(n, (100 + n, n % 2)))
         port.out += encode(Frame(code, 1, 0, payload))
     while port.out:
         one.receive()
@@ -298,13 +297,13 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
         },
     )
     one = Device(port, clock)
-    token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
+    token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
     with pytest.raises(DeviceRefusedError, match="disarmed itself") as caught:
         one.fire(token)
     assert caught.value.disarmed is reason
     assert "arm again" in caught.value.hint
     port.answers[wire.Arm] = [wire.Armed(10)]
-    token = one.arm(label=1, gates=1, release=0, pulse_us=0, timeout_ms=1, record_ms=1)
+    token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
     with pytest.raises(DeviceRefusedError, match="is not armed"):
         one.fire(token)
 
@@ -344,13 +343,13 @@ def heard(*messages) -> Transcript:
     return transcript
 
 
-def frame(first, *events) -> wire.EventsFrame:
-    return wire.EventsFrame(1, first, tuple(wire.Event(*event) for event in events))
+def events_frame(first, *events) -> wire.EventsFrame:
+    return wire.EventsFrame(1, first, wire.pack_events(events))
 
 
 def test_a_gap_in_the_events_invents_no_edge():
     transcript = heard(
-        IDENTITY, frame(0, (110, 1)), frame(3, (140, 2), (150, 3)), certificate(1, 5)
+        IDENTITY, events_frame(0, (110, 1)), events_frame(3, (140, 2), (150, 3)), certificate(1, 5)
     )
     drop = transcript.pending(1)
     assert drop.edges == ((10, 0, True), (50, 0, True))
@@ -361,11 +360,11 @@ def test_a_gap_in_the_events_invents_no_edge():
 def test_a_drop_is_given_out_once_when_acknowledged():
     transcript = heard(IDENTITY, certificate(1, 0))
     pending = transcript.pending(1)
-    assert transcript.unfinished() == [pending]
+    assert transcript.unfinished_drops() == [pending]
     assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == [pending]
     assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == []
     say(transcript, "rx", certificate(1, 0))  # a late repeat
-    assert transcript.unfinished() == []
+    assert transcript.unfinished_drops() == []
     with pytest.raises(KeyError):
         transcript.pending(1)
 
@@ -383,7 +382,7 @@ def test_arming_again_begins_anew_but_a_repeated_answer_does_not():
     order = wire.Arm(1, 0x00FF, 0, 0, 1, 1)
     say(transcript, "tx", order, seq=1)
     say(transcript, "rx", wire.Armed(9), ack=1)
-    say(transcript, "rx", wire.EventsFrame(1, 0, (wire.Event(110, 1),)))
+    say(transcript, "rx", events_frame(0, (110, 1)))
     say(transcript, "rx", wire.Armed(9), ack=1)
     assert transcript.assembly(1).begun
     say(transcript, "tx", order, seq=2)
@@ -396,7 +395,7 @@ def test_half_a_frame_before_a_reconnect_swallows_nothing():
     code, payload = wire.pack(certificate(1, 0))
     transcript.feed("rx", 0, encode(Frame(code, 1, 0, payload))[:9])
     transcript.feed("tx", 1, b"\0")
-    assert say(transcript, "rx", IDENTITY, ack=1) == [Received(0, 1, IDENTITY)]
+    assert say(transcript, "rx", IDENTITY, ack=1) == [Incoming(0, 1, IDENTITY)]
 
 
 @pytest.mark.parametrize(
@@ -407,7 +406,7 @@ def test_half_a_frame_before_a_reconnect_swallows_nothing():
     ],
 )
 def test_snapshots_become_edges_since_the_fire_stamp(events, edges):
-    transcript = heard(frame(0, *events), certificate(1, len(events)))
+    transcript = heard(events_frame(0, *events), certificate(1, len(events)))
     assert list(transcript.pending(1).edges) == edges
 
 
@@ -419,7 +418,7 @@ def test_the_release_sense_counts_from_the_fire_stamp(tick, sense):
 
 
 def test_without_identity_or_certificate_the_drop_says_so():
-    drop = heard(frame(0, (110, 1))).pending(1)
+    drop = heard(events_frame(0, (110, 1))).pending(1)
     assert (drop.edges, len(drop.faults)) == ((), 2)
 
 
@@ -427,7 +426,7 @@ def test_what_is_no_message_is_counted():
     transcript = Transcript()
     assert transcript.feed("rx", 0, encode(Frame(0xEE, 1, 0, b""))) == []
     assert transcript.unreadable == 1
-    assert say(transcript, "rx", wire.Done(), ack=3, ns=8) == [Received(8, 3, wire.Done())]
+    assert say(transcript, "rx", wire.Done(), ack=3, ns=8) == [Incoming(8, 3, wire.Done())]
 
 
 @given(st.lists(st.tuples(st.sampled_from(["tx", "rx"]), MESSAGES, SMALL, SMALL), max_size=30))
@@ -435,7 +434,7 @@ def test_any_conversation_is_survived(said):
     transcript = Transcript()
     for direction, message, seq, ack in said:
         say(transcript, direction, message, seq=seq, ack=ack)
-    for drop in transcript.unfinished():
+    for drop in transcript.unfinished_drops():
         assert drop == transcript.pending(drop.run | drop.attempt << 16)
 
 

@@ -22,7 +22,7 @@ def bridge():
         yield bridge
 
 
-def connected(url, tap=None):
+def connected(url, tap=lambda *_: None):
     port = open_port(url)
     device = Device(port, port_clock(port), tap)
     device.connect(boot_wait_s=0.5)

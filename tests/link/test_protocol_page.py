@@ -8,8 +8,8 @@ from typing import NamedTuple
 from rig.link import frames
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
+from rig.link.messages import Chars, Raw, Tail, UnsignedInt, pack_events
 from rig.link.port import BAUDRATE
-from rig.link.wiretypes import Chars, Event, Raw, Tail, Unsigned
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PAGE = (FIRMWARE / "PROTOCOL.md").read_text("utf-8")
@@ -57,7 +57,7 @@ def expected_rows(kind: type) -> list[list[str]]:
     for field in wire.FIELDS[kind]:
         size = None
         match field.wire:
-            case Unsigned(size=size):
+            case UnsignedInt(size=size):
                 name = f"u{8 * size}"
             case Raw(size=size):
                 name = f"{size} bytes"
@@ -145,7 +145,7 @@ def spoken(told: str) -> wire.Message:
             if isinstance(field.wire, Raw):
                 value = bytes.fromhex(value)
             elif isinstance(field.wire, Tail):
-                value = tuple(Event(*record) for record in value)
+                value = pack_events(value)
         values[keyword.arg] = value
     return kind(**values)
 

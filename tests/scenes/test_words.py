@@ -9,8 +9,7 @@ import pytest
 
 from bench import pictures
 from bench.pictures import FakeClient, screenshots, seen
-from rig.campaign.events import Stage
-from rig.campaign.machine import Flow
+from rig.campaign.machine import Flow, Stage
 from rig.cli import main
 from rig.ready import ready_protocol
 from rig.records import Job

@@ -198,7 +198,7 @@ def hold_drop(port, run):
     device.connect()
     order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
     order["label"] = pack_label(run, 2)
-    device.fire(device.arm(**order))
+    device.fire(device.arm(wire.Arm(**order)))
     return device, order, device.collect(order["label"])
 
 
@@ -215,7 +215,7 @@ def test_a_drop_of_a_session_is_left_alone():
     again.connect(boot_wait_s=0)
     assert again.fetch(order["label"]) == drop
     with pytest.raises(DeviceError, match="still holds the drop of run 7"):
-        again.arm(**order)  # no ABORT made it free to be discarded
+        again.arm(wire.Arm(**order))  # no ABORT made it free to be discarded
 
 
 def test_a_drop_that_an_earlier_test_left_is_cleared_away():

@@ -18,7 +18,7 @@ from tests.session.test_session_store import make, make_older
 
 def record(session, run):
     session.log_bytes("rx", run, b"\x00\xff")
-    session.add_ping(ClockSample(run, run + 1, run))
+    session.add_timing(ClockSample(run, run + 1, run))
     session.add_drop(Drop(run, 1, 1000, (Edge(1, 0, True), Edge(9, 0, False))))
     session.add_state(run, 1, RunState.RECORDED, run)
     session.commit()

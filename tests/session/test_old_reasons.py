@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from rig.session.reason_rows import read_reasons
+from rig.session.schema import read_reasons
 
 
 @pytest.mark.parametrize(

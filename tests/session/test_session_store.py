@@ -55,10 +55,10 @@ def fill(session):
     session.log_bytes("tx", 1, b"\x00\xff")
     session.log_bytes("rx", 2, b"")
     session.add_identity({"serial": "µ1", "tick_hz": 2_000_000}, 3)
-    session.add_ping(ClockSample(1, 2, 3))
-    session.add_ping(ClockSample(4, 5, 2**32 - 1))
-    session.add_pulse(PULSE)
-    session.add_host_break(BREAK)
+    session.add_timing(ClockSample(1, 2, 3))
+    session.add_timing(ClockSample(4, 5, 2**32 - 1))
+    session.add_timing(PULSE)
+    session.add_timing(BREAK)
     session.add_drop(DEVICE_DROP, host_ns=99, provenance="device")
     session.add_drop(IMPORTED)
     session.add_state(2, 0, RunState.PLANNED, 1)
@@ -149,7 +149,7 @@ def test_a_file_of_an_older_format_is_read_and_continued(path, version):
     third = replace(DEVICE_DROP, run=3)
     with Session.open(path) as session:
         session.add_drop(third)
-        session.add_pulse(PULSE._replace(number=1))
+        session.add_timing(PULSE._replace(number=1))
     with Session.open(path) as session:
         assert list(session.drops()) == [without, IMPORTED, third]
         assert session.pulses() == [*pulses, PULSE._replace(number=1)]

@@ -9,7 +9,7 @@ import pytest
 
 from rig.errors import InputError
 from rig.link.client import Device
-from rig.link.messages import pack_label
+from rig.link.messages import Arm, pack_label
 from rig.link.port import open_port, port_clock
 from rig.records import ClockSample, Drop
 from tests.sim.falls import PROTOCOLS
@@ -45,7 +45,7 @@ def talk(where: str, gates: int = 0b11, runs=((1, 1),), pings: int = 3) -> Talk:
     for run, attempt in runs:
         label = pack_label(run, attempt)
         order = {"release": 1, "pulse_us": 80_000, "timeout_ms": 5000, "record_ms": 900}
-        device.fire(device.arm(label=label, gates=gates, **order))
+        device.fire(device.arm(Arm(label=label, gates=gates, **order)))
         drop = device.collect(label)
         device.acknowledge(label, drop.certificate.crc32)
         done.drops.append(drop)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from textual.widgets import Input
 
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 from rig.session.store import Session
 from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
 from tests.tui.lab import DAEMON, run

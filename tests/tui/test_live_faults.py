@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 from rig.session.store import Session
 from tests.tui.lab import run
 

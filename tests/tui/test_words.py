@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from rig.campaign.events import GoOn, Stage
-from rig.campaign.machine import Flow, step
+from rig.campaign.machine import Flow, GoOn, Stage, step
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.records import Job
 from rig.tui.indicators import Indicators

@@ -258,7 +258,7 @@ class Stand:
             heard += self.hear(self._scaled(160_000))
         certificate, self.certified = heard[-1], self._latest
         self._ahead = certificate.fire_tick - fire
-        raw = [event for m in heard if isinstance(m, wire.EventsFrame) for event in m.events]
+        raw = [event for m in heard if isinstance(m, wire.EventsFrame) for event in m.snapshots]
         events = [
             wire.Event((e.tick - certificate.fire_tick + 2**31) % 2**32 - 2**31, e.state)
             for e in raw

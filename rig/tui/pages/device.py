@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 from rig.report.finding import clock_lines
 from rig.tui.desk import Face
 from rig.tui.pages.drop import hanging

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from rig.analysis.result import GOOD
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 from rig.reasons import notes_in, remedies
 from rig.tui.desk import Face
 from rig.tui.drop_words import LOOKS, expected_words, headline, number_table, past_runs, sentence

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from rig.campaign.events import Stage
+from rig.campaign.machine import Stage
 from rig.predictions import notes
 from rig.protocol.describe import describe
 from rig.protocol.plan import runs
