@@ -59,7 +59,6 @@ _HEAD = """\
 
 `./run bench bulk`: relative error and processor time of one fall, by how many are computed at once.
 
-![Error against time](bulk-falls.svg)
 """
 
 

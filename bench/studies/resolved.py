@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rig.bench.falls import Asked, falls, simulation
 from rig.bench.findings import Findings
 from rig.bench.work import measure as measure_problem
-from rig.commands.bench_precision import Study, duration
+from rig.commands.bench_precision import Study
 from rig.errors import RigError
 from rig.films import Film
 from rig.protocol import reader
@@ -64,13 +64,13 @@ def _work(falls: int) -> Findings:
          f"{row['falls']:g}", f"{row['cpu_s']:.3f}"]
         for row in means
     ]  # fmt: skip
-    points = [["problem", "method", "", "error", "time"]]
+    points = [["method", "step or touch (s)", "error", "ms"]]
     points += [
-        [point.problem, point.method, point.setting, f"{point.error:.1e}", duration(point.cpu_s)]
+        [point.method, f"{point.value:.1e}", f"{point.error:.1e}", f"{1e3 * point.cpu_s:.4g}"]
         for point in study.points
     ]
     lines = [
-        *text_table(points, left={0, 1, 2}, rule=True),
+        *text_table(points, left={0}, rule=True),
         "",
         *text_table(rows, left={0}, rule=True),
         "",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.figures import choice_figure, work_figure
@@ -69,11 +70,11 @@ class Study:
             for problem in self.problems
         }
         head = self._head + "\n\n".join(f"![{name}]({name}.svg)" for name in pictures)
-        choices = {problem.title: self._choice(problem) for problem in self.problems}
+        choices = {one.title: points for one in self.problems if (points := self._choice(one))}
         return Findings(
             self._record(), [*self.table(), "", *self.remarks()], head,
             [point.row() for point in self.points],
-            choice_figure({title: points for title, points in choices.items() if points}),
+            choice_figure(choices),
             pictures,
         )  # fmt: skip
 
@@ -90,37 +91,28 @@ class Study:
         """Return the cheapest setting of each problem for each of `TARGETS`."""
         rows = [["problem", *(f"error ≤ {target:.0e}" for target in TARGETS)]]
         for problem in self.problems:
-            best = [cheapest(self._of(problem), target) for target in TARGETS]
-            rows.append(
-                [problem.title, *("–" if point is None else _words(point) for point in best)]
-            )
+            best = [_words(cheapest(self._of(problem), target)) for target in TARGETS]
+            again = ("″" if cell == last else cell for last, cell in pairwise(best))
+            rows.append([problem.title, best[0], *again])
         return text_table(rows, left=range(5), rule=True)
 
     def remarks(self) -> Iterator[str]:
         """Say how well references are known, and what was left out."""
-        for problem in self.problems:
-            own = max(1e-50, own_error(problem.exact, problem.inputs))
-            yield f"{problem.title}: reference by {problem.route}, known to {own:.0e}"
+        known = max(own_error(one.exact, one.inputs) for one in self.problems)
+        routes = dict.fromkeys(one.route for one in self.problems)
+        yield f"references, known to {max(1e-50, known):.0e}: {'; '.join(routes)}"
         for one in self.left_out:
             yield f"left out: {one.problem}, {one.method}, from {one.setting} on: {one.reason}"
 
     def _record(self) -> dict[str, Any]:
         return {
-            "problems": [
-                {"name": one.name, "title": one.title, "route": one.route,
-                 "reference_error": own_error(one.exact, one.inputs)}
-                for one in self.problems
-            ],
+            "problems": [{"name": one.name, "title": one.title} for one in self.problems],
             "points": [asdict(point) for point in self.points],
             "left_out": [asdict(one) for one in self.left_out],
-        }  # fmt: skip
+        }
 
 
-def _words(point: Point) -> str:
-    setting = "" if point.setting == "–" else f", {point.setting}"
-    return f"{point.method}{setting}: {duration(point.cpu_s)}"
-
-
-def duration(seconds: float) -> str:
-    """Return a time in words."""
-    return f"{1e6 * seconds:.3g} µs" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
+def _words(point: Point | None) -> str:
+    if not point:
+        return "–"
+    return f"{point.method}, {point.setting}: {1e3 * point.cpu_s:.3g} ms".replace(", –", "")
