@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one benchmark and return its exit code, as the ``rig`` command does."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded
     arguments = _parser().parse_args(argv)
-    from bench.frame import carry_out  # noqa: PLC0415 - with numpy, which --help does not need
+    from rig.commands.study import carry_out  # noqa: PLC0415 - with numpy, which --help does not need
 
     try:
         module = import_module(f"bench.{BENCHES[arguments.bench].module}")
@@ -127,7 +127,8 @@ BENCHES = {
         _switch("--more", "go on with the sessions of that folder"),
     )),
     "board": Bench("board", "what a class costs that looks on", (_PAGE,)),
-    "bulk": Bench("studies.bulk", "one fall, batches, a C loop and a solver, in ratios", (
+    "bulk": Bench("studies.bulk", "many falls in Python, numpy, numba and C; limits of speed", (
+        _folder("folder for a page of the same", required=False),
         _number("--falls", "in a batch", 100_000),
         _number("--rounds", "of measurement", 15),
     )),
@@ -198,6 +199,7 @@ BENCHES = {
     )),
     "resolved": Bench("studies.resolved", "the resolved world by itself", (
         _folder("folder for what is made"), _PROTOCOLS,
+        _number("--falls", "of 25 rods with each step", 48),
     ), either=(
         _option("--film", type=float, metavar="DEG", help="draw one fall at this incline"),
         _switch("--work", "error against run time of that world itself"),

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.frame import Findings
 from bench.studies.sessions import with_repeats, without_device
 from bench.workers import results
 from rig.analysis.comparison import compare
 from rig.analysis.summary import good_cases
 from rig.bench.falls import Asked, simulation
+from rig.bench.findings import Findings
 from rig.commands.output import progress
 from rig.measurands import MEASURANDS
 from rig.protocol import reader

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from bench.frame import Findings
 from bench.process_fixture import ProcessFixture, processor_s
+from rig.bench.findings import Findings
 from rig.session.store import Session
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from bench.frame import Findings
+from rig.bench.findings import Findings
 from rig.clock.epochs import epochs
 from rig.clock.rate import ping_rate, pulse_rate
 from rig.commands.output import say

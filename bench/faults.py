@@ -11,10 +11,10 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from bench.contention import deaf, raced
-from bench.frame import Findings
 from bench.moments import STATES, fell_upon, off_after, reach
 from bench.process_fixture import ProcessFixture
 from bench.tally import FaultTally
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.errors import DeviceError, SessionError
 from rig.link.transcript import Transcript

@@ -20,9 +20,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
-from bench.frame import Findings
 from bench.mutants import CSV, LONGEST_S, MEMORY_BYTES, Mutants, altered_text, make_session
 from bench.process_fixture import FENCE
+from rig.bench.findings import Findings
 from rig.cli import main as rig
 from rig.commands.output import say
 from rig.text_table import text_table

@@ -20,9 +20,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bench.decoding import bytewise, checked, frames, speed, to_edges
-from bench.frame import Findings
 from bench.process_fixture import ProcessFixture, memory_bytes, processor_s
 from bench.pty_writer import PtyWriter
+from rig.bench.findings import Findings
 from rig.clock.host import SystemClock
 from rig.commands.output import say
 from rig.daemon.server import Server

@@ -27,10 +27,10 @@ from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
-from bench.frame import Findings
 from bench.mutation_memory import Memory
 from bench.mutation_plugin import RECORD, SELECT
 from bench.mutators import c_faults, python_faults
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.errors import InputError
 from rig.files import write_atomic

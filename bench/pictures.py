@@ -10,7 +10,7 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bench.frame import Findings
+from rig.bench.findings import Findings
 from rig.campaign.machine import Flow, Stage
 from rig.files import make_folder, require_file
 from rig.results.live import LiveAnalysis

@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from bench.frame import Findings
 from bench.process_fixture import FENCE
+from rig.bench.findings import Findings
 from rig.recorder.controller import Controller
 from rig.replay import replay
 from rig.session.schema import RunState

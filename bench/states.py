@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bench.frame import Findings
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.text_table import text_table
 from tests.daemon import test_state_space

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.failing_disk import FailingDisk
-from bench.frame import Findings
 from bench.process_fixture import ProcessFixture
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.daemon import rpc
 from rig.errors import InputError, RigError

@@ -21,8 +21,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self
 
-from bench.frame import Findings
 from bench.process_fixture import processor_s
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.daemon.client import Client
 from rig.daemon.server import Server

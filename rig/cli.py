@@ -20,8 +20,6 @@ from rig.ctrl_c import ctrl_c_goes_to
 from rig.errors import RigError
 from rig.ready import find_protocol
 from rig.streams import open_streams, say, settle_streams
-from rig.units import Dimension, parse
-from rig.usb.listing import sole_port
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -141,6 +139,12 @@ def _place(name: str) -> Callable[[str], str]:
     return place
 
 
+def _quantity(text: str, dimension: str) -> float:
+    """Read a quantity; units, with fractions and decimals, are loaded only for one."""
+    units = import_module("rig.units")
+    return float(units.parse(text, units.Dimension[dimension]).value)
+
+
 def _is_name(text: str) -> bool:
     """Whether a rig may be called so: the name becomes a part of a file's."""
     return re.fullmatch(r"[\w-]{1,40}", text, re.ASCII) is not None
@@ -162,7 +166,7 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
         lambda mask: mask < 1 << GATES,
     ),
     "length": _accept(
-        "a length above 0", lambda text: parse(text, Dimension.LENGTH).value, lambda m: m > 0.0
+        "a length above 0", lambda text: _quantity(text, "LENGTH"), lambda metres: metres > 0.0
     ),
     "name": _accept("letters, digits, - and _", str, _is_name),
     "rig": lambda _: {"dest": "socket"} | _accept("letters, digits, - and _", _socket, bool)(""),
@@ -173,7 +177,7 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     ),
     "port": _accept(
         "a device path, or a URL such as sim://, or auto",
-        lambda text: sole_port() if text == "auto" else text,
+        lambda text: import_module("rig.usb.listing").sole_port() if text == "auto" else text,
         bool,
     ),
     "protocol": lambda _: {"type": find_protocol},
@@ -182,7 +186,7 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
     "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),
     "share": _accept(
         "a share from 0 to 10 %, as in 50 ppm",
-        lambda text: parse(text, Dimension.NUMBER).value,
+        lambda text: _quantity(text, "NUMBER"),
         lambda share: 0.0 <= share < 0.1,
     ),
     "trials": _accept(

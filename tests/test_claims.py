@@ -61,7 +61,7 @@ GIVEN = {
     "docs/resolved-world.md": dict.fromkeys(("1 nm", "1.4 %", "2 %"), "tests/sim/test_resolved.py")
     | dict.fromkeys(
         ("96 %", "89 %", "70 %", "41 %", "19 %"), "resolved-published.csv, looked at below"
-    ) | dict.fromkeys(("10 µs", "0.1 mm"), "settings of ./run bench resolved --work") | {
+    ) | {
         "80.2 mm": "the paper's", "16 mm": "119 - 103 of the table",
         "75 ± 8 and 88 ± 4 mm": "resolved-published.csv, looked at below",
     },

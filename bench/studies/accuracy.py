@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.frame import Findings
 from bench.studies.disturbances import DOUBLED, STACK
 from bench.studies.errors import Errors, shares_held
 from bench.studies.sessions import SimulatedSession, with_device, without_device
 from bench.workers import results
 from rig.analysis.result import GOOD
 from rig.bench.falls import STRAY, Asked, simulation, with_settings
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.measurands import MEASURANDS
 from rig.protocol import reader

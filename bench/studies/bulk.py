@@ -1,7 +1,7 @@
-"""Speed of the falls, as ratios between things timed in turns on one machine.
+"""Many falls of one chain: error against processor time a fall, in Python, numpy, numba and C.
 
-A machine's speed drifts while it is measured. So everything is timed in every round, ratios are
-taken within a round, and their median is given with the least and the most.
+A point's parameter is how many falls are computed at once. The other limits of speed that this
+project sets itself are measured beside it, as ratios within one run.
 """
 
 from __future__ import annotations
@@ -11,79 +11,90 @@ import math
 import os
 import shlex
 import shutil
-import statistics
 import subprocess
-import time
-from dataclasses import dataclass
-from decimal import Decimal
-from itertools import accumulate
+import sys
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+from statistics import median
 from tempfile import TemporaryDirectory
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.frame import Findings
+from bench.decoding import speed, to_edges
+from rig.bench import references
+from rig.bench.work import Answer, Method, WorkProblem, measure
+from rig.commands.bench_precision import Study
 from rig.commands.output import say
 from rig.errors import RigError
-from rig.model.batch import FallBatch, Floats, falls, given_impacts
-from rig.model.chain import Chain
-from rig.model.fall import Fall, fall, kicks
+from rig.model import paper
+from rig.model.batch import falls, given_impacts
+from rig.model.fall import fall
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
-RODS, LENGTH = 25, 1.165  # the paper's chain, m
-ALPHA, GAMMA, DROP, GRAVITY = 0.155, 4.0 / 3.0, 0.18, 9.81  # and its fall at 40°
+    from rig.bench.findings import Findings
+
+    Ends = Sequence[Any]  # Δz, V and t, an array each
+
+CHAIN = paper.UNIFORM
+INPUTS = {"alpha": 0.155, "gamma": 4.0 / 3.0, "drop": 0.18, "gravity": 9.81, "initial_speed": 0.0}
+"""The paper's fall at 40°: the first of every batch."""
 C_SOURCE = Path(__file__).with_name("fall_loop.c")
-C_OPTIONS = ("-O2", "-shared", "-fPIC")
-AT_ROUNDING = 1e-14
-"""Relative error at which a solver counts as good as the closed forms."""
-_TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
-# Turns long enough for the clock, and short enough to fit between two interruptions.
-_SINGLE_FALLS, _ROOTS = 50, 500
-_TRIES = 5
+C_OPTIONS = {
+    "C -O2": ("-O2", "-ffp-contract=off"),
+    "C -O3, vectors": ("-O3", "-march=native", "-fno-math-errno"),
+}
+"""Without errno a square root is one instruction, and a loop of them can be vectorised."""
+_SIZES = (1, 10, 100, 1000, 10_000, 100_000)
+_ROUNDS = 15
+_FRAMES = 1000  # of edges to decode
+_HEAD = """\
+# Many falls at once
+
+`./run bench bulk`: relative error and processor time of one fall, by how many are computed at once.
+
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Falls of one chain, one number a fall in each array."""
+    """Falls of `CHAIN`, no two alike but like those of a lab, a number a fall in each array."""
 
-    alpha: Floats
-    gamma: Floats
-    drop: Floats
-    gravity: Floats
-    initial_speed: Floats
+    inputs: tuple[Any, ...]
 
-
-def paper_chain() -> Chain:
-    """Return the paper's uniform chain: 25 rods over 1.165 m."""
-    return Chain((1.0,) * RODS, tuple(LENGTH * k / (RODS - 1) for k in range(RODS)))
-
-
-def varied(count: int, seed: int = 1) -> Batch:
-    """Falls like those of the lab, no two alike."""
-    source = np.random.default_rng(seed)
-    ranges = (0.01, 0.4), (1.2, 1.5), (0.1, 0.3), (9.7, 9.9), (0.0, 0.1)
-    return Batch(*(source.uniform(low, high, count) for low, high in ranges))
+    @classmethod
+    def of(cls, count: int, seed: int = 1) -> Batch:
+        """Draw falls; the first is that of `INPUTS`."""
+        source = np.random.default_rng(seed)
+        ranges = (0.01, 0.4), (1.2, 1.5), (0.1, 0.3), (9.7, 9.9), (0.0, 0.1)
+        arrays = [source.uniform(low, high, count) for low, high in ranges]
+        for array, first in zip(arrays, INPUTS.values(), strict=True):
+            array[0] = first
+        return cls(tuple(arrays))
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:
-    """Find how long falls take, as ratios."""
-    ratios = bulk(arguments.falls, arguments.rounds)
-    yield Findings(ratios, _table(ratios))
+    """Measure falls and limits."""
+    with TemporaryDirectory() as folder:
+        contestants = methods(Path(folder))
+        sizes = [size for size in _SIZES if size <= arguments.falls]
+        problem = _problem(contestants, sizes)
+        study = Study("bulk", _HEAD)
+        study.add(problem, *_each(measure(problem)))
+        limits = measure_limits(contestants, sizes[-1], arguments.rounds)
+    found = study.findings()
+    lines = [*found.lines, "", *(f"{words}: {value:.3g}" for words, value in limits.items())]
+    yield replace(found, record={**found.record, "limits": limits}, lines=lines, picture="")
 
 
-def bulk(count: int, rounds: int) -> dict[str, Any]:
-    """Time the falls against square roots, a C loop and a general solver.
-
-    Parameters
-    ----------
-    count
-        Falls in a batch.
-    rounds
-        Of measurement, each with all contestants.
+def methods(folder: Path) -> dict[str, Callable[[Batch], Ends]]:
+    """Return every way to compute a batch, ours first; what is not installed is left out.
 
     Raises
     ------
@@ -91,45 +102,80 @@ def bulk(count: int, rounds: int) -> dict[str, Any]:
         Where there is no C compiler although the environment's ``CI`` asks for all of it, or
         where the compiler fails.
     """
-    chain, batch = paper_chain(), varied(count)
-    roots = [float(k + 1) for k in range(chain.rods)]
-    timed: dict[str, Callable[[], float]] = {
-        "roots": lambda: _per_turn(lambda: _square_roots(roots), _ROOTS),
-        "single": lambda: _per_turn(lambda: _single(chain), _SINGLE_FALLS),
-        "batch": lambda: _per_turn(lambda: batch_falls(chain, batch), 1) / count,
+    found: dict[str, Callable[[Batch], Ends]] = {
+        "numpy (rig)": by_numpy,
+        "Python (rig)": one_by_one,
     }
-    found: dict[str, Any] = {"rods": chain.rods, "falls": count, "rounds": rounds}
-    with TemporaryDirectory() as folder:
-        compiler = find_compiler()
-        if compiler:
-            loop = CLoop(compiler, Path(folder))
-            timed["c"] = lambda: _per_turn(lambda: loop.falls(chain, batch), 1) / count
-            found["compiler"] = shlex.join((*compiler, *C_OPTIONS))
-        elif os.environ.get("CI"):
-            raise RigError("there is no C compiler here", "install one, or name it in CC")
-        else:
-            say("no C compiler here: left out the C loop (install one, or name it in CC)")
-        solver = _solver(chain)
-        if solver is not None:
-            found["solver"] = solver
-            timed["solver"] = lambda: _per_turn(lambda: solve(chain, solver["rtol"]), 1)
-        measured = _in_turns(timed, rounds)
-    ratios = {"single_over_roots": ("single", "roots"), "single_over_batch": ("single", "batch")}
-    ratios |= {"batch_over_c": ("batch", "c"), "solver_over_single": ("solver", "single")}
-    found["falls_per_s"] = _spread([1.0 / seconds for seconds in measured["batch"]])
-    for name, (above, below) in ratios.items():
-        if above in measured and below in measured:
-            pairs = zip(measured[above], measured[below], strict=True)
-            found[name] = _spread([a / b for a, b in pairs])
+    found["numpy, float32"] = by_float32
+    compiler = find_compiler()
+    if compiler:
+        found |= {name: c_loop(compiler, options, folder) for name, options in C_OPTIONS.items()}
+    elif os.environ.get("CI"):
+        raise RigError("there is no C compiler here", "install one, or name it in CC")
+    else:
+        say("no C compiler here: left out the C loops (install one, or name it in CC)")
+    try:
+        found["numba"] = numba_loop()
+    except ModuleNotFoundError:
+        say("no numba here: left out its loop")
     return found
 
 
-def batch_falls(chain: Chain, batch: Batch) -> FallBatch:
-    """All falls at once, in numpy."""
-    impacts = given_impacts(batch.alpha, batch.gamma)
-    return falls(
-        chain.masses, chain.heights, impacts, batch.drop, batch.gravity, batch.initial_speed
-    )
+def by_numpy(batch: Batch) -> Ends:
+    """Compute all falls at once, as the program does."""
+    alpha, gamma, *rest = batch.inputs
+    return falls(CHAIN.masses, CHAIN.heights, given_impacts(alpha, gamma), *rest)
+
+
+def one_by_one(batch: Batch) -> Ends:
+    """Compute fall after fall, as the program does with a single one."""
+    ends = [
+        fall(CHAIN, *inputs) for inputs in zip(*(a.tolist() for a in batch.inputs), strict=True)
+    ]
+    return [
+        [end.separation_m for end in ends], [end.speed_m_s for end in ends],
+        [end.time_s for end in ends],
+    ]  # fmt: skip
+
+
+def by_float32(batch: Batch) -> Ends:
+    """Compute all falls at once in half as many bits."""
+    alpha, gamma, drop, gravity, start = (a.astype(np.float32) for a in batch.inputs)
+    ends: Ends = _loop(np.array(CHAIN.legs, np.float32), alpha, gamma, drop, gravity, start)
+    return ends
+
+
+def numba_loop() -> Callable[[Batch], Ends]:
+    """Compile `_loop` for numbers, fall by fall."""
+    from numba import njit  # noqa: PLC0415 - an extra
+
+    loop, legs = njit(error_model="numpy")(_loop), np.array(CHAIN.legs)
+
+    @njit(error_model="numpy")
+    def every(legs: Any, a: Any, b: Any, c: Any, d: Any, e: Any) -> Any:
+        ends = np.empty((3, a.size))
+        for n in range(a.size):
+            ends[0, n], ends[1, n], ends[2, n] = loop(legs, a[n], b[n], c[n], d[n], e[n])
+        return ends
+
+    return lambda batch: every(legs, *batch.inputs)
+
+
+def _loop(legs: Any, alpha: Any, gamma: Any, drop: Any, gravity: Any, start: Any) -> Any:
+    """Compute one fall, or arrays of them in arrays' own precision."""
+    arrival = np.sqrt(start * start + 2 * gravity * drop)
+    time = 2 * drop / (start + arrival)
+    gained, separation = 0 * arrival, 0 * arrival
+    for k in range(len(legs)):
+        gap, ratio = legs[k, 0], legs[k, 1]
+        step = arrival * (alpha / (gamma + ratio))
+        gained = gained + step
+        after = arrival + step
+        arrival = np.sqrt(after * after + 2 * gravity * gap)
+        duration = 2 * gap / (after + arrival)
+        time = time + duration
+        separation = separation + gained * duration
+    return separation, arrival, time
 
 
 def find_compiler() -> list[str] | None:
@@ -139,91 +185,103 @@ def find_compiler() -> list[str] | None:
     return [found, *command[1:]] if found else None
 
 
-class CLoop:
-    """``fall_loop.c``, compiled into a folder.
+def c_loop(
+    compiler: Sequence[str], options: Sequence[str], folder: Path
+) -> Callable[[Batch], Ends]:
+    """Compile ``fall_loop.c`` into a folder and return its function.
 
     Raises
     ------
     RigError
         Where the compiler fails; its own words are the hint.
     """
+    library = folder / f"fall{''.join(options)}.so"
+    command = [*compiler, *options, "-shared", "-fPIC", "-o", str(library), str(C_SOURCE), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RigError(f"the C compiler {compiler[0]} failed", done.stderr.strip())
+    function = ctypes.CDLL(str(library)).falls
+    numbers = np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
+    function.argtypes, function.restype = [ctypes.c_size_t] * 2 + [numbers] * 10, None
+    legs = [np.array(column) for column in zip(*CHAIN.legs, strict=True)]
 
-    def __init__(self, compiler: Sequence[str], folder: Path) -> None:
-        library = folder / "fall_loop.so"
-        command = [*compiler, *C_OPTIONS, "-o", str(library), str(C_SOURCE), "-lm"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise RigError(f"the C compiler failed: {shlex.join(command)}", done.stderr.strip())
-        self._falls = ctypes.CDLL(str(library)).falls
-        numbers = np.ctypeslib.ndpointer(np.float64, flags="C_CONTIGUOUS")
-        self._falls.argtypes = [ctypes.c_size_t, ctypes.c_size_t, *[numbers] * 11]
-        self._falls.restype = None
+    def loop(batch: Batch) -> Ends:
+        count = batch.inputs[0].size
+        ends = [np.empty(count) for _ in range(3)]
+        function(count, CHAIN.rods, *legs, *batch.inputs, *ends)
+        return ends
 
-    def falls(self, chain: Chain, batch: Batch) -> tuple[Floats, Floats, Floats]:
-        """Δz, V and t of each fall."""
-        above = [*list(accumulate(chain.masses[:0:-1]))[::-1], 0.0]
-        profile = [np.array(one, dtype=np.float64) for one in (chain.masses, above, chain.heights)]
-        inputs = batch.alpha, batch.gamma, batch.drop, batch.gravity, batch.initial_speed
-        separation, speed, seconds = (np.empty(batch.alpha.size) for _ in range(3))
-        self._falls(batch.alpha.size, chain.rods, *profile, *inputs, separation, speed, seconds)
-        return separation, speed, seconds
+    return loop
 
 
-def solve(chain: Chain, rtol: float) -> Fall:
-    """The paper's fall by scipy's `solve_ivp`, stopped by an event at each impact."""
-    from scipy.integrate import solve_ivp  # noqa: PLC0415 - only here, and not always installed
+def _problem(contestants: dict[str, Callable[[Batch], Ends]], sizes: Sequence[int]) -> WorkProblem:
+    alpha, gamma, *where = INPUTS.values()
+    coefficients = [alpha] * CHAIN.rods, [gamma] * CHAIN.rods
 
-    def motion(_: float, state: Floats) -> list[float]:
-        return [-state[1], GRAVITY, -state[3], GRAVITY]
+    def first(compute: Callable[[Batch], Ends], size: float) -> Answer:
+        ends = compute(batches[int(size)])
+        names = ("separation", "speed", "time")
+        values = {name: float(end[0]) for name, end in zip(names, ends, strict=True)}
+        return Answer(values, CHAIN.rods * int(size))
 
-    clock, arrival = 0.0, 0.0
-    state = np.array([DROP, 0.0, DROP, 0.0])  # height and speed of this chain and of the free one
-    for height, gain in zip(chain.heights, kicks(chain, [ALPHA] * chain.rods, GAMMA), strict=True):
-
-        def strikes(_: float, state: Floats, height: float = height) -> float:
-            return float(state[0]) + height
-
-        strikes.terminal = True  # type: ignore[attr-defined]  # this is how scipy wants it
-        leg = solve_ivp(motion, (clock, clock + 1.0), state, rtol=rtol, atol=rtol, events=strikes)
-        clock, state = float(leg.t[-1]), leg.y[:, -1].copy()
-        arrival = float(state[1])
-        state[1] *= 1.0 + gain
-    return Fall(float(state[2] - state[0]), arrival, clock)
-
-
-def _solver(chain: Chain) -> dict[str, float] | None:
-    """Find the loosest tolerance whose result is as good as rounding allows; none: left out."""
-    try:
-        from rig.bench.reference import exact_fall  # noqa: PLC0415 - needs mpmath
-
-        exact = exact_fall(
-            chain.masses,
-            chain.heights,
-            [Decimal(ALPHA)] * chain.rods,
-            [Decimal(GAMMA)] * chain.rods,
-            DROP,
-            GRAVITY,
-        )
-        errors = {rtol: _error(solve(chain, rtol), exact) for rtol in _TOLERANCES}
-    except ModuleNotFoundError as error:
-        say(f"no {error.name} here: left out the solver")
-        return None
-    rtol = next(
-        (t for t in _TOLERANCES if errors[t] <= AT_ROUNDING), min(errors, key=errors.__getitem__)
-    )
-    return {"rtol": rtol, "error": errors[rtol], "single_error": _error(_single(chain), exact)}
+    batches = {size: Batch.of(size) for size in sizes}
+    title = f"{CHAIN.rods} rods, falls at once"
+    return WorkProblem(
+        "falls", title, {"drop": where[0], "gravity": where[1]},
+        partial(references.exact_fall, CHAIN.masses, CHAIN.heights, *coefficients),
+        "legs as printed, with digits to spare",
+        tuple(
+            # One by one, no number of falls makes a fall cheaper.
+            Method(name, sizes[: 4 if name.startswith("Python") else None], "{:.0f} falls",
+                   partial(first, compute))
+            for name, compute in contestants.items()
+        ),
+    )  # fmt: skip
 
 
-def _error(found: Fall, exact: Sequence[Decimal]) -> float:
-    """Return the largest relative error of Δz, V and t."""
-    values = found.separation_m, found.speed_m_s, found.time_s
-    return max(
-        abs(float(Decimal(value) / true - 1)) for value, true in zip(values, exact, strict=True)
-    )
+def _each(measured: tuple[list[Any], list[Any]]) -> tuple[list[Any], list[Any]]:
+    """Count the time of one fall, not of the batch."""
+    points = [
+        replace(point, **{name: getattr(point, name) / point.value for name in _TIMES})
+        for point in measured[0]
+    ]
+    return points, measured[1]
 
 
-def _single(chain: Chain) -> Fall:
-    return fall(chain, ALPHA, GAMMA, DROP, GRAVITY)
+_TIMES = ("cpu_s", "lower_s", "upper_s")
+
+
+def measure_limits(
+    contestants: dict[str, Callable[[Batch], Ends]], count: int, rounds: int
+) -> dict[str, float]:
+    """Measure the limits that the project sets itself, as medians of ratios within a round."""
+    batch, roots = Batch.of(count), [float(k + 1) for k in range(CHAIN.rods)]
+    single, rows = [*INPUTS.values()], np.ones((2, 8192))
+    passes = 11 * (CHAIN.rods - 1) * count / rows[0].size
+    works: dict[str, tuple[Callable[[], object], int]] = {
+        "roots": (lambda: _square_roots(roots), 500),
+        "fall": (lambda: fall(CHAIN, *single), 100),
+        "numpy": (lambda: by_numpy(batch), 1),
+        "passes": (lambda: np.add(rows[0], 1.5, out=rows[1]), 200),
+    }
+    best = "C -O3, vectors"
+    if best in contestants:
+        works["C"] = (lambda: contestants[best](batch), 1)
+    times = [
+        {name: _least(work, turns) for name, (work, turns) in works.items()} for _ in range(rounds)
+    ]
+
+    def ratio(above: str, below: str) -> float:
+        return median(turn[above] / turn[below] for turn in times)
+
+    starts = [(_command("-m", "rig", "--help"), _command("-c", "")) for _ in range(rounds)]
+    found = {f"one fall over {CHAIN.rods} square roots (goal 10)": ratio("fall", "roots")}
+    if "C" in works:
+        found["numpy batch over the C loop with vectors (goal 1)"] = ratio("numpy", "C")
+        found["of which array additions alone, over the C loop"] = passes * ratio("passes", "C")
+    found["edges decoded to objects, million/s (goal 1)"] = speed(to_edges, _FRAMES) / 1e6
+    found["rig --help over bare Python (goal 2.3)"] = median(a / b for a, b in starts)
+    return found
 
 
 def _square_roots(numbers: Sequence[float]) -> None:
@@ -232,53 +290,20 @@ def _square_roots(numbers: Sequence[float]) -> None:
         root(number)
 
 
-def _per_turn(work: Callable[[], object], turns: int) -> float:
-    """Seconds that one turn takes."""
-    begin = time.perf_counter()
-    for _ in range(turns):
-        work()
-    return (time.perf_counter() - begin) / turns
+def _least(work: Callable[[], object], turns: int) -> float:
+    """Least processor time of a turn in five tries: other programs only ever make it longer."""
+    tries = []
+    for _ in range(5):
+        begin = process_time()
+        for _ in range(turns):
+            work()
+        tries.append((process_time() - begin) / turns)
+    return min(tries)
 
 
-def _in_turns(timed: dict[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
-    """Time everything in turns, `_TRIES` times a round; a round's best counts.
-
-    Other programs on the machine only ever make a time longer.
-    """
-    measured: dict[str, list[float]] = {name: [] for name in timed}
-    for _ in range(rounds):
-        tries = [[clock() for clock in timed.values()] for _ in range(_TRIES)]
-        for name, *seconds in zip(timed, *tries, strict=True):
-            measured[name].append(min(seconds))
-    return measured
-
-
-def _spread(values: Sequence[float]) -> dict[str, float]:
-    return {"median": statistics.median(values), "least": min(values), "most": max(values)}
-
-
-def _table(found: Mapping[str, Any]) -> list[str]:
-    rods = found["rods"]
-    lines = [
-        f"{rods} rods, batches of {found['falls']} falls; median of {found['rounds']} rounds, "
-        "least to most",
-        _line(f"one fall over {rods} square roots", found["single_over_roots"], "×"),
-        _line("falls of a batch, million/s", found["falls_per_s"], "", 1e-6),
-        _line("one fall over one of a batch", found["single_over_batch"], "×"),
-    ]
-    if "batch_over_c" in found:
-        line = _line("batch over a C loop", found["batch_over_c"], "×")
-        lines.append(f"{line}   {found['compiler']}")
-    if "solver_over_single" in found:
-        solver = found["solver"]
-        lines.append(
-            f"{_line('solve_ivp over one fall', found['solver_over_single'], '×')}   "
-            f"rtol {solver['rtol']:g}: error {solver['error']:.0e}, "
-            f"of one fall {solver['single_error']:.0e}"
-        )
-    return lines
-
-
-def _line(label: str, spread: Mapping[str, float], unit: str, scale: float = 1.0) -> str:
-    median, least, most = (spread[key] * scale for key in ("median", "least", "most"))
-    return f"{label:<32}{f'{median:.4g}{unit}':>9}   {least:.4g} to {most:.4g}"
+def _command(*arguments: str) -> float:
+    """Processor time of a command of Python."""
+    before = getrusage(RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
+    after = getrusage(RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

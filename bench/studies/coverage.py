@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import yaml
 
-from bench.frame import Findings
 from bench.studies.errors import Errors, shares_held
 from bench.studies.sessions import SimulatedSession, without_device
 from bench.workers import results
 from rig.analysis.gravity import check_gravity
 from rig.analysis.result import GOOD, Measured
 from rig.bench.falls import Asked, SimulatedDrop, falls, simulation
+from rig.bench.findings import Findings
 from rig.commands.output import progress, say
 from rig.errors import InputError
 from rig.estimate.session import estimate

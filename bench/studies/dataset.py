@@ -14,11 +14,11 @@ from statistics import fmean, stdev
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from bench.frame import Findings
 from bench.studies.baselines import TimerReading, line_fit, two_gate_timer
 from bench.studies.sessions import with_repeats
 from rig.analysis.result import GOOD
 from rig.bench.falls import with_settings
+from rig.bench.findings import Findings
 from rig.bundle.archive import list_hashes, pack, to_json
 from rig.bundle.tables import data_package
 from rig.commands.bundling import derive_bundle

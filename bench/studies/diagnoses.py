@@ -9,7 +9,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from bench.frame import Findings
 from bench.studies.layout_catalogue import (
     FENCE,
     KINDS,
@@ -20,10 +19,12 @@ from bench.studies.layout_catalogue import (
     chosen,
     under,
 )
+from bench.studies.time_scales import time_scale
 from bench.studies.wrong_rigs import WRONG_RIGS
 from bench.workers import results
 from rig.analysis.drop import fit_drop
-from rig.bench.falls import Asked, falls, simulation, time_scale
+from rig.bench.falls import Asked, falls, simulation
+from rig.bench.findings import Findings
 from rig.clock.calibration import TimeScale
 from rig.commands.output import say
 from rig.protocol import reader

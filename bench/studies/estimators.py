@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from bench.frame import Findings
 from bench.studies.baselines import TimerReading, plain_fit
 from bench.studies.columns import Column, aligned
 from bench.studies.errors import Errors
@@ -19,6 +18,7 @@ from rig.analysis.joint_fit import joint_fit
 from rig.analysis.monte_carlo import monte_carlo
 from rig.analysis.quantities import COMPUTED, Adjusted, measurands
 from rig.analysis.result import GOOD
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.errors import InputError
 from rig.threads import one_thread

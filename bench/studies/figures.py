@@ -19,8 +19,6 @@ _LONGEST_LABEL = 24
 _VOID_DARKEST = 0.2
 """Share of void drops from which on a layout is drawn as dark as can be."""
 _SHADES = "Oranges"
-_WORLD_ERROR_MM = 0.1
-"""Of Δz, that the resolved world may make before its falls are chaotic."""
 _STYLES = (("o", MUTED), ("s", INK), ("D", MODEL), ("*", SECOND), ("^", MUTED), ("v", INK))
 
 
@@ -101,40 +99,4 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
             for chain, gates, heights in rows
         ]
         drawing.axes[0].set_yticks(range(len(rows)), labels, fontsize=6.5)
-    return drawing.svg
-
-
-def work_figure(lines: Sequence[Mapping[str, Any]]) -> str:
-    """Draw error against run time of the resolved world.
-
-    Parameters
-    ----------
-    lines
-        As `bench.studies.resolved.work` gives them.
-
-    Returns
-    -------
-    str
-        SVG.
-    """
-    kinds = (
-        ("step", "leapfrog, by its step (µs)", "o", MODEL, "step_s", 1e6),
-        ("Euler", "semi-implicit Euler", "v", MUTED, "step_s", 1e6),
-        ("Runge and Kutta", "Runge and Kutta", "^", INK, "step_s", 1e6),
-        ("touch", "length of touches (ms); step in proportion", "s", SECOND, "touch_s", 1e3),
-    )
-    with canvas((3.6,), simulated=False) as drawing:
-        (panel,) = drawing.axes
-        for kind, label, marker, color, field, scale in kinds:
-            some = [one for one in lines if one["changed"] == kind and one["rms_m"]]
-            times, errors = [one["cpu_s"] for one in some], [1e3 * one["rms_m"] for one in some]
-            panel.plot(times, errors, color=color, marker=marker, markersize=4.5, label=label)
-            for time, error, one in zip(times, errors, some, strict=True):
-                panel.annotate(f" {scale * one[field]:g}", (time, error), fontsize=8, color=color)
-        panel.axhline(_WORLD_ERROR_MM, color=MUTED, linestyle=":", linewidth=1.2)
-        panel.set_xscale("log")
-        panel.set_yscale("log")
-        panel.set_xlabel("processor time of a fall of three rods (s)")
-        panel.set_ylabel("rms error of Δz at the strike (mm)")
-        panel.legend(loc="best")
     return drawing.svg

@@ -6,12 +6,12 @@ import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from bench.frame import Findings
 from bench.studies.columns import Column, aligned
 from bench.studies.sessions import with_device
 from rig.analysis.components import stated
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.design.cases import beams_of, cases
 from rig.design.forecast import GateLayout, forecast

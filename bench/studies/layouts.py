@@ -12,16 +12,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from bench.frame import Findings
 from bench.studies.baselines import plain_fit
 from bench.studies.columns import Column, filled
 from bench.studies.disturbances import DOUBLED, STACK
 from bench.studies.figures import layouts_figure
 from bench.studies.layout_catalogue import LAYOUTS, chosen
+from bench.studies.time_scales import time_scale
 from bench.workers import results
 from rig.analysis.drop import fit_drop
 from rig.analysis.result import GOOD
-from rig.bench.falls import HZ, STRAY, Asked, falls, simulation, time_scale
+from rig.bench.falls import HZ, STRAY, Asked, falls, simulation
+from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.errors import InputError
 from rig.measurands import MEASURANDS

@@ -10,8 +10,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
+from bench.studies.time_scales import time_scale
 from rig.analysis.session import analyze
-from rig.bench.falls import SimulatedDrop, falls, time_scale
+from rig.bench.falls import SimulatedDrop, falls
 from rig.errors import InputError
 from rig.ports import is_simulated, truth_file
 from rig.results import detailed, protocol_of

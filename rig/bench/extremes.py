@@ -1,20 +1,33 @@
-"""Scenes at the ends of what can be asked."""
+"""Scenes at the ends of what can be asked: each quantity by itself, and every two together."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
 
-from rig.model.chain import Chain
+from rig.bench.references import exact_coefficients, exact_fall, many_digits
+from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
+from rig.model.drag import drag_fall
+from rig.model.fall import fall, kicks
+from rig.model.impact import gamma_finite, impact_on
 from rig.model.surface import Surface
 from rig.units import Quantity
 
-TIGHT = 1e-13
-"""Relative error allowed inside the domain."""
-MILLION = 1e-10
-"""The same for a million rods."""
-PITCH = 0.0485
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from rig.bench.references import Number, Values
+
+LENGTH = 1.165
+
+
+PAPER: dict[str, float] = {
+    "restitution": 0.5, "friction": 0.2, "incline": 40.0, "inertia": UNIFORM_ROD_INERTIA,
+    "length": LENGTH, "drop": 0.18, "gravity": 9.81,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,117 +36,146 @@ class Extreme:
 
     Attributes
     ----------
-    group
-        What is driven to its end.
-    value
-        How far, in words.
-    alpha
-        Given α instead of the surface's; `None` otherwise.
-    kappa
-        Of the air, 1/m, the same on every leg.
+    name
+        What is driven to its end, and how far.
+    inputs
+        Numbers of the scene whose rounding counts: all but masses, heights and drags.
+    masses
+        Bottom up.
+    even_air
+        Whether the air holds all legs back alike; else κ grows by a third to the top.
     """
 
-    group: str
-    value: str
-    chain: Chain
-    incline_deg: float = 40.0
-    restitution: float = 0.5
-    friction: float = 0.2
-    drop: float = 0.18
-    gravity: float = 9.81
-    initial_speed: float = 0.0
-    alpha: float | None = None
-    kappa: float = 0.0
-    allowed: float = TIGHT
+    name: str
+    inputs: dict[str, float] = field(default_factory=lambda: dict(PAPER))
+    masses: tuple[float, ...] = (1.0,) * 25
+    even_air: bool = True
 
     @property
-    def surface(self) -> Surface:
-        """The surface struck."""
-        return Surface(Quantity(self.restitution), Quantity(self.friction))
+    def chain(self) -> Chain:
+        """The chain, with α where it is given."""
+        inputs, rods = self.inputs, len(self.masses)
+        heights = tuple(inputs["length"] * k / (rods - 1) for k in range(rods))
+        given = Quantity(inputs["alpha"]) if "alpha" in inputs else None
+        gamma = inputs.get("gamma")
+        return Chain(
+            self.masses, heights, inputs["inertia"], None, inputs.get("inertia_z"), given, gamma
+        )
+
+    @property
+    def kappas(self) -> list[float]:
+        """κ of each leg, 1/m; empty without air."""
+        kappa, rods = self.inputs.get("kappa", 0.0), len(self.masses)
+        growth = 0.0 if self.even_air else kappa / (3.0 * rods)
+        return [kappa + growth * k for k in range(rods)] if kappa else []
+
+    def predict(self) -> tuple[dict[str, float], str]:
+        """Return what the model says of each quantity, and its notes on the domain."""
+        inputs, chain = self.inputs, self.chain
+        surface = Surface(Quantity(inputs["restitution"]), Quantity(inputs["friction"]))
+        impact = impact_on(surface, chain, inputs["incline"])
+        where = inputs["drop"], inputs["gravity"], inputs.get("speed", 0.0)
+        if kappas := self.kappas:
+            gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
+            end = drag_fall(chain, gains, kappas, *where)
+        else:
+            end = fall(chain, impact.alpha, impact.gamma, *where)
+        values = {"alpha": impact.alpha, "gamma": impact.gamma, "separation": end.separation_m}
+        return values | {"speed": end.speed_m_s, "time": end.time_s}, "; ".join(impact.notes)
+
+    def exact(self, inputs: Mapping[str, Number], *, as_float: bool = False) -> Values:
+        """Return the true values of inputs near to these, or those of the equations as printed."""
+        coefficients = exact_coefficients(
+            inputs["restitution"], inputs["friction"], inputs["incline"], inputs["inertia"],
+            inputs.get("inertia_z"), as_float=as_float,
+        )  # fmt: skip
+        coefficients |= {
+            name: Decimal(inputs[name]) for name in ("alpha", "gamma") if name in inputs
+        }
+        with many_digits():  # heights and drags are what floats make of them, but for the nudge
+            longer = Decimal(inputs["length"]) / Decimal(self.inputs["length"])
+            heights = [Decimal(height) * longer for height in self.chain.heights]
+            kappas = [Decimal(kappa) for kappa in self.kappas]
+            if kappas:
+                more = Decimal(inputs["kappa"]) / Decimal(self.inputs["kappa"])
+                kappas = [kappa * more for kappa in kappas]
+        alphas, gammas = ([coefficients[name]] * len(heights) for name in ("alpha", "gamma"))
+        where = inputs["drop"], inputs["gravity"], inputs.get("speed", 0.0)
+        return coefficients | exact_fall(
+            self.masses, heights, alphas, gammas, *where, kappas, as_float=as_float
+        )
 
 
-def uniform(rods: int, length: float = 1.165) -> Chain:
-    """Like rods at equal distances."""
-    return Chain((1.0,) * rods, tuple(length * k / (rods - 1) for k in range(rods)))
+_SLIDES = math.degrees(math.atan(0.2))
+ALONE: dict[str, tuple[float, ...]] = {
+    "rods": (2, 3, 1000, 10_000, 1_000_000),
+    "mass decades": (-12, 12, -300, 300, -600),
+    "alpha": (0.0, 1e-15, 1e-12, 1e-6, 0.5, 0.51),
+    "incline": (0.0, 1e-9, 5.0, _SLIDES * 0.999, _SLIDES * 1.001, 89.0, 90.0 - 1e-9, 90.0),
+    "friction": (0.0, 1e-15, 0.839, 0.84, 10.0, 1e3),
+    "inertia": (1e-12, 1e-3, 0.999, 1.0 - 2.0**-52, 1.0),
+    "inertia_z": (1e-12, 1e-3),
+    "pole": (1e-3, 1e-6, 1e-9, 1e-12, -1e-3),
+    "restitution": (-1.0, -1.0 + 2.0**-52, 0.0, 1.0),
+    "drop": (0.0, 1e-12, 1e6, 1e12),
+    "gravity": (1e-320, 1e-12, 1e-6, 1e6, 1e300, 0.0),
+    "speed": (1e-300, 1e-160, 1.0, 1e160, 1e300),
+    "length": (1e-320, 1e-300, 1e-150, 1e150, 1e300),
+    "air": (1e-15, 1e-12, 1e-3, 0.06, 1.0, 10.0, 1e3),
+    "unequal air": (1e-15, 1e-9, 0.06, 10.0),
+}
+"""Ends of each quantity. Masses change by so many powers of ten from bottom to top, and a pole is
+how far μ is below where Eq. 13 is singular at 10°, relative."""
+TOGETHER: dict[str, tuple[float, float]] = {
+    "rods": (2, 200), "mass decades": (-12, 12), "alpha": (1e-12, 0.5),
+    "incline": (1e-9, 90 - 1e-9), "friction": (0.0, 0.839), "inertia": (1e-6, 1 - 1e-12),
+    "drop": (0.0, 1e9),
+    "gravity": (1e-6, 1e6), "speed": (1e-6, 1e6), "air": (1e-15, 10.0),
+    "unequal air": (1e-12, 0.06),
+}  # fmt: skip
+"""Ends that are taken together by twos."""
+_APART = ({"alpha", "incline"}, {"alpha", "friction"}, {"air", "unequal air"})
+"""Pairs of which the one leaves the other out."""
 
 
-def decades(ratio: float, rods: int = 25, length: float = 1.165) -> Chain:
-    """Masses that change by a power of ten given over the whole chain, bottom to top."""
-    exponents = [ratio * k / (rods - 1) for k in range(rods)]
-    # Both ends inside the floats' own 616 decades.
-    middle = 0.5 * ratio if abs(ratio) > 300 else 0.0
-    return Chain(
-        tuple(10.0 ** (e - middle) for e in exponents),
-        tuple(length * k / (rods - 1) for k in range(rods)),
-    )
+def alone() -> Iterator[Extreme]:
+    """Yield every end of every quantity by itself, and the paper's scene."""
+    yield Extreme("as in the paper")
+    yield from (_drive(Extreme(""), name, end) for name, ends in ALONE.items() for end in ends)
+    yield replace(Extreme("mass 1e-300, top rod only"), masses=(*(1.0,) * 24, 1e-300))
 
 
-PAPER = uniform(25)
+def pairs() -> Iterator[Extreme]:
+    """Yield every two ends of two quantities."""
+    for (name, ends), (other, other_ends) in combinations(TOGETHER.items(), 2):
+        if {name, other} not in _APART:
+            for end in ends:
+                for other_end in other_ends:
+                    yield _drive(_drive(Extreme(""), name, end), other, other_end)
 
 
-def extremes() -> Iterator[Extreme]:
-    """Every scene, group by group."""
-    yield from _chains()
-    yield from _impacts()
-    yield from _falls()
-    yield from _in_air()
-    yield from _units()
-
-
-def _chains() -> Iterator[Extreme]:
-    for rods in (2, 3, 25, 1000, 10_000, 1_000_000):
-        allowed = MILLION if rods >= 1_000_000 else TIGHT
-        yield Extreme("rods", f"{rods}", uniform(rods), allowed=allowed)
-    for power in (-12, 12, -300, 300, -600):
-        yield Extreme("mass, top/bottom", f"1e{power}", decades(float(power)))
-    yield Extreme("mass, top/bottom", "1e-300, 1000 rods", decades(-300.0, 1000))
-    light = replace(PAPER, masses=(*PAPER.masses[:-1], 1e-300))
-    yield Extreme("mass, top/bottom", "1e-300, top rod only", light)
-
-
-def _impacts() -> Iterator[Extreme]:
-    for alpha in (0.0, 1e-15, 1e-12, 1e-6, 0.5, 0.51):
-        yield Extreme("α", f"{alpha:g}", PAPER, alpha=alpha)
-    slides = math.degrees(math.atan(0.2))
-    for incline in (0.0, 1e-9, 5.0, slides * 0.999, slides * 1.001, 45.0, 89.0, 90 - 1e-9, 90.0):
-        yield Extreme("incline (°)", f"{incline:.11g}", PAPER, incline_deg=incline)
-    for friction in (0.0, 1e-15, 0.839, 0.84, 10.0, 1e3):
-        yield Extreme("friction", f"{friction:g}", PAPER, friction=friction)
-    for inertia in (1e-12, 1e-3, 0.999, 1.0 - 2.0**-52, 1.0):
-        yield Extreme("rod inertia ξ", f"{inertia:.17g}", replace(PAPER, inertia=inertia))
-    for inertia in (1e-12, 1e-3):
-        yield Extreme("rod inertia ξ_z", f"{inertia:g}", replace(PAPER, inertia_z=inertia))
-    thin = replace(PAPER, inertia_z=1e-3)
-    yield Extreme("rod inertia ξ_z", "0.001, at 10°", thin, incline_deg=10.0)
-    for restitution in (-1.0, -1.0 + 2.0**-52, 0.0, 1.0):
-        yield Extreme("restitution", f"{restitution:.17g}", PAPER, restitution=restitution)
-
-
-def _falls() -> Iterator[Extreme]:
-    for drop in (0.0, 1e-12, 1e6, 1e12):
-        yield Extreme("drop (m)", f"{drop:g}", PAPER, drop=drop)
-    for gravity in (1e-12, 1e-6, 1e6):
-        yield Extreme("gravity (m/s²)", f"{gravity:g}", PAPER, gravity=gravity)
-    yield Extreme("gravity (m/s²)", "0, at 1 m/s", PAPER, gravity=0.0, initial_speed=1.0)
-    yield Extreme("gravity (m/s²)", "0, at rest", PAPER, gravity=0.0)
-
-
-def _in_air() -> Iterator[Extreme]:
-    for kappa in (1e-12, 1e-3, 0.06, 1.0, 10.0, 1000.0):
-        yield Extreme("air, κ (1/m)", f"{kappa:g}", PAPER, kappa=kappa)
-    yield Extreme("air, κ (1/m)", "0.06, 1000 rods", uniform(1000), kappa=0.06)
-    yield Extreme("air, κ (1/m)", "0.06, mass 1e-12", decades(-12.0), kappa=0.06)
-    yield Extreme("air, κ (1/m)", "0.06, α 1e-12", PAPER, alpha=1e-12, kappa=0.06)
-    terminal = math.sqrt(9.81)  # of κ = 1/m
-    for share in (0.5, 10.0):
-        yield Extreme("air, terminal speed ×", f"{share:g}", PAPER, kappa=1.0,
-                      initial_speed=share * terminal)  # fmt: skip
-
-
-def _units() -> Iterator[Extreme]:
-    for length in (1e-320, 1e-300, 1e-150, 1e150, 1e300):
-        yield Extreme("length (m)", f"{length:g}", uniform(25, length), drop=length / 8)
-    for speed in (1e-300, 1e-160, 1e160, 1e300):
-        yield Extreme("initial speed (m/s)", f"{speed:g}", PAPER, initial_speed=speed)
-    for gravity in (1e-320, 1e300):
-        yield Extreme("gravity (m/s²)", f"{gravity:g}", PAPER, gravity=gravity)
+def _drive(scene: Extreme, name: str, end: float) -> Extreme:
+    """Drive one quantity of a scene to an end."""
+    changes: dict[str, Any] = {"name": f"{scene.name} + {name} {end:.11g}".removeprefix(" + ")}
+    inputs = dict(scene.inputs)
+    if name == "rods":
+        changes["masses"] = (1.0,) * int(end)
+    elif name == "mass decades":
+        # Both ends inside the floats' own 616 decades.
+        middle, last = (0.5 * end if abs(end) > 300 else 0.0), len(scene.masses) - 1
+        changes["masses"] = tuple(10.0 ** (end * k / last - middle) for k in range(last + 1))
+    elif name == "pole":
+        cos, sin = math.cos(math.radians(10.0)), math.sin(math.radians(10.0))
+        free_rod = gamma_finite(inputs["inertia"])
+        singular = (cos**2 + free_rod * sin**2) / ((free_rod - 1.0) * sin * cos)
+        inputs |= {"incline": 10.0, "friction": singular * (1.0 - end)}
+    elif name.endswith("air"):
+        inputs["kappa"] = end
+        changes["even_air"] = name == "air"
+    elif name == "alpha":
+        inputs |= {"alpha": end, "gamma": 4.0 / 3.0}
+    elif name == "length":
+        inputs |= {"length": end, "drop": end / 8}
+    else:
+        inputs[name] = end
+    return replace(scene, inputs=inputs, **changes)

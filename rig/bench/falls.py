@@ -12,16 +12,11 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
-import numpy as np
-
-from rig.clock.calibration import TimeScale
 from rig.errors import RigError
 from rig.ports import simulation_package
 from rig.records import Drop, Edge
 
 HZ = 16_000_000
-CLOCK_U = 1e-6
-"""How well the time scale is known, relative: a few minutes of clock samples."""
 
 
 class Asked(NamedTuple):
@@ -87,12 +82,6 @@ def falls(asked: Sequence[Asked], module: str = "") -> Iterator[SimulatedDrop]:
     if simulation.returncode:
         urls = ", ".join(request.url for request in asked)
         raise RigError(f"the simulation {urls} ended with exit code {simulation.returncode}")
-
-
-def time_scale(seed: int) -> TimeScale:
-    """Calibrate a rig's clock: it is off by chance, as far as it says."""
-    hz = HZ * (1.0 + CLOCK_U * np.random.default_rng(seed).normal())
-    return TimeScale(float(hz), CLOCK_U)
 
 
 def simulation(

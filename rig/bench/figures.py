@@ -1,159 +1,106 @@
-"""Pictures of what the studies found: error against run time, and what scenes cost."""
+"""Pictures of what the studies found."""
 
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, canvas
+from rig.report.canvas import INK, MODEL, MUTED, SECOND, canvas
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from matplotlib.axes import Axes
+    from rig.bench.stability import StabilityRow
+    from rig.bench.work import Point
 
-    from rig.bench.precision import Point
-    from rig.bench.scenes import Cost
-
-FLOOR = 1e-17
-"""Where an error of 0 is drawn."""
-_CEILING = 3.0
-
-_COLORS = {"discrete": MODEL, "continuum": SECOND, "contact": INK}
-_MARKERS = {
-    "RK45": "o",
-    "DOP853": "s",
-    "Radau": "^",
-    "BDF": "v",
-    "LSODA": "D",
-    "Euler": "x",
-    "RK4": "+",
-    "Gauss–Legendre": ">",
-}
-_PRECISION_PANELS = (
-    ("separation_error", "relative error of Δz"),
-    ("speed_error", "relative error of V"),
-    ("gate_error_s", "error of gate time (s)"),
-)
+FLOOR = 3e-17
+"""Where an error of 0 is drawn: no float is nearer."""
+_CEILING = 1.0
+_LOOKS = [
+    (marker, color, fill)
+    for fill in (True, False)
+    for marker, color in zip("Dos^vP", (MODEL, SECOND, INK, MUTED, MODEL, SECOND), strict=True)
+]
 
 
-def precision_figure(title: str, points: Sequence[Point]) -> str:
-    """Draw a scene's work–precision picture.
+def work_figure(title: str, points: Sequence[Point]) -> str:
+    """Draw a problem's work–precision picture, a line a method; return SVG."""
+    lines = {method: list(line) for method, line in groupby(points, lambda point: point.method)}
+    return _picture(f"{title}: relative error against processor time", lines, 4)
+
+
+def choice_figure(lines: Mapping[str, Sequence[Point]]) -> str:
+    """Draw the method to choose for each problem, at most six problems; return SVG.
 
     Parameters
     ----------
-    title
-        Of the scene.
-    points
-        Of this scene only, in the order of the sweep.
-
-    Returns
-    -------
-    str
-        SVG.
+    lines
+        All settings of that method, by the problem's title. Of problems that differ by one number
+        alone, the last is drawn.
     """
-    with canvas((4.9, 2.9, 2.9), 8.0, simulated=False) as drawing:
-        for panel, (field, label) in zip(drawing.axes, _PRECISION_PANELS, strict=True):
-            for _, line in groupby(points, key=lambda point: point.method):
-                _draw_method(panel, field, list(line))
-            panel.set_xscale("log")
-            panel.set_yscale("log")
-            panel.set_ylim(FLOOR / 3.0, _CEILING)
-            panel.axhline(FLOOR, color=MUTED, linewidth=0.6, linestyle=":")
-            panel.set_ylabel(label)
-        drawing.axes[-1].set_xlabel(
-            "median run time (s), with quartiles; dotted: no float is nearer"
-        )
-        handles, labels = drawing.axes[1].get_legend_handles_labels()
+    kinds = {points[0].problem.partition("-")[0]: title for title, points in lines.items()}
+    named = {f"{title}: {lines[title][0].method}": lines[title] for title in kinds.values()}
+    return _picture("What to choose", dict([*named.items()][:6]), 1)
+
+
+def _picture(title: str, lines: Mapping[str, Sequence[Point]], columns: int) -> str:
+    with canvas((4.4,), simulated=False) as drawing:
+        (panel,) = drawing.axes
+        for (label, points), (marker, color, fill) in zip(lines.items(), _LOOKS, strict=False):
+            times = [point.cpu_s for point in points]
+            panel.errorbar(
+                times, [min(max(point.error, FLOOR), _CEILING) for point in points],
+                xerr=[
+                    [point.cpu_s - point.lower_s for point in points],
+                    [point.upper_s - point.cpu_s for point in points],
+                ],
+                label=label, color=color, marker=marker, markersize=5, linewidth=0.9,
+                elinewidth=0.6, markerfacecolor=color if fill else "none",
+                linestyle="-" if fill else "--",
+            )  # fmt: skip
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_ylim(FLOOR / 2.0, _CEILING)
+        panel.set_xlabel("processor time of one solution (s): median, quartiles")
+        panel.set_ylabel("relative error")
         drawing.figure.legend(
-            handles,
-            labels,
-            title=f"{title}: each method against 50 digits of its own model",
-            title_fontsize=9.5,
-            alignment="left",
-            loc="outside upper center",
-            ncols=4,
-            fontsize=7.0,
+            title=title, alignment="left", loc="outside upper center", ncols=columns, fontsize=7.5
         )
     return drawing.svg
 
 
-def _draw_method(panel: Axes, field: str, line: Sequence[Point]) -> None:
-    """Draw one method; colours stand for models, marks for solvers."""
-    drawn = [(point, getattr(point, field)) for point in line]
-    drawn = [(point, error) for point, error in drawn if error is not None]
-    if not drawn:
-        return
-    first = line[0]
-    kind = first.method.split()[-1]
-    fixed = first.method.startswith("fixed-step")
-    color = MUTED if fixed else _COLORS[first.model]
-    times = [point.median_s for point, _ in drawn]
-    bars = [
-        [point.median_s - point.lower_s for point, _ in drawn],
-        [point.upper_s - point.median_s for point, _ in drawn],
-    ]
-    panel.errorbar(
-        times,
-        [min(max(error, FLOOR), _CEILING) for _, error in drawn],
-        xerr=bars,
-        label=first.method,
-        color=color,
-        marker=_MARKERS.get(kind, "*"),
-        markersize=8 if kind not in _MARKERS else 4.5,
-        # Contact times make another model each: no curve of work against precision joins them.
-        linestyle="none" if first.model == "contact" else "-",
-        linewidth=0.9,
-        elinewidth=0.6,
-        capsize=0,
-        markerfacecolor="none" if first.model == "contact" else color,
-    )
-
-
-def scenes_figure(costs: Sequence[Cost]) -> str:
-    """Draw the costs of scenes as bars.
-
-    Parameters
-    ----------
-    costs
-        In the order in which they are drawn.
-
-    Returns
-    -------
-    str
-        SVG.
-    """
-    names = [cost.scene for cost in costs]
-    with canvas((1.5, 1.5, 1.9), simulated=False) as drawing:
-        modules, commands, work = drawing.axes
-        _bars(modules, names, [len(cost.account.rooms) for cost in costs])
-        modules.set_ylabel("modules of rig")
-        spreads = [cost.seconds["predict"] for cost in costs]
-        medians = [1e3 * spread.median for spread in spreads]
-        _bars(commands, names, medians, at="center")
-        ends = [
-            [1e3 * (spread.median - spread.low) for spread in spreads],
-            [1e3 * (spread.high - spread.median) for spread in spreads],
-        ]
-        commands.errorbar(names, medians, yerr=ends, fmt="none", ecolor=INK, elinewidth=0.8)
-        commands.set_ylabel("rig predict (ms)")
-        _bars(work, names, [cost.account.operations["predict"] for cost in costs])
-        work.set_yscale("log")
-        work.set_ylabel("bytecodes\nof the prediction")
-        work.tick_params(axis="x", labelrotation=40)
-        for label in work.get_xticklabels():
-            label.set_horizontalalignment("right")
-            label.set_rotation_mode("anchor")
+def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
+    """Draw errors against what the inputs' own rounding explains; return SVG."""
+    with canvas((4.4,), simulated=False) as drawing:
+        (panel,) = drawing.axes
+        for label, field, color, marker in (
+            ("the equations computed as printed", "naive_error", MUTED, "x"),
+            ("this program", "error", MODEL, "o"),
+        ):
+            known = [row for row in rows if getattr(row, field) is not None]
+            panel.plot(
+                [min(row.expected, 5.0) for row in known],
+                [min(max(getattr(row, field), FLOOR), 10.0) for row in known],
+                linestyle="none", marker=marker, color=color, markersize=3.5, label=label,
+            )  # fmt: skip
+        panel.axline((1e-16, 1e-16), (1.0, 1.0), color=INK, linewidth=0.8, label="error = κ·ε")
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_xlim(1e-16, 10.0)
+        panel.set_ylim(FLOOR / 2.0, 20.0)
+        panel.set_xlabel("κ·ε: what rounding of the inputs alone may cost")
+        panel.set_ylabel("relative error against 50 digits")
+        panel.legend(loc="best")
     return drawing.svg
 
 
-def _bars(
-    panel: Axes,
-    names: Sequence[str],
-    values: Sequence[float],
-    at: Literal["edge", "center"] = "edge",
-) -> None:
-    bars = panel.bar(names, values, color=MODEL, width=0.7)
-    color = INK if at == "edge" else PAPER
-    panel.bar_label(bars, fmt="{:.0f}", label_type=at, fontsize=6.5, padding=2, color=color)
-    panel.margins(y=0.15)
+def scenes_figure(names: Sequence[str], panels: Mapping[str, Sequence[float]]) -> str:
+    """Draw what scenes cost beside the whole, a panel a kind of cost; return SVG."""
+    with canvas((1.25,) * (len(panels) - 1) + (1.75,), simulated=False) as drawing:
+        for panel, (label, shares) in zip(drawing.axes, panels.items(), strict=True):
+            bars = panel.bar(names, shares, color=MODEL)
+            panel.bar_label(bars, fmt="{:.2g}", fontsize=6.5)
+            panel.margins(y=0.2)
+            panel.set_ylabel(label)
+            panel.set_xticks(range(len(names)), names, rotation=40, ha="right")
+    return drawing.svg

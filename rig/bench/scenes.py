@@ -1,42 +1,53 @@
-"""What each scene costs, from the simplest to the richest, and how little the simpler ones.
+"""``rig bench scenes``: what each scene costs beside the whole, and that it gains nothing else.
 
-Counts are the same on every run of one Python version. Times are not: every scene is timed in
-every round, ratios are taken within a round, and medians are given with their quartiles.
+Counts are the same on every run of a Python version. Processor times are not: every scene is timed
+in every round, ratios are taken within a round, and medians are given.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import statistics
 import subprocess
 import sys
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
+from rig.bench.figures import scenes_figure
+from rig.bench.findings import Findings
 from rig.errors import RigError
 from rig.predictions import predictions
 from rig.protocol.reader import parse
+from rig.streams import say
+from rig.text_table import text_table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from argparse import Namespace
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rig.protocol.protocol import Protocol
 
-PACKAGES = ("numpy", "yaml", "scipy", "matplotlib")
-"""Large packages that a scene may or may not load."""
+PARTS = {
+    "surface": {"rig.model.impact", "rig.model.surface",
+                "impact coefficients", "falls", "falls in air"},
+    "inclined surface": {"g(θ)"},
+    "air": {"rig.model.drag", "falls in air"},
+    "gates": {"rig.protocol.gates"},
+    "figures": {"numpy", "scipy", "matplotlib", "textual"},
+}  # fmt: skip
+"""Modules and calls that only a scene with this part may need; no prediction has figures."""
 _PROBE = "from rig.bench.scene_probe import main; main()"
 _PROBES = 3
 _ROOT = Path(__file__).parents[2]
-_TURN_S = 0.002  # long for the clock, short between two interruptions
+_CALLS = 20
 
-_LEVEL = "surface: {restitution: 0.50}\n"
-_INCLINED = "surface: {restitution: 0.50, friction: 0.20}\n"
-_UNSURE = "surface: {restitution: 0.50 ± 0.05, friction: 0.20 ± 0.02}\n"
-_DROP, _UNSURE_DROP = "drop: 180 mm\n", "drop: 180 mm ± 2 mm\n"
+_LEVEL, _INCLINED = "restitution: 0.50", "restitution: 0.50, friction: 0.20"
+_UNSURE = "surface: {restitution: 0.50 ± 0.05, friction: 0.20 ± 0.02}\ndrop: 180 mm ± 2 mm\n"
+_TWO, _AIR = "  B: {like: A}\n", "drag: {terminal_speed: 25 m/s}\n"
 _PLAN = "plan: {incline: 40 deg}\n"
 _PLANS = "plan: {incline: [30 deg, 40 deg, 50 deg, 60 deg, 70 deg, 80 deg], randomize: incline}\n"
 _GATES = """\
@@ -46,244 +57,226 @@ gates:
 release: {channel: 0, pulse: 80 ms}
 accept: {release_skew: 5 ms, missed_edges: 5 %}
 """
+_CHAIN = """\
+protocol: 1
+title: measured
+gravity: 9.81 m/s^2
+chains:
+  A: {{rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg{}}}
+"""
 
 
 @dataclass(frozen=True, slots=True)
-class LadderScene:
-    """A protocol to be measured.
-
-    Attributes
-    ----------
-    name
-        Short, for tables.
-    text
-        The protocol.
-    """
-
-    name: str
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Quartiles:
-    """Median and quartiles of all rounds."""
-
-    median: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, slots=True)
-class Account:
-    """What does not depend on the machine's mood.
+class Cost:
+    """What one scene costs.
 
     Attributes
     ----------
     modules
         Names of all modules that ``rig predict`` has loaded, Python's own included.
-    peak_bytes
-        Most memory resident.
-    operations
-        Bytecodes to ``read``, ``describe`` and ``predict``.
-    evaluations
-        How often the prediction evaluates what `rig.bench.scene_probe.COUNTED` names.
-    """
-
-    modules: tuple[str, ...]
-    peak_bytes: float
-    operations: dict[str, int]
-    evaluations: dict[str, int]
-
-    @property
-    def packages(self) -> tuple[str, ...]:
-        """Those of `PACKAGES` that are loaded."""
-        return tuple(name for name in PACKAGES if name in self.modules)
-
-    @property
-    def rooms(self) -> tuple[str, ...]:
-        """Our own modules."""
-        return tuple(name for name in self.modules if name.partition(".")[0] == "rig")
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """One line of the table.
-
-    Attributes
-    ----------
-    seconds
-        Of the whole commands ``check`` and ``predict``, Python's start included, and of the
-        prediction alone (``compute``).
-    ratios
-        The same over those of the simplest scene.
+    least_bytes, most_bytes
+        What Python holds when the command is done; from process to process.
+    calls
+        Of the prediction alone: of all functions, and of `rig.bench.scene_probe.COUNTED`.
+    command_s, compute_s
+        Processor time of ``rig predict``, Python's start included, and of the prediction alone.
+    shares
+        Each cost over that of the whole.
+    gained
+        What belongs to a part that this scene does not have; nothing, or the study fails.
     """
 
     scene: str
-    account: Account
-    seconds: dict[str, Quartiles]
-    ratios: dict[str, Quartiles]
+    modules: tuple[str, ...]
+    least_bytes: int
+    most_bytes: int
+    calls: dict[str, int]
+    command_s: float
+    compute_s: float
+    shares: dict[str, float]
+    gained: tuple[str, ...]
 
 
-def ladder() -> list[LadderScene]:
-    """The paper's chain, from free fall to the whole experiment."""
-    two = "  B: {like: A}\n"
-    air = "drag: {terminal_speed: 25 m/s}\n"
-    return [
-        LadderScene("free fall", _scene()),
-        LadderScene(
-            "α given, level", _scene("surface: {}\n", _DROP, keys=", alpha: 0.25, gamma: 1")
-        ),
-        LadderScene("level surface", _scene(_LEVEL, _DROP)),
-        LadderScene("inclined", _scene(_INCLINED, _DROP, _PLAN)),
-        LadderScene("± on β, μ, drop", _scene(_UNSURE, _UNSURE_DROP, _PLAN)),
-        LadderScene("second chain", _scene(two, _UNSURE, _UNSURE_DROP, _PLAN)),
-        LadderScene("six inclines", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS)),
-        LadderScene("gates", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS, _GATES)),
-        LadderScene("drag, no gates", _scene(two, _UNSURE, _UNSURE_DROP, _PLANS, air)),
-    ]
+def ladder() -> dict[str, str]:
+    """Return the paper's chain, from free fall to the whole experiment, as protocols by name."""
+    chain = _CHAIN.format("")
+    level, inclined = (f"surface: {{{keys}}}\ndrop: 180 mm\n" for keys in (_LEVEL, _INCLINED))
+    two = chain + _TWO + _UNSURE
+    return {
+        "free fall": chain,
+        "α given, level": _CHAIN.format(", alpha: 0.25, gamma: 1") + "surface: {}\ndrop: 180 mm\n",
+        "level surface": chain + level,
+        "inclined": chain + inclined + _PLAN,
+        "± on β, μ, drop": chain + _UNSURE + _PLAN,
+        "second chain": two + _PLAN,
+        "six inclines": two + _PLANS,
+        "gates": two + _PLANS + _GATES,
+        "air, no gates": two + _PLANS + _AIR,
+        "whole": two + _PLANS + _GATES + _AIR,
+    }
 
 
-def _scene(*parts: str, keys: str = "") -> str:
-    return f"""\
-protocol: 1
-title: measured
-gravity: 9.81 m/s^2
-chains:
-  A: {{rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg{keys}}}
-{"".join(parts)}"""
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Measure the ladder, then ready protocols; fail where a scene gains what it does not have."""
+    texts = ladder()
+    paths = sorted(Path(arguments.protocols).glob("*.yaml"))
+    if not paths:
+        say(f"no protocols in {arguments.protocols}: left out the ready ones")
+    texts |= {path.stem: path.read_text("utf-8") for path in paths}
+    costs = measure(texts, arguments.rounds)
+    names = [cost.scene for cost in costs]
+    panels = {
+        "modules\nof rig": [float(len(_rooms(cost))) for cost in costs],
+        "rig predict,\nof the whole": [cost.shares["command"] for cost in costs],
+        "calls,\nof the whole": [cost.shares["calls"] for cost in costs],
+    }
+    yield Findings(
+        {"python": sys.version.split()[0], "scenes": [asdict(cost) for cost in costs]},
+        [*_lines(costs)], _HEAD, [_row(cost) for cost in costs], scenes_figure(names, panels),
+        failed=any(cost.gained for cost in costs),
+    )  # fmt: skip
 
 
-def scenes(
-    ready: Iterable[Path], rounds: int, say: Callable[[str], None] = lambda _: None
-) -> list[Cost]:
-    """Measure every scene of `ladder`, then ready protocols.
+def measure(texts: Mapping[str, str], rounds: int) -> list[Cost]:
+    """Measure scenes; the one named ``whole`` is what the others are compared with.
 
     Parameters
     ----------
-    ready
-        Protocol files; they come in order of what a prediction takes.
+    texts
+        Protocols by name.
     rounds
         Of timing.
-    say
-        Told what goes on.
 
     Raises
     ------
     InputError
-        If a protocol file is bad.
+        If a protocol is bad.
     RigError
-        If a scene's process fails.
+        If a scene's process fails, or counts differently when it is asked again.
     """
-    extra = [LadderScene(path.stem, path.read_text("utf-8")) for path in ready]
+    protocols = {name: parse(text, name) for name, text in texts.items()}
     with TemporaryDirectory() as folder:
-        measured = [*ladder(), *extra]
-        files = [Path(folder) / f"{number}.yaml" for number in range(len(measured))]
-        read = [parse(scene.text, scene.name) for scene in measured]
-        for scene, file in zip(measured, files, strict=True):
-            file.write_text(scene.text, "utf-8")
+        files = {name: Path(folder) / f"{n}.yaml" for n, name in enumerate(texts)}
+        for name, file in files.items():
+            file.write_text(texts[name], "utf-8")
         say("counting …")
-        accounts = [account(file) for file in files]
+        counts = {name: _count(file) for name, file in files.items()}
         say("timing …")
-        times = _time_in_turns(files, read, rounds)
-    costs = [
-        Cost(scene.name, counted, _spreads(seconds), _ratios(seconds, times[0]))
-        for scene, counted, seconds in zip(measured, accounts, times, strict=True)
-    ]
-    steps = len(costs) - len(extra)
-    by_work = sorted(costs[steps:], key=lambda cost: cost.account.operations["predict"])
-    return [*costs[:steps], *by_work]
+        times = [
+            {
+                name: (float(_probe("time", file)), _seconds(protocols[name]))
+                for name, file in files.items()
+            }
+            for _ in range(rounds)
+        ]
+    costs = []
+    for name, counted in counts.items():
+        command_s, compute_s = (median(turn[name][n] for turn in times) for n in (0, 1))
+        shares = {
+            "command": median(turn[name][0] / turn["whole"][0] for turn in times),
+            "compute": median(turn[name][1] / turn["whole"][1] for turn in times),
+            "calls": counted["calls"]["calls"] / counts["whole"]["calls"]["calls"],
+        }
+        gained = _gained(protocols[name], counted)
+        costs.append(
+            Cost(
+                name,
+                command_s=command_s,
+                compute_s=compute_s,
+                shares=shares,
+                gained=gained,
+                **counted,
+            )
+        )
+    return costs
 
 
-def account(file: Path) -> Account:
-    """Have a fresh process predict a protocol and tell what that took.
-
-    Raises
-    ------
-    RigError
-        If the process fails, or counts differently when asked again.
-    """
-    reports = [json.loads(_child("-c", _PROBE, str(file))) for _ in range(_PROBES)]
-    peak = statistics.median(report.pop("peak_bytes") for report in reports)
-    first, *repeats = reports
-    if any(repeat != first for repeat in repeats):
+def _count(file: Path) -> dict[str, Any]:
+    reports = [json.loads(_probe("count", file)) for _ in range(_PROBES)]
+    sizes = [report.pop("bytes") for report in reports]
+    first, *others = reports
+    if any(other != first for other in others):
         raise RigError(f"{file.name}: two equal runs do not count the same")
-    return Account(tuple(first["modules"]), peak, first["operations"], first["evaluations"])
+    return {
+        **first,
+        "modules": tuple(first["modules"]),
+        "least_bytes": min(sizes),
+        "most_bytes": max(sizes),
+    }
 
 
-def _child(*arguments: str) -> str:
-    """Run Python and return what it prints."""
+def _probe(task: str, file: Path) -> str:
+    """Have a fresh Python process look at a scene, and return what it prints."""
     search = os.pathsep.join([str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(
-        [sys.executable, *arguments],
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
+        [sys.executable, "-c", _PROBE, task, str(file)],
+        capture_output=True, encoding="utf-8", check=False,
         env={**os.environ, "PYTHONPATH": search, "PYTHONHASHSEED": "0", "PYTHONUTF8": "1"},
-    )
+    )  # fmt: skip
     if done.returncode:
         raise RigError("a scene could not be measured", done.stderr.strip())
     return done.stdout
 
 
-def _time_in_turns(
-    files: Sequence[Path], protocols: Sequence[Protocol], rounds: int
-) -> list[dict[str, list[float]]]:
-    """Seconds by scene and kind, one a round."""
-    times: list[dict[str, list[float]]] = [
-        {"check": [], "predict": [], "compute": []} for _ in files
-    ]
-    turns = []
-    for protocol in protocols:
-        _seconds(protocol, 3)  # a first call is slow
-        turns.append(max(1, round(_TURN_S / _seconds(protocol, 3))))
-    for _ in range(rounds):
-        for file, protocol, often, seconds in zip(files, protocols, turns, times, strict=True):
-            for command in ("check", "predict"):
-                begin = time.perf_counter()
-                _child("-m", "rig", command, str(file))
-                seconds[command].append(time.perf_counter() - begin)
-            seconds["compute"].append(_seconds(protocol, often))
-    return times
-
-
-def _seconds(protocol: Protocol, turns: int) -> float:
-    begin = time.perf_counter()
-    for _ in range(turns):
+def _seconds(protocol: Protocol) -> float:
+    predictions(protocol)  # a first call is slow
+    begin = process_time()
+    for _ in range(_CALLS):
         predictions(protocol)
-    return (time.perf_counter() - begin) / turns
+    return (process_time() - begin) / _CALLS
 
 
-def _spreads(times: Mapping[str, Sequence[float]]) -> dict[str, Quartiles]:
-    return {kind: _spread(values) for kind, values in times.items()}
+def _gained(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str, ...]:
+    """List what was loaded or called for parts that the scene does not have."""
+    surface = protocol.surface is not None
+    from_surface = any(rods.chain.alpha is None for rods in protocol.chains.values())
+    tilted = surface and from_surface and max(protocol.plan.inclines) > 0.0
+    present = {
+        "surface": surface, "inclined surface": tilted, "air": protocol.drag is not None,
+        "gates": protocol.gates is not None, "figures": False,
+    }  # fmt: skip
+    used = {*counted["modules"], *(name for name, calls in counted["calls"].items() if calls)}
+    return tuple(
+        f"{name} ({part})"
+        for part, needs in PARTS.items()
+        if not present[part]
+        for name in sorted(needs & used)
+    )
 
 
-def _ratios(
-    times: Mapping[str, Sequence[float]], simplest: Mapping[str, Sequence[float]]
-) -> dict[str, Quartiles]:
+def _rooms(cost: Cost) -> list[str]:
+    return [name for name in cost.modules if name.partition(".")[0] == "rig"]
+
+
+def _row(cost: Cost) -> dict[str, str]:
+    """Return a line of the table, which is also that of the CSV file."""
+    shares = {f"{name} ×": f"{share:.2g}" for name, share in cost.shares.items()}
     return {
-        kind: _spread([a / b for a, b in zip(values, simplest[kind], strict=True)])
-        for kind, values in times.items()
-    }
+        "scene": cost.scene, "modules": f"{len(cost.modules)}", "of rig": f"{len(_rooms(cost))}",
+        "MB held": f"{cost.least_bytes / 1e6:.2f}–{cost.most_bytes / 1e6:.2f}",
+        "command ms": f"{1e3 * cost.command_s:.1f}", "compute µs": f"{1e6 * cost.compute_s:.3g}",
+        **shares, **{name: f"{calls}" for name, calls in cost.calls.items()},
+    }  # fmt: skip
 
 
-def _spread(values: Sequence[float]) -> Quartiles:
-    if len(values) == 1:
-        return Quartiles(values[0], values[0], values[0])
-    low, median, high = statistics.quantiles(values, n=4, method="inclusive")
-    return Quartiles(median, low, high)
+def _lines(costs: Sequence[Cost]) -> Iterator[str]:
+    """Lay the costs out as text, then what each scene leaves out that the whole has."""
+    rows = [_row(cost) for cost in costs]
+    yield from text_table([[*rows[0]], *([*row.values()] for row in rows)], left={0}, rule=True)
+    whole = next(cost for cost in costs if cost.scene == "whole")
+    yield from ("", "× is over the whole; left out of the whole:")
+    for cost in costs:
+        without = sorted(set(_rooms(whole)) - set(_rooms(cost)))
+        without += [name for name, calls in whole.calls.items() if calls and not cost.calls[name]]
+        yield f"  {cost.scene}: {', '.join(without) or 'nothing'}"
+    faults = [f"{cost.scene} gained {name}" for cost in costs for name in cost.gained]
+    yield from ("", *(faults or ["no scene gained what it does not have"]))
 
 
-def as_json(costs: Sequence[Cost]) -> dict[str, Any]:
-    """Everything as plain objects; ``added`` lists what a scene loads beyond the simplest."""
-    simplest = set(costs[0].account.modules)
-    return {
-        "python": sys.version.split()[0],
-        "scenes": [
-            {
-                **asdict(cost),
-                "packages": cost.account.packages,
-                "added": [name for name in cost.account.modules if name not in simplest],
-            }
-            for cost in costs
-        ],
-    }
+_HEAD = """\
+# What each scene leaves out
+
+`rig bench scenes`: what a scene does not have is neither loaded nor computed, or the bench fails.
+Counts are reproducible; times are of one machine. `rig check` says in words what was left out.
+
+![Costs of scenes](scenes.svg)"""

@@ -1,193 +1,176 @@
-"""How the model fares at the ends of what can be asked, against 50 digits."""
+"""``rig bench stability``: the model at the ends of what can be asked, against 50 digits.
+
+What rounding of the inputs alone may cost is κ·ε, κ being the condition: the sum over the inputs of
+how many times their relative errors grow. An error beyond that, but for the roundings of a sum over
+all rods, is a fault of the program.
+"""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
-from rig.bench.extremes import PITCH, Extreme, extremes
-from rig.bench.reference import Exact, exact_coefficients, exact_fall
-from rig.errors import DomainError
-from rig.model.chain import Chain
-from rig.model.drag import drag_fall
-from rig.model.fall import Fall, fall, kicks
-from rig.model.impact import Impact, impact_on
-from rig.model.surface import Surface
-from rig.units import Quantity
+from rig.bench import references
+from rig.bench.extremes import Extreme, alone, pairs
+from rig.bench.problems import beam_fit, contact, fall_time
+from rig.bench.work import EPSILON, relative_error
+from rig.errors import DomainError, RigError
 
-SOUND = 343.0
-"""Speed of sound in air at 20 °C, m/s."""
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from rig.bench.references import Number, Values
+    from rig.bench.work import WorkProblem
+
+    Floats = Mapping[str, float]
+
+SLACK = 4.0
+"""Roundings of one leg that may count, in ε; those of n legs add up as √n."""
+CONTACTS_S = tuple(10.0**-n for n in range(1, 13))
+BANDS_M = tuple(10.0**-n for n in range(6))
+KAPPAS = tuple(10.0**n for n in range(-15, 4, 2))
+"""Ends of problems: how long impacts last, s; over how many metres the beams of a fit are spread;
+1/m of the air in which the time of a fall is looked for."""
+_NUDGE = Decimal("1e-22")
+_MANY = 1000  # rods of which a condition is worked out
+VERDICTS = ("exact", "noted", "refused", "FAILED")
+
+
+@dataclass(frozen=True, slots=True)
+class ExactCase:
+    """Something to compute.
+
+    Attributes
+    ----------
+    inputs
+        Numbers whose rounding counts.
+    exact
+        True values by quantity, of these inputs or of others near them.
+    ours, naive
+        The program's values with notes on the domain, and those of the equations as printed.
+    slack, unit
+        How many times κ·unit an error may be: unit is ε, or a solver's tolerance.
+    """
+
+    name: str
+    inputs: Mapping[str, Number]
+    exact: Callable[[Mapping[str, Number]], Values]
+    ours: Callable[[], tuple[Floats, str]]
+    naive: Callable[[], Mapping[str, Number]]
+    slack: float = SLACK
+    unit: float = EPSILON
 
 
 @dataclass(frozen=True, slots=True)
 class StabilityRow:
-    """One line of the table.
+    """One quantity of one case.
 
     Attributes
     ----------
-    separation_error, speed_error
+    error
         Relative, against 50 digits; `None` where the model refuses.
+    condition, expected
+        κ, and κ·ε; of a general solver κ times its tolerance.
+    backward
+        Relative change of the inputs that explains the error.
+    naive_error, naive
+        Of the equations computed as printed with the digits and the range of a float; or its end.
     verdict
         ``exact``, ``noted`` (outside the domain, and said so), ``refused`` (a clear error), or
         ``FAILED``.
     note
         The domain note or error, word for word.
-    naive
-        What becomes of the same scene when it is evaluated as the equations are printed.
     """
 
-    group: str
-    value: str
-    separation_error: float | None
-    speed_error: float | None
+    case: str
+    quantity: str
+    error: float | None
+    condition: float
+    expected: float
+    backward: float
+    naive_error: float | None
+    naive: str
     verdict: str
     note: str
-    naive: str
 
 
-def stability(progress: Callable[[StabilityRow], None] | None = None) -> list[StabilityRow]:
-    """Try every scene of `rig.bench.extremes.extremes`.
+def stability(
+    *, quick: bool = False, say: Callable[[str], None] = lambda _: None
+) -> list[StabilityRow]:
+    """Examine each quantity by itself, the problems of `rig.bench.problems`, and pairs.
 
     Parameters
     ----------
-    progress
-        Told each row as it is done.
+    quick
+        Without chains of more than a thousand rods, and with few problems.
+    say
+        Told what goes on.
     """
-    rows = []
-    for scene in extremes():
-        row = examine(scene)
-        rows.append(row)
-        if progress is not None:
-            progress(row)
-    return rows
+    say("each quantity by itself …")
+    cases = [of_fall(scene) for scene in alone() if not quick or len(scene.masses) <= _MANY]
+    for make, ends in ((contact, CONTACTS_S), (beam_fit, BANDS_M), (fall_time, KAPPAS)):
+        cases += [of_problem(make(end)) for end in ends[:: 4 if quick else 1]]
+    rows = [row for case in cases for row in examine(case)]
+    say("every two together …")
+    return rows + [row for scene in pairs() for row in examine(of_fall(scene))]
 
 
-def examine(scene: Extreme) -> StabilityRow:
-    """Try one scene; a warning counts as a failure."""
+def examine(case: ExactCase) -> list[StabilityRow]:
+    """Compare a case with its true values, quantity by quantity; a warning counts as a failure."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            impact = _impact(scene)
-            result = _fall(scene, impact)
-        except DomainError as error:
-            return StabilityRow(scene.group, scene.value, None, None, "refused", error.message, "–")
-        except (ArithmeticError, ValueError, Warning) as error:
-            words = f"{type(error).__name__}: {error}"
-            return StabilityRow(scene.group, scene.value, None, None, "FAILED", words, "–")
-    exact = _exact(scene)
-    separation = relative_error(result.separation_m, exact.separation)
-    speed = relative_error(result.speed_m_s, exact.speed)
-    good = max(separation, speed) <= scene.allowed
-    verdict = "FAILED" if not good else "noted" if impact.notes else "exact"
-    note = "; ".join(impact.notes)
-    return StabilityRow(
-        scene.group, scene.value, separation, speed, verdict, note, _naive(scene, impact, exact)
-    )
-
-
-def relative_error(result: float, exact: Decimal) -> float:
-    """|found/exact − 1|; infinite where found is no number, 0 where no float is nearer."""
-    if result == float(exact):
-        return 0.0
-    if not math.isfinite(result) or exact == 0:
-        return math.inf
-    return float(abs(Decimal(result) / exact - 1))
-
-
-def _fall(scene: Extreme, impact: Impact) -> Fall:
-    chain, where = scene.chain, (scene.drop, scene.gravity, scene.initial_speed)
-    if not scene.kappa:
-        return fall(chain, impact.alpha, impact.gamma, *where)
-    gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
-    return drag_fall(chain, gains, [scene.kappa] * chain.rods, *where)
-
-
-def _impact(scene: Extreme) -> Impact:
-    chain = scene.chain
-    if scene.alpha is not None:
-        gamma = impact_on(scene.surface, chain, 0.0).gamma
-        chain = replace(chain, alpha=Quantity(scene.alpha), gamma=gamma)
-    return impact_on(scene.surface, chain, scene.incline_deg)
-
-
-def _exact(scene: Extreme) -> Exact:
-    chain = scene.chain
-    alpha, gamma = exact_coefficients(
-        scene.restitution, scene.friction, scene.incline_deg, chain.inertia, chain.inertia_z
-    )
-    if scene.alpha is not None:
-        alpha = Decimal(scene.alpha)
-    body = chain.masses, chain.heights, [alpha] * chain.rods, [gamma] * chain.rods
-    return exact_fall(*body, scene.drop, scene.gravity, scene.initial_speed, scene.kappa)
-
-
-def _naive(scene: Extreme, impact: Impact, exact: Exact) -> str:
-    """Evaluate as printed: times as (V' − V)/g, Δz as a difference of heights, J before J/M."""
-    chain, g = scene.chain, scene.gravity
-    if scene.kappa:
-        return "without air"
+            values, note = case.ours()
+        except (RigError, ArithmeticError, ValueError, Warning) as fault:
+            verdict, words = "FAILED", f"{type(fault).__name__}: {fault}"
+            if isinstance(fault, DomainError):
+                verdict, words = "refused", fault.message
+            return [StabilityRow(case.name, "", None, 0.0, 0.0, 0.0, None, "–", verdict, words)]
     try:
-        mass = sum(chain.masses)
-        time, speed, before = 0.0, scene.initial_speed, -scene.drop
-        arrival = speed
-        for k, height in enumerate(chain.heights):
-            arrival = math.sqrt(speed**2 + 2 * g * (height - before))
-            time += (arrival - speed) / g
-            mass -= chain.masses[k]
-            if k < chain.rods - 1:
-                m = chain.masses[k]
-                speed = arrival + impact.alpha * m * arrival / (1 + impact.gamma * m / mass) / mass
-            before = height
-        top = scene.drop + chain.heights[-1]
-        separation = top - scene.initial_speed * time - 0.5 * g * time**2
-    except ArithmeticError as error:
-        return type(error).__name__
-    errors = relative_error(separation, exact.separation), relative_error(arrival, exact.speed)
-    return f"{errors[0]:.0e} {errors[1]:.0e}"
+        naive, end = case.naive(), ""
+    except (RigError, ArithmeticError) as fault:
+        naive, end = {}, type(fault).__name__
+    rows = []
+    for name, (exact, condition) in _conditions(case).items():
+        error, expected = relative_error(values[name], exact), case.unit * max(1.0, condition)
+        plain = relative_error(float(naive[name]), exact) if naive else None
+        verdict = "FAILED" if error > case.slack * expected else "noted" if note else "exact"
+        rows.append(StabilityRow(
+            case.name, name, error, condition, expected, error / max(1.0, condition), plain,
+            end if plain is None else f"{plain:.0e}", verdict, note,
+        ))  # fmt: skip
+    return rows
 
 
-@dataclass(frozen=True, slots=True)
-class Sonic:
-    """How long a chain must be for its end to break the speed of sound.
-
-    Attributes
-    ----------
-    ratio
-        Mass of each rod over that of the rod below.
-    rods, length_m, decades
-        Of the shortest such chain, and by how many powers of ten its mass per rod falls.
-    """
-
-    ratio: float
-    rods: int
-    length_m: float
-    decades: float
+def _conditions(case: ExactCase) -> dict[str, tuple[Decimal, float]]:
+    """Return each true value and its condition."""
+    values = case.exact(case.inputs)
+    conditions = dict.fromkeys(values, 0.0)
+    with references.many_digits():
+        for name, value in case.inputs.items():
+            nudged = case.exact({**case.inputs, name: Decimal(value) * (1 + _NUDGE)})
+            for quantity, exact in values.items():
+                if exact:
+                    conditions[quantity] += float(abs(nudged[quantity] / exact - 1) / _NUDGE)
+    return {name: (exact, conditions[name]) for name, exact in values.items()}
 
 
-def sonic_lengths(ratios: Iterable[float] = (0.9, 0.7, 0.5, 0.3)) -> list[Sonic]:
-    """Find the shortest chains that end faster than sound, on a hard level surface without air.
-
-    Rods are `PITCH` apart and fall 18 cm before the first impact, as in the paper.
-    """
-    result = []
-    for ratio in ratios:
-        low, high = 2, 4
-        while _end_speed(ratio, high) < SOUND:
-            low, high = high, 2 * high
-        while high - low > 1:
-            middle = (low + high) // 2
-            if _end_speed(ratio, middle) < SOUND:
-                low = middle
-            else:
-                high = middle
-        result.append(Sonic(ratio, high, (high - 1) * PITCH, (high - 1) * -math.log10(ratio)))
-    return result
+def of_fall(scene: Extreme) -> ExactCase:
+    """Return the fall of a scene; of a long chain the condition is taken to be 1."""
+    return ExactCase(
+        scene.name, scene.inputs if len(scene.masses) <= _MANY else {},
+        lambda inputs: scene.exact({**scene.inputs, **inputs}), scene.predict,
+        lambda: scene.exact(scene.inputs, as_float=True), SLACK * math.sqrt(len(scene.masses)),
+    )  # fmt: skip
 
 
-def _end_speed(ratio: float, rods: int) -> float:
-    chain = Chain(tuple(ratio**k for k in range(rods)), tuple(PITCH * k for k in range(rods)))
-    impact = impact_on(Surface(Quantity(0.5)), chain, 0.0)
-    return fall(chain, impact.alpha, impact.gamma, 0.18, 9.81).speed_m_s
+def of_problem(problem: WorkProblem) -> ExactCase:
+    """Return a problem of `rig bench precision`, by the method to choose there."""
+    return ExactCase(
+        problem.title, problem.inputs, lambda inputs: problem.exact(**inputs),
+        lambda: (problem.best(problem.ours).values, ""),
+        lambda: problem.best(problem.naive).values, unit=problem.unit,
+    )  # fmt: skip

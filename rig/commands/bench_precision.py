@@ -1,77 +1,118 @@
-"""``rig bench precision``."""
+"""``rig bench precision``: error against processor time of every method on every problem."""
 
 from __future__ import annotations
 
-from argparse import Namespace
-from dataclasses import asdict, fields
-from functools import partial
-from itertools import groupby
-from pathlib import Path
+from dataclasses import asdict
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
-from rig.bench.figures import precision_figure
-from rig.bench.precision import Cheapest, Gap, Point, Precision, as_json, precision
-from rig.commands.output import print_found, say, write_study
-from rig.files import make_folder, write_atomic
-from rig.text_table import csv_text
+from rig.bench.figures import choice_figure, work_figure
+from rig.bench.findings import Findings
+from rig.bench.problems import problems
+from rig.bench.references import own_error
+from rig.bench.work import TARGETS, LeftOut, Point, WorkProblem, cheapest, measure
+from rig.commands.output import say
+from rig.commands.study import carry_out
+from rig.text_table import text_table
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator, Sequence
 
 _HEAD = """\
-# Cheapest way to compute the model
+# Error against run time
 
-`rig bench precision`: error against 50 digits, and run time, of every method and tolerance. Times
-are of one machine: compare them with each other. Every point is in `precision.csv`."""
+`rig bench precision`: relative error against a reference in 50 digits, and processor time, of every
+method at every setting. Times are of one machine: compare them with each other. `(rig)` is what
+this program does. Every point is in `precision.csv`.
+
+![What to choose](precision.svg)
+
+The line of each problem is the method to choose there. All methods:
+
+"""
 
 
 def main(arguments: Namespace) -> int:
-    """Sweep, keep tables and pictures, print what is cheapest and what was left out."""
-    folder = make_folder(arguments.output)
-    study = precision(quick=arguments.quick, progress=say, keep=partial(_write, folder))
-    print_found(as_json(study), lambda: summary(study), as_json=arguments.json)
-    return 0
+    """Measure problem after problem; keep what there is so far, print it at the end."""
+    return carry_out("precision", _measure, arguments)
 
 
-def summary(study: Precision) -> str:
-    """The cheapest methods, how far the models are apart, and what was left out."""
-    lines = []
-    for name, title in study.scenes:
-        lines.append(f"{title}: cheapest method for a relative error of Δz")
-        rows: dict[str, list[Cheapest]] = {}
-        for method in study.cheapest:
-            if method.scene == name:
-                rows.setdefault(_model(method), []).append(method)
-        width = max(map(len, rows))
-        for model, row in rows.items():
-            for winner, won in groupby(row, key=_winner):
-                targets = [f"{method.target:.0e}" for method in won]
-                lines.append(f"  {model:<{width}}  {', '.join(targets)}: {winner}")
-        lines += [
-            f"  {_model(gap):<{width}}  less discrete: Δz {gap.separation_relative:+.2e}, "
-            f"V {gap.speed_relative:+.2e}, gate {gap.gate_difference_s:+.2e} s"
-            for gap in study.gaps
-            if gap.scene == name
-        ]
-        omitted = sum(out.scene == name for out in study.left_out)
-        lines.append(f"  left out: {omitted}, see precision.json")
-    return "\n".join(lines)
+def _measure(arguments: Namespace) -> Iterator[Findings]:
+    study = Study()
+    for problem in problems(quick=arguments.quick):
+        say(f"{problem.title} …")
+        study.add(problem, *measure(problem, quick=arguments.quick))
+        yield study.findings()
 
 
-def _model(of: Cheapest | Gap) -> str:
-    return of.model if of.contact_time_s is None else f"{of.model} τ {of.contact_time_s:.0e} s"
+class Study:
+    """Problems, and what was measured of them."""
+
+    def __init__(self, name: str = "precision", head: str = _HEAD) -> None:
+        self._name, self._head = name, head
+        self.problems: list[WorkProblem] = []
+        self.points: list[Point] = []
+        self.left_out: list[LeftOut] = []
+
+    def add(
+        self, problem: WorkProblem, points: Sequence[Point], left_out: Sequence[LeftOut]
+    ) -> None:
+        """Take in what was measured of one more problem."""
+        self.problems.append(problem)
+        self.points += points
+        self.left_out += left_out
+
+    def findings(self) -> Findings:
+        """Return the page, its pictures and its tables."""
+        pictures = {
+            f"{self._name}-{problem.name}": work_figure(problem.title, self._of(problem))
+            for problem in self.problems
+        }
+        head = self._head + "\n\n".join(f"![{name}]({name}.svg)" for name in pictures)
+        choices = {one.title: points for one in self.problems if (points := self._choice(one))}
+        return Findings(
+            self._record(), [*self.table(), "", *self.remarks()], head,
+            [point.row() for point in self.points],
+            choice_figure(choices),
+            pictures,
+        )  # fmt: skip
+
+    def _of(self, problem: WorkProblem) -> list[Point]:
+        return [point for point in self.points if point.problem == problem.name]
+
+    def _choice(self, problem: WorkProblem) -> list[Point]:
+        """All settings of the method that is cheapest at the hardest target that any reaches."""
+        points = self._of(problem)
+        reached = [best for target in TARGETS if (best := cheapest(points, target))]
+        return [point for point in points if reached and point.method == reached[-1].method]
+
+    def table(self) -> list[str]:
+        """Return the cheapest setting of each problem for each of `TARGETS`."""
+        rows = [["problem", *(f"error ≤ {target:.0e}" for target in TARGETS)]]
+        for problem in self.problems:
+            best = [_words(cheapest(self._of(problem), target)) for target in TARGETS]
+            again = ("″" if cell == last else cell for last, cell in pairwise(best))
+            rows.append([problem.title, best[0], *again])
+        return text_table(rows, left=range(5), rule=True)
+
+    def remarks(self) -> Iterator[str]:
+        """Say how well references are known, and what was left out."""
+        known = max(own_error(one.exact, one.inputs) for one in self.problems)
+        routes = dict.fromkeys(one.route for one in self.problems)
+        yield f"references, known to {max(1e-50, known):.0e}: {'; '.join(routes)}"
+        for one in self.left_out:
+            yield f"left out: {one.problem}, {one.method}, from {one.setting} on: {one.reason}"
+
+    def _record(self) -> dict[str, Any]:
+        return {
+            "problems": [{"name": one.name, "title": one.title} for one in self.problems],
+            "points": [asdict(point) for point in self.points],
+            "left_out": [asdict(one) for one in self.left_out],
+        }
 
 
-def _winner(method: Cheapest) -> str:
-    if method.median_s is None:
-        return "none gets there"
-    setting = f", {method.setting}" if method.contact_time_s is None else ""
-    return f"{method.median_s * 1e6:.1f} µs, {method.method}{setting}"
-
-
-def _write(folder: Path, study: Precision) -> None:
-    """Write ``precision.csv``, ``precision.json`` and a picture for each scene so far."""
-    columns = [field.name for field in fields(Point)]
-    table = csv_text(columns, (asdict(point) for point in study.points))
-    for name, title in study.scenes:
-        points = [point for point in study.points if point.scene == name]
-        write_atomic(folder / f"precision-{name}.svg", precision_figure(title, points))
-    pictures = [f"![{title}](precision-{name}.svg)" for name, title in study.scenes]
-    head, lines = "\n\n".join([_HEAD, *pictures]), summary(study).splitlines()
-    write_study(folder, "precision", head, lines, as_json(study), table)
+def _words(point: Point | None) -> str:
+    if not point:
+        return "–"
+    return f"{point.method}, {point.setting}: {1e3 * point.cpu_s:.3g} ms".replace(", –", "")

@@ -13,13 +13,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rig.command_help import runnable
-from rig.files import write_atomic
 from rig.streams import say as narrate
 from rig.streams import tolerated
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from rig.analysis.session import Analysis
     from rig.results import SessionResults
@@ -96,32 +94,6 @@ def stage(label: str) -> None:
     if sys.stderr.isatty():
         with tolerated(sys.stderr):
             print(f"\r\x1b[K{label}", end="", file=sys.stderr, flush=True)
-
-
-def write_study(
-    folder: Path, name: str, head: str, lines: Sequence[str], data: Mapping[str, Any],
-    table: str, picture: str | None = None,
-) -> None:  # fmt: skip
-    """Write the files of a study.
-
-    Parameters
-    ----------
-    folder, name
-        Where they go, and how they begin: .json, .csv, .svg and .md.
-    head, lines
-        Of the page: what stands above, in Markdown, and its tables as text.
-    whole, table, picture
-        All that was found; every line of it as CSV; as SVG, where there is a picture.
-    """
-    texts = {
-        "json": json.dumps(data, indent=2, ensure_ascii=False) + "\n",
-        "csv": table,
-        "svg": picture,
-        "md": "\n".join([head, "", "```text", *lines, "```", ""]),
-    }
-    for kind, text in texts.items():
-        if text:
-            write_atomic(folder / f"{name}.{kind}", text)
 
 
 def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bool) -> None:

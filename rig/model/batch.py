@@ -150,27 +150,29 @@ def _block_ends(
 ) -> tuple[Floats, Floats, Floats]:
     """Δz, V and t of falls rod by rod; masses, heights of ``(rods,)``, all else ``(falls,)``."""
     twice_g = gravity * 2.0
-    first = height[0] + drop
-    arrival, time = _leg(first, initial_speed, twice_g)
+    arrival = np.sqrt(initial_speed * initial_speed + twice_g * drop)
     # A rod released on the contact point strikes at once, though its leg's time was 0/0.
-    arrival = np.where(first == 0.0, initial_speed, arrival)
-    time = np.where(first == 0.0, 0.0, time)
-    gained, separation = np.zeros_like(drop), np.zeros_like(drop)
-    # Summed from the top, as in rig.model.fall.kicks.
-    above = np.cumsum(mass[:0:-1])[::-1]
-    for m, rest, gap in zip(mass[:-1], above, np.diff(height), strict=True):
-        step = arrival * (alpha * m / (gamma * m + rest))  # Eq. 9
+    arrival = np.where(drop == 0.0, initial_speed, arrival)
+    time = np.where(drop == 0.0, 0.0, 2.0 * drop / (initial_speed + arrival))
+    gained, separation, speed, step = np.zeros((4, drop.size))
+    above = np.cumsum(mass[:0:-1])[::-1]  # from the top, as in rig.model.chain.Chain.legs
+    # In place: a fresh array for each result takes longer than its arithmetic.
+    for gap, ratio in zip(np.diff(height).tolist(), (above / mass[:-1]).tolist(), strict=True):
+        np.add(gamma, ratio, out=step)
+        np.divide(alpha, step, out=step)
+        step *= arrival  # Eq. 9
         gained += step
-        arrival, duration = _leg(gap, arrival + step, twice_g)
+        np.add(arrival, step, out=speed)
+        np.multiply(speed, speed, out=arrival)
+        np.multiply(twice_g, gap, out=step)
+        arrival += step
+        np.sqrt(arrival, out=arrival)
+        speed += arrival
+        duration = np.divide(2.0 * gap, speed, out=speed)
         time += duration
-        separation += gained * duration
+        duration *= gained
+        separation += duration
     return separation, arrival, time
-
-
-def _leg(distance: Floats | float, speed: Floats, twice_g: Floats) -> tuple[Floats, Floats]:
-    """Speed at the end of a free fall over a distance, and its duration."""
-    arrival = np.sqrt(speed * speed + twice_g * distance)
-    return arrival, 2.0 * distance / (speed + arrival)
 
 
 def _gamma(inertia: Floats, inertia_above: Floats) -> Floats:

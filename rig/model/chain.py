@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,7 +16,7 @@ UNIFORM_ROD_INERTIA = 1.0 / 3.0
 """ξ = 4I/(mL²) of a uniform rod about its middle (below Eq. 8)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots, so that `legs` is worked out once
 class Chain:
     """Masses and places of the rods, bottom up.
 
@@ -52,3 +54,14 @@ class Chain:
     def length(self) -> float:
         """Middle of the bottom rod to the middle of the top rod, m."""
         return self.heights[-1]
+
+    @cached_property
+    def legs(self) -> tuple[tuple[float, float], ...]:
+        """After each impact but the top rod's: the gap to the next rod, m, and M/m of Eq. 9.
+
+        M is the mass above the rod that struck and m its own. M is summed from the top, so that a
+        light end on a heavy chain keeps its digits.
+        """
+        above = [*accumulate(self.masses[:0:-1])][::-1]
+        pairs = zip(pairwise(self.heights), above, self.masses, strict=False)
+        return tuple((high - low, rest / mass) for (low, high), rest, mass in pairs)

@@ -44,9 +44,6 @@ if TYPE_CHECKING:
 _FARTHEST = 45.0
 """x beyond which nothing is left to add: e^−45 of the chain, 1e-18 of Δz and of t."""
 
-_SERIES_BELOW = 0.5
-"""Argument below which the differences in S17 are summed as series."""
-
 
 @dataclass(frozen=True, slots=True)
 class UniformChain:
@@ -249,52 +246,6 @@ def separation_leading_order(alpha: float, length_m: float, reach_m: float) -> f
     if ratio > 0.0:
         braces += c * ratio / (c + 1.0) * math.log(ratio / (c * (c + 1.0)))
     return 2.0 * alpha * length_m * braces
-
-
-def separation_fast(alpha: float, length_m: float, reach_m: float) -> float:
-    """Δz of a chain so fast that gravity no longer matters (h ≫ z₀), S17, m.
-
-    Exact in α. S17 as printed cancels for γs ≫ z₀; with ε = z₀/γs and y = α ln(1 + ε) it is
-    ``γs [α (ε − ln(1 + ε)) + (y − 1 + e^−y)]/(1 + α)``, both terms positive.
-
-    Parameters
-    ----------
-    reach_m
-        γs.
-    """
-    if reach_m == 0.0:
-        return length_m * alpha / (1.0 + alpha)
-    ratio = length_m / reach_m
-    logarithm = math.log1p(ratio)
-    if ratio < _SERIES_BELOW:
-        excess = reach_m * _log_excess(ratio)
-    else:
-        excess = length_m - reach_m * logarithm
-    return (alpha * excess + reach_m * _exp_excess(alpha * logarithm)) / (1.0 + alpha)
-
-
-def _log_excess(e: float) -> float:
-    """ε − ln(1 + ε) for 0 ≤ ε < ½, by ln(1 + ε) = 2 artanh(w) with w = ε/(2 + ε)."""
-    w = e / (2.0 + e)
-    # ε = 2w/(1 − w), so ε − 2 artanh(w) = 2w²/(1 − w) − 2(w³/3 + w⁵/5 + …).
-    term, total, k = w * w * w, 0.0, 3
-    while term > 1e-18 * w * w:
-        total += term / k
-        term *= w * w
-        k += 2
-    return 2.0 * (w * w / (1.0 - w) - total)
-
-
-def _exp_excess(y: float) -> float:
-    """Y − 1 + e^−y for y ≥ 0."""
-    if y >= _SERIES_BELOW:
-        return y + math.expm1(-y)
-    term, total, k = 0.5 * y * y, 0.0, 2
-    while abs(term) > 1e-18 * total:
-        total += term
-        k += 1
-        term *= -y / k
-    return total
 
 
 def _span(chain: UniformChain) -> float:

@@ -20,10 +20,11 @@ from fractions import Fraction
 from functools import lru_cache
 from itertools import accumulate
 from math import atanh, cos, exp, expm1, inf, log, log1p, radians, sinh, sqrt, tanh
+from operator import mul
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, Hit
+from rig.model.fall import Fall, Hit, checked_fall, impacts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -98,15 +99,10 @@ def drag_hits(
     drop, gravity, initial_speed
         As in `rig.model.fall.hits`; none negative.
     """
-    events: list[Hit] = []
-    time, speed, before = 0.0, initial_speed, -drop
-    for height, gain, kappa in zip(chain.heights, gains, kappas, strict=True):
-        arrival, duration = drag_leg(height - before, speed, gravity, kappa)
-        time += duration
-        speed = arrival * (1.0 + gain)
-        before = height
-        events.append(Hit(time, arrival, speed))
-    return events
+    return impacts(
+        chain, gains, drop, initial_speed,
+        lambda rod, distance, speed: drag_leg(distance, speed, gravity, kappas[rod]),
+    )  # fmt: skip
 
 
 def drag_fall(
@@ -119,10 +115,13 @@ def drag_fall(
 ) -> Fall:
     """Δz, V and t of one fall in air; arguments as in `drag_hits`.
 
-    With one κ for all legs Δz keeps full relative precision as α → 0: it is summed from the
-    impacts' own effects. Where κ changes from leg to leg, unequal drag separates the chains too,
-    and that part is a difference of two distances: each leg then adds an error of a few units in
-    the last place of its length, a relative one of about 2^-52/(κ' − κ)d.
+    Δz keeps full relative precision as α → 0 and as drags become equal: it is summed from the
+    impacts' own effects and, where κ changes from leg to leg, from those of κ' − κ.
+
+    Raises
+    ------
+    DomainError
+        As `drag_leg`; and where a speed leaves the range of numbers.
     """
     gained = separation = time = 0.0
     speed = twin = initial_speed
@@ -135,14 +134,15 @@ def drag_fall(
         separation += grown
         if kappa != free:
             # So far as if this chain too had the free one's drag.
-            separation += distance - fallen(duration, gravity, free, speed)
-            gained += arrival - falling_speed(duration, gravity, free, speed)
+            slowed = _behind(distance, duration, speed, gravity, kappa, free)
+            separation += slowed[0]
+            gained += slowed[1]
         twin = falling_speed(duration, gravity, free, twin)
         step = arrival * gain
         gained += step
         speed = arrival + step
         before = height
-    return Fall(separation, arrival, time)
+    return checked_fall(separation, arrival, time)
 
 
 def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tuple[float, float]:
@@ -212,6 +212,40 @@ def _apart(
     decay = exp(-2.0 * x)
     sech_squared = 4.0 * decay / ((1.0 + decay) * (1.0 + decay))
     return parted * _per(log1p, kappa * parted), gained * sech_squared / (faster * slower)
+
+
+def _behind(
+    distance: float, time: float, speed: float, gravity: float, kappa: float, free: float
+) -> tuple[float, float]:
+    """How far a leg ends below one with the free chain's κ in the same time, and how much faster.
+
+    Both are proportional to κ' − κ. They are summed as series in time of v' = g − κ'v² and of the
+    difference d of both speeds, d' = −(κ' − κ)v² − κ(2v − d)d.
+    """
+    if max(kappa, free) * distance > _SERIES_BELOW:
+        # A plain difference loses no digits but those that κ' − κ itself has lost.
+        return (
+            distance - fallen(time, gravity, free, speed),
+            falling_speed(time, gravity, kappa, speed) - falling_speed(time, gravity, free, speed),
+        )
+    speeds, faster, way, pull = [speed], [0.0], 0.0, gravity
+    last = inf
+    while len(faster) < 5 or abs(last) + abs(faster[-1]) > 1e-17 * abs(sum(faster)):
+        last = faster[-1]
+        square = sum(map(mul, speeds, reversed(speeds)))
+        mixed = sum(
+            (2.0 * v - d) * e for v, d, e in zip(speeds, faster, reversed(faster), strict=True)
+        )
+        scale = time / len(speeds)
+        speeds.append((pull - kappa * square) * scale)
+        faster.append(-((kappa - free) * square + free * mixed) * scale)
+        way += faster[-1] * time / len(speeds)
+        pull = 0.0
+    return way, sum(faster)
+
+
+_SERIES_BELOW = 0.4
+"""κd up to which the series are summed; they converge well below π/2."""
 
 
 def _per(function: Callable[[float], float], x: float) -> float:

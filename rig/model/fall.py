@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import accumulate, repeat
+from itertools import repeat
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from rig.model.chain import Chain
 
@@ -55,7 +55,7 @@ class Hit:
 def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float]) -> list[float]:
     """Relative speed gain ΔV/V of the chain at each rod's impact, from Eq. 9.
 
-    ΔV = J/M with J = α m V / (1 + γ m/M), so ΔV/V = α m / (M + γ m).
+    ΔV = J/M with J = α m V / (1 + γ m/M), so ΔV/V = α / (γ + M/m).
 
     Parameters
     ----------
@@ -67,14 +67,13 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float])
     Returns
     -------
     list of float
-        Shape ``(rods,)``; the top rod's is 0, there being nothing above it to pull on.
+        Shape ``(rods,)``; the top rod's is 0, there being nothing above it to pull on. Infinite
+        where the mass above is nothing beside the rod's own, and γ = 0.
     """
-    # Summed from the top so that a light end on a heavy chain keeps its digits.
-    above = list(accumulate(chain.masses[:0:-1]))[::-1]
     gammas = repeat(gamma) if isinstance(gamma, float | int) else gamma
     gains = [
-        alpha * m / (M + g * m)
-        for alpha, g, m, M in zip(alphas, gammas, chain.masses, above, strict=False)
+        alpha / (g + ratio) if g + ratio else math.inf
+        for alpha, g, (_, ratio) in zip(alphas, gammas, chain.legs, strict=False)
     ]
     return [*gains, 0.0]
 
@@ -95,10 +94,30 @@ def hits(
     initial_speed
         Downward speed at release, m/s.
     """
+    return impacts(
+        chain, gains, drop, initial_speed, lambda _, distance, speed: _leg(distance, speed, gravity)
+    )
+
+
+def impacts(
+    chain: Chain,
+    gains: Sequence[float],
+    drop: float,
+    initial_speed: float,
+    leg: Callable[[int, float, float], tuple[float, float]],
+) -> list[Hit]:
+    """Every impact of any fall; arguments as in `hits`.
+
+    Parameters
+    ----------
+    leg
+        Speed at the end and duration of the leg before a rod's impact, from the rod's number, the
+        distance and the speed before.
+    """
     events: list[Hit] = []
     time, speed, before = 0.0, initial_speed, -drop
-    for height, gain in zip(chain.heights, gains, strict=True):
-        arrival, duration = _leg(height - before, speed, gravity)
+    for rod, (height, gain) in enumerate(zip(chain.heights, gains, strict=True)):
+        arrival, duration = leg(rod, height - before, speed)
         time += duration
         speed = arrival * (1.0 + gain)
         before = height
@@ -126,7 +145,8 @@ def fall(
     Raises
     ------
     DomainError
-        Where nothing would ever move: no gravity and no initial speed.
+        Where nothing would ever move: no gravity and no initial speed. Where a speed
+        leaves the range of floats.
     """
     if not (
         SMALL < chain.heights[-1] + drop < LARGE
@@ -141,29 +161,40 @@ def _fall(
     chain: Chain, alpha: float, gamma: float, drop: float, gravity: float, initial_speed: float
 ) -> Fall:
     """The legs one after another."""
-    gained = separation = time = 0.0
-    speed, before = initial_speed, -drop
-    arrival = speed
-    gains = kicks(chain, [alpha] * chain.rods, gamma)
-    twice_g = 2.0 * gravity
+    arrival, time = _leg(drop, initial_speed, gravity)
+    if arrival == 0.0 == gravity:
+        raise _never_falls()
+    gained = separation = 0.0
+    twice_g, root = 2.0 * gravity, math.sqrt
     # `_leg` written out: calling it takes longer than its arithmetic (see ``./run bench bulk``).
     try:
-        for height, gain in zip(chain.heights, gains, strict=True):
-            distance = height - before
-            if distance == 0.0:
-                arrival = speed
-            else:
-                arrival = math.sqrt(speed * speed + twice_g * distance)
-                duration = 2.0 * distance / (speed + arrival)
-                time += duration
-                separation += gained * duration
-            step = arrival * gain
+        for gap, ratio in chain.legs:
+            step = arrival * (alpha / (gamma + ratio))
             gained += step
             speed = arrival + step
-            before = height
+            arrival = root(speed * speed + twice_g * gap)
+            duration = 2.0 * gap / (speed + arrival)
+            time += duration
+            separation += gained * duration
     except ZeroDivisionError:
-        raise _never_falls() from None
-    return Fall(separation, arrival, time)
+        arrival = math.inf
+    return checked_fall(separation, arrival, time)
+
+
+def checked_fall(separation: float, speed: float, time: float) -> Fall:
+    """Return the end of a fall.
+
+    Raises
+    ------
+    DomainError
+        Where a number has left the range of floats.
+    """
+    if not math.isfinite(separation + speed + time):
+        raise DomainError(
+            "the chain's speed leaves the range of numbers",
+            "an impact may bring too much energy (alpha above ½), or lift next to no mass",
+        )
+    return Fall(separation, speed, time)
 
 
 def _fall_in_own_units(
@@ -192,11 +223,6 @@ def _fall_in_own_units(
         math.ldexp(scaled.speed_m_s, unit),
         math.ldexp(scaled.time_s, length - unit),
     )
-
-
-def free_fall_speed(chain: Chain, drop: float, gravity: float, initial_speed: float = 0.0) -> float:
-    """Speed of the top rod at the contact point when nothing is struck, m/s."""
-    return math.sqrt(initial_speed**2 + 2.0 * gravity * (drop + chain.length))
 
 
 def free_fall(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, fall, free_fall_speed, kicks
+from rig.model.fall import Fall, fall, free_fall, kicks
 from rig.model.impact import Impact, impact_on
 from rig.units import Quantity
 
@@ -151,7 +151,7 @@ def _ways_down(
     """The speed of free fall from drop, gravity and initial speed; the fall from its inputs."""
     if not kappas:
         return (
-            lambda drop, gravity, speed: free_fall_speed(chain, drop, gravity, speed),
+            lambda drop, gravity, speed: free_fall(chain, drop, gravity, speed)[0],
             lambda x: fall(chain, x.alpha, x.gamma, x.drop, x.gravity, x.speed),
         )
     from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
-from rig.model.fall import free_fall_speed
 from rig.report.figure import chart
 
 if TYPE_CHECKING:
@@ -58,7 +57,6 @@ def paper_figure(
 
 def _figure_3(model: Rows, resolved: Rows) -> Iterator[dict[str, Any]]:
     """Δz above, V below; of resolved falls the means with their standard deviations."""
-    free = free_fall_speed(paper.UNIFORM, paper.DROP, paper.GRAVITY)
     surface = [row for row in model if not row["pile"]]
     # The rods do not slide between level and arctan μ: no line across.
     start = surface[0]["incline_deg"] == 0.0
@@ -73,7 +71,7 @@ def _figure_3(model: Rows, resolved: Rows) -> Iterator[dict[str, Any]]:
             "sd": row.key("sd"),
             "in_text": paper.TEXT_FREE_FALL_SPEED,
             "texts": [paper.TEXT_FREE_FALL_SPEED] * (row == SPEED),
-            "speeds": [free] * (row == SPEED),
+            "speeds": [paper.FREE_FALL_SPEED] * (row == SPEED),
         }
 
 

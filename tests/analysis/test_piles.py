@@ -4,8 +4,9 @@ import json
 
 import pytest
 
+from bench.studies.time_scales import time_scale
 from rig.analysis.drop import DropCase
-from rig.bench.falls import Asked, falls, time_scale
+from rig.bench.falls import Asked, falls
 from rig.protocol.plan import runs as planned
 from tests.analysis.drops import PROTOCOLS, UNIFORM, codes
 

@@ -1,4 +1,4 @@
-"""Error against run time: what is deterministic in it, and that its references hold."""
+"""Error against processor time: what is deterministic in it, and that errors are errors."""
 
 import csv
 import json
@@ -7,73 +7,44 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from rig import cli
-from rig.bench import methods, precision
-from rig.bench.precision_reference import (
-    discrete_truth,
-    scenes,
-)
-from rig.bench.stability import relative_error
-
-UNIFORM, GRADED, MANY, EXPONENTIAL = scenes()
+from rig.bench.problems import beam_fit, contact, fall_time, problems
+from rig.bench.references import own_error
+from rig.bench.work import EPSILON, relative_error
 
 
-# References
+@pytest.mark.parametrize("number", range(5))
+def test_methods_come_nearer_to_the_reference_as_they_are_asked_to(number):
+    problem = [*problems(quick=True)][number]
+    exact = problem.exact(**problem.inputs)
+    assert own_error(problem.exact, problem.inputs) < 1e-45
+    for method in problem.methods:
+        errors = [
+            max(relative_error(x, exact[name]) for name, x in method.solve(value).values.items())
+            for value in (method.values[0], method.values[-1 if len(method.values) < 9 else 7])
+        ]
+        assert errors[-1] < 1e-4 or len(method.values) == 1, method.name
+        assert errors[-1] <= max(errors[0], 1e4 * EPSILON), method.name  # κ of the fit is 1e3
 
 
-# Methods
+def test_impacts_at_once_are_the_limit_of_short_ones():
+    errors = []
+    for contact_s in (1e-4, 1e-6):
+        problem = contact(contact_s)
+        separation = problem.methods[0].solve(0.0).values["separation"]
+        errors.append(relative_error(separation, problem.exact(**problem.inputs)["separation"]))
+    assert errors[1] == pytest.approx(errors[0] / 100, rel=0.1)
 
 
-@pytest.mark.parametrize("one", [UNIFORM, GRADED, MANY, EXPONENTIAL], ids=lambda one: one.name)
-def test_the_event_exact_fall_is_exact(one):
-    truth = discrete_truth(one)
-    (setting,) = methods.methods(one)[0].settings
-    answer = setting.solve()
-    assert relative_error(answer.separation_m, truth.separation) <= 1e-14
-    assert relative_error(answer.speed_m_s, truth.speed) <= 1e-14
-    assert precision.absolute_error(setting.gate().time_s, truth.gate) <= 1e-14
-    assert answer.evaluations == one.chain.rods
-
-
-def line(name, one=UNIFORM):
-    return next(method for method in methods.methods(one) if method.name == name)
-
-
-# The sweep
-
-
-@pytest.fixture(scope="module")
-def quick():
-    told: list[str] = []
-    return precision.precision(quick=True, progress=told.append), told
-
-
-def test_the_sweep_has_every_model_and_says_what_it_left_out(quick):
-    found, told = quick
-    assert {point.model for point in found.points} == {"discrete", "continuum", "contact"}
-    assert all(point.lower_s <= point.median_s <= point.upper_s for point in found.points)
-    assert any("RK45" in line for line in told)
-    reasons = {(out.scene, out.method): out.reason for out in found.left_out}
-    assert "30000 evaluations" in reasons["uniform", "contact RK45"]
-    assert "like rods" in reasons["graded", "continuum, every method"]
-    swept = {(p.scene, p.method, p.setting) for p in found.points}
-    assert not swept & {(out.scene, out.method, out.setting) for out in found.left_out}
-
-
-def test_the_command_writes_all_of_it(quick, monkeypatch, tmp_path, capsys):
-    def swept(**options):
-        options["keep"](quick[0])
-        return quick[0]
-
-    monkeypatch.setattr(precision, "precision", swept)
-    assert cli.main(["bench", "precision", "--quick", "-o", str(tmp_path / "new")]) == 0
+def test_the_command_writes_all_of_it(tmp_path, monkeypatch, capsys):
+    some = [beam_fit(0.5e-3), fall_time()]
+    monkeypatch.setattr("rig.commands.bench_precision.problems", lambda quick: some)
+    assert cli.main(["bench", "precision", "--quick", "-o", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert "cheapest method" in printed
-    assert "left out" in printed
-    with (tmp_path / "new" / "precision.csv").open(newline="", encoding="utf-8") as stream:
+    assert "left out: fit-0.5mm, Cholesky" in printed
+    points = json.loads((tmp_path / "precision.json").read_text("utf-8"))["points"]
+    with (tmp_path / "precision.csv").open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
-    assert len(rows) == len(quick[0].points)
-    text = (tmp_path / "new" / "precision.json").read_text(encoding="utf-8")
-    assert json.loads(text)["gaps"]
-    for name in ("uniform", "graded"):
-        svg = (tmp_path / "new" / f"precision-{name}.svg").read_text(encoding="utf-8")
-        ET.fromstring(svg)
+    assert [row["method"] for row in rows] == [point["method"] for point in points]
+    assert all(0.0 < point["lower_s"] <= point["cpu_s"] <= point["upper_s"] for point in points)
+    for picture in ("precision", "precision-fit-0.5mm", "precision-fall-time"):
+        ET.fromstring((tmp_path / f"{picture}.svg").read_text("utf-8"))

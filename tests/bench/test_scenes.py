@@ -11,25 +11,27 @@ from rig.bench.scenes import ladder
 from rig.cli import main
 
 
-def test_the_command_prints_a_table_and_keeps_it(monkeypatch, capsys, tmp_path):
-    steps = ladder()[:2]
-    monkeypatch.setattr(bench, "ladder", lambda: steps)
+def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, capsys, tmp_path):
+    steps = {name: ladder()[name] for name in ("free fall", "level surface", "whole")}
+    monkeypatch.setattr(bench, "ladder", lambda: dict(steps))
     ready, kept = tmp_path / "ready", tmp_path / "kept"
     ready.mkdir()
-    (ready / "mine.yaml").write_text(ladder()[3].text, "utf-8")
-    assert (
-        main(["bench", "scenes", "--rounds", "1", "--protocols", str(ready), "-o", str(kept)]) == 0
-    )
-    heading, *rows = capsys.readouterr().out.splitlines()
-    assert heading.split()[:2] == ["scene", "modules"]
-    names = ["free fall", "α given, level", "mine"]
-    assert all(row.startswith(name) for row, name in zip(rows, names, strict=False))
-    whole = json.loads((kept / "scenes.json").read_text("utf-8"))
-    assert [scene["scene"] for scene in whole["scenes"]] == names
-    assert whole["scenes"][0]["added"] == []
-    assert "rig.model.impact" in whole["scenes"][1]["added"]
+    (ready / "mine.yaml").write_text(ladder()["inclined"], "utf-8")
+    command = ["bench", "scenes", "--rounds", "1", "--protocols", str(ready)]
+    assert main([*command, "-o", str(kept)]) == 0
+    assert "no scene gained what it does not have" in capsys.readouterr().out
+    scenes = json.loads((kept / "scenes.json").read_text("utf-8"))["scenes"]
+    assert [scene["scene"] for scene in scenes] == [*steps, "mine"]
+    assert [scene["calls"]["g(θ)"] for scene in scenes] == [0, 0, 30, 1]
+    assert [scene["calls"]["falls"] for scene in scenes][:2] == [0, 1]
     with (kept / "scenes.csv").open(encoding="utf-8", newline="") as file:
-        lines = list(csv.DictReader(file))
-    assert [line["scene"] for line in lines] == names
-    assert [line["g(θ)"] for line in lines] == ["0", "0", "1"]
+        assert [line["scene"] for line in csv.DictReader(file)] == [*steps, "mine"]
     assert (kept / "scenes.svg").read_text("utf-8").lstrip().startswith("<?xml")
+
+
+def test_what_a_scene_gains_fails(monkeypatch, capsys):
+    parts = {**bench.PARTS, "gates": {"rig.model.chain"}}  # as if falls needed gates
+    monkeypatch.setattr(bench, "PARTS", parts)
+    monkeypatch.setattr(bench, "ladder", lambda: {"whole": ladder()["level surface"]})
+    assert main(["bench", "scenes", "--rounds", "1", "--protocols", "nowhere"]) == 1
+    assert "whole gained rig.model.chain (gates)" in capsys.readouterr().out

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import DomainError
+from rig.model.chain import Chain
 from rig.model.fall import fall, hits, kicks
 from tests.examples import examples
 from tests.model.chains import (
@@ -60,6 +61,12 @@ def test_without_gravity_it_is_a_product_of_speeds(chain, alpha, gamma, drop, st
 def test_without_gravity_or_speed_there_is_no_fall(drop):
     with pytest.raises(DomainError, match="never falls"):
         fall(even_chain(3), 0.1, 1.0, drop, 0.0)
+
+
+def test_a_speed_beyond_all_floats_is_refused():
+    chain = Chain((1e300, 1e300, 1e-300), (0.0, 0.1, 0.2))
+    with pytest.raises(DomainError, match="range of numbers"):
+        fall(chain, 0.25, 0.0, 0.18, 9.81)
 
 
 @examples(80)

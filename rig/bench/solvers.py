@@ -1,0 +1,178 @@
+"""General solvers on falls: SciPy's, with events.
+
+All are given the same equations, locate impacts by the same event and take tolerances alike; the
+implicit ones have the Jacobian.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from rig.bench.work import Answer
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Slope = Callable[[Array], Array]
+
+Solver = Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
+SOLVERS: tuple[Solver, ...] = get_args(Solver)
+IMPLICIT: frozenset[Solver] = frozenset({"Radau", "BDF", "LSODA"})
+ABSOLUTE = 1e-3
+"""Absolute tolerance (m, m/s) per relative one."""
+BUDGET = 60_000
+"""Evaluations that all legs of a fall may take."""
+LONGEST_S = 5.0
+"""More than any leg takes."""
+HEIGHT, SPEED, SEPARATION, GAINED, PULL = range(5)
+"""Places in a state: height of the bottom rod, m, downward speed, Δz, the speed gained, and what
+lasting impacts still pull."""
+
+
+@dataclass(frozen=True, slots=True)
+class Legs:
+    """A fall as first-order equations between impacts.
+
+    Attributes
+    ----------
+    start
+        State at release.
+    heights, gains
+        Of each rod above the bottom rod, m, and what its impact adds: ΔV/V, or to the pull.
+    slope, jacobian
+        At a state.
+    at_once
+        Whether impacts change the speed, and not the pull.
+    begin_s
+        Time of `start`.
+    """
+
+    start: Sequence[float]
+    heights: Sequence[float]
+    gains: Sequence[float]
+    slope: Callable[[Array], Array]
+    jacobian: Callable[[Array], Array]
+    at_once: bool = True
+    begin_s: float = 0.0
+
+    def strike(self, leg: int, state: Array) -> None:
+        """Let the rod strike that ends a leg."""
+        if self.at_once:
+            state[[SPEED, GAINED]] += state[SPEED] * self.gains[leg]
+        else:
+            state[PULL] += self.gains[leg]
+
+
+def in_air(
+    heights: Sequence[float], gains: Sequence[float], kappa: float, drop: float, gravity: float
+) -> Legs:
+    """Return a fall of both chains in the same air: v' = g − κv²."""
+
+    def slope(y: Array) -> Array:
+        v, u = y[SPEED], y[GAINED]
+        return np.array([-v, gravity - kappa * v * v, u, -kappa * u * (2.0 * v - u)])
+
+    def jacobian(y: Array) -> Array:
+        rates, v, u = np.zeros((4, 4)), y[SPEED], y[GAINED]
+        rates[HEIGHT, SPEED], rates[SEPARATION, GAINED] = -1.0, 1.0
+        rates[[SPEED, GAINED], SPEED] = -2.0 * kappa * v, -2.0 * kappa * u
+        rates[GAINED, GAINED] = -2.0 * kappa * (v - u)
+        return rates
+
+    return Legs([drop, 0.0, 0.0, 0.0], heights, gains, slope, jacobian)
+
+
+def lasting_impacts(
+    heights: Sequence[float], gains: Sequence[float], drop: float, gravity: float, contact_s: float
+) -> Legs:
+    """Return a fall whose impacts last: a pull in proportion to the speed that dies away with τ.
+
+    v' = g + wv/τ and w' = −w/τ, to whose w an impact adds ln(1 + ΔV/V): as τ → 0 it is Eq. 9, and
+    an explicit solver must take steps of the order of τ.
+    """
+
+    def slope(y: Array) -> Array:
+        pull = y[PULL] * y[SPEED] / contact_s
+        return np.array([-y[SPEED], gravity + pull, y[GAINED], pull, -y[PULL] / contact_s])
+
+    def jacobian(y: Array) -> Array:
+        rates = np.zeros((5, 5))
+        rates[HEIGHT, SPEED], rates[SEPARATION, GAINED] = -1.0, 1.0
+        rates[[SPEED, GAINED], SPEED] = y[PULL] / contact_s
+        rates[[SPEED, GAINED], PULL] = y[SPEED] / contact_s
+        rates[PULL, PULL] = -1.0 / contact_s
+        return rates
+
+    start, pulls = [drop, 0.0, 0.0, 0.0, 0.0], [math.log1p(gain) for gain in gains]
+    return Legs(start, heights, pulls, slope, jacobian, at_once=False)
+
+
+def folding(length: float, reach: float, alpha: float, drop: float, gravity: float) -> Legs:
+    """Return the fold of a continuous chain: v' = g + αv²/(z + γs) from Eqs. 1 and 11.
+
+    Parameters
+    ----------
+    reach
+        γs, m.
+    """
+    speed = math.sqrt(2.0 * gravity * drop)
+
+    def slope(y: Array) -> Array:
+        pull = alpha * y[SPEED] * y[SPEED] / (y[HEIGHT] + reach)
+        return np.array([-y[SPEED], gravity + pull, y[GAINED], pull])
+
+    def jacobian(y: Array) -> Array:
+        rates, above, v = np.zeros((4, 4)), y[HEIGHT] + reach, y[SPEED]
+        rates[HEIGHT, SPEED], rates[SEPARATION, GAINED] = -1.0, 1.0
+        rates[[SPEED, GAINED], HEIGHT] = -alpha * v * v / above**2
+        rates[[SPEED, GAINED], SPEED] = 2.0 * alpha * v / above
+        return rates
+
+    start = [length, speed, 0.0, 0.0]
+    return Legs(start, [0.0], [0.0], slope, jacobian, begin_s=speed / gravity)
+
+
+def solve(legs: Legs, solver: Solver, rtol: float) -> Answer:
+    """Integrate from impact to impact, each an event of `scipy.integrate.solve_ivp`.
+
+    Raises
+    ------
+    RigError
+        When `BUDGET` is spent, or the solver gives up.
+    """
+    state, time, arrival = np.array(legs.start), legs.begin_s, 0.0
+    evaluations = 0
+    for leg, height in enumerate(legs.heights):
+
+        def slope(_: float, y: Array) -> Array:
+            nonlocal evaluations
+            evaluations += 1
+            if evaluations > BUDGET:
+                raise RigError(f"more than {BUDGET} evaluations, and the chain is not down yet")
+            return legs.slope(y)
+
+        def landing(_: float, y: Array, height: float = height) -> float:
+            return float(y[HEIGHT] + height)
+
+        landing.terminal, landing.direction = True, -1.0  # type: ignore[attr-defined]  # SciPy's
+        implicit: dict[str, Any] = {"jac": lambda _, y: legs.jacobian(y)}
+        run = solve_ivp(
+            slope, (time, time + LONGEST_S), state, method=solver, events=landing,
+            rtol=rtol, atol=ABSOLUTE * rtol, **(implicit if solver in IMPLICIT else {}),
+        )  # fmt: skip
+        if run.status != 1:
+            raise RigError(f"{solver}: {run.message}")
+        state, time = run.y[:, -1].copy(), float(run.t[-1])
+        arrival = float(state[SPEED])
+        legs.strike(leg, state)
+    values = {"separation": float(state[SEPARATION]), "speed": arrival, "time": time}
+    return Answer(values, evaluations)

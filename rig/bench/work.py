@@ -1,0 +1,222 @@
+"""Error against processor time: the frame of every work–precision study.
+
+A `WorkProblem` has reference values with an error of their own. Each `Method` is swept over its
+accuracy parameter, cheapest setting first. All settings of a problem take turns on the processor,
+so that a machine that slows down slows all of them down; only processor time counts.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from dataclasses import asdict, dataclass, field
+from decimal import Decimal
+from time import process_time
+from typing import TYPE_CHECKING, Any
+
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rig.bench.references import Number, Values
+
+EPSILON = 2.0**-52
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
+"""Relative errors for which the cheapest method is looked for."""
+_CALLS_S = 0.002  # of calls between two looks at the clock, which ticks in microseconds
+_SHARE_S = 0.15  # of processor time for one setting, but for `_FEWEST` turns
+_FEWEST, _TURNS = 3, 15
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a method returns: values by quantity, and how often it evaluated its equations."""
+
+    values: Mapping[str, float]
+    evaluations: int
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One line of a picture.
+
+    Attributes
+    ----------
+    values
+        Of the accuracy parameter, cheapest first: where one fails, those after it are not tried.
+    text
+        A value in words, as `str.format` has it.
+    solve
+        Returns the answer at a value.
+    """
+
+    name: str
+    values: Sequence[float]
+    text: str
+    solve: Callable[[float], Answer]
+
+
+def direct(name: str, compute: Callable[[], Answer]) -> Method:
+    """Return a method without an accuracy parameter."""
+    return Method(name, [0.0], "–", lambda _: compute())
+
+
+@dataclass(frozen=True, slots=True)
+class WorkProblem:
+    """What all its methods solve.
+
+    Attributes
+    ----------
+    name, title
+        For file names, and for people.
+    inputs
+        Numbers whose rounding counts, by name.
+    exact
+        True values by quantity, from such inputs and to so many ``digits``.
+    route
+        How they are computed.
+    ours, naive
+        Names of the method to choose, and of what a plain program would do.
+    unit
+        Relative error that ours may make of exact inputs: a rounding, or a solver's tolerance.
+    """
+
+    name: str
+    title: str
+    inputs: Mapping[str, Number]
+    exact: Callable[..., Values]
+    route: str
+    methods: Sequence[Method]
+    ours: str = ""
+    naive: str = ""
+    unit: float = EPSILON
+
+    def best(self, name: str) -> Answer:
+        """Return the answer of a method at its most accurate setting."""
+        method = next(method for method in self.methods if method.name == name)
+        return method.solve(method.values[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One setting of one method, measured.
+
+    Attributes
+    ----------
+    value
+        Of the accuracy parameter.
+    error
+        The largest of `errors`, which are relative, by quantity; 0 where no float is nearer.
+    cpu_s, lower_s, upper_s
+        Median of the processor time of one solution, with its quartiles.
+    repeats
+        How often it was timed.
+    """
+
+    problem: str
+    method: str
+    setting: str
+    value: float
+    error: float
+    errors: Mapping[str, float]
+    evaluations: int
+    cpu_s: float
+    lower_s: float
+    upper_s: float
+    repeats: int
+
+    def row(self) -> dict[str, Any]:
+        """Return a line of a CSV table."""
+        row = asdict(self)
+        errors = row.pop("errors")
+        return row | {f"{quantity}_error": error for quantity, error in errors.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """The first setting of a method that gave no answer, and why; dearer ones were not tried."""
+
+    problem: str
+    method: str
+    setting: str
+    reason: str
+
+
+@dataclass(slots=True)
+class _Trial:
+    """A setting that works, with its times so far."""
+
+    method: Method
+    value: float
+    answer: Answer
+    turns: int
+    calls: int
+    times: list[float] = field(default_factory=list)
+
+
+def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], list[LeftOut]]:
+    """Solve a problem by every method with every setting, and time them in turns.
+
+    Parameters
+    ----------
+    quick
+        Two settings of each method, two turns.
+    """
+    trials: list[_Trial] = []
+    left_out: list[LeftOut] = []
+    for method in problem.methods:
+        for value in method.values[:6:3] if quick else method.values:
+            try:
+                answer, took = _timed(method, value)
+                if took < _SHARE_S:  # a first call also loads and compiles
+                    answer, took = _timed(method, value)
+            except RigError as error:
+                setting = method.text.format(value)
+                left_out.append(LeftOut(problem.name, method.name, setting, error.message))
+                break  # what follows is dearer still
+            turns = 2 if quick else min(_TURNS, max(_FEWEST, round(_SHARE_S / took)))
+            calls = max(1, round(_CALLS_S / took))
+            trials.append(_Trial(method, value, answer, turns, calls))
+    for turn in range(_TURNS):
+        for trial in trials:
+            if turn < trial.turns:
+                trial.times.append(_timed(trial.method, trial.value, trial.calls)[1])
+    exact = problem.exact(**problem.inputs)
+    return [_point(problem, exact, trial) for trial in trials], left_out
+
+
+def _timed(method: Method, value: float, calls: int = 1) -> tuple[Answer, float]:
+    """Return an answer and its processor time, s."""
+    begin = process_time()
+    for _ in range(calls):
+        answer = method.solve(value)
+    return answer, max((process_time() - begin) / calls, 1e-9)
+
+
+def _point(problem: WorkProblem, exact: Values, trial: _Trial) -> Point:
+    errors = {
+        quantity: relative_error(value, exact[quantity])
+        for quantity, value in trial.answer.values.items()
+    }
+    lower, middle, upper = statistics.quantiles(trial.times, n=4, method="inclusive")
+    return Point(
+        problem.name, trial.method.name, trial.method.text.format(trial.value), trial.value,
+        max(errors.values()), errors, trial.answer.evaluations, middle, lower, upper,
+        len(trial.times),
+    )  # fmt: skip
+
+
+def relative_error(value: float, exact: Decimal) -> float:
+    """|value/exact − 1|; infinite where the value is no number, 0 where no float is nearer."""
+    if value == float(exact):
+        return 0.0
+    if not math.isfinite(value) or exact == 0:
+        return math.inf
+    return float(abs(Decimal(value) / exact - 1))
+
+
+def cheapest(points: Sequence[Point], target: float) -> Point | None:
+    """Return the point of least processor time within a relative error; `None` without one."""
+    good = [point for point in points if point.error <= target]
+    return min(good, key=lambda point: point.cpu_s, default=None)

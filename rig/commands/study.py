@@ -1,0 +1,51 @@
+"""Carry a study out: what it finds is kept and printed in one way."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from rig.commands.output import print_found
+from rig.files import make_folder, write_atomic
+from rig.text_table import csv_text
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from rig.bench.findings import Findings
+
+
+def carry_out(
+    name: str, study: Callable[[Namespace], Iterator[Findings]], arguments: Namespace
+) -> int:
+    """Keep what a study finds whenever it has found more; print it at the end.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    output = getattr(arguments, "output", None)
+    folder = make_folder(output) if output else None
+    for findings in study(arguments):
+        if folder is not None:
+            _write(folder, findings.name or name, findings)
+    lines = [*(["SIMULATED DATA"] if findings.simulated else []), *findings.lines]
+    print_found(findings.record, lambda: "\n".join(lines), as_json=arguments.json)
+    return int(findings.failed)
+
+
+def _write(folder: Path, name: str, findings: Findings) -> None:
+    """Write the table and pictures, and where there is a head also a page and all figures."""
+    columns = dict.fromkeys(column for row in findings.rows for column in row)
+    texts = {f"{further}.svg": drawing for further, drawing in findings.pictures.items()}
+    texts[f"{name}.svg"] = findings.picture
+    texts[f"{name}.csv"] = csv_text(columns, findings.rows) if columns else ""
+    if findings.head:
+        texts[f"{name}.md"] = "\n".join([findings.head, "", "```text", *findings.lines, "```", ""])
+        texts[f"{name}.json"] = json.dumps(findings.record, indent=2, ensure_ascii=False) + "\n"
+    for file, text in texts.items():
+        if text:
+            write_atomic(folder / file, text)
