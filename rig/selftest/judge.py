@@ -11,7 +11,7 @@ from statistics import stdev
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
 from rig.link.assembly import ticks_since
-from rig.link.gatewatch import listed
+from rig.link.gatewatch import name_gates
 from rig.link.messages import DisarmReason, DropCertificate2, Phase, PulseEnd, RefusalReason
 from rig.selftest.board import LABEL, BoardUnderTest, RecordedDrop
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
@@ -185,7 +185,7 @@ def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:
             changes.append(ticks_since(recorded.certificate.fire_tick, event.tick))
         state = event.state
     if len(changes) != 2:
-        raise CheckFailedError("judged_edges", gates_listed=listed(gate), edges=len(changes))
+        raise CheckFailedError("judged_edges", gates_listed=name_gates(gate), edges=len(changes))
     return changes[0], changes[1]
 
 
