@@ -13,16 +13,8 @@ from textual.css.query import NoMatches
 from textual.theme import Theme
 from textual.widgets import Input
 
-from rig.campaign.machine import (
-    BEFORE_RELEASE,
-    EffectFailure,
-    Flow,
-    GoOn,
-    Notice,
-    Stage,
-    StopRequest,
-    Tick,
-)
+from rig.campaign import machine as campaign
+from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.tui import commands
 from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, possible
 from rig.tui.client import ReconnectingClient
@@ -200,7 +192,7 @@ class RigApp(App[None], inherit_bindings=False):
             return
         self._stillness.alive(now)
         if self.flow.stage is Stage.COUNTDOWN:
-            self.driver.take(Tick(min(passed, _COUNTED_S)))
+            self.driver.take(campaign.Tick(min(passed, _COUNTED_S)))
         self.desk.tick(self.model, passed)
         begins = self.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S
         if begins and self.client is not None:
@@ -420,7 +412,7 @@ class RigApp(App[None], inherit_bindings=False):
         """Stop what is on its way to a release; say whether anything was."""
         if self.flow.stage not in BEFORE_RELEASE:
             return False
-        self.driver.take(StopRequest())
+        self.driver.take(campaign.StopRequest())
         return True
 
     def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
@@ -449,9 +441,9 @@ class RigApp(App[None], inherit_bindings=False):
             self.action_do("go_on")  # which says so
         elif self._stillness.meant(self._face, at_s):
             model = self.model
-            self.driver.take(GoOn(model.next_job, model.settle_s))
+            self.driver.take(campaign.GoOn(model.next_job, model.settle_s))
         else:
-            self.driver.take(Notice(_NOT_MEANT))
+            self.driver.take(campaign.Notice(_NOT_MEANT))
 
     def action_do(self, name: str) -> None:
         """Do one action of the table, if it makes sense now."""
@@ -459,7 +451,7 @@ class RigApp(App[None], inherit_bindings=False):
         if self.possible(action):
             commands.do(self, name)
         elif self.client is not None and action.driving and not self.driving:
-            self.driver.take(EffectFailure(self.flow.ticket, _WATCHING))
+            self.driver.take(campaign.EffectFailure(self.flow.ticket, _WATCHING))
 
     def possible(self, action: Action) -> bool:
         """Say whether an action makes sense now."""

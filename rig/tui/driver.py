@@ -5,22 +5,8 @@ from __future__ import annotations
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from rig.campaign.machine import (
-    ArmRelease,
-    Collect,
-    Drive,
-    DropVerdict,
-    EffectDone,
-    FireRelease,
-    GiveUp,
-    Judge,
-    Log,
-    Stage,
-    Stop,
-    Wait,
-    effect_failure,
-    step,
-)
+from rig.campaign import machine as campaign
+from rig.campaign.machine import Stage, effect_failure, step
 from rig.errors import DeviceTimeoutError, RigError
 from rig.tui.model import StopAnswer
 
@@ -76,9 +62,9 @@ class Driver:
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
             self._follower.judged.add(self.flow.job)
         for effect in effects:
-            if isinstance(effect, Stop) and (self._client is None or self._client.idle):
+            if isinstance(effect, campaign.Stop) and (self._client is None or self._client.idle):
                 continue  # nothing is there that could fall
-            if isinstance(effect, Stop):
+            if isinstance(effect, campaign.Stop):
                 self.stop = StopAnswer(monotonic())
             self._begin(self._carry_out(effect, self.flow.ticket))
 
@@ -103,36 +89,36 @@ class Driver:
         token = None
         try:
             match effect:
-                case GiveUp():
+                case campaign.GiveUp():
                     return  # what is wrong is shown, and the operator goes on from there
-                case Stop(reason):
+                case campaign.Stop(reason):
                     await self._switch_off(client, reason)
                     return
-                case Wait(seconds):
+                case campaign.Wait(seconds):
                     await client.call("wait", seconds=seconds)
-                case ArmRelease(job):
+                case campaign.ArmRelease(job):
                     answer = await client.call("arm", run=job.run, attempt=job.attempt)
                     token = int(answer["token"])
-                case FireRelease(armed):
+                case campaign.FireRelease(armed):
                     await client.call("fire", token=armed)
-                case Drive():
+                case campaign.Drive():
                     await client.call("test_release")
-                case Collect(job):
+                case campaign.Collect(job):
                     await client.call("collect", run=job.run, attempt=job.attempt)
-                case Log(job, state, reasons):
+                case campaign.Log(job, state, reasons):
                     await client.call(
                         "log_state", run=job.run, attempt=job.attempt, state=state,
                         reasons=[reason.record() for reason in reasons],
                     )  # fmt: skip
-                case Judge(job):
+                case campaign.Judge(job):
                     result = (await self._follower.read()).results[job]
                     row = self._follower.voids.row
-                    self.take(DropVerdict(ticket, result.verdict, result.reasons, row))
+                    self.take(campaign.DropVerdict(ticket, result.verdict, result.reasons, row))
                     return
         except RigError as error:
             self.take(effect_failure(ticket, error))
         else:
-            self.take(EffectDone(ticket, token))
+            self.take(campaign.EffectDone(ticket, token))
 
     async def _switch_off(self, client: ReconnectingClient, reason: str) -> None:
         """Have everything switched off, and ask on until it is known whether it is.

@@ -6,15 +6,8 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.campaign.machine import (
-    BEFORE_RELEASE,
-    Found,
-    Lost,
-    Notice,
-    SessionClose,
-    SessionOpen,
-    Stage,
-)
+from rig.campaign import machine as campaign
+from rig.campaign.machine import BEFORE_RELEASE, Stage
 from rig.campaign.plan import job_to_judge
 from rig.campaign.voids import Voids, voids_of
 from rig.errors import RigError
@@ -122,22 +115,24 @@ class Follower:
         self.state = state
         self._look_at_gates(state, now)
         if not client.up:
-            return [Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)]
+            return [campaign.Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)]
         events: list[Event] = [*_back(client, state), *_broken(stage, state)]
         session = state.section("session")
         if session:
             self._look_at_session(session, state, now)
-            events.append(SessionOpen())
+            events.append(campaign.SessionOpen())
         elif before.section("session") and not reopens:
             self._forget()
-            events.append(SessionClose())
+            events.append(campaign.SessionClose())
         if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
             events.append(
-                Lost("another client took control of the rig\npress c to take it when it is free")
+                campaign.Lost(
+                    "another client took control of the rig\npress c to take it when it is free"
+                )
             )
         missed = job_to_judge(state.runs)
         if missed and missed not in self.judged and client.driving:
-            events.append(Found(missed))
+            events.append(campaign.Found(missed))
         return events
 
     def _look_at_gates(self, state: DaemonState, now: float) -> None:
@@ -231,7 +226,7 @@ def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
         return
     lost, client.lost = client.lost, {}
     if lost:
-        yield Notice(f"the port was lost and is back: {lost['message']}\n{lost['hint']}")
+        yield campaign.Notice(f"the port was lost and is back: {lost['message']}\n{lost['hint']}")
 
 
 def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
@@ -239,9 +234,11 @@ def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
     if stage not in BEFORE_RELEASE:
         return
     if state.link == "down":
-        yield Lost("the port was lost before the release: nothing fell\narm again when it is back")
+        yield campaign.Lost(
+            "the port was lost before the release: nothing fell\narm again when it is back"
+        )
     drop = state.section("drop")
     if stage is Stage.COUNTDOWN and drop.get("state") == "interrupted":
         line = state.line(drop["run"])
         why = line.reasons[0] if line and line.reasons else "stopped"
-        yield Lost(f"{why}: nothing fell\narm again when this is mended")
+        yield campaign.Lost(f"{why}: nothing fell\narm again when this is mended")

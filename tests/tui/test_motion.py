@@ -45,7 +45,8 @@ def recorded(run, pairs):
     """A drop of these edges, and what an analysis says that they are."""
     edges = tuple(edge for edge, _ in pairs)
     matches = {number: rod for number, (_, rod) in enumerate(pairs)}
-    return Drop(run.number, 1, HZ, edges), HZ, SimpleNamespace(run=run, matches=matches)
+    result = SimpleNamespace(run=run, matches=matches, quantities={})
+    return Drop(run.number, 1, HZ, edges), HZ, result
 
 
 def test_points_lie_on_the_models_curve(scene):
