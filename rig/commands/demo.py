@@ -76,6 +76,7 @@ def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
             bars="U95",
             fresh=False,
             estimate=False,
+            pdf=None,
         )
     )
     # A browser in a terminal would be in the way.
