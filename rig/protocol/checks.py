@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from rig.protocol.contact import lacking_geometry
 from rig.protocol.fields import DEFAULTS
-from rig.protocol.gates import check_clear, check_sides
 from rig.protocol.yamltree import Sequence
 
 if TYPE_CHECKING:
@@ -57,6 +56,8 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
         _check_plan(top["plan"], struck=struck, turns=kept or count != 1)
     on_board = struck and _is_on_board(top["contact"], rods)
     if top["gates"]:
+        from rig.protocol.gates import check_clear, check_sides  # noqa: PLC0415 - a scene may have none
+
         check_sides(top["gates"], surface=struck, chains=count)
         if rods and "drop" in top and top.is_sound("drop"):
             inclines = top["plan"]["incline"] if top["plan"] else DEFAULTS["plan.incline"]

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from rig.errors import InputError, Problem
 from rig.files import read_input
-from rig.model.surface import Pile, Surface
 from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
 from rig.protocol.fields import FieldFaults, Section, read_value
@@ -35,6 +34,8 @@ from rig.units import Quantity
 
 if TYPE_CHECKING:
     import os
+
+    from rig.model.surface import Surface
 
 MAX_BYTES = 1_000_000
 
@@ -150,6 +151,8 @@ def _arguments(section: Section | None, **names: str) -> dict[str, Any]:
 
 def _surface(section: Section) -> Surface:
     """Return the surface; without a restitution, which no chain then needs, its is 0."""
+    from rig.model.surface import Pile, Surface  # noqa: PLC0415 - only where something is struck
+
     pile = section["pile"]
     return Surface(
         section["restitution"] or Quantity(0.0),
