@@ -24,7 +24,7 @@ BESIDE_THE_FALL = (
 )  # fmt: skip
 PHYSICAL = [
     key
-    for key in KEYS
+    for key in KEYS.values()
     if key.example
     and (key.path == "plan.incline" or key.path.partition(".")[0] not in BESIDE_THE_FALL)
     and not key.path.endswith(("_uncertainty", ".like"))
