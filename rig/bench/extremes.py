@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.references import exact_coefficients, exact_fall, many_digits
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from rig.bench.references import Number, Values
 
 LENGTH = 1.165
-
-
 PAPER: dict[str, float] = {
     "restitution": 0.5, "friction": 0.2, "incline": 40.0, "inertia": UNIFORM_ROD_INERTIA,
     "length": LENGTH, "drop": 0.18, "gravity": 9.81,
@@ -54,13 +52,11 @@ class Extreme:
     @property
     def chain(self) -> Chain:
         """The chain, with α where it is given."""
-        inputs, rods = self.inputs, len(self.masses)
-        heights = tuple(inputs["length"] * k / (rods - 1) for k in range(rods))
-        given = Quantity(inputs["alpha"]) if "alpha" in inputs else None
-        gamma = inputs.get("gamma")
-        return Chain(
-            self.masses, heights, inputs["inertia"], None, inputs.get("inertia_z"), given, gamma
-        )
+        inputs, last = self.inputs, len(self.masses) - 1
+        heights = tuple(inputs["length"] * k / last for k in range(last + 1))
+        alpha = Quantity(inputs["alpha"]) if "alpha" in inputs else None
+        further = inputs.get("inertia_z"), alpha, inputs.get("gamma")
+        return Chain(self.masses, heights, inputs["inertia"], None, *further)
 
     @property
     def kappas(self) -> list[float]:
@@ -93,12 +89,11 @@ class Extreme:
             name: Decimal(inputs[name]) for name in ("alpha", "gamma") if name in inputs
         }
         with many_digits():  # heights and drags are what floats make of them, but for the nudge
-            longer = Decimal(inputs["length"]) / Decimal(self.inputs["length"])
-            heights = [Decimal(height) * longer for height in self.chain.heights]
-            kappas = [Decimal(kappa) for kappa in self.kappas]
-            if kappas:
-                more = Decimal(inputs["kappa"]) / Decimal(self.inputs["kappa"])
-                kappas = [kappa * more for kappa in kappas]
+            nudges = {
+                name: Decimal(x) / Decimal(self.inputs[name] or 1) for name, x in inputs.items()
+            }
+            heights = [Decimal(height) * nudges["length"] for height in self.chain.heights]
+            kappas = [Decimal(kappa) * nudges["kappa"] for kappa in self.kappas]
         alphas, gammas = ([coefficients[name]] * len(heights) for name in ("alpha", "gamma"))
         where = inputs["drop"], inputs["gravity"], inputs.get("speed", 0.0)
         return coefficients | exact_fall(
@@ -149,9 +144,8 @@ def pairs() -> Iterator[Extreme]:
     """Yield every two ends of two quantities."""
     for (name, ends), (other, other_ends) in combinations(TOGETHER.items(), 2):
         if {name, other} not in _APART:
-            for end in ends:
-                for other_end in other_ends:
-                    yield _drive(_drive(Extreme(""), name, end), other, other_end)
+            for end, other_end in product(ends, other_ends):
+                yield _drive(_drive(Extreme(""), name, end), other, other_end)
 
 
 def _drive(scene: Extreme, name: str, end: float) -> Extreme:

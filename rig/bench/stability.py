@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
 from decimal import Decimal
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bench import references
 from rig.bench.extremes import Extreme, alone, pairs
@@ -39,8 +38,7 @@ _MANY = 1000  # rods of which a condition is worked out
 VERDICTS = ("exact", "noted", "refused", "FAILED")
 
 
-@dataclass(frozen=True, slots=True)
-class ExactCase:
+class ExactCase(NamedTuple):
     """Something to compute.
 
     Attributes
@@ -64,8 +62,7 @@ class ExactCase:
     unit: float = EPSILON
 
 
-@dataclass(frozen=True, slots=True)
-class StabilityRow:
+class StabilityRow(NamedTuple):
     """One quantity of one case.
 
     Attributes
