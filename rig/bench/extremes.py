@@ -9,6 +9,7 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 from rig.bench.references import exact_coefficients, exact_fall, many_digits
+from rig.bench.work import Answer
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 from rig.model.drag import drag_fall
 from rig.model.fall import fall, kicks
@@ -21,10 +22,9 @@ if TYPE_CHECKING:
 
     from rig.bench.references import Number, Values
 
-LENGTH = 1.165
 PAPER: dict[str, float] = {
     "restitution": 0.5, "friction": 0.2, "incline": 40.0, "inertia": UNIFORM_ROD_INERTIA,
-    "length": LENGTH, "drop": 0.18, "gravity": 9.81,
+    "length": 1.165, "drop": 0.18, "gravity": 9.81,
 }  # fmt: skip
 
 
@@ -65,7 +65,7 @@ class Extreme:
         growth = 0.0 if self.even_air else kappa / (3.0 * rods)
         return [kappa + growth * k for k in range(rods)] if kappa else []
 
-    def predict(self) -> tuple[dict[str, float], str]:
+    def predict(self) -> Answer:
         """Return what the model says of each quantity, and its notes on the domain."""
         inputs, chain = self.inputs, self.chain
         surface = Surface(Quantity(inputs["restitution"]), Quantity(inputs["friction"]))
@@ -77,7 +77,13 @@ class Extreme:
         else:
             end = fall(chain, impact.alpha, impact.gamma, *where)
         values = {"alpha": impact.alpha, "gamma": impact.gamma, "separation": end.separation_m}
-        return values | {"speed": end.speed_m_s, "time": end.time_s}, "; ".join(impact.notes)
+        values |= {"speed": end.speed_m_s, "time": end.time_s}
+        return Answer(values, chain.rods, "; ".join(impact.notes))
+
+    def printed(self) -> Answer:
+        """Return what the equations as printed give with the digits and the range of a float."""
+        values = self.exact(self.inputs, as_float=True)
+        return Answer({name: float(value) for name, value in values.items()}, len(self.masses))
 
     def exact(self, inputs: Mapping[str, Number], *, as_float: bool = False) -> Values:
         """Return the true values of inputs near to these, or those of the equations as printed."""

@@ -246,16 +246,16 @@ def beam_fit(digits: int = DIGITS, **numbers: Number) -> Values:
     with mp.workdps(digits + 3 * _SPARE):
         values = [mp.mpf(number) for number in numbers.values()]
         count = len(values) // 2
+        beams = [*zip(values[:count], values[count:], strict=True)]
         p, step = mp.matrix([0, 0, 10]), mp.matrix([1, 1, 1])
         while mp.norm(step) > mp.mpf(10) ** -(digits + 5) * mp.norm(p):
-            rows, left = mp.matrix(count, 3), mp.matrix(count, 1)
-            for n in range(count):
-                way = p[0] + values[n]
-                root = mp.sqrt(p[1] ** 2 + 2 * p[2] * way)
+            rows, left = [], []
+            for height, passage in beams:
+                root = mp.sqrt(p[1] ** 2 + 2 * p[2] * (p[0] + height))
                 time = (root - p[1]) / p[2]
-                rows[n, 0], rows[n, 1], rows[n, 2] = 1 / root, -time / root, -(time**2) / (2 * root)
-                left[n] = values[count + n] - time
-            step = mp.lu_solve(rows, left)
+                rows.append([1 / root, -time / root, -(time**2) / (2 * root)])
+                left.append(passage - time)
+            step = mp.lu_solve(mp.matrix(rows), mp.matrix(left))
             p += step
         return _decimals(rise=p[0], speed=p[1], gravity=p[2])
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from rig.bench.references import Number, Values
 
 EPSILON = 2.0**-52
+SLACK = 4.0
+"""Roundings of one leg that may count, in ε; those of n legs add up as √n."""
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 """Relative errors for which the cheapest method is looked for."""
 _CALLS_S = 0.002  # of calls between two looks at the clock, which ticks in microseconds
@@ -29,10 +31,21 @@ _FEWEST, _TURNS = 3, 15
 
 
 class Answer(NamedTuple):
-    """What a method returns: values by quantity, and how often it evaluated its equations."""
+    """What a method returns.
+
+    Attributes
+    ----------
+    values
+        By quantity.
+    evaluations
+        How often it evaluated its equations.
+    note
+        What it notes on the domain of its model.
+    """
 
     values: Mapping[str, float]
     evaluations: int
+    note: str = ""
 
 
 class Method(NamedTuple):
@@ -76,6 +89,8 @@ class WorkProblem(NamedTuple):
         Names of the method to choose, and of what a plain program would do.
     unit
         Relative error that ours may make of exact inputs: a rounding, or a solver's tolerance.
+    slack
+        How many times `unit`, times the condition, an error may be.
     """
 
     name: str
@@ -87,6 +102,7 @@ class WorkProblem(NamedTuple):
     ours: str = ""
     naive: str = ""
     unit: float = EPSILON
+    slack: float = SLACK
 
     def best(self, name: str) -> Answer:
         """Return the answer of a method at its most accurate setting."""
