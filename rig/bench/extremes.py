@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.bench.references import exact_coefficients, exact_fall, many_digits
 from rig.bench.work import Answer
@@ -28,8 +27,7 @@ PAPER: dict[str, float] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Extreme:
+class Extreme(NamedTuple):
     """One scene.
 
     Attributes
@@ -45,7 +43,7 @@ class Extreme:
     """
 
     name: str
-    inputs: dict[str, float] = field(default_factory=lambda: dict(PAPER))
+    inputs: Mapping[str, float] = PAPER
     masses: tuple[float, ...] = (1.0,) * 25
     even_air: bool = True
 
@@ -143,7 +141,7 @@ def alone() -> Iterator[Extreme]:
     """Yield every end of every quantity by itself, and the paper's scene."""
     yield Extreme("as in the paper")
     yield from (_drive(Extreme(""), name, end) for name, ends in ALONE.items() for end in ends)
-    yield replace(Extreme("mass 1e-300, top rod only"), masses=(*(1.0,) * 24, 1e-300))
+    yield Extreme("mass 1e-300, top rod only", masses=(*(1.0,) * 24, 1e-300))
 
 
 def pairs() -> Iterator[Extreme]:
@@ -172,10 +170,7 @@ def _drive(scene: Extreme, name: str, end: float) -> Extreme:
     elif name.endswith("air"):
         inputs["kappa"] = end
         changes["even_air"] = name == "air"
-    elif name == "alpha":
-        inputs |= {"alpha": end, "gamma": 4.0 / 3.0}
-    elif name == "length":
-        inputs |= {"length": end, "drop": end / 8}
     else:
-        inputs[name] = end
-    return replace(scene, inputs=inputs, **changes)
+        further = {"alpha": {"gamma": 4.0 / 3.0}, "length": {"drop": end / 8}}
+        inputs |= {name: end, **further.get(name, {})}
+    return scene._replace(inputs=inputs, **changes)

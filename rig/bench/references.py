@@ -90,7 +90,6 @@ def exact_fall(
         # From the top: a light end would be lost in the sum of a chain over many decades.
         above = [*accumulate(reversed(exact[1:]))][::-1]
         time, speed, before = Decimal(0), start, -Decimal(drop)
-        arrival = speed
         for n, (m, height) in enumerate(zip(exact, map(Decimal, heights), strict=True)):
             arrival, duration = _leg(height - before, speed, g, air[n])
             time += duration

@@ -28,11 +28,11 @@ _SCENE = """
 protocol: 1
 title: a figure of the paper
 chains:
-  A: {{{rods}, length: {length:g} mm, rod_length: 102 mm, tilt: {tilt:g} deg}}
+  A: {{{rods}, length: {paper.LENGTH:g} m, rod_length: 102 mm, tilt: {tilt:g} deg}}
   B: {{like: A}}
-surface: {{restitution: {beta:g}, friction: {mu:g}}}
-drop: {drop:g} mm
-gravity: {gravity:g} m/s^2
+surface: {{restitution: {surface.restitution.value:g}, friction: {surface.friction.value:g}}}
+drop: {paper.DROP:g} m
+gravity: {paper.GRAVITY:g} m/s^2
 gates: {{impact: [{{channel: 0, height: 25 mm}}], free: [{{channel: 8, height: 25 mm}}]}}
 plan: {{incline: [{inclines}], repeats: {repeats}, settle: 0 s}}
 """
@@ -77,13 +77,10 @@ def graded(drops: int = DROPS) -> Ensemble:
 
 def _ensembles(rods: str, tilt: float, inclines: Sequence[float], drops: int) -> list[Ensemble]:
     text = _SCENE.format(
+        paper=paper,
+        surface=paper.SURFACE,
         rods=rods,
         tilt=tilt,
-        length=1e3 * paper.LENGTH,
-        beta=paper.SURFACE.restitution.value,
-        mu=paper.SURFACE.friction.value,
-        drop=1e3 * paper.DROP,
-        gravity=paper.GRAVITY,
         inclines=", ".join(f"{incline:g} deg" for incline in inclines),
         repeats=drops,
     )
