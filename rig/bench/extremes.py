@@ -89,9 +89,7 @@ class Extreme(NamedTuple):
             inputs["restitution"], inputs["friction"], inputs["incline"], inputs["inertia"],
             inputs.get("inertia_z"), as_float=as_float,
         )  # fmt: skip
-        coefficients |= {
-            name: Decimal(inputs[name]) for name in ("alpha", "gamma") if name in inputs
-        }
+        coefficients |= {name: Decimal(inputs[name]) for name in coefficients if name in inputs}
         with many_digits():  # heights and drags are what floats make of them, but for the nudge
             nudges = {
                 name: Decimal(x) / Decimal(self.inputs[name] or 1) for name, x in inputs.items()

@@ -189,10 +189,10 @@ def _exponential_series(w: mpmath.mpf, log: mpmath.mpf) -> tuple[mpmath.mpf, ...
         k += 1
         power *= w / k
         harmonic += mp.mpf(1) / k
-        sign = -1 if k % 2 else 1
+        alternating = (-1) ** k * power / k
         above += power / k
-        one += sign * power / k
-        both += sign * power / k * (log - mp.mpf(1) / k - harmonic)
+        one += alternating
+        both += alternating * (log - mp.mpf(1) / k - harmonic)
     return above, one, both
 
 

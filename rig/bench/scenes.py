@@ -165,14 +165,12 @@ def measure(texts: Mapping[str, str], rounds: int) -> list[Cost]:
             for _ in range(rounds)
         ]
     for name, counted in counts.items():
-        counted["command_s"], counted["compute_s"] = (
-            median(turn[name][n] for turn in times) for n in (0, 1)
-        )
-        counted["shares"] = {
-            "command": median(turn[name][0] / turn["whole"][0] for turn in times),
-            "compute": median(turn[name][1] / turn["whole"][1] for turn in times),
-            "calls": counted["calls"]["calls"] / counts["whole"]["calls"]["calls"],
-        }
+        shares: dict[str, float] = {}
+        for n, kind in enumerate(("command", "compute")):
+            counted[f"{kind}_s"] = median(turn[name][n] for turn in times)
+            shares[kind] = median(turn[name][n] / turn["whole"][n] for turn in times)
+        shares["calls"] = counted["calls"]["calls"] / counts["whole"]["calls"]["calls"]
+        counted["shares"] = shares
         counted["gained"] = _gained(protocols[name], counted)
     return [Cost(name, **counted) for name, counted in counts.items()]
 
