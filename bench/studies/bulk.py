@@ -242,7 +242,7 @@ def _problem(contestants: dict[str, Callable[[Batch], Ends]], sizes: Sequence[in
 def _each(measured: tuple[list[Any], list[Any]]) -> tuple[list[Any], list[Any]]:
     """Count the time of one fall, not of the batch."""
     points = [
-        replace(point, **{name: getattr(point, name) / point.value for name in _TIMES})
+        point._replace(**{name: getattr(point, name) / point.value for name in _TIMES})
         for point in measured[0]
     ]
     return points, measured[1]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from itertools import combinations, product
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.bench.references import exact_coefficients, exact_fall, many_digits
+from rig.bench.work import Answer
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 from rig.model.drag import drag_fall
 from rig.model.fall import fall, kicks
@@ -21,17 +21,13 @@ if TYPE_CHECKING:
 
     from rig.bench.references import Number, Values
 
-LENGTH = 1.165
-
-
 PAPER: dict[str, float] = {
     "restitution": 0.5, "friction": 0.2, "incline": 40.0, "inertia": UNIFORM_ROD_INERTIA,
-    "length": LENGTH, "drop": 0.18, "gravity": 9.81,
+    "length": 1.165, "drop": 0.18, "gravity": 9.81,
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Extreme:
+class Extreme(NamedTuple):
     """One scene.
 
     Attributes
@@ -47,20 +43,18 @@ class Extreme:
     """
 
     name: str
-    inputs: dict[str, float] = field(default_factory=lambda: dict(PAPER))
+    inputs: Mapping[str, float] = PAPER
     masses: tuple[float, ...] = (1.0,) * 25
     even_air: bool = True
 
     @property
     def chain(self) -> Chain:
         """The chain, with α where it is given."""
-        inputs, rods = self.inputs, len(self.masses)
-        heights = tuple(inputs["length"] * k / (rods - 1) for k in range(rods))
-        given = Quantity(inputs["alpha"]) if "alpha" in inputs else None
-        gamma = inputs.get("gamma")
-        return Chain(
-            self.masses, heights, inputs["inertia"], None, inputs.get("inertia_z"), given, gamma
-        )
+        inputs, last = self.inputs, len(self.masses) - 1
+        heights = tuple(inputs["length"] * k / last for k in range(last + 1))
+        alpha = Quantity(inputs["alpha"]) if "alpha" in inputs else None
+        further = inputs.get("inertia_z"), alpha, inputs.get("gamma")
+        return Chain(self.masses, heights, inputs["inertia"], None, *further)
 
     @property
     def kappas(self) -> list[float]:
@@ -69,7 +63,7 @@ class Extreme:
         growth = 0.0 if self.even_air else kappa / (3.0 * rods)
         return [kappa + growth * k for k in range(rods)] if kappa else []
 
-    def predict(self) -> tuple[dict[str, float], str]:
+    def predict(self) -> Answer:
         """Return what the model says of each quantity, and its notes on the domain."""
         inputs, chain = self.inputs, self.chain
         surface = Surface(Quantity(inputs["restitution"]), Quantity(inputs["friction"]))
@@ -81,7 +75,13 @@ class Extreme:
         else:
             end = fall(chain, impact.alpha, impact.gamma, *where)
         values = {"alpha": impact.alpha, "gamma": impact.gamma, "separation": end.separation_m}
-        return values | {"speed": end.speed_m_s, "time": end.time_s}, "; ".join(impact.notes)
+        values |= {"speed": end.speed_m_s, "time": end.time_s}
+        return Answer(values, chain.rods, "; ".join(impact.notes))
+
+    def printed(self) -> Answer:
+        """Return what the equations as printed give with the digits and the range of a float."""
+        values = self.exact(self.inputs, as_float=True)
+        return Answer({name: float(value) for name, value in values.items()}, len(self.masses))
 
     def exact(self, inputs: Mapping[str, Number], *, as_float: bool = False) -> Values:
         """Return the true values of inputs near to these, or those of the equations as printed."""
@@ -89,16 +89,13 @@ class Extreme:
             inputs["restitution"], inputs["friction"], inputs["incline"], inputs["inertia"],
             inputs.get("inertia_z"), as_float=as_float,
         )  # fmt: skip
-        coefficients |= {
-            name: Decimal(inputs[name]) for name in ("alpha", "gamma") if name in inputs
-        }
+        coefficients |= {name: Decimal(inputs[name]) for name in coefficients if name in inputs}
         with many_digits():  # heights and drags are what floats make of them, but for the nudge
-            longer = Decimal(inputs["length"]) / Decimal(self.inputs["length"])
-            heights = [Decimal(height) * longer for height in self.chain.heights]
-            kappas = [Decimal(kappa) for kappa in self.kappas]
-            if kappas:
-                more = Decimal(inputs["kappa"]) / Decimal(self.inputs["kappa"])
-                kappas = [kappa * more for kappa in kappas]
+            nudges = {
+                name: Decimal(x) / Decimal(self.inputs[name] or 1) for name, x in inputs.items()
+            }
+            heights = [Decimal(height) * nudges["length"] for height in self.chain.heights]
+            kappas = [Decimal(kappa) * nudges["kappa"] for kappa in self.kappas]
         alphas, gammas = ([coefficients[name]] * len(heights) for name in ("alpha", "gamma"))
         where = inputs["drop"], inputs["gravity"], inputs.get("speed", 0.0)
         return coefficients | exact_fall(
@@ -142,16 +139,15 @@ def alone() -> Iterator[Extreme]:
     """Yield every end of every quantity by itself, and the paper's scene."""
     yield Extreme("as in the paper")
     yield from (_drive(Extreme(""), name, end) for name, ends in ALONE.items() for end in ends)
-    yield replace(Extreme("mass 1e-300, top rod only"), masses=(*(1.0,) * 24, 1e-300))
+    yield Extreme("mass 1e-300, top rod only", masses=(*(1.0,) * 24, 1e-300))
 
 
 def pairs() -> Iterator[Extreme]:
     """Yield every two ends of two quantities."""
     for (name, ends), (other, other_ends) in combinations(TOGETHER.items(), 2):
         if {name, other} not in _APART:
-            for end in ends:
-                for other_end in other_ends:
-                    yield _drive(_drive(Extreme(""), name, end), other, other_end)
+            for end, other_end in product(ends, other_ends):
+                yield _drive(_drive(Extreme(""), name, end), other, other_end)
 
 
 def _drive(scene: Extreme, name: str, end: float) -> Extreme:
@@ -172,10 +168,7 @@ def _drive(scene: Extreme, name: str, end: float) -> Extreme:
     elif name.endswith("air"):
         inputs["kappa"] = end
         changes["even_air"] = name == "air"
-    elif name == "alpha":
-        inputs |= {"alpha": end, "gamma": 4.0 / 3.0}
-    elif name == "length":
-        inputs |= {"length": end, "drop": end / 8}
     else:
-        inputs[name] = end
-    return replace(scene, inputs=inputs, **changes)
+        further = {"alpha": {"gamma": 4.0 / 3.0}, "length": {"drop": end / 8}}
+        inputs |= {name: end, **further.get(name, {})}
+    return scene._replace(inputs=inputs, **changes)

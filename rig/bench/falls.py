@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from subprocess import PIPE, Popen
 from types import MappingProxyType
@@ -27,8 +26,7 @@ class Asked(NamedTuple):
     runs: Sequence[Sequence[int]]
 
 
-@dataclass(frozen=True, slots=True)
-class SimulatedDrop:
+class SimulatedDrop(NamedTuple):
     """One drop on the rig of a seed, and what is true of it."""
 
     seed: int

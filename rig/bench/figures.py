@@ -58,9 +58,7 @@ def _picture(title: str, lines: Mapping[str, Sequence[Point]], columns: int) -> 
                 elinewidth=0.6, markerfacecolor=color if fill else "none",
                 linestyle="-" if fill else "--",
             )  # fmt: skip
-        panel.set_xscale("log")
-        panel.set_yscale("log")
-        panel.set_ylim(FLOOR / 2.0, _CEILING)
+        panel.set(xscale="log", yscale="log", ylim=(FLOOR / 2.0, _CEILING))
         panel.set_xlabel("processor time of one solution (s): median, quartiles")
         panel.set_ylabel("relative error")
         drawing.figure.legend(
@@ -84,10 +82,7 @@ def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
                 linestyle="none", marker=marker, color=color, markersize=3.5, label=label,
             )  # fmt: skip
         panel.axline((1e-16, 1e-16), (1.0, 1.0), color=INK, linewidth=0.8, label="error = κ·ε")
-        panel.set_xscale("log")
-        panel.set_yscale("log")
-        panel.set_xlim(1e-16, 10.0)
-        panel.set_ylim(FLOOR / 2.0, 20.0)
+        panel.set(xscale="log", xlim=(1e-16, 10.0), yscale="log", ylim=(FLOOR / 2.0, 20.0))
         panel.set_xlabel("κ·ε: what rounding of the inputs alone may cost")
         panel.set_ylabel("relative error against 50 digits")
         panel.legend(loc="best")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import linalg, optimize
@@ -13,14 +13,7 @@ from rig.analysis.adjust import least_squares
 from rig.analysis.equations import Linearization
 from rig.analysis.square_root import EquationRows
 from rig.bench import references
-from rig.bench.solvers import (
-    SOLVERS,
-    Legs,
-    folding,
-    in_air,
-    lasting_impacts,
-    solve,
-)
+from rig.bench.solvers import SOLVERS, Legs, folding, in_air, lasting_impacts, solve
 from rig.bench.work import Answer, Method, WorkProblem, direct
 from rig.errors import RigError
 from rig.model import continuum, paper
@@ -30,7 +23,7 @@ from rig.model.fall import fall, kicks
 from rig.model.impact import impact_on
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
@@ -184,7 +177,7 @@ def beam_fit(band: float) -> WorkProblem:
     def slopes(p: Array) -> Array:
         return _passages(beams, p)[1]
 
-    def by_scipy(method: Literal["lm", "trf"], tolerance: float) -> Answer:
+    def by_scipy(method: Any, tolerance: float) -> Answer:
         run = optimize.least_squares(
             left, begin, slopes, method=method, xtol=tolerance, ftol=tolerance, gtol=tolerance,
             x_scale="jac",
@@ -203,8 +196,8 @@ def beam_fit(band: float) -> WorkProblem:
                 for name, one_step in (("QR", by_qr), ("Cholesky", by_cholesky))
             ),
             *(
-                Method(f"scipy {name}", _TOLERANCES, "tolerance {:.0e}", by)
-                for name, by in (("lm", partial(by_scipy, "lm")), ("trf", partial(by_scipy, "trf")))
+                Method(f"scipy {name}", _TOLERANCES, "tolerance {:.0e}", partial(by_scipy, name))
+                for name in ("lm", "trf")
             ),
         ],
         "square root (rig)", "Cholesky",
@@ -224,22 +217,22 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
     distance, gravity = paper.LENGTH + paper.DROP, paper.GRAVITY
     latest = 2.0 * math.sqrt(2.0 * distance / gravity)
 
-    def answer(time: float, evaluations: int) -> Answer:
-        return Answer({"time": time}, evaluations)
+    def printed() -> float:
+        return math.acosh(math.exp(kappa * distance)) / math.sqrt(kappa * gravity)
 
     def left(time: float) -> float:
         return fallen(time, gravity, kappa) - distance
 
+    def by_scipy(finder: Any, *where: object, **accuracy: float) -> Answer:
+        run = finder(left, *where, **accuracy, full_output=True)[1]
+        return Answer({"time": run.root}, run.function_calls)
+
     def bracketed(finder: Any, tolerance: float) -> Answer:
-        run: Mapping[str, Any] = finder(
-            left, 0.0, latest, xtol=tolerance, rtol=1e-15, full_output=True
-        )[1]
-        return answer(run["root"], run["function_calls"])
+        return by_scipy(finder, 0.0, latest, xtol=tolerance, rtol=1e-15)
 
     def newton(tolerance: float) -> Answer:
         slope = partial(falling_speed, gravity=gravity, kappa=kappa)
-        run = optimize.newton(left, latest, slope, tol=tolerance, full_output=True)[1]
-        return answer(run["root"], run["function_calls"])
+        return by_scipy(optimize.newton, latest, slope, tol=tolerance)
 
     return WorkProblem(
         "fall-time", "the time to fall 1.345 m in air",
@@ -247,11 +240,8 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
         references.fall_time, "arcosh(e^κd)/√(κg)",
         [
             direct("closed form (rig)",
-                   lambda: answer(drag_leg(distance, 0.0, gravity, kappa)[1], 1)),
-            direct("as printed",
-                   lambda: answer(
-                       math.acosh(math.exp(kappa * distance)) / math.sqrt(kappa * gravity), 1
-                   )),
+                   lambda: Answer({"time": drag_leg(distance, 0.0, gravity, kappa)[1]}, 1)),
+            direct("as printed", lambda: Answer({"time": printed()}, 1)),
             *(
                 Method(finder.__name__, _TOLERANCES, "xtol {:.0e}", partial(bracketed, finder))
                 for finder in (optimize.brentq, optimize.bisect, optimize.toms748)

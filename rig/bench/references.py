@@ -90,7 +90,6 @@ def exact_fall(
         # From the top: a light end would be lost in the sum of a chain over many decades.
         above = [*accumulate(reversed(exact[1:]))][::-1]
         time, speed, before = Decimal(0), start, -Decimal(drop)
-        arrival = speed
         for n, (m, height) in enumerate(zip(exact, map(Decimal, heights), strict=True)):
             arrival, duration = _leg(height - before, speed, g, air[n])
             time += duration
@@ -135,8 +134,8 @@ def exact_coefficients(
 ) -> Values:  # fmt: skip
     """Return ``alpha`` by Eqs. 12 and 13, ``gamma`` by Eq. 10; `as_float` as in `exact_fall`."""
     with mp.workdps(15 if as_float else DIGITS + _SPARE):
-        beta, mu, xi, degrees = map(_mpf, (restitution, friction, inertia, incline_deg))
-        xi_z = xi if inertia_z is None else _mpf(inertia_z)
+        beta, mu, xi, degrees = map(mp.mpf, (restitution, friction, inertia, incline_deg))
+        xi_z = xi if inertia_z is None else mp.mpf(inertia_z)
         theta = degrees * mp.pi / 180
         # Eq. 12 has no vertical part at a wall.
         cos, sin = mp.cos(theta) if degrees != 90 else mp.mpf(0), mp.sin(theta)
@@ -157,7 +156,7 @@ def lasting_impacts(
     As a function of w, dv/dw = −gτ/w − v, so v = e^−w (C − gτ Ei(w)), and the way is τ∫v dw/w.
     """
     with mp.workdps(digits + _SPARE):
-        g, tau = mp.mpf(gravity), _mpf(contact_s)
+        g, tau = mp.mpf(gravity), mp.mpf(contact_s)
         before = mp.mpf(heights[0])
         speed = mp.sqrt(2 * g * drop)
         time, pull = speed / g, mp.mpf(0)
@@ -170,15 +169,14 @@ def lasting_impacts(
             start = c * way_one - g * tau * way_log
             leg = 2 * distance / (speed + mp.sqrt(speed**2 + 2 * g * distance))
             step = leg
-            # The way is convex in time and no leg is longer than free fall: Newton from above.
-            while abs(step) > leg * mp.mpf(10) ** -(digits // 2 + 10):
+            # The way is convex in time and no leg is longer than free fall: Newton from above,
+            # whose last step is too short to count even in the speed.
+            while abs(step) > leg * mp.mpf(10) ** -(digits + _SPARE // 2):
                 w, now = pull * mp.exp(-leg / tau), log - leg / tau
                 s, way_one, way_log = _exponential_series(w, now)
                 speed = mp.exp(-w) * (c - g * tau * (now + s))
                 step = (tau * (start - c * way_one + g * tau * way_log) - distance) / speed
                 leg -= step
-            w, now = pull * mp.exp(-leg / tau), log - leg / tau
-            speed = mp.exp(-w) * (c - g * tau * (now + _exponential_series(w, now)[0]))
             time, pull = time + leg, w
         return _decimals(separation=mp.mpf(drop) + before - g * time**2 / 2, speed=speed, time=time)
 
@@ -191,10 +189,10 @@ def _exponential_series(w: mpmath.mpf, log: mpmath.mpf) -> tuple[mpmath.mpf, ...
         k += 1
         power *= w / k
         harmonic += mp.mpf(1) / k
-        sign = -1 if k % 2 else 1
+        alternating = (-1) ** k * power / k
         above += power / k
-        one += sign * power / k
-        both += sign * power / k * (log - mp.mpf(1) / k - harmonic)
+        one += alternating
+        both += alternating * (log - mp.mpf(1) / k - harmonic)
     return above, one, both
 
 
@@ -211,7 +209,7 @@ def continuum(
     S15 is ∫ v^(b−1) (c − d v)^(−1/2) dv, b = (1+α)/(1+2α).
     """
     with mp.workdps(digits + _SPARE):
-        z0, r, a, h, g = map(_mpf, (length, reach, alpha, drop, gravity))
+        z0, r, a, h, g = map(mp.mpf, (length, reach, alpha, drop, gravity))
         power, above = 1 + 2 * a, z0 + r
         b, d = (1 + a) / power, 2 * g * above / power
         c = 2 * g * h + d
@@ -230,7 +228,7 @@ def continuum(
 def fall_time(distance: Number, gravity: Number, kappa: Number, digits: int = DIGITS) -> Values:
     """Return the ``time`` to fall so far from rest in air: arcosh(e^κd)/√(κg)."""
     with mp.workdps(digits + _SPARE):
-        d, g, k = map(_mpf, (distance, gravity, kappa))
+        d, g, k = map(mp.mpf, (distance, gravity, kappa))
         return _decimals(time=mp.acosh(mp.exp(k * d)) / mp.sqrt(k * g))
 
 
@@ -245,24 +243,20 @@ def beam_fit(digits: int = DIGITS, **numbers: Number) -> Values:
         First all heights of beams, then all times.
     """
     with mp.workdps(digits + 3 * _SPARE):
-        values = [_mpf(number) for number in numbers.values()]
+        values = [mp.mpf(number) for number in numbers.values()]
         count = len(values) // 2
+        beams = [*zip(values[:count], values[count:], strict=True)]
         p, step = mp.matrix([0, 0, 10]), mp.matrix([1, 1, 1])
         while mp.norm(step) > mp.mpf(10) ** -(digits + 5) * mp.norm(p):
-            rows, left = mp.matrix(count, 3), mp.matrix(count, 1)
-            for n in range(count):
-                way = p[0] + values[n]
-                root = mp.sqrt(p[1] ** 2 + 2 * p[2] * way)
+            rows, left = [], []
+            for height, passage in beams:
+                root = mp.sqrt(p[1] ** 2 + 2 * p[2] * (p[0] + height))
                 time = (root - p[1]) / p[2]
-                rows[n, 0], rows[n, 1], rows[n, 2] = 1 / root, -time / root, -(time**2) / (2 * root)
-                left[n] = values[count + n] - time
-            step = mp.lu_solve(rows, left)
+                rows.append([1 / root, -time / root, -(time**2) / (2 * root)])
+                left.append(passage - time)
+            step = mp.lu_solve(mp.matrix(rows), mp.matrix(left))
             p += step
         return _decimals(rise=p[0], speed=p[1], gravity=p[2])
-
-
-def _mpf(value: Number) -> mpmath.mpf:
-    return mp.mpf(str(value)) if isinstance(value, Decimal) else mp.mpf(value)
 
 
 def _decimals(**values: mpmath.mpf) -> Values:

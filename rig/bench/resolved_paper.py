@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from statistics import fmean, stdev
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -29,11 +28,11 @@ _SCENE = """
 protocol: 1
 title: a figure of the paper
 chains:
-  A: {{{rods}, length: {length:g} mm, rod_length: 102 mm, tilt: {tilt:g} deg}}
+  A: {{{rods}, length: {paper.LENGTH:g} m, rod_length: 102 mm, tilt: {tilt:g} deg}}
   B: {{like: A}}
-surface: {{restitution: {beta:g}, friction: {mu:g}}}
-drop: {drop:g} mm
-gravity: {gravity:g} m/s^2
+surface: {{restitution: {surface.restitution.value:g}, friction: {surface.friction.value:g}}}
+drop: {paper.DROP:g} m
+gravity: {paper.GRAVITY:g} m/s^2
 gates: {{impact: [{{channel: 0, height: 25 mm}}], free: [{{channel: 8, height: 25 mm}}]}}
 plan: {{incline: [{inclines}], repeats: {repeats}, settle: 0 s}}
 """
@@ -44,8 +43,7 @@ _HANGING = {
 """Chains hang as they would, let go together and seen by a perfect rig."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ensemble:
+class Ensemble(NamedTuple):
     """Falls that differ only in how their chains hang.
 
     Attributes
@@ -79,13 +77,10 @@ def graded(drops: int = DROPS) -> Ensemble:
 
 def _ensembles(rods: str, tilt: float, inclines: Sequence[float], drops: int) -> list[Ensemble]:
     text = _SCENE.format(
+        paper=paper,
+        surface=paper.SURFACE,
         rods=rods,
         tilt=tilt,
-        length=1e3 * paper.LENGTH,
-        beta=paper.SURFACE.restitution.value,
-        mu=paper.SURFACE.friction.value,
-        drop=1e3 * paper.DROP,
-        gravity=paper.GRAVITY,
         inclines=", ".join(f"{incline:g} deg" for incline in inclines),
         repeats=drops,
     )

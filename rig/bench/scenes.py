@@ -10,12 +10,11 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.bench.figures import scenes_figure
 from rig.bench.findings import Findings
@@ -66,8 +65,7 @@ chains:
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Cost:
+class Cost(NamedTuple):
     """What one scene costs.
 
     Attributes
@@ -131,7 +129,7 @@ def run(arguments: Namespace) -> Iterator[Findings]:
         "calls,\nof the whole": [cost.shares["calls"] for cost in costs],
     }
     yield Findings(
-        {"python": sys.version.split()[0], "scenes": [asdict(cost) for cost in costs]},
+        {"python": sys.version.split()[0], "scenes": [cost._asdict() for cost in costs]},
         [*_lines(costs)], _HEAD, [_row(cost) for cost in costs], scenes_figure(names, panels),
         failed=any(cost.gained for cost in costs),
     )  # fmt: skip
@@ -163,46 +161,28 @@ def measure(texts: Mapping[str, str], rounds: int) -> list[Cost]:
         counts = {name: _count(file) for name, file in files.items()}
         say("timing …")
         times = [
-            {
-                name: (float(_probe("time", file)), _seconds(protocols[name]))
-                for name, file in files.items()
-            }
+            {name: _times(file, protocols[name]) for name, file in files.items()}
             for _ in range(rounds)
         ]
-    costs = []
     for name, counted in counts.items():
-        command_s, compute_s = (median(turn[name][n] for turn in times) for n in (0, 1))
-        shares = {
-            "command": median(turn[name][0] / turn["whole"][0] for turn in times),
-            "compute": median(turn[name][1] / turn["whole"][1] for turn in times),
-            "calls": counted["calls"]["calls"] / counts["whole"]["calls"]["calls"],
-        }
-        gained = _gained(protocols[name], counted)
-        costs.append(
-            Cost(
-                name,
-                command_s=command_s,
-                compute_s=compute_s,
-                shares=shares,
-                gained=gained,
-                **counted,
-            )
-        )
-    return costs
+        shares: dict[str, float] = {}
+        for n, kind in enumerate(("command", "compute")):
+            counted[f"{kind}_s"] = median(turn[name][n] for turn in times)
+            shares[kind] = median(turn[name][n] / turn["whole"][n] for turn in times)
+        shares["calls"] = counted["calls"]["calls"] / counts["whole"]["calls"]["calls"]
+        counted["shares"] = shares
+        counted["gained"] = _gained(protocols[name], counted)
+    return [Cost(name, **counted) for name, counted in counts.items()]
 
 
 def _count(file: Path) -> dict[str, Any]:
     reports = [json.loads(_probe("count", file)) for _ in range(_PROBES)]
-    sizes = [report.pop("bytes") for report in reports]
-    first, *others = reports
-    if any(other != first for other in others):
+    held = [report.pop("bytes") for report in reports]
+    report = reports[0]
+    if reports.count(report) < _PROBES:
         raise RigError(f"{file.name}: two equal runs do not count the same")
-    return {
-        **first,
-        "modules": tuple(first["modules"]),
-        "least_bytes": min(sizes),
-        "most_bytes": max(sizes),
-    }
+    sizes = {"least_bytes": min(held), "most_bytes": max(held)}
+    return {"modules": tuple(report["modules"]), **sizes, "calls": report["calls"]}
 
 
 def _probe(task: str, file: Path) -> str:
@@ -218,12 +198,14 @@ def _probe(task: str, file: Path) -> str:
     return done.stdout
 
 
-def _seconds(protocol: Protocol) -> float:
+def _times(file: Path, protocol: Protocol) -> tuple[float, float]:
+    """Return the processor time of ``rig predict`` and of the prediction alone, s."""
+    command_s = float(_probe("time", file))
     predictions(protocol)  # a first call is slow
     begin = process_time()
     for _ in range(_CALLS):
         predictions(protocol)
-    return (process_time() - begin) / _CALLS
+    return command_s, (process_time() - begin) / _CALLS
 
 
 def _gained(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str, ...]:
@@ -236,12 +218,8 @@ def _gained(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str, ...]:
         "gates": protocol.gates is not None, "figures": False,
     }  # fmt: skip
     used = {*counted["modules"], *(name for name, calls in counted["calls"].items() if calls)}
-    return tuple(
-        f"{name} ({part})"
-        for part, needs in PARTS.items()
-        if not present[part]
-        for name in sorted(needs & used)
-    )
+    absent = [part for part in PARTS if not present[part]]
+    return tuple(f"{name} ({part})" for part in absent for name in sorted(PARTS[part] & used))
 
 
 def _rooms(cost: Cost) -> list[str]:

@@ -7,8 +7,7 @@ implicit ones have the Jacobian.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -38,8 +37,7 @@ HEIGHT, SPEED, SEPARATION, GAINED, PULL = range(5)
 lasting impacts still pull."""
 
 
-@dataclass(frozen=True, slots=True)
-class Legs:
+class Legs(NamedTuple):
     """A fall as first-order equations between impacts.
 
     Attributes

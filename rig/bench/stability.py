@@ -9,26 +9,17 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
 from decimal import Decimal
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bench import references
 from rig.bench.extremes import Extreme, alone, pairs
 from rig.bench.problems import beam_fit, contact, fall_time
-from rig.bench.work import EPSILON, relative_error
+from rig.bench.work import SLACK, WorkProblem, direct, relative_error
 from rig.errors import DomainError, RigError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from rig.bench.references import Number, Values
-    from rig.bench.work import WorkProblem
-
-    Floats = Mapping[str, float]
-
-SLACK = 4.0
-"""Roundings of one leg that may count, in ε; those of n legs add up as √n."""
+    from collections.abc import Callable
 CONTACTS_S = tuple(10.0**-n for n in range(1, 13))
 BANDS_M = tuple(10.0**-n for n in range(6))
 KAPPAS = tuple(10.0**n for n in range(-15, 4, 2))
@@ -39,33 +30,7 @@ _MANY = 1000  # rods of which a condition is worked out
 VERDICTS = ("exact", "noted", "refused", "FAILED")
 
 
-@dataclass(frozen=True, slots=True)
-class ExactCase:
-    """Something to compute.
-
-    Attributes
-    ----------
-    inputs
-        Numbers whose rounding counts.
-    exact
-        True values by quantity, of these inputs or of others near them.
-    ours, naive
-        The program's values with notes on the domain, and those of the equations as printed.
-    slack, unit
-        How many times κ·unit an error may be: unit is ε, or a solver's tolerance.
-    """
-
-    name: str
-    inputs: Mapping[str, Number]
-    exact: Callable[[Mapping[str, Number]], Values]
-    ours: Callable[[], tuple[Floats, str]]
-    naive: Callable[[], Mapping[str, Number]]
-    slack: float = SLACK
-    unit: float = EPSILON
-
-
-@dataclass(frozen=True, slots=True)
-class StabilityRow:
+class StabilityRow(NamedTuple):
     """One quantity of one case.
 
     Attributes
@@ -112,65 +77,62 @@ def stability(
     say("each quantity by itself …")
     cases = [of_fall(scene) for scene in alone() if not quick or len(scene.masses) <= _MANY]
     for make, ends in ((contact, CONTACTS_S), (beam_fit, BANDS_M), (fall_time, KAPPAS)):
-        cases += [of_problem(make(end)) for end in ends[:: 4 if quick else 1]]
+        cases += [make(end) for end in ends[:: 4 if quick else 1]]
     rows = [row for case in cases for row in examine(case)]
     say("every two together …")
     return rows + [row for scene in pairs() for row in examine(of_fall(scene))]
 
 
-def examine(case: ExactCase) -> list[StabilityRow]:
-    """Compare a case with its true values, quantity by quantity; a warning counts as a failure."""
+def examine(case: WorkProblem) -> list[StabilityRow]:
+    """Compare our method of a problem with true values, quantity by quantity.
+
+    A warning counts as a failure.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            values, note = case.ours()
+            values, _, note = case.best(case.ours)
         except (RigError, ArithmeticError, ValueError, Warning) as fault:
             verdict, words = "FAILED", f"{type(fault).__name__}: {fault}"
             if isinstance(fault, DomainError):
                 verdict, words = "refused", fault.message
-            return [StabilityRow(case.name, "", None, 0.0, 0.0, 0.0, None, "–", verdict, words)]
+            return [StabilityRow(case.title, "", None, 0.0, 0.0, 0.0, None, "–", verdict, words)]
     try:
-        naive, end = case.naive(), ""
+        naive, end = case.best(case.naive).values, ""
     except (RigError, ArithmeticError) as fault:
         naive, end = {}, type(fault).__name__
     rows = []
-    for name, (exact, condition) in _conditions(case).items():
+    for name, exact, condition in _conditions(case):
         error, expected = relative_error(values[name], exact), case.unit * max(1.0, condition)
-        plain = relative_error(float(naive[name]), exact) if naive else None
+        plain = relative_error(naive[name], exact) if naive else None
         verdict = "FAILED" if error > case.slack * expected else "noted" if note else "exact"
         rows.append(StabilityRow(
-            case.name, name, error, condition, expected, error / max(1.0, condition), plain,
+            case.title, name, error, condition, expected, error / max(1.0, condition), plain,
             end if plain is None else f"{plain:.0e}", verdict, note,
         ))  # fmt: skip
     return rows
 
 
-def _conditions(case: ExactCase) -> dict[str, tuple[Decimal, float]]:
-    """Return each true value and its condition."""
-    values = case.exact(case.inputs)
-    conditions = dict.fromkeys(values, 0.0)
+def _conditions(case: WorkProblem) -> list[tuple[str, Decimal, float]]:
+    """Return each quantity, its true value and its condition."""
+    conditions = []
     with references.many_digits():
-        for name, value in case.inputs.items():
-            nudged = case.exact({**case.inputs, name: Decimal(value) * (1 + _NUDGE)})
-            for quantity, exact in values.items():
-                if exact:
-                    conditions[quantity] += float(abs(nudged[quantity] / exact - 1) / _NUDGE)
-    return {name: (exact, conditions[name]) for name, exact in values.items()}
+        nudged = [
+            case.exact(**{**case.inputs, name: Decimal(value) * (1 + _NUDGE)})
+            for name, value in case.inputs.items()
+        ]
+        for name, exact in case.exact(**case.inputs).items():
+            changes = [float(abs(near[name] / exact - 1) / _NUDGE) for near in nudged if exact]
+            conditions.append((name, exact, sum(changes, 0.0)))
+    return conditions
 
 
-def of_fall(scene: Extreme) -> ExactCase:
+def of_fall(scene: Extreme) -> WorkProblem:
     """Return the fall of a scene; of a long chain the condition is taken to be 1."""
-    return ExactCase(
-        scene.name, scene.inputs if len(scene.masses) <= _MANY else {},
-        lambda inputs: scene.exact({**scene.inputs, **inputs}), scene.predict,
-        lambda: scene.exact(scene.inputs, as_float=True), SLACK * math.sqrt(len(scene.masses)),
-    )  # fmt: skip
-
-
-def of_problem(problem: WorkProblem) -> ExactCase:
-    """Return a problem of `rig bench precision`, by the method to choose there."""
-    return ExactCase(
-        problem.title, problem.inputs, lambda inputs: problem.exact(**inputs),
-        lambda: (problem.best(problem.ours).values, ""),
-        lambda: problem.best(problem.naive).values, unit=problem.unit,
+    rods = len(scene.masses)
+    return WorkProblem(
+        scene.name, scene.name, scene.inputs if rods <= _MANY else {},
+        lambda **inputs: scene.exact({**scene.inputs, **inputs}), "legs in closed form",
+        [direct("rig", scene.predict), direct("as printed", scene.printed)],
+        "rig", "as printed", slack=SLACK * math.sqrt(rods),
     )  # fmt: skip

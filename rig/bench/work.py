@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 import statistics
-from dataclasses import asdict, dataclass, field
 from decimal import Decimal
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.errors import RigError
 
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
     from rig.bench.references import Number, Values
 
 EPSILON = 2.0**-52
+SLACK = 4.0
+"""Roundings of one leg that may count, in ε; those of n legs add up as √n."""
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 """Relative errors for which the cheapest method is looked for."""
 _CALLS_S = 0.002  # of calls between two looks at the clock, which ticks in microseconds
@@ -29,16 +30,25 @@ _SHARE_S = 0.15  # of processor time for one setting, but for `_FEWEST` turns
 _FEWEST, _TURNS = 3, 15
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What a method returns: values by quantity, and how often it evaluated its equations."""
+class Answer(NamedTuple):
+    """What a method returns.
+
+    Attributes
+    ----------
+    values
+        By quantity.
+    evaluations
+        How often it evaluated its equations.
+    note
+        What it notes on the domain of its model.
+    """
 
     values: Mapping[str, float]
     evaluations: int
+    note: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Method:
+class Method(NamedTuple):
     """One line of a picture.
 
     Attributes
@@ -62,8 +72,7 @@ def direct(name: str, compute: Callable[[], Answer]) -> Method:
     return Method(name, [0.0], "–", lambda _: compute())
 
 
-@dataclass(frozen=True, slots=True)
-class WorkProblem:
+class WorkProblem(NamedTuple):
     """What all its methods solve.
 
     Attributes
@@ -80,6 +89,8 @@ class WorkProblem:
         Names of the method to choose, and of what a plain program would do.
     unit
         Relative error that ours may make of exact inputs: a rounding, or a solver's tolerance.
+    slack
+        How many times `unit`, times the condition, an error may be.
     """
 
     name: str
@@ -91,6 +102,7 @@ class WorkProblem:
     ours: str = ""
     naive: str = ""
     unit: float = EPSILON
+    slack: float = SLACK
 
     def best(self, name: str) -> Answer:
         """Return the answer of a method at its most accurate setting."""
@@ -98,8 +110,7 @@ class WorkProblem:
         return method.solve(method.values[-1])
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(NamedTuple):
     """One setting of one method, measured.
 
     Attributes
@@ -128,13 +139,12 @@ class Point:
 
     def row(self) -> dict[str, Any]:
         """Return a line of a CSV table."""
-        row = asdict(self)
+        row = self._asdict()
         errors = row.pop("errors")
         return row | {f"{quantity}_error": error for quantity, error in errors.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class LeftOut:
+class LeftOut(NamedTuple):
     """The first setting of a method that gave no answer, and why; dearer ones were not tried."""
 
     problem: str
@@ -143,8 +153,7 @@ class LeftOut:
     reason: str
 
 
-@dataclass(slots=True)
-class _Trial:
+class _Trial(NamedTuple):
     """A setting that works, with its times so far."""
 
     method: Method
@@ -152,7 +161,7 @@ class _Trial:
     answer: Answer
     turns: int
     calls: int
-    times: list[float] = field(default_factory=list)
+    times: list[float]
 
 
 def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], list[LeftOut]]:
@@ -177,7 +186,7 @@ def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], 
                 break  # what follows is dearer still
             turns = 2 if quick else min(_TURNS, max(_FEWEST, round(_SHARE_S / took)))
             calls = max(1, round(_CALLS_S / took))
-            trials.append(_Trial(method, value, answer, turns, calls))
+            trials.append(_Trial(method, value, answer, turns, calls, []))
     for turn in range(_TURNS):
         for trial in trials:
             if turn < trial.turns:

@@ -78,10 +78,9 @@ class PageServer:
                     longest_silent.transport.abort()
                     del self._lines[longest_silent]
                 async with asyncio.timeout(_PATIENCE_S):
-                    try:
+                    head = b""
+                    with suppress(asyncio.LimitOverrunError):
                         head = await reader.readuntil(b"\r\n\r\n")
-                    except asyncio.LimitOverrunError:
-                        head = b""
                     writer.write(self._answer(head))
                     await writer.drain()
         except (OSError, EOFError, TimeoutError):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.bench.figures import choice_figure, work_figure
 from rig.bench.findings import Findings
@@ -71,12 +70,13 @@ class Study:
         }
         head = self._head + "\n\n".join(f"![{name}]({name}.svg)" for name in pictures)
         choices = {one.title: points for one in self.problems if (points := self._choice(one))}
-        return Findings(
-            self._record(), [*self.table(), "", *self.remarks()], head,
-            [point.row() for point in self.points],
-            choice_figure(choices),
-            pictures,
-        )  # fmt: skip
+        record = {
+            "problems": [{"name": one.name, "title": one.title} for one in self.problems],
+            "points": [point._asdict() for point in self.points],
+            "left_out": [setting._asdict() for setting in self.left_out],
+        }
+        lines, rows = [*self.table(), "", *self.remarks()], [point.row() for point in self.points]
+        return Findings(record, lines, head, rows, choice_figure(choices), pictures)
 
     def _of(self, problem: WorkProblem) -> list[Point]:
         return [point for point in self.points if point.problem == problem.name]
@@ -103,13 +103,6 @@ class Study:
         yield f"references, known to {max(1e-50, known):.0e}: {'; '.join(routes)}"
         for one in self.left_out:
             yield f"left out: {one.problem}, {one.method}, from {one.setting} on: {one.reason}"
-
-    def _record(self) -> dict[str, Any]:
-        return {
-            "problems": [{"name": one.name, "title": one.title} for one in self.problems],
-            "points": [asdict(point) for point in self.points],
-            "left_out": [asdict(one) for one in self.left_out],
-        }
 
 
 def _words(point: Point | None) -> str:

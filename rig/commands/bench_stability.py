@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -32,7 +31,7 @@ def main(arguments: Namespace) -> int:
 def _examine(arguments: Namespace) -> Iterator[Findings]:
     rows = stability(quick=arguments.quick, say=say)
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in VERDICTS}
-    records = [asdict(row) for row in rows]
+    records = [row._asdict() for row in rows]
     lines = [
         *_summary(rows), "", ", ".join(f"{n} {verdict}" for verdict, n in counts.items()), "",
         *_table(rows),
