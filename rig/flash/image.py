@@ -40,13 +40,13 @@ class Image:
     size: int
 
 
-def read_image(path: Path, target: Target) -> Image:
+def read_image(file: str | Path | None, target: Target) -> Image:
     """Read an image and see whether it may be flashed.
 
     Parameters
     ----------
-    path
-        The file.
+    file
+        The file; `None`: the one that comes with this program.
     target
         The board it is meant for.
 
@@ -55,6 +55,7 @@ def read_image(path: Path, target: Target) -> Image:
     InputError
         The file is damaged, is no firmware of this project, or is for another board.
     """
+    path = target.shipped if file is None else Path(file)
     try:
         data = read_input(path)
     except OSError as error:
@@ -80,15 +81,14 @@ def shipped_firmware(board: str) -> str:
     """Say which firmware comes with this program for a board of that name; empty for none."""
     for target in (*TARGETS.values(), DRIVE):
         if target.board.name == board:
-            return read_image(target.shipped, target).firmware
+            return read_image(None, target).firmware
     return ""
 
 
 def _flash(text: str, path: Path) -> bytes:
     """Lay the records out from address 0; what no record fills stays erased."""
     flash = bytearray()
-    base = 0
-    number = 0
+    base = number = 0
     for number, line in enumerate(text.splitlines(), 1):
 
         def fault(text: str, at: int = number) -> InputError:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import closing
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
@@ -13,6 +11,7 @@ from rig.flash.boards import DRIVE, TARGETS, Target
 from rig.flash.drive import (
     choose_drive,
     copy_to,
+    looks,
     new_port,
     pico_ports,
     sees_waiting_pico,
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
 
 _UDEV_S = 2.0
 """For which a port that has just appeared may be forbidden: udev gives permission after it."""
-_LOOK_S = 0.1
 
 
 def flash(
@@ -70,7 +68,7 @@ def flash(
         raise make_error(InputError, "not_flashable", port=port)
     target = TARGETS[board]
     program = find_avrdude(avrdude)
-    file = read_image(target.shipped if image is None else Path(image), target)
+    file = read_image(image, target)
     # Avrdude tries for ever to open a port that is not there, and does not ask who uses it.
     with closing(open_port(port)):
         pass
@@ -108,7 +106,7 @@ def flash_drive(
     DeviceError
         No Pico waits, writing failed, or the board does not say what it should.
     """
-    file = read_image(DRIVE.shipped if image is None else Path(image), DRIVE)
+    file = read_image(image, DRIVE)
     if drive is None and not sees_waiting_pico():
         _ask_to_wait(port, say)
     folder = choose_drive(drive)
@@ -170,12 +168,10 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
 
 def _open_soon(port: str) -> Port:
     """Open a port as soon as it is permitted."""
-    end = time.monotonic() + _UDEV_S
-    while True:
+    for _ in looks(_UDEV_S):
         try:
             return open_port(port)
         except DeviceError as error:
-            denied = any(reason.code == "port_denied" for reason in error.reasons)
-            if not denied or time.monotonic() > end:
+            if all(reason.code != "port_denied" for reason in error.reasons):
                 raise
-        time.sleep(_LOOK_S)
+    return open_port(port)
