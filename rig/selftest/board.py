@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -80,17 +79,11 @@ def name_request(request: wire.HostMessage | RawRequest) -> str:
 class RecordedDrop:
     """A drop as the board sent it of its own accord."""
 
-    fired: wire.Fired
     events: tuple[wire.Event, ...]
     certificate: wire.DropCertificate
 
-    @property
-    def crc32(self) -> int:
-        """CRC-32 over the events that came."""
-        return zlib.crc32(wire.pack_events(self.events))
 
-
-class BoardUnderTest:
+class BoardUnderTest(Exchange):
     """One board during a self-test.
 
     No release is driven unless the options allow it: orders to arm pulse none, and where a check
@@ -114,14 +107,12 @@ class BoardUnderTest:
     """
 
     def __init__(self, port: Port, clock: Clock, options: SelftestOptions) -> None:
-        self.line = Exchange(port, clock)
-        self.line.expect_boot = True  # to be restarted ends no check by itself
-        self.clock = clock
+        super().__init__(port, clock)
+        self.expect_boot = True  # to be restarted ends no check by itself
         self.options = options
         self.identity: wire.Identity | None = None
         self.foreign = 0
         self.slowest_s = 0.0
-        self._seq = 0
         self._waiting: deque[Incoming] = deque()  # came together with what somebody waited for
         self._unasked: deque[Incoming] = deque()
         self._may_release = False
@@ -137,7 +128,7 @@ class BoardUnderTest:
     def send(self, request: wire.HostMessage | RawRequest, seq: int) -> None:
         """Send a request once, be it a message or not."""
         code, payload = request if isinstance(request, RawRequest) else wire.pack(request)
-        self.line.write(encode(Frame(code, seq, 0, payload)))
+        self.write(encode(Frame(code, seq, 0, payload)))
 
     def ask(self, request: wire.HostMessage | RawRequest, seq: int = 0) -> wire.Message:
         """Send a request, a few times if need be, and give its answer.
@@ -182,7 +173,7 @@ class BoardUnderTest:
 
     def wait(self, seconds: float, accepts: Callable[[Incoming], bool]) -> Incoming | None:
         """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
-        transcript, end_ns = self.line.transcript, self.clock.now_ns() + round(seconds * 1e9)
+        end_ns = self.clock.now_ns() + round(seconds * 1e9)
         while True:
             while self._waiting:
                 heard = self._waiting.popleft()
@@ -192,10 +183,10 @@ class BoardUnderTest:
                     self._unasked.append(heard)
             if self.clock.now_ns() >= end_ns:
                 return None
-            before, records = transcript.unreadable, self.line.receive()
+            before, records = self.transcript.unreadable, self.receive()
             self._waiting += [record for record in records if isinstance(record, Incoming)]
-            if transcript.unreadable > before:
-                raise CheckFailedError("invalid_message", text=transcript.misreading)
+            if self.transcript.unreadable > before:
+                raise CheckFailedError("invalid_message", text=self.transcript.misreading)
 
     def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Incoming | None:
         """Give the next message of some kinds that came, or comes in time, of its own accord."""
@@ -208,10 +199,11 @@ class BoardUnderTest:
     # -- arming and drops
 
     def order(self, **changes: int) -> wire.Arm:
-        """Make an order of a quiet gate that drives nothing."""
-        gates = changes.pop("gates", None)
-        gates = self.quiet_gate() if gates is None else gates
-        return replace(wire.Arm(LABEL, gates, 0, 0, 5000, RECORD_MS), **changes)
+        """Make an order of a quiet gate that drives nothing, of a board that is idle."""
+        self.need_idle()
+        if "gates" not in changes:
+            changes["gates"] = self.quiet_gate()
+        return replace(wire.Arm(LABEL, 0, 0, 0, 5000, RECORD_MS), **changes)
 
     def releasing_order(self, **changes: int) -> wire.Arm:
         """Make an order that would pulse release 0 for 50 ms, if it were fired."""
@@ -244,11 +236,10 @@ class BoardUnderTest:
 
     def drop(self, **changes: int) -> RecordedDrop:
         """Arm, fire, and take what the board sends until its certificate."""
-        return self.collect_drop(
-            self.fire(self.arm(**changes)), changes.get("record_ms", RECORD_MS)
-        )
+        self.fire(self.arm(**changes))
+        return self.collect_drop()
 
-    def collect_drop(self, fired: wire.Fired, record_ms: int = 0) -> RecordedDrop:
+    def collect_drop(self, record_ms: int = RECORD_MS) -> RecordedDrop:
         """Take what the board sends of a drop, up to its certificate."""
         events: list[wire.Event] = []
         deadline = self.clock.now_ns() + round((record_ms / 1000 + _END_S) * 1e9)
@@ -258,7 +249,7 @@ class BoardUnderTest:
                 case wire.EventsFrame(snapshots=snapshots):
                     events += snapshots
                 case wire.DropCertificate() as certificate:
-                    return RecordedDrop(fired, tuple(events), certificate)
+                    return RecordedDrop(tuple(events), certificate)
         raise CheckFailedError("no_certificate")
 
     def acknowledge(self, recorded: RecordedDrop) -> None:
@@ -274,9 +265,7 @@ class BoardUnderTest:
 
     def insist_phase(self, phase: Phase, event: str) -> None:
         """Insist on what the board is doing after an event."""
-        actual = self.phase()
-        if actual is not phase:
-            raise wrong_answer(f"Status after {event}", phase.name, actual.name)
+        insist(f"Status after {event}", self.phase().name, phase.name)
 
     def settle(self) -> None:
         """Bring the board back to IDLE; somebody else's drop is left as it is.
@@ -285,8 +274,12 @@ class BoardUnderTest:
         ------
         CheckFailedError
             It does not come to rest.
+        NotPossibleError
+            It is not known who it is.
         """
-        self.line.write(DELIMITER)
+        if self.identity is None:
+            raise NotPossibleError("no_identity")
+        self.write(DELIMITER)
         self._unasked.clear()
         for _ in range(4):
             state = self.answer(wire.Status(), wire.State)

@@ -6,6 +6,7 @@ docs/first-board.md lists the wires.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
@@ -14,7 +15,7 @@ from rig.link.assembly import ticks_since
 from rig.link.gatewatch import name_gates
 from rig.link.messages import DisarmReason, DropCertificate2, Phase, PulseEnd, RefusalReason
 from rig.selftest.board import LABEL, BoardUnderTest, RecordedDrop
-from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+from rig.selftest.findings import CheckFailedError, insist, wrong_answer
 from rig.selftest.requests import identify
 
 RELEASE, SYNC, QUIET = 1, 2, 4
@@ -32,29 +33,29 @@ _PULSE_LIMIT_US = 30.0
 """Within these the stop acts and a pulse is as long as ordered: firmware/PROTOCOL.md."""
 
 
-class JudgeBoard:
-    """The second board, which is wired to the first.
+class JudgeBoard(BoardUnderTest):
+    """The second board, which is wired to the first."""
 
-    Parameters
-    ----------
-    board
-        The second board.
-    """
+    rate = 1.0
+    """Ticks of the first board in one of the second."""
 
-    def __init__(self, board: BoardUnderTest) -> None:
-        self.board = board
-        self.rate = 1.0  # ticks of the first board in one of the second
-
-    def identify(self, _: BoardUnderTest) -> str:
-        """See who judges."""
-        return identify(self.board)
+    def checks(self) -> dict[str, Callable[[BoardUnderTest], str | None]]:
+        """Give the checks of the first board, of which some replace those that need a hand."""
+        return {
+            "judge": lambda _: identify(self),
+            "stamps": self.measure_stamps,
+            "release pulse": self.measure_release,
+            "emergency stop": self.measure_stop,
+            "STOPPED": self.open_stop,
+            "GATE_UNSTEADY": self.disturb_beam,
+        }
 
     def measure_stamps(self, board: BoardUnderTest) -> str:
         """See how exactly all gates stamp pulses whose length is known, from 1 µs on."""
         recorded, judged = self._pulse(board, BEAMS, _LONG_US, AT_BEAMS)
         self.rate = _flanks(recorded, AT_BEAMS)[1] / _certificate(judged).pulse_ticks
         hz = board.known_identity().tick_hz
-        off = self.rate * self.board.known_identity().tick_hz / hz - 1
+        off = self.rate * self.known_identity().tick_hz / hz - 1
         _limit("the clocks differ by", [1e6 * off], 2e6 * RESONATOR_TOLERANCE, "ppm")
         errors, skews = [], []
         for n in range(board.options.drops):
@@ -79,9 +80,9 @@ class JudgeBoard:
             order = {"release": 1, "pulse_us": pulse_us, "record_ms": record_ms}
             watch = {"gates": RELEASE | SYNC, "record_ms": record_ms + 50}
             token, judge_token = self._arm_both(board, order | {"gates": AT_BEAMS}, watch)
-            judge_fired = self.board.fire(judge_token)
-            recorded = _finish(board, board.fire(token))
-            judged = _finish(self.board, judge_fired)
+            self.fire(judge_token)
+            board.fire(token)
+            recorded, judged = _finish(board), _finish(self)
             (on, off), (high, _) = _changes(judged, RELEASE), _changes(judged, SYNC)
             length = (off - on) * self.rate
             ordered.append(length * us - pulse_us)
@@ -110,19 +111,20 @@ class JudgeBoard:
         """See that an open emergency stop disarms the board and forbids arming."""
         order = {"release": STOP, "pulse_us": _LONG_US, "record_ms": _LONG_US // 1000}
         _, judge_token = self._arm_both(board, {"gates": AT_BEAMS}, order)
-        fired = self.board.fire(judge_token)
+        self.fire(judge_token)
         heard = board.wait_unasked(0.1, wire.Disarmed)
         message = heard.message if heard else None
         insist("an open stop", message, wire.Disarmed(LABEL, DisarmReason.STOPPED))
         board.insist_phase(Phase.IDLE, "the stop")
         board.refuse(board.order(gates=AT_BEAMS), RefusalReason.STOPPED)
-        _finish(self.board, fired)
+        _finish(self)
 
     def disturb_beam(self, board: BoardUnderTest) -> None:
         """See that a beam that was broken since ARM forbids firing."""
         order = {"release": BEAMS, "pulse_us": 1000}
         token, judge_token = self._arm_both(board, {"gates": AT_BEAMS}, order)
-        _finish(self.board, self.board.fire(judge_token))
+        self.fire(judge_token)
+        _finish(self)
         board.refuse(wire.Fire(token), RefusalReason.GATE_UNSTEADY, AT_BEAMS)
 
     def _pulse(
@@ -133,22 +135,20 @@ class JudgeBoard:
         order = {"release": output, "pulse_us": length_us, "record_ms": record_ms}
         own |= {"gates": gates, "record_ms": record_ms}
         token, judge_token = self._arm_both(board, own, order)
-        fired = board.fire(token)
-        judge_fired = self.board.fire(judge_token)
-        return _finish(board, fired), _finish(self.board, judge_fired)
+        board.fire(token)
+        self.fire(judge_token)
+        return _finish(board), _finish(self)
 
     def _arm_both(
         self, board: BoardUnderTest, own: dict[str, int], order: dict[str, int]
     ) -> tuple[int, int]:
         """Arm both at once, when both releases have rested; give the tokens."""
-        if self.board.identity is None:
-            raise NotPossibleError("no_identity")
-        self.board.settle()
-        self.board.need_idle()
+        self.settle()
+        board.need_idle()
         order = {"gates": QUIET} | order
-        _arm(self.board, **order)
+        _arm(self, **order)
         token = _arm(board, **own)
-        return token, _arm(self.board, **order)
+        return token, _arm(self, **order)
 
 
 def _arm(board: BoardUnderTest, **changes: int) -> int:
@@ -161,8 +161,8 @@ def _arm(board: BoardUnderTest, **changes: int) -> int:
         board.clock.sleep(1.02e-3 * answer.detail)
 
 
-def _finish(board: BoardUnderTest, fired: wire.Fired) -> RecordedDrop:
-    recorded = board.collect_drop(fired, 1000)
+def _finish(board: BoardUnderTest) -> RecordedDrop:
+    recorded = board.collect_drop(1000)
     board.acknowledge(recorded)
     return recorded
 

@@ -32,7 +32,7 @@ _UNKNOWN_CODES = (0x55, 0x00, 0x82, 0xFF)
 
 def identify(board: BoardUnderTest) -> str:
     """See that the board introduces itself, sensibly and twice alike."""
-    board.line.write(DELIMITER)
+    board.write(DELIMITER)
     board.wait_unasked(BOOT_WAIT_S, wire.Boot)
     identity = board.answer(wire.Identify(), wire.Identity)
     board.identity = identity
@@ -126,6 +126,7 @@ def arm_and_abort(board: BoardUnderTest) -> None:
 
 def fire_unarmed(board: BoardUnderTest) -> None:
     """See that FIRE alone does nothing."""
+    board.need_idle()
     board.refuse(wire.Fire(1), RefusalReason.NOT_ARMED)
 
 
@@ -155,6 +156,7 @@ def send_bad_orders(board: BoardUnderTest) -> str:
 
 def read_no_drop(board: BoardUnderTest) -> None:
     """See that nothing is read or acknowledged while nothing is held."""
+    board.need_idle()
     board.refuse(wire.Read(LABEL, 0, 1), RefusalReason.NO_SUCH_DROP)
     board.refuse(wire.Acknowledge(LABEL, 0), RefusalReason.NO_SUCH_DROP)
 
