@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.link import messages as wire
-from rig.link.exchange import Exchange
+from rig.link.exchange import Answer, Exchange
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.gatewatch import GateStates, watch_gates
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from rig.clock.host import Clock
     from rig.link.port import Port
-
-Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 
 LABEL = pack_label(TEST_RUN, 1)
 OTHER_LABEL = pack_label(TEST_RUN, 2)
@@ -98,8 +96,6 @@ class BoardUnderTest(Exchange):
 
     Attributes
     ----------
-    identity
-        Known after the first check.
     foreign
         Label of a drop of somebody's session that the board holds, or 0.
     slowest_s
@@ -110,13 +106,10 @@ class BoardUnderTest(Exchange):
         super().__init__(port, clock)
         self.expect_boot = True  # to be restarted ends no check by itself
         self.options = options
-        self.identity: wire.Identity | None = None
         self.foreign = 0
         self.slowest_s = 0.0
-        self._waiting: deque[Incoming] = deque()  # came together with what somebody waited for
-        self._unasked: deque[Incoming] = deque()
+        self._heard: list[Incoming] = []  # and taken by nobody yet
         self._may_release = False
-        self._gates: GateStates | None = None
 
     # -- asking
 
@@ -172,28 +165,22 @@ class BoardUnderTest(Exchange):
         return answer
 
     def wait(self, seconds: float, accepts: Callable[[Incoming], bool]) -> Incoming | None:
-        """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
+        """Wait for a message, at most so long; what else comes unasked is kept."""
         end_ns = self.clock.now_ns() + round(seconds * 1e9)
         while True:
-            while self._waiting:
-                heard = self._waiting.popleft()
+            for n, heard in enumerate(self._heard):
                 if accepts(heard):
-                    return heard
-                if heard.ack == 0:
-                    self._unasked.append(heard)
+                    return self._heard.pop(n)
+            self._heard = [heard for heard in self._heard if heard.ack == 0]
             if self.clock.now_ns() >= end_ns:
                 return None
             before, records = self.transcript.unreadable, self.receive()
-            self._waiting += [record for record in records if isinstance(record, Incoming)]
+            self._heard += [record for record in records if isinstance(record, Incoming)]
             if self.transcript.unreadable > before:
                 raise CheckFailedError("invalid_message", text=self.transcript.misreading)
 
     def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Incoming | None:
         """Give the next message of some kinds that came, or comes in time, of its own accord."""
-        while self._unasked:
-            heard = self._unasked.popleft()
-            if isinstance(heard.message, kinds):
-                return heard
         return self.wait(seconds, lambda h: h.ack == 0 and isinstance(h.message, kinds))
 
     # -- arming and drops
@@ -259,13 +246,18 @@ class BoardUnderTest(Exchange):
 
     # -- rest
 
-    def phase(self) -> Phase:
+    def state(self) -> wire.State:
         """Ask what the board is doing."""
-        return self.answer(wire.Status(), wire.State).phase
+        return self.answer(wire.Status(), wire.State)
 
-    def insist_phase(self, phase: Phase, event: str) -> None:
-        """Insist on what the board is doing after an event."""
-        insist(f"Status after {event}", self.phase().name, phase.name)
+    def insist_state(self, event: str, **fields: Any) -> None:
+        """Insist on some of what the board says of its state after an event."""
+        state = self.state()
+        insist(f"Status after {event}", state, replace(state, **fields))
+
+    def abort(self) -> None:
+        """Disarm the board, or end its recording."""
+        self.answer(wire.Abort(), wire.Done)
 
     def settle(self) -> None:
         """Bring the board back to IDLE; somebody else's drop is left as it is.
@@ -277,12 +269,12 @@ class BoardUnderTest(Exchange):
         NotPossibleError
             It is not known who it is.
         """
-        if self.identity is None:
+        if self.transcript.identity is None:
             raise NotPossibleError("no_identity")
         self.write(DELIMITER)
-        self._unasked.clear()
+        self._heard.clear()
         for _ in range(4):
-            state = self.answer(wire.Status(), wire.State)
+            state = self.state()
             own = unpack_label(state.label)[0] == TEST_RUN
             if state.phase is Phase.IDLE:
                 self._may_release = False
@@ -294,7 +286,7 @@ class BoardUnderTest(Exchange):
                 held = self.answer(wire.Read(state.label, 0, 0), wire.DropCertificate)
                 self.ask(wire.Acknowledge(held.label, held.crc32))
             else:
-                self.answer(wire.Abort(), wire.Done)
+                self.abort()
                 self.wait(_ANSWER_S, lambda h: isinstance(h.message, wire.DropCertificate))
         raise wrong_answer("Abort", "an idle board", state.phase.name)
 
@@ -312,13 +304,10 @@ class BoardUnderTest(Exchange):
 
     # -- gates
 
+    @cached_property
     def gates(self) -> GateStates:
-        """Watch all gates for a moment, once."""
-        if self._gates is None:
-            self._gates = watch_gates(
-                lambda: self.answer(wire.Status(), wire.State).gates, self.clock, _WATCH_S
-            )
-        return self._gates
+        """All gates, watched for a moment, once."""
+        return watch_gates(lambda: self.state().gates, self.clock, _WATCH_S)
 
     def quiet_gate(self) -> int:
         """Mask of one gate that is clear and steady, and not at the end of the loop-back wire.
@@ -328,14 +317,15 @@ class BoardUnderTest(Exchange):
         NotPossibleError
             There is none.
         """
-        states = self.gates()
+        states = self.gates
         restless = states.stuck | states.flickering
-        for gate in reversed(range(self.known_identity().gates)):
+        for gate in reversed(range(self.identity.gates)):
             if not restless >> gate & 1 and gate != self.options.loopback:
                 return 1 << gate
         raise NotPossibleError("check_needs", needed=_QUIET)
 
-    def known_identity(self) -> wire.Identity:
+    @property
+    def identity(self) -> wire.Identity:
         """Who the board is."""
-        assert self.identity is not None, "the handshake comes first"
-        return self.identity
+        assert self.transcript.identity is not None, "the handshake comes first"
+        return self.transcript.identity

@@ -6,7 +6,6 @@ The last one needs a wire, from the sync output to a gate input.
 from __future__ import annotations
 
 import zlib
-from dataclasses import replace
 from statistics import fmean, stdev
 
 from rig.link import messages as wire
@@ -28,17 +27,14 @@ def compare_certificate(board: BoardUnderTest) -> None:
     sent = (LABEL, order.gates, 0, fired.tick, events)
     crc32 = zlib.crc32(wire.pack_events(recorded.events))
     insist("the certificate of a drop", (*certified, seal.crc32), (*sent, crc32))
-    state = board.answer(wire.Status(), wire.State)
-    held = replace(state, phase=Phase.HOLDING, label=LABEL, events=events)
-    insist("Status after a drop", state, held)
+    board.insist_state("a drop", phase=Phase.HOLDING, label=LABEL, events=events)
 
 
 def ask_while_recording(board: BoardUnderTest) -> None:
     """See that nothing else is begun while the board records."""
     token = board.arm(record_ms=_BUSY_MS)
     board.fire(token)
-    state = board.answer(wire.Status(), wire.State)
-    insist("Status after Fire", state, replace(state, phase=Phase.RECORDING, label=LABEL))
+    board.insist_state("Fire", phase=Phase.RECORDING, label=LABEL)
     board.refuse(board.order(label=OTHER_LABEL), RefusalReason.BUSY)
     board.refuse(wire.Read(LABEL, 0, 0), RefusalReason.BUSY)
     board.refuse(wire.Acknowledge(LABEL, 0), RefusalReason.BUSY)
@@ -49,9 +45,9 @@ def ask_while_recording(board: BoardUnderTest) -> None:
 def abort_a_recording(board: BoardUnderTest) -> None:
     """See that ABORT ends a recording at once and keeps what there is."""
     board.fire(board.arm(record_ms=20_000))
-    board.answer(wire.Abort(), wire.Done)
+    board.abort()
     board.collect_drop()
-    board.insist_phase(Phase.HOLDING, "Abort")
+    board.insist_state("Abort", phase=Phase.HOLDING)
 
 
 def arm_while_holding(board: BoardUnderTest) -> None:
@@ -59,7 +55,7 @@ def arm_while_holding(board: BoardUnderTest) -> None:
     board.drop()
     for label in (LABEL, OTHER_LABEL):
         board.refuse(board.order(label=label), RefusalReason.HOLDING_A_DROP, TEST_RUN)
-    board.answer(wire.Abort(), wire.Done)
+    board.abort()
     board.refuse(board.order(label=OTHER_LABEL), RefusalReason.HOLDING_A_DROP, TEST_RUN)
     board.arm()
 
@@ -85,7 +81,7 @@ def acknowledge_drop(board: BoardUnderTest) -> None:
     board.refuse(wire.Acknowledge(LABEL, crc32 ^ 1), RefusalReason.WRONG_CRC)
     board.refuse(wire.Acknowledge(OTHER_LABEL, crc32), RefusalReason.NO_SUCH_DROP)
     board.acknowledge(recorded)
-    board.insist_phase(Phase.IDLE, "Acknowledge")
+    board.insist_state("Acknowledge", phase=Phase.IDLE)
     board.refuse(wire.Acknowledge(LABEL, crc32), RefusalReason.NO_SUCH_DROP)
 
 
@@ -115,11 +111,11 @@ def measure_sync_edges(board: BoardUnderTest) -> str:
     if gate is None:
         wire_needed = "a wire from the sync output to a gate: --loopback GATE"
         raise NotPossibleError("check_needs", needed=wire_needed)
-    identity = board.known_identity()
+    identity = board.identity
     if gate >= identity.gates:
         gates = f"gate {gate}, and this board has gates 0 to {identity.gates - 1}"
         raise NotPossibleError("check_needs", needed=gates)
-    states = board.gates()
+    states = board.gates
     if (states.stuck | states.flickering) >> gate & 1:
         raise CheckFailedError("sync_blocked", gate=gate)
     late = [_sync_edge(board, gate) for _ in range(board.options.drops)]

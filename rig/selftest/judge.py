@@ -54,8 +54,8 @@ class JudgeBoard(BoardUnderTest):
         """See how exactly all gates stamp pulses whose length is known, from 1 µs on."""
         recorded, judged = self._pulse(board, BEAMS, _LONG_US, AT_BEAMS)
         self.rate = _flanks(recorded, AT_BEAMS)[1] / _certificate(judged).pulse_ticks
-        hz = board.known_identity().tick_hz
-        off = self.rate * self.known_identity().tick_hz / hz - 1
+        hz = board.identity.tick_hz
+        off = self.rate * self.identity.tick_hz / hz - 1
         _limit("the clocks differ by", [1e6 * off], 2e6 * RESONATOR_TOLERANCE, "ppm")
         errors, skews = [], []
         for n in range(board.options.drops):
@@ -73,7 +73,7 @@ class JudgeBoard(BoardUnderTest):
 
     def measure_release(self, board: BoardUnderTest) -> str:
         """See that release pulses are as long as ordered and as recorded, and begin at FIRE."""
-        us = 1e6 / board.known_identity().tick_hz
+        us = 1e6 / board.identity.tick_hz
         ordered, written, skews = [], [], []
         for pulse_us in _PULSES_US:
             record_ms = 100 + pulse_us // 1000
@@ -101,7 +101,7 @@ class JudgeBoard(BoardUnderTest):
             seal = _certificate(recorded)
             insist("the stop in a pulse", PulseEnd(seal.pulse_end).name, "STOPPED")
             ticks = seal.pulse_ticks - _changes(recorded, AT_STOP)[0]
-            delays.append(1e6 / board.known_identity().tick_hz * ticks)
+            delays.append(1e6 / board.identity.tick_hz * ticks)
         _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
         recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **release)
         insist("a spike", PulseEnd(_certificate(recorded).pulse_end).name, "ORDERED")
@@ -115,7 +115,7 @@ class JudgeBoard(BoardUnderTest):
         heard = board.wait_unasked(0.1, wire.Disarmed)
         message = heard.message if heard else None
         insist("an open stop", message, wire.Disarmed(LABEL, DisarmReason.STOPPED))
-        board.insist_phase(Phase.IDLE, "the stop")
+        board.insist_state("the stop", phase=Phase.IDLE)
         board.refuse(board.order(gates=AT_BEAMS), RefusalReason.STOPPED)
         _finish(self)
 
@@ -174,7 +174,7 @@ def _certificate(recorded: RecordedDrop) -> DropCertificate2:
 
 
 def _late(board: BoardUnderTest) -> int:
-    return board.known_identity().late_ticks
+    return board.identity.late_ticks
 
 
 def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:

@@ -38,7 +38,7 @@ def measure_round_trips(board: BoardUnderTest) -> str:
     late = sum(trip > limit_s for trip in trips)
     if late > _LATE:
         raise CheckFailedError("slow_answers", slowest_s=trips[-1])
-    clock = judge_clock(pings, board.known_identity().tick_hz)
+    clock = judge_clock(pings, board.identity.tick_hz)
     if late:
         raise NotPossibleError("computer_busy", interval_s=limit_s)
     low, middle, high = (1e3 * trip for trip in (trips[0], median(trips), trips[-1]))
@@ -68,7 +68,7 @@ def let_arming_time_out(board: BoardUnderTest) -> str:
     board.arm(timeout_ms=_TIMEOUT_MS)
     for _ in range(3):
         board.wait(_ASK_S, lambda _: False)
-        phase, now_ns = board.phase(), board.clock.now_ns()
+        phase, now_ns = board.state().phase, board.clock.now_ns()
         if phase is not Phase.ARMED:
             if now_ns - asked > HOST_SILENCE_MS * 10**6 or now_ns - sent > _TIMEOUT_MS * 10**6:
                 board.wait_unasked(_QUIET_S, wire.Disarmed)
@@ -98,7 +98,7 @@ def _insist_disarmed(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_
     room = 1e3 * (_SLACK_S + 2 * board.slowest_s)
     if not ms * (1 - RESONATOR_TOLERANCE) - 1 <= delay <= ms * (1 + RESONATOR_TOLERANCE) + room:
         raise wrong_answer(silence, f"Disarmed after {ms} ms", f"Disarmed after {delay:.0f} ms")
-    board.insist_phase(Phase.IDLE, "Disarmed")
+    board.insist_state("Disarmed", phase=Phase.IDLE)
     return f"after {delay:.0f} ms"
 
 
@@ -133,5 +133,5 @@ def send_junk(board: BoardUnderTest) -> str:
     noise = random.Random(3)
     for _ in range(_BURSTS):
         board.write(noise.randbytes(noise.randrange(1, 300)) + DELIMITER)
-        board.insist_phase(Phase.IDLE, "junk")
+        board.insist_state("junk", phase=Phase.IDLE)
     return f"{_BURSTS} bursts"

@@ -35,23 +35,18 @@ def identify(board: BoardUnderTest) -> str:
     board.write(DELIMITER)
     board.wait_unasked(BOOT_WAIT_S, wire.Boot)
     identity = board.answer(wire.Identify(), wire.Identity)
-    board.identity = identity
-    faults = [
-        fault
-        for fault, present in (
-            ("no name", not (identity.board and identity.firmware)),
-            ("no id", not any(identity.unique_id)),
-            ("no gates", not identity.gates),
-            ("gates without a name", len(identity.channels.split()) != identity.gates),
-            ("no release", not identity.releases),
-            ("an impossible tick rate", identity.tick_hz < 1_000_000),
-            ("hardly any memory", identity.capacity < 100),
-        )
-        if present
-    ]
-    if faults:
-        values = {"expected": "a complete identity", "answer": ", ".join(faults)}
-        raise CheckFailedError("wrong_answer", request="Identify", **values)
+    faults = {
+        "no name": not (identity.board and identity.firmware),
+        "no id": not any(identity.unique_id),
+        "no gates": not identity.gates,
+        "gates without a name": len(identity.channels.split()) != identity.gates,
+        "no release": not identity.releases,
+        "an impossible tick rate": identity.tick_hz < 1_000_000,
+        "hardly any memory": identity.capacity < 100,
+    }
+    if any(faults.values()):
+        answer = ", ".join(fault for fault, present in faults.items() if present)
+        raise wrong_answer("Identify", "a complete identity", answer)
     insist("a second Identify", board.answer(wire.Identify(), wire.Identity), identity)
     return f"{identity.board}, {identity.firmware}, id {identity.unique_id.hex()}"
 
@@ -65,10 +60,10 @@ def ask_other_versions(board: BoardUnderTest) -> None:
 def ask_every_message(board: BoardUnderTest) -> None:
     """See that each request gets its own kind of answer; those about drops have their own tests."""
     board.answer(wire.Ping(), wire.Pong)
-    board.answer(wire.Status(), wire.State)
+    board.state()
     board.answer(wire.Reference(), wire.ReferencePulse)
     board.need_idle()  # ABORT would let a held drop be discarded
-    board.answer(wire.Abort(), wire.Done)
+    board.abort()
 
 
 def send_unknown_messages(board: BoardUnderTest) -> None:
@@ -79,13 +74,13 @@ def send_unknown_messages(board: BoardUnderTest) -> None:
 
 def send_other_lengths(board: BoardUnderTest) -> None:
     """See that a request that is too long or too short is refused."""
-    for request in _wrong_lengths(wire.Arm(1, 1, 0, 0, 1, 1)):
+    for request in _wrong_lengths():
         board.refuse(request, RefusalReason.BAD_PARAMETER, 0)
 
 
 def look_at_gates(board: BoardUnderTest) -> str:
     """See that every gate in use is clear and keeps still."""
-    states, fitted = board.gates(), (1 << board.known_identity().gates) - 1
+    states, fitted = board.gates, (1 << board.identity.gates) - 1
     in_use = board.options.gates
     counted = fitted if in_use is None else in_use
     if absent := counted & ~fitted:
@@ -103,7 +98,7 @@ def look_at_gates(board: BoardUnderTest) -> str:
 
 def arm_blocked_gate(board: BoardUnderTest) -> str:
     """See that a gate that is blocked forbids arming."""
-    stuck = board.gates().stuck
+    stuck = board.gates.stuck
     if not stuck:
         raise NotPossibleError("check_needs", needed="a gate that is blocked by hand")
     gate = stuck & -stuck
@@ -117,10 +112,9 @@ def arm_blocked_gate(board: BoardUnderTest) -> str:
 def arm_and_abort(board: BoardUnderTest) -> None:
     """See that a board that was armed says so, and that ABORT disarms it."""
     token = board.arm()
-    state = board.answer(wire.Status(), wire.State)
-    insist("Status when armed", state, replace(state, phase=Phase.ARMED, label=LABEL, events=0))
-    board.answer(wire.Abort(), wire.Done)
-    board.insist_phase(Phase.IDLE, "Abort")
+    board.insist_state("Arm", phase=Phase.ARMED, label=LABEL, events=0)
+    board.abort()
+    board.insist_state("Abort", phase=Phase.IDLE)
     board.refuse(wire.Fire(token), RefusalReason.NOT_ARMED)
 
 
@@ -141,7 +135,7 @@ def send_wrong_tokens(board: BoardUnderTest) -> None:
 
 def send_bad_orders(board: BoardUnderTest) -> str:
     """See that no order is accepted that its table excludes, and that refusing changes nothing."""
-    variants = [*BAD_ORDERS, *_beyond(board.known_identity())]
+    variants = [*BAD_ORDERS, *_beyond(board.identity)]
     good = board.releasing_order()
     for changes in variants:
         name = "Arm with " + ", ".join(f"{name} {value}" for name, value in changes.items())
@@ -150,7 +144,7 @@ def send_bad_orders(board: BoardUnderTest) -> str:
     token = board.arm()
     board.refuse(board.order(gates=0), RefusalReason.BAD_PARAMETER)
     board.refuse(wire.Fire(token ^ 1), RefusalReason.WRONG_TOKEN)
-    board.insist_phase(Phase.ARMED, "a refused order")
+    board.insist_state("a refused order", phase=Phase.ARMED)
     return f"{len(variants)} orders"
 
 
@@ -170,24 +164,14 @@ def _beyond(identity: wire.Identity) -> Iterator[dict[str, int]]:
         yield {"release": 1 << identity.releases}
 
 
-def _wrong_lengths(order: wire.Arm) -> Iterator[RawRequest]:
-    """Give every request with a byte too many, and with one too few.
-
-    Parameters
-    ----------
-    order
-        An ARM that would be accepted.
-    """
-    examples: dict[type[wire.Message], wire.Message] = {
-        wire.Arm: order,
-        wire.Fire: wire.Fire(1),
-        wire.Read: wire.Read(order.label, 0, 1),
-        wire.Acknowledge: wire.Acknowledge(order.label, 0),
-    }
+def _wrong_lengths() -> Iterator[RawRequest]:
+    """Give every request with a byte too many, and with one too few."""
+    order = wire.Arm(1, 1, 0, 0, 1, 1)  # of the right length it would be accepted
+    orders = order, wire.Fire(1), wire.Read(1, 0, 1), wire.Acknowledge(1, 0)
+    examples: dict[type[wire.Message], wire.Message] = {type(each): each for each in orders}
     for code, kind in wire.TABLE.items():
         if code < 0x80 and kind is not wire.Flash:  # not every board knows it
-            example = examples[kind] if kind in examples else kind()
-            _, payload = wire.pack(example)
+            _, payload = wire.pack(examples.get(kind) or kind())
             yield RawRequest(code, payload + b"\1")
             if payload:
                 yield RawRequest(code, payload[:-1])

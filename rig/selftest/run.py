@@ -114,6 +114,6 @@ def selftest(
 
 
 def _make(check: Callable[[BoardUnderTest], str | None], board: BoardUnderTest) -> str | None:
-    if board.identity is not None:
+    if board.transcript.identity is not None:
         board.settle()
     return check(board)
