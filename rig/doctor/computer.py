@@ -119,13 +119,8 @@ def _owners(port: PortPlace) -> Iterator[str]:
         if folder.name == str(os.getpid()):
             continue
         with suppress(OSError):
-            if any(_points_to(handle, port.device) for handle in (folder / "fd").iterdir()):
+            handles = (folder / "fd").iterdir()
+            if str(port.device) in map(os.path.realpath, handles):
                 words = (folder / "cmdline").read_bytes().split(b"\0")
                 command = b" ".join(words).decode("utf-8", "replace").strip()
                 yield f"{command or name} (process {folder.name})"
-
-
-def _points_to(handle: Path, place: Path) -> bool:
-    with suppress(OSError):
-        return str(handle.readlink()) == str(place)
-    return False

@@ -40,11 +40,6 @@ def sees_boot_pico() -> bool:
     return False
 
 
-def sees_waiting_pico() -> bool:
-    """Whether a Pico waits for firmware, mounted or not."""
-    return bool(waiting_drives()) or sees_boot_pico()
-
-
 def looks(seconds: float) -> Iterator[None]:
     """Come back now and then until the time is over, and once at least."""
     end = time.monotonic() + seconds

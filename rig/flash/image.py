@@ -17,6 +17,7 @@ from rig.flash.uf2 import read_blocks
 from rig.reasons import make_error
 
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START = range(6)
+_TARGETS: tuple[Target, ...] = (*TARGETS.values(), DRIVE)
 _ERASED = b"\xff"
 _VERSION = re.compile(rb"(%s [0-9][\w.+-]*)\0" % FIRMWARE.encode())
 
@@ -60,14 +61,10 @@ def read_image(file: str | Path | None, target: Target) -> Image:
         data = read_input(path)
     except OSError as error:
         raise make_error(InputError, "image_unreadable", path=path, text=error) from None
-    flash = (
-        read_blocks(data, path)
-        if target is DRIVE
-        else _flash(data.decode("ascii", "replace"), path)
-    )
+    flash = read_blocks(data, path) if target is DRIVE else _flash(data, path)
     versions = set(_VERSION.findall(flash))
-    boards_known = {one.board for one in (*TARGETS.values(), DRIVE)}
-    boards = [board for board in boards_known if board.name.encode() + b"\0" in flash]
+    every = {target.board for target in _TARGETS}
+    boards = [board for board in every if board.name.encode() + b"\0" in flash]
     if len(versions) != 1 or len(boards) != 1:
         raise make_error(InputError, "image_foreign", path=path)
     if boards != [target.board]:
@@ -79,17 +76,17 @@ def read_image(file: str | Path | None, target: Target) -> Image:
 
 def shipped_firmware(board: str) -> str:
     """Say which firmware comes with this program for a board of that name; empty for none."""
-    for target in (*TARGETS.values(), DRIVE):
+    for target in _TARGETS:
         if target.board.name == board:
             return read_image(None, target).firmware
     return ""
 
 
-def _flash(text: str, path: Path) -> bytes:
+def _flash(data: bytes, path: Path) -> bytes:
     """Lay the records out from address 0; what no record fills stays erased."""
     flash = bytearray()
     base = number = 0
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(data.decode("ascii", "replace").splitlines(), 1):
 
         def fault(text: str, at: int = number) -> InputError:
             return InputError(problems=[Problem(str(path), at, 1, "", text)])
@@ -102,15 +99,15 @@ def _flash(text: str, path: Path) -> bytes:
             raise fault("no record of an Intel HEX file")
         if sum(record) & 0xFF:
             raise fault("the checksum is wrong: the file is damaged")
-        kind, data = record[3], record[4:-1]
+        kind, content = record[3], record[4:-1]
         if kind == _DATA:
             at = base + int.from_bytes(record[1:3], "big")
-            if at + len(data) > 1 << 20:
+            if at + len(content) > 1 << 20:
                 raise fault("an address beyond any board's flash")
-            flash.extend(_ERASED * (at + len(data) - len(flash)))
-            flash[at : at + len(data)] = data
+            flash.extend(_ERASED * (at + len(content) - len(flash)))
+            flash[at : at + len(content)] = content
         elif kind in {_SEGMENT, _LINEAR}:
-            base = int.from_bytes(data, "big") << (4 if kind == _SEGMENT else 16)
+            base = int.from_bytes(content, "big") << (4 if kind == _SEGMENT else 16)
         elif kind == _END:
             return bytes(flash)
         elif kind not in {_START_SEGMENT, _START}:

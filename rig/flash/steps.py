@@ -14,8 +14,9 @@ from rig.flash.drive import (
     looks,
     new_port,
     pico_ports,
-    sees_waiting_pico,
+    sees_boot_pico,
     wait_for_drive,
+    waiting_drives,
 )
 from rig.flash.image import read_image
 from rig.link import messages as wire
@@ -107,7 +108,7 @@ def flash_drive(
         No Pico waits, writing failed, or the board does not say what it should.
     """
     file = read_image(image, DRIVE)
-    if drive is None and not sees_waiting_pico():
+    if drive is None and not waiting_drives() and not sees_boot_pico():
         _ask_to_wait(port, say)
     folder = choose_drive(drive)
     before = pico_ports()

@@ -10,7 +10,7 @@ from rig.link import messages as wire
 from rig.link.exchange import Answer, Exchange
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.gatewatch import GateStates, watch_gates
-from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
+from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
 from rig.link.transcript import Incoming
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
@@ -78,7 +78,7 @@ class RecordedDrop:
     """A drop as the board sent it of its own accord."""
 
     events: tuple[wire.Event, ...]
-    certificate: wire.DropCertificate
+    certificate: wire.DropCertificate2
 
 
 class BoardUnderTest(Exchange):
@@ -192,9 +192,9 @@ class BoardUnderTest(Exchange):
             changes["gates"] = self.quiet_gate()
         return replace(wire.Arm(LABEL, 0, 0, 0, 5000, RECORD_MS), **changes)
 
-    def releasing_order(self, **changes: int) -> wire.Arm:
+    def releasing_order(self) -> wire.Arm:
         """Make an order that would pulse release 0 for 50 ms, if it were fired."""
-        return replace(self.order(), release=1, pulse_us=PULSE_US, **changes)
+        return self.order(release=1, pulse_us=PULSE_US)
 
     def arm(self, **changes: int) -> int:
         """Arm without a release; give the token."""
@@ -235,8 +235,10 @@ class BoardUnderTest(Exchange):
             match heard and heard.message:
                 case wire.EventsFrame(snapshots=snapshots):
                     events += snapshots
-                case wire.DropCertificate() as certificate:
+                case wire.DropCertificate2() as certificate:
                     return RecordedDrop(tuple(events), certificate)
+                case wire.DropCertificate() as certificate:
+                    raise wrong_answer("a drop", "DropCertificate2", certificate)
         raise CheckFailedError("no_certificate")
 
     def acknowledge(self, recorded: RecordedDrop) -> None:
@@ -254,6 +256,14 @@ class BoardUnderTest(Exchange):
         """Insist on some of what the board says of its state after an event."""
         state = self.state()
         insist(f"Status after {event}", state, replace(state, **fields))
+
+    def wait_disarmed(self, event: str, reason: DisarmReason, seconds: float) -> int:
+        """Insist on being disarmed for a reason after an event; give the host time, ns."""
+        heard = self.wait_unasked(seconds, wire.Disarmed)
+        message = heard.message if heard else "no message"
+        insist(event, message, wire.Disarmed(LABEL, reason))
+        self.insist_state("Disarmed", phase=Phase.IDLE)
+        return heard.host_ns if heard else 0
 
     def abort(self) -> None:
         """Disarm the board, or end its recording."""

@@ -13,9 +13,9 @@ from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
 from rig.link.assembly import ticks_since
 from rig.link.gatewatch import name_gates
-from rig.link.messages import DisarmReason, DropCertificate2, Phase, PulseEnd, RefusalReason
-from rig.selftest.board import LABEL, BoardUnderTest, RecordedDrop
-from rig.selftest.findings import CheckFailedError, insist, wrong_answer
+from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
+from rig.selftest.board import BoardUnderTest, RecordedDrop
+from rig.selftest.findings import CheckFailedError, insist
 from rig.selftest.requests import identify
 
 RELEASE, SYNC, QUIET = 1, 2, 4
@@ -53,7 +53,7 @@ class JudgeBoard(BoardUnderTest):
     def measure_stamps(self, board: BoardUnderTest) -> str:
         """See how exactly all gates stamp pulses whose length is known, from 1 µs on."""
         recorded, judged = self._pulse(board, BEAMS, _LONG_US, AT_BEAMS)
-        self.rate = _flanks(recorded, AT_BEAMS)[1] / _certificate(judged).pulse_ticks
+        self.rate = _flanks(recorded, AT_BEAMS)[1] / judged.certificate.pulse_ticks
         hz = board.identity.tick_hz
         off = self.rate * self.identity.tick_hz / hz - 1
         _limit("the clocks differ by", [1e6 * off], 2e6 * RESONATOR_TOLERANCE, "ppm")
@@ -61,9 +61,9 @@ class JudgeBoard(BoardUnderTest):
         for n in range(board.options.drops):
             recorded, judged = self._pulse(board, BEAMS, 1 + _STEP_US * n, AT_BEAMS)
             skew, length = _flanks(recorded, AT_BEAMS)
-            errors.append(1e9 / hz * (length - _certificate(judged).pulse_ticks * self.rate))
+            errors.append(1e9 / hz * (length - judged.certificate.pulse_ticks * self.rate))
             skews.append(1e9 / hz * skew)
-        _limit("a stamp is off by", errors + skews, 1e9 / hz * _late(board), "ns")
+        _limit("a stamp is off by", errors + skews, 1e9 / hz * board.identity.late_ticks, "ns")
         scatter = f"{stdev(errors) / 2**0.5:.0f} ns" if len(errors) > 1 else "unknown"
         worst = max(map(abs, errors))
         return (
@@ -86,10 +86,11 @@ class JudgeBoard(BoardUnderTest):
             (on, off), (high, _) = _changes(judged, RELEASE), _changes(judged, SYNC)
             length = (off - on) * self.rate
             ordered.append(length * us - pulse_us)
-            written.append((length - _certificate(recorded).pulse_ticks) * us)
+            written.append((length - recorded.certificate.pulse_ticks) * us)
             skews.append((high - on) * self.rate * us)
         _limit("a pulse is off by", ordered, _PULSE_LIMIT_US, "µs")
-        _limit("a pulse and its record differ by", written + skews, _late(board) * us, "µs")
+        late_us = board.identity.late_ticks * us
+        _limit("a pulse and its record differ by", written + skews, late_us, "µs")
         worst = (f"{1e3 * max(map(abs, us)):.0f} ns" for us in (ordered, written, skews))
         return "{} off at most; its record {}; sync {} from the release".format(*worst)
 
@@ -98,13 +99,13 @@ class JudgeBoard(BoardUnderTest):
         delays, release = [], {"release": 1, "pulse_us": _LONG_US}  # or to the recording's end
         for _ in range(max(1, board.options.drops // 4)):
             recorded, _ = self._pulse(board, STOP, 10_000, AT_STOP, **release)
-            seal = _certificate(recorded)
+            seal = recorded.certificate
             insist("the stop in a pulse", PulseEnd(seal.pulse_end).name, "STOPPED")
             ticks = seal.pulse_ticks - _changes(recorded, AT_STOP)[0]
             delays.append(1e6 / board.identity.tick_hz * ticks)
         _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
         recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **release)
-        insist("a spike", PulseEnd(_certificate(recorded).pulse_end).name, "ORDERED")
+        insist("a spike", PulseEnd(recorded.certificate.pulse_end).name, "ORDERED")
         return f"after {max(delays):.0f} µs at most; {_SPIKE_US} µs are ignored"
 
     def open_stop(self, board: BoardUnderTest) -> None:
@@ -112,10 +113,7 @@ class JudgeBoard(BoardUnderTest):
         order = {"release": STOP, "pulse_us": _LONG_US, "record_ms": _LONG_US // 1000}
         _, judge_token = self._arm_both(board, {"gates": AT_BEAMS}, order)
         self.fire(judge_token)
-        heard = board.wait_unasked(0.1, wire.Disarmed)
-        message = heard.message if heard else None
-        insist("an open stop", message, wire.Disarmed(LABEL, DisarmReason.STOPPED))
-        board.insist_state("the stop", phase=Phase.IDLE)
+        board.wait_disarmed("an open stop", DisarmReason.STOPPED, 0.1)
         board.refuse(board.order(gates=AT_BEAMS), RefusalReason.STOPPED)
         _finish(self)
 
@@ -165,16 +163,6 @@ def _finish(board: BoardUnderTest) -> RecordedDrop:
     recorded = board.collect_drop(1000)
     board.acknowledge(recorded)
     return recorded
-
-
-def _certificate(recorded: RecordedDrop) -> DropCertificate2:
-    if not isinstance(recorded.certificate, DropCertificate2):
-        raise wrong_answer("a drop", "DropCertificate2", recorded.certificate)
-    return recorded.certificate
-
-
-def _late(board: BoardUnderTest) -> int:
-    return board.identity.late_ticks
 
 
 def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:

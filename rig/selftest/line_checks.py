@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Sequence
 from statistics import median
+from typing import TYPE_CHECKING
 
 from rig.clock.epochs import RESONATOR_TOLERANCE, epochs
 from rig.clock.rate import ping_rate
@@ -12,8 +13,10 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
 from rig.records import ClockSample
-from rig.selftest.board import LABEL, BoardUnderTest
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+
+if TYPE_CHECKING:
+    from rig.selftest.board import BoardUnderTest
 
 _PINGS = 60
 _LATE = 6  # of them, above which it is not the computer that was busy
@@ -90,15 +93,10 @@ def stay_silent(board: BoardUnderTest) -> str:
 def _insist_disarmed(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_ns: int) -> str:
     """Wait in silence for DISARMED, neither early nor late."""
     silence = f"{ms} ms of silence"
-    heard = board.wait_unasked(ms / 1000 + 0.3, wire.Disarmed)
-    if heard is None:
-        raise wrong_answer(silence, "Disarmed", "no message")
-    insist(silence, heard.message, wire.Disarmed(LABEL, reason))
-    delay = (heard.host_ns - sent_ns) * 1e-6
+    delay = (board.wait_disarmed(silence, reason, ms / 1000 + 0.3) - sent_ns) * 1e-6
     room = 1e3 * (_SLACK_S + 2 * board.slowest_s)
     if not ms * (1 - RESONATOR_TOLERANCE) - 1 <= delay <= ms * (1 + RESONATOR_TOLERANCE) + room:
         raise wrong_answer(silence, f"Disarmed after {ms} ms", f"Disarmed after {delay:.0f} ms")
-    board.insist_state("Disarmed", phase=Phase.IDLE)
     return f"after {delay:.0f} ms"
 
 
