@@ -88,14 +88,14 @@ def copy_to(drive: Path, image: Path) -> None:
         The drive could not be written.
     """
     try:
-        file = os.open(drive / "chainrig.uf2", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        stream = (drive / "chainrig.uf2").open("wb")
     except OSError as error:
         raise make_error(DeviceError, "drive_unwritable", path=drive, text=error) from None
     try:
-        with open(file, "wb") as stream:  # noqa: PTH123 - of the handle
+        with stream:
             stream.write(image.read_bytes())
             stream.flush()
-            os.fsync(file)
+            os.fsync(stream.fileno())
     except OSError as error:
         # The board may be gone before the computer has noticed that everything was written: who it
         # is afterwards decides.

@@ -86,24 +86,24 @@ def _flash(data: bytes, path: Path) -> bytes:
     """Lay the records out from address 0; what no record fills stays erased."""
     flash = bytearray()
     base = number = 0
+
+    def fault(line: int, text: str) -> InputError:
+        return InputError(problems=[Problem(str(path), line, 1, "", text)])
+
     for number, line in enumerate(data.decode("ascii", "replace").splitlines(), 1):
-
-        def fault(text: str, at: int = number) -> InputError:
-            return InputError(problems=[Problem(str(path), at, 1, "", text)])
-
         try:
             record = bytes.fromhex(line.removeprefix(":"))
         except ValueError:
             record = b""
         if not line.startswith(":") or len(record) < 5 or len(record) != record[0] + 5:
-            raise fault("no record of an Intel HEX file")
+            raise fault(number, "no record of an Intel HEX file")
         if sum(record) & 0xFF:
-            raise fault("the checksum is wrong: the file is damaged")
+            raise fault(number, "the checksum is wrong: the file is damaged")
         kind, content = record[3], record[4:-1]
         if kind == _DATA:
             at = base + int.from_bytes(record[1:3], "big")
             if at + len(content) > 1 << 20:
-                raise fault("an address beyond any board's flash")
+                raise fault(number, "an address beyond any board's flash")
             flash.extend(_ERASED * (at + len(content) - len(flash)))
             flash[at : at + len(content)] = content
         elif kind in {_SEGMENT, _LINEAR}:
@@ -111,5 +111,5 @@ def _flash(data: bytes, path: Path) -> bytes:
         elif kind == _END:
             return bytes(flash)
         elif kind not in {_START_SEGMENT, _START}:
-            raise fault(f"an unknown kind of record: {kind}")
-    raise InputError(problems=[Problem(str(path), number, 1, "", "the end of the file is missing")])
+            raise fault(number, f"an unknown kind of record: {kind}")
+    raise fault(number, "the end of the file is missing")

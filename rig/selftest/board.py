@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rig.link import messages as wire
 from rig.link.exchange import Answer, Exchange
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from rig.clock.host import Clock
     from rig.link.port import Port
 
+Check: TypeAlias = "Callable[[BoardUnderTest], str | None]"
+"""What a check finds, in words; or it raises why it ended."""
 LABEL = pack_label(TEST_RUN, 1)
 OTHER_LABEL = pack_label(TEST_RUN, 2)
 RECORD_MS = 60
@@ -197,8 +199,14 @@ class BoardUnderTest(Exchange):
         return self.order(release=1, pulse_us=PULSE_US)
 
     def arm(self, **changes: int) -> int:
-        """Arm without a release; give the token."""
-        return self.read_token(self.ask(self.order(**changes)))
+        """Arm, after a release that the order pulses has rested; give the token."""
+        order = self.order(**changes)
+        answer = self.ask(order)
+        match answer:
+            case wire.Refused(reason=RefusalReason.COOLING, detail=rest_ms) if order.release:
+                self.clock.sleep(1.02e-3 * rest_ms)
+                answer = self.ask(order)
+        return self.read_token(answer)
 
     def read_token(self, answer: wire.Message) -> int:
         """Take the token from an answer to ARM.

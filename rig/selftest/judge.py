@@ -6,7 +6,6 @@ docs/first-board.md lists the wires.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
@@ -14,7 +13,7 @@ from rig.link import messages as wire
 from rig.link.assembly import ticks_since
 from rig.link.gatewatch import name_gates
 from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
-from rig.selftest.board import BoardUnderTest, RecordedDrop
+from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
 from rig.selftest.findings import CheckFailedError, insist
 from rig.selftest.requests import identify
 
@@ -39,7 +38,7 @@ class JudgeBoard(BoardUnderTest):
     rate = 1.0
     """Ticks of the first board in one of the second."""
 
-    def checks(self) -> dict[str, Callable[[BoardUnderTest], str | None]]:
+    def checks(self) -> dict[str, Check]:
         """Give the checks of the first board, of which some replace those that need a hand."""
         return {
             "judge": lambda _: identify(self),
@@ -144,19 +143,9 @@ class JudgeBoard(BoardUnderTest):
         self.settle()
         board.need_idle()
         order = {"gates": QUIET} | order
-        _arm(self, **order)
-        token = _arm(board, **own)
-        return token, _arm(self, **order)
-
-
-def _arm(board: BoardUnderTest, **changes: int) -> int:
-    """Arm a board, after its release has rested."""
-    order = board.order(**changes)
-    while True:
-        answer = board.ask(order)
-        if not (isinstance(answer, wire.Refused) and answer.reason is RefusalReason.COOLING):
-            return board.read_token(answer)
-        board.clock.sleep(1.02e-3 * answer.detail)
+        self.arm(**order)
+        token = board.arm(**own)
+        return token, self.arm(**order)
 
 
 def _finish(board: BoardUnderTest) -> RecordedDrop:

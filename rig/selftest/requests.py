@@ -83,16 +83,18 @@ def look_at_gates(board: BoardUnderTest) -> str:
     states, fitted = board.gates, (1 << board.identity.gates) - 1
     in_use = board.options.gates
     counted = fitted if in_use is None else in_use
-    if absent := counted & ~fitted:
-        raise CheckFailedError("gates_not_fitted", gates_listed=name_gates(absent))
-    if restless := states.flickering & counted:
-        raise CheckFailedError("gates_flicker", gates_listed=name_gates(restless))
-    stuck = name_gates(states.stuck) if states.stuck else ""
-    if in_use is None and stuck:
+    faults = {
+        "gates_not_fitted": counted & ~fitted,
+        "gates_flicker": states.flickering & counted,
+        "gates_blocked": states.stuck & (in_use or 0),
+    }
+    for code, mask in faults.items():
+        if mask:
+            raise CheckFailedError(code, gates_listed=name_gates(mask))
+    stuck = name_gates(states.stuck)
+    if in_use is None and states.stuck:
         raise NotPossibleError("gates_unused", gates_listed=stuck)
-    if states.stuck & counted:
-        raise CheckFailedError("gates_blocked", gates_listed=name_gates(states.stuck & counted))
-    unused = f"; not in use and blocked: {stuck}" if stuck else ""
+    unused = f"; not in use and blocked: {stuck}" if states.stuck else ""
     return f"{counted.bit_count()} gates clear{unused}"
 
 

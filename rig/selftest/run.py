@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rig.errors import DeviceError
 from rig.link.port import port_clock
 from rig.selftest import drops, line_checks, requests
-from rig.selftest.board import BoardUnderTest, SelftestOptions
+from rig.selftest.board import BoardUnderTest, Check, SelftestOptions
 from rig.selftest.findings import (
     CheckEndedError,
     Finding,
@@ -20,21 +20,21 @@ from rig.selftest.findings import (
 from rig.selftest.judge import JudgeBoard
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from rig.clock.host import Clock
     from rig.link.port import Port
     from rig.reasons import Reason
 
 
-def _needs(needed: str) -> Callable[[BoardUnderTest], str]:
+def _needs(needed: str) -> Check:
     def refuse(_board: BoardUnderTest) -> str:
         raise NotPossibleError("check_needs", needed=needed)
 
     return refuse
 
 
-CHECKS: dict[str, Callable[[BoardUnderTest], str | None]] = {
+CHECKS: dict[str, Check] = {
     "handshake": requests.identify,
     "VERSION": requests.ask_other_versions,
     "every message": requests.ask_every_message,
@@ -113,7 +113,7 @@ def selftest(
                 each.settle()
 
 
-def _make(check: Callable[[BoardUnderTest], str | None], board: BoardUnderTest) -> str | None:
+def _make(check: Check, board: BoardUnderTest) -> str | None:
     if board.transcript.identity is not None:
         board.settle()
     return check(board)
