@@ -16,18 +16,10 @@ from rig.flash.boards import UNSEEN
 from rig.flash.image import shipped_firmware
 from rig.link.client import Device
 from rig.link.gatewatch import GateStates, name_gates, watch_gates
-from rig.link.messages import (
-    HOST_SILENCE_MS,
-    TEST_RUN,
-    Arm,
-    Identity,
-    Phase,
-    RefusalReason,
-    pack_label,
-    unpack_label,
-)
+from rig.link.messages import HOST_SILENCE_MS, Arm, Identity, Phase, RefusalReason, unpack_label
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import Reason, make_reason
+from rig.selftest.board import LABEL
 from rig.selftest.findings import CheckFailedError
 from rig.selftest.line_checks import judge_clock
 
@@ -41,7 +33,6 @@ if TYPE_CHECKING:
 _GLANCE_S = 0.3
 _WATCH_S = 1.0
 _PINGS = 40
-_LABEL = pack_label(TEST_RUN, 1)
 _TRIES = 40
 _AGAIN = (RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY)
 """Refusals that a flickering gate gives now and then."""
@@ -105,7 +96,7 @@ def _record_gates(device: Device, gates: int) -> tuple[Edge, ...] | Reason:
     A board fires only when all its gates are clear and keep still. One that flickers with the
     mains does so for some milliseconds between two pulses, so a few tries in a row get there.
     """
-    order = Arm(_LABEL, gates, 0, 0, timeout_ms=1000, record_ms=round(_WATCH_S * 1000))
+    order = Arm(LABEL, gates, 0, 0, timeout_ms=1000, record_ms=round(_WATCH_S * 1000))
     for _ in range(_TRIES):
         try:
             device.fire(device.arm(order))
@@ -114,9 +105,9 @@ def _record_gates(device: Device, gates: int) -> tuple[Edge, ...] | Reason:
             if refusal.reason not in _AGAIN:
                 break
         else:
-            drop = device.collect(_LABEL)
+            drop = device.collect(LABEL)
             if drop.certificate is not None:
-                device.acknowledge(_LABEL, drop.certificate.crc32)
+                device.acknowledge(LABEL, drop.certificate.crc32)
             return drop.edges
     with suppress(DeviceRefusedError):
         device.abort()

@@ -6,18 +6,9 @@ from contextlib import closing
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
+from rig.flash import drive as drives
 from rig.flash.avrdude import find_avrdude, write_flash
 from rig.flash.boards import DRIVE, TARGETS, Target
-from rig.flash.drive import (
-    choose_drive,
-    copy_to,
-    looks,
-    new_port,
-    pico_ports,
-    sees_boot_pico,
-    wait_for_drive,
-    waiting_drives,
-)
 from rig.flash.image import read_image
 from rig.link import messages as wire
 from rig.link.client import Device
@@ -108,19 +99,19 @@ def flash_drive(
         No Pico waits, writing failed, or the board does not say what it should.
     """
     file = read_image(image, DRIVE)
-    if drive is None and not waiting_drives() and not sees_boot_pico():
+    if drive is None and not drives.waiting_drives() and not drives.sees_boot_pico():
         _ask_to_wait(port, say)
-    folder = choose_drive(drive)
-    before = pico_ports()
+    folder = drives.choose_drive(drive)
+    before = drives.pico_ports()
     say(f"copying {file.firmware} ({file.size} bytes) to the {DRIVE.board.name} at {folder}")
-    copy_to(folder, file.path)
+    drives.copy_to(folder, file.path)
     say("copied; asking the board who it is")
-    return identify(port or new_port(before), DRIVE, file.firmware)
+    return identify(port or drives.new_port(before), DRIVE, file.firmware)
 
 
 def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
     """Ask the one Pico that runs to take firmware, which it does when it has nothing else to do."""
-    ports = {port} if port else pico_ports()
+    ports = {port} if port else drives.pico_ports()
     if len(ports) != 1:
         return
     (path,) = ports
@@ -136,7 +127,7 @@ def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
                 return  # it has older firmware
             raise
     say(f"the {DRIVE.board.name} at {path} waits for firmware")
-    wait_for_drive()
+    drives.wait_for_drive()
 
 
 def identify(port: str, target: Target, firmware: str) -> Identity:
@@ -169,7 +160,7 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
 
 def _open_soon(port: str) -> Port:
     """Open a port as soon as it is permitted."""
-    for _ in looks(_UDEV_S):
+    for _ in drives.looks(_UDEV_S):
         try:
             return open_port(port)
         except DeviceError as error:

@@ -89,16 +89,16 @@ def arm_while_cooling(board: BoardUnderTest) -> str:
     """See that a release rests after its pulse. Drives release 0."""
     if not board.options.release:
         raise NotPossibleError("check_needs", needed="leave to drive release 0: --release")
-    order = board.releasing_order()
-    board.fire(board.read_token(board.ask(order)))
+    pulse = {"release": 1, "pulse_us": PULSE_US}
+    board.fire(board.arm(**pulse))
     board.acknowledge(board.collect_drop())
     # It must rest for 150 ms, of which a slow line takes some.
-    refused = board.refuse(order, RefusalReason.COOLING)
+    refused = board.refuse(board.order(**pulse), RefusalReason.COOLING)
     if not 0 < refused.detail <= 3 * PULSE_US // 1000 + 1:
         limit = f"a rest of at most {3 * PULSE_US // 1000} ms"
         raise wrong_answer("Arm after a pulse", limit, f"{refused.detail} ms")
     board.clock.sleep(1.02e-3 * refused.detail)
-    board.read_token(board.ask(order))
+    board.read_token(board.ask(board.order(**pulse)))
     return f"{refused.detail} ms more"
 
 

@@ -102,19 +102,20 @@ def _insist_disarmed(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_
 
 def repeat_requests(board: BoardUnderTest) -> None:
     """See that a repeated request is answered as before and not executed again."""
-    order = board.order()
-    seq = board.next_seq()
-    armed = board.ask(order, seq)
-    token = board.read_token(armed)
-    insist("a repeated Arm", board.ask(order, seq), armed)
-    seq = board.next_seq()
-    fired = board.answer(wire.Fire(token), wire.Fired, seq)
-    insist("a repeated Fire", board.ask(wire.Fire(token), seq), fired)
+    token = board.read_token(_repeat(board, board.order()))
+    fired = _repeat(board, wire.Fire(token))
     certificate = board.collect_drop().certificate
-    insist("a repeated Fire", certificate.fire_tick, fired.tick)
+    insist("a repeated Fire", fired, wire.Fired(certificate.fire_tick))
+    done = _repeat(board, wire.Acknowledge(certificate.label, certificate.crc32))
+    insist("a repeated Acknowledge", done, wire.Done())
+
+
+def _repeat(board: BoardUnderTest, request: wire.HostMessage) -> wire.Message:
+    """Send a request twice, and insist on the same answer."""
     seq = board.next_seq()
-    done = wire.Acknowledge(certificate.label, certificate.crc32)
-    insist("a repeated Acknowledge", [board.ask(done, seq) for _ in range(2)], [wire.Done()] * 2)
+    answer = board.ask(request, seq)
+    insist(f"a repeated {type(request).__name__}", board.ask(request, seq), answer)
+    return answer
 
 
 def send_without_seq(board: BoardUnderTest) -> None:

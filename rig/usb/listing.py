@@ -140,7 +140,7 @@ def sole_port() -> str:
     return paths[0]
 
 
-def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> str | None:
+def path_of(serial_number: str, ports: Iterable[SerialPort]) -> str | None:
     """Find a board again, wherever it is plugged in now.
 
     Parameters
@@ -148,7 +148,7 @@ def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> st
     serial_number
         From `serial_number_at`.
     ports
-        Where to look; by default at everything that is there.
+        Where to look.
 
     Returns
     -------
@@ -160,7 +160,6 @@ def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> st
     DeviceError
         Several have this number, as some copies of boards do.
     """
-    ports = serial_ports() if ports is None else ports
     paths = [port.path for port in ports if port.serial_number == serial_number]
     if len(paths) > 1:
         raise DeviceError(
@@ -178,7 +177,7 @@ def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> st
     path
         Device path, or a link to one as in ``/dev/serial/by-id``.
     ports
-        As in `path_of`.
+        Where to look; by default at everything that is there.
 
     Returns
     -------
