@@ -63,12 +63,11 @@ def read_image(file: str | Path | None, target: Target) -> Image:
         raise make_error(InputError, "image_unreadable", path=path, text=error) from None
     flash = read_blocks(data, path) if target is DRIVE else _flash(data, path)
     versions = set(_VERSION.findall(flash))
-    every = {target.board for target in _TARGETS}
-    boards = [board for board in every if board.name.encode() + b"\0" in flash]
+    boards = {each.board for each in _TARGETS if each.board.name.encode() + b"\0" in flash}
     if len(versions) != 1 or len(boards) != 1:
         raise make_error(InputError, "image_foreign", path=path)
-    if boards != [target.board]:
-        raise InputError(f"{path} is for {boards[0].one}, not for {target.board.one}")
+    if boards != {target.board}:
+        raise InputError(f"{path} is for {boards.pop().one}, not for {target.board.one}")
     if len(flash) > target.flash_limit:
         raise InputError(f"{path} would overwrite the boot loader of {target.board.one}")
     return Image(path, versions.pop().decode(), len(flash))
