@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import tau
 from typing import TYPE_CHECKING
 
@@ -16,17 +16,10 @@ from rig.flash.boards import UNSEEN
 from rig.flash.image import shipped_firmware
 from rig.link.client import Device
 from rig.link.gatewatch import GateStates, name_gates, watch_gates
-from rig.link.messages import (
-    HOST_SILENCE_MS,
-    TEST_RUN,
-    Arm,
-    Identity,
-    Phase,
-    RefusalReason,
-    pack_label,
-    unpack_label,
-)
+from rig.link.messages import HOST_SILENCE_MS, Arm, Identity, Phase, RefusalReason, unpack_label
 from rig.link.refusals import DeviceRefusedError
+from rig.reasons import Reason, make_reason
+from rig.selftest.board import LABEL
 from rig.selftest.findings import CheckFailedError
 from rig.selftest.line_checks import judge_clock
 
@@ -38,8 +31,8 @@ if TYPE_CHECKING:
     from rig.records import ClockSample, Edge
 
 _GLANCE_S = 0.3
+_WATCH_S = 1.0
 _PINGS = 40
-_LABEL = pack_label(TEST_RUN, 1)
 _TRIES = 40
 _AGAIN = (RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY)
 """Refusals that a flickering gate gives now and then."""
@@ -56,26 +49,18 @@ class BoardFacts:
     ----------
     shipped
         The firmware that comes with this program for such a board; empty when none does.
-    held
-        Run and attempt of a drop that it holds, or `None`.
     states
         Its gates as STATUS had them for a moment.
     edges
-        Of all gates that were not blocked, for `watched_s`, from a recording without a release;
-        `None` when none could be made, for the reason `unwatched`.
-    stopped
-        Whether that was because the emergency stop is open.
+        Of all gates that were not blocked, for a second, from a recording without a release; or
+        the reason for which none could be made.
     """
 
     identity: Identity
     shipped: str
     pings: tuple[ClockSample, ...]
-    held: tuple[int, int] | None
     states: GateStates
-    edges: tuple[Edge, ...] | None = None
-    watched_s: float = 1.0
-    unwatched: str = ""
-    stopped: bool = False
+    edges: tuple[Edge, ...] | Reason
 
 
 def look_at_board(port: Port, clock: Clock) -> BoardFacts:
@@ -94,44 +79,39 @@ def look_at_board(port: Port, clock: Clock) -> BoardFacts:
         clock.sleep(0.023 + 0.0071 * (n % 5))
     state = device.status()
     states = watch_gates(lambda: device.status().gates, clock, _GLANCE_S)
-    facts = BoardFacts(
-        identity,
-        shipped_firmware(identity.board),
-        tuple(pings),
-        unpack_label(state.label) if state.phase is Phase.HOLDING else None,
-        states,
-    )
-    clear = ((1 << identity.gates) - 1) & ~states.stuck
+    edges: tuple[Edge, ...] | Reason
     if state.phase is not Phase.IDLE:
-        return replace(facts, unwatched="it holds a drop")
-    if not clear:
-        return replace(facts, unwatched="all gates are blocked")
-    return _record_gates(device, clear, facts)
+        run, attempt = unpack_label(state.label)
+        edges = make_reason("drop_held", run=run, attempt=attempt)
+    elif clear := ((1 << identity.gates) - 1) & ~states.stuck:
+        edges = _record_gates(device, clear)
+    else:
+        edges = make_reason("gates_blocked", gates_listed=name_gates(states.stuck))
+    return BoardFacts(identity, shipped_firmware(identity.board), tuple(pings), states, edges)
 
 
-def _record_gates(device: Device, gates: int, facts: BoardFacts) -> BoardFacts:
-    """Add a recording of the gates with all releases off; else why there is none.
+def _record_gates(device: Device, gates: int) -> tuple[Edge, ...] | Reason:
+    """Record the gates with all releases off; else say why that cannot be.
 
     A board fires only when all its gates are clear and keep still. One that flickers with the
     mains does so for some milliseconds between two pulses, so a few tries in a row get there.
     """
-    order = Arm(_LABEL, gates, 0, 0, timeout_ms=1000, record_ms=round(facts.watched_s * 1000))
+    order = Arm(LABEL, gates, 0, 0, timeout_ms=1000, record_ms=round(_WATCH_S * 1000))
     for _ in range(_TRIES):
         try:
             device.fire(device.arm(order))
         except DeviceRefusedError as refusal:
-            stopped = refusal.reason is RefusalReason.STOPPED
-            facts = replace(facts, unwatched=refusal.message, stopped=stopped)
+            reason: Reason = refusal.reasons[0]
             if refusal.reason not in _AGAIN:
                 break
         else:
-            drop = device.collect(_LABEL)
+            drop = device.collect(LABEL)
             if drop.certificate is not None:
-                device.acknowledge(_LABEL, drop.certificate.crc32)
-            return replace(facts, edges=drop.edges, unwatched="", stopped=False)
+                device.acknowledge(LABEL, drop.certificate.crc32)
+            return drop.edges
     with suppress(DeviceRefusedError):
         device.abort()
-    return facts
+    return reason
 
 
 def _firmware(board: BoardFacts) -> str:
@@ -146,8 +126,8 @@ def _firmware(board: BoardFacts) -> str:
 
 def _held_drop(board: BoardFacts) -> str:
     """See that the board holds no drop that somebody waits for."""
-    if board.held is not None:
-        raise CheckFailedError("drop_held", run=board.held[0], attempt=board.held[1])
+    if isinstance(board.edges, Reason) and board.edges.code == "drop_held":
+        raise CheckFailedError("drop_held", **board.edges.values)
     return "none"
 
 
@@ -163,9 +143,11 @@ def _round_trip(board: BoardFacts) -> str:
 
 def _emergency_stop(board: BoardFacts) -> str:
     """See that the emergency stop lets the board arm."""
-    if board.stopped:
+    if not isinstance(board.edges, Reason):
+        return "closed"
+    if board.edges.code == "refused_stopped":
         raise CheckFailedError("stop_open")
-    return "closed" if board.edges is not None else "not tried"
+    return "not tried"
 
 
 def _stuck_gates(board: BoardFacts) -> str:
@@ -177,14 +159,15 @@ def _stuck_gates(board: BoardFacts) -> str:
 
 def _flickering_gates(board: BoardFacts) -> str:
     """See that no gate changes while nothing moves, and whether the mains do it if one does."""
-    if not board.edges:
+    edges = board.edges
+    if isinstance(edges, Reason) or not edges:
         if seen := board.states.flickering:
             raise CheckFailedError("gates_flicker", gates_listed=name_gates(seen))
-        if board.edges is None:
-            return f"none seen at a glance; not recorded: {board.unwatched}"
-        return f"none within {board.watched_s:g} s"
+        if isinstance(edges, Reason):
+            return f"none seen at a glance; not recorded: {edges}"
+        return f"none within {_WATCH_S:g} s"
     rises: dict[int, list[float]] = {}
-    for edge in board.edges:
+    for edge in edges:
         if edge.blocked:
             rises.setdefault(edge.channel, []).append(edge.tick / board.identity.tick_hz)
     ripples = {channel: mains_ripple(times) for channel, times in sorted(rises.items())}
@@ -193,7 +176,7 @@ def _flickering_gates(board: BoardFacts) -> str:
         for channel, hz in ripples.items()
     )
     code = "gates_flicker_mains" if any(ripples.values()) else "gates_flicker"
-    raise CheckFailedError(code, gates_listed=f"{gates} within {board.watched_s:g} s")
+    raise CheckFailedError(code, gates_listed=f"{gates} within {_WATCH_S:g} s")
 
 
 def mains_ripple(times_s: Sequence[float]) -> int | None:

@@ -67,7 +67,7 @@ def check_modem_manager(port: PortPlace) -> str:
     with suppress(OSError):
         number = port.device.stat().st_rdev
         account = port.udev / f"c{os.major(number)}:{os.minor(number)}"
-        if not set(_IGNORED).isdisjoint(account.read_text("utf-8", "replace").splitlines()):
+        if any(line in _IGNORED for line in account.read_text("utf-8", "replace").splitlines()):
             return "it is told to leave this port alone"
     raise CheckFailedError("modem_manager")
 
@@ -119,13 +119,8 @@ def _owners(port: PortPlace) -> Iterator[str]:
         if folder.name == str(os.getpid()):
             continue
         with suppress(OSError):
-            if any(_points_to(handle, port.device) for handle in (folder / "fd").iterdir()):
+            handles = (folder / "fd").iterdir()
+            if str(port.device) in map(os.path.realpath, handles):
                 words = (folder / "cmdline").read_bytes().split(b"\0")
                 command = b" ".join(words).decode("utf-8", "replace").strip()
                 yield f"{command or name} (process {folder.name})"
-
-
-def _points_to(handle: Path, place: Path) -> bool:
-    with suppress(OSError):
-        return str(handle.readlink()) == str(place)
-    return False

@@ -21,42 +21,42 @@ _USB = Path("/sys/bus/usb/devices")
 _BOOT = ["2e8a", "0003"]  # USB vendor and product of the RP2040's boot program
 _OCTAL = re.compile(r"\\([0-7]{3})")
 _LOOK_S = 0.2
+_MOUNT_S = 5.0
+_RESTART_S = 10.0
 
 
-def waiting_drives(mounts: Path = _MOUNTS) -> list[Path]:
-    """Find the drives of Picos that wait for firmware, where they are mounted.
-
-    Parameters
-    ----------
-    mounts
-        The kernel's account of what is mounted.
-    """
-    return [folder for folder in _fat_mounts(mounts) if _is_drive(folder)]
+def waiting_drives() -> list[Path]:
+    """Find the drives of Picos that wait for firmware, where they are mounted."""
+    return [folder for folder in _fat_mounts() if _is_drive(folder)]
 
 
-def sees_boot_pico(devices: Path = _USB) -> bool:
+def sees_boot_pico() -> bool:
     """Whether a Pico in boot mode is plugged in, by the kernel's account of USB devices."""
     names = ("idVendor", "idProduct")
-    for device in devices.glob("*"):
+    for device in _USB.glob("*"):
         with suppress(OSError):
             if [(device / name).read_text("ascii").strip() for name in names] == _BOOT:
                 return True
     return False
 
 
-def sees_waiting_pico() -> bool:
-    """Whether a Pico waits for firmware, mounted or not."""
-    return bool(waiting_drives()) or sees_boot_pico()
-
-
-def wait_for_drive(patience_s: float = 5.0) -> None:
-    """Give a desktop some time to mount the drive of a Pico that goes over to wait."""
-    end = time.monotonic() + patience_s
-    while not waiting_drives() and time.monotonic() < end:
+def looks(seconds: float) -> Iterator[None]:
+    """Come back now and then until the time is over, and once at least."""
+    end = time.monotonic() + seconds
+    yield
+    while time.monotonic() < end:
         time.sleep(_LOOK_S)
+        yield
 
 
-def choose_drive(folder: str | None, mounts: Path = _MOUNTS, devices: Path = _USB) -> Path:
+def wait_for_drive() -> None:
+    """Give a desktop some time to mount the drive of a Pico that goes over to wait."""
+    for _ in looks(_MOUNT_S):
+        if waiting_drives():
+            return
+
+
+def choose_drive(folder: str | None) -> Path:
     """Find the one drive to copy to.
 
     Raises
@@ -70,15 +70,13 @@ def choose_drive(folder: str | None, mounts: Path = _MOUNTS, devices: Path = _US
         if not _is_drive(Path(folder)):
             raise make_error(InputError, "not_a_pico", path=folder, file=_ABOUT)
         return Path(folder)
-    drives = waiting_drives(mounts)
+    drives = waiting_drives()
     if len(drives) == 1:
         return drives[0]
     if drives:
         names = ", ".join(map(str, drives))
         raise make_error(DeviceError, "many_picos", count=len(drives), names=names)
-    if sees_boot_pico(devices):
-        raise make_error(DeviceError, "pico_unmounted")
-    raise make_error(DeviceError, "no_pico")
+    raise make_error(DeviceError, "pico_unmounted" if sees_boot_pico() else "no_pico")
 
 
 def copy_to(drive: Path, image: Path) -> None:
@@ -90,14 +88,14 @@ def copy_to(drive: Path, image: Path) -> None:
         The drive could not be written.
     """
     try:
-        file = os.open(drive / "chainrig.uf2", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        stream = (drive / "chainrig.uf2").open("wb")
     except OSError as error:
         raise make_error(DeviceError, "drive_unwritable", path=drive, text=error) from None
     try:
-        with open(file, "wb") as stream:  # noqa: PTH123 - of the handle
+        with stream:
             stream.write(image.read_bytes())
             stream.flush()
-            os.fsync(file)
+            os.fsync(stream.fileno())
     except OSError as error:
         # The board may be gone before the computer has noticed that everything was written: who it
         # is afterwards decides.
@@ -105,28 +103,23 @@ def copy_to(drive: Path, image: Path) -> None:
             raise make_error(DeviceError, "drive_failed", path=drive, text=error) from None
 
 
-def new_port(before: set[str], patience_s: float = 10.0) -> str:
+def new_port(before: set[str]) -> str:
     """Wait for the port of the board that restarts.
 
     Parameters
     ----------
     before
         Ports that were there already.
-    patience_s
-        How long, s.
 
     Raises
     ------
     DeviceTimeoutError
         None appears.
     """
-    end = time.monotonic() + patience_s
-    while True:
+    for _ in looks(_RESTART_S):
         for path in pico_ports() - before:
             return path
-        if time.monotonic() > end:
-            raise make_error(DeviceTimeoutError, "no_pico_port")
-        time.sleep(_LOOK_S)
+    raise make_error(DeviceTimeoutError, "no_pico_port")
 
 
 def pico_ports() -> set[str]:
@@ -134,9 +127,9 @@ def pico_ports() -> set[str]:
     return {p.path for p in serial_ports() if p.candidate and DRIVE.board.name in p.kinds}
 
 
-def _fat_mounts(mounts: Path) -> Iterator[Path]:
+def _fat_mounts() -> Iterator[Path]:
     try:
-        lines = mounts.read_text("utf-8", "surrogateescape").splitlines()
+        lines = _MOUNTS.read_text("utf-8", "surrogateescape").splitlines()
     except OSError:  # another kernel
         return
     for line in lines:

@@ -17,6 +17,7 @@ from rig.flash.uf2 import read_blocks
 from rig.reasons import make_error
 
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START = range(6)
+_TARGETS: tuple[Target, ...] = (*TARGETS.values(), DRIVE)
 _ERASED = b"\xff"
 _VERSION = re.compile(rb"(%s [0-9][\w.+-]*)\0" % FIRMWARE.encode())
 
@@ -40,13 +41,13 @@ class Image:
     size: int
 
 
-def read_image(path: Path, target: Target) -> Image:
+def read_image(file: str | Path | None, target: Target) -> Image:
     """Read an image and see whether it may be flashed.
 
     Parameters
     ----------
-    path
-        The file.
+    file
+        The file; `None`: the one that comes with this program.
     target
         The board it is meant for.
 
@@ -55,22 +56,18 @@ def read_image(path: Path, target: Target) -> Image:
     InputError
         The file is damaged, is no firmware of this project, or is for another board.
     """
+    path = target.shipped if file is None else Path(file)
     try:
         data = read_input(path)
     except OSError as error:
         raise make_error(InputError, "image_unreadable", path=path, text=error) from None
-    flash = (
-        read_blocks(data, path)
-        if target is DRIVE
-        else _flash(data.decode("ascii", "replace"), path)
-    )
+    flash = read_blocks(data, path) if target is DRIVE else _flash(data, path)
     versions = set(_VERSION.findall(flash))
-    boards_known = {one.board for one in (*TARGETS.values(), DRIVE)}
-    boards = [board for board in boards_known if board.name.encode() + b"\0" in flash]
+    boards = {each.board for each in _TARGETS if each.board.name.encode() + b"\0" in flash}
     if len(versions) != 1 or len(boards) != 1:
         raise make_error(InputError, "image_foreign", path=path)
-    if boards != [target.board]:
-        raise InputError(f"{path} is for {boards[0].one}, not for {target.board.one}")
+    if boards != {target.board}:
+        raise InputError(f"{path} is for {boards.pop().one}, not for {target.board.one}")
     if len(flash) > target.flash_limit:
         raise InputError(f"{path} would overwrite the boot loader of {target.board.one}")
     return Image(path, versions.pop().decode(), len(flash))
@@ -78,41 +75,40 @@ def read_image(path: Path, target: Target) -> Image:
 
 def shipped_firmware(board: str) -> str:
     """Say which firmware comes with this program for a board of that name; empty for none."""
-    for target in (*TARGETS.values(), DRIVE):
+    for target in _TARGETS:
         if target.board.name == board:
-            return read_image(target.shipped, target).firmware
+            return read_image(None, target).firmware
     return ""
 
 
-def _flash(text: str, path: Path) -> bytes:
+def _flash(data: bytes, path: Path) -> bytes:
     """Lay the records out from address 0; what no record fills stays erased."""
     flash = bytearray()
-    base = 0
-    number = 0
-    for number, line in enumerate(text.splitlines(), 1):
+    base = number = 0
 
-        def fault(text: str, at: int = number) -> InputError:
-            return InputError(problems=[Problem(str(path), at, 1, "", text)])
+    def fault(line: int, text: str) -> InputError:
+        return InputError(problems=[Problem(str(path), line, 1, "", text)])
 
+    for number, line in enumerate(data.decode("ascii", "replace").splitlines(), 1):
         try:
             record = bytes.fromhex(line.removeprefix(":"))
         except ValueError:
             record = b""
         if not line.startswith(":") or len(record) < 5 or len(record) != record[0] + 5:
-            raise fault("no record of an Intel HEX file")
+            raise fault(number, "no record of an Intel HEX file")
         if sum(record) & 0xFF:
-            raise fault("the checksum is wrong: the file is damaged")
-        kind, data = record[3], record[4:-1]
+            raise fault(number, "the checksum is wrong: the file is damaged")
+        kind, content = record[3], record[4:-1]
         if kind == _DATA:
             at = base + int.from_bytes(record[1:3], "big")
-            if at + len(data) > 1 << 20:
-                raise fault("an address beyond any board's flash")
-            flash.extend(_ERASED * (at + len(data) - len(flash)))
-            flash[at : at + len(data)] = data
+            if at + len(content) > 1 << 20:
+                raise fault(number, "an address beyond any board's flash")
+            flash.extend(_ERASED * (at + len(content) - len(flash)))
+            flash[at : at + len(content)] = content
         elif kind in {_SEGMENT, _LINEAR}:
-            base = int.from_bytes(data, "big") << (4 if kind == _SEGMENT else 16)
+            base = int.from_bytes(content, "big") << (4 if kind == _SEGMENT else 16)
         elif kind == _END:
             return bytes(flash)
         elif kind not in {_START_SEGMENT, _START}:
-            raise fault(f"an unknown kind of record: {kind}")
-    raise InputError(problems=[Problem(str(path), number, 1, "", "the end of the file is missing")])
+            raise fault(number, f"an unknown kind of record: {kind}")
+    raise fault(number, "the end of the file is missing")

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import closing
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
+from rig.flash import drive as drives
 from rig.flash.avrdude import find_avrdude, write_flash
 from rig.flash.boards import DRIVE, TARGETS, Target
-from rig.flash.drive import (
-    choose_drive,
-    copy_to,
-    new_port,
-    pico_ports,
-    sees_waiting_pico,
-    wait_for_drive,
-)
 from rig.flash.image import read_image
 from rig.link import messages as wire
 from rig.link.client import Device
@@ -33,7 +24,6 @@ if TYPE_CHECKING:
 
 _UDEV_S = 2.0
 """For which a port that has just appeared may be forbidden: udev gives permission after it."""
-_LOOK_S = 0.1
 
 
 def flash(
@@ -70,7 +60,7 @@ def flash(
         raise make_error(InputError, "not_flashable", port=port)
     target = TARGETS[board]
     program = find_avrdude(avrdude)
-    file = read_image(target.shipped if image is None else Path(image), target)
+    file = read_image(image, target)
     # Avrdude tries for ever to open a port that is not there, and does not ask who uses it.
     with closing(open_port(port)):
         pass
@@ -108,20 +98,20 @@ def flash_drive(
     DeviceError
         No Pico waits, writing failed, or the board does not say what it should.
     """
-    file = read_image(DRIVE.shipped if image is None else Path(image), DRIVE)
-    if drive is None and not sees_waiting_pico():
+    file = read_image(image, DRIVE)
+    if drive is None and not drives.waiting_drives() and not drives.sees_boot_pico():
         _ask_to_wait(port, say)
-    folder = choose_drive(drive)
-    before = pico_ports()
+    folder = drives.choose_drive(drive)
+    before = drives.pico_ports()
     say(f"copying {file.firmware} ({file.size} bytes) to the {DRIVE.board.name} at {folder}")
-    copy_to(folder, file.path)
+    drives.copy_to(folder, file.path)
     say("copied; asking the board who it is")
-    return identify(port or new_port(before), DRIVE, file.firmware)
+    return identify(port or drives.new_port(before), DRIVE, file.firmware)
 
 
 def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
     """Ask the one Pico that runs to take firmware, which it does when it has nothing else to do."""
-    ports = {port} if port else pico_ports()
+    ports = {port} if port else drives.pico_ports()
     if len(ports) != 1:
         return
     (path,) = ports
@@ -137,7 +127,7 @@ def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
                 return  # it has older firmware
             raise
     say(f"the {DRIVE.board.name} at {path} waits for firmware")
-    wait_for_drive()
+    drives.wait_for_drive()
 
 
 def identify(port: str, target: Target, firmware: str) -> Identity:
@@ -170,12 +160,10 @@ def identify(port: str, target: Target, firmware: str) -> Identity:
 
 def _open_soon(port: str) -> Port:
     """Open a port as soon as it is permitted."""
-    end = time.monotonic() + _UDEV_S
-    while True:
+    for _ in drives.looks(_UDEV_S):
         try:
             return open_port(port)
         except DeviceError as error:
-            denied = any(reason.code == "port_denied" for reason in error.reasons)
-            if not denied or time.monotonic() > end:
+            if all(reason.code != "port_denied" for reason in error.reasons):
                 raise
-        time.sleep(_LOOK_S)
+    return open_port(port)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rig.errors import InputError
 
-_BLOCK = 512
+_LAYOUT = struct.Struct("<8I476sI")
 _MAGIC = (0x0A324655, 0x9E5D5157)
 _END = 0x0AB16F30
 _RP2040 = 0xE48BFF56
@@ -28,19 +28,18 @@ def read_blocks(data: bytes, path: Path) -> bytes:
     InputError
         It is no UF2, not for an RP2040, or not whole.
     """
-    if not data or len(data) % _BLOCK:
+    if not data or len(data) % _LAYOUT.size:
         raise InputError(f"{path} is no whole UF2 file")
     flash = bytearray()
-    for n in range(len(data) // _BLOCK):
-        block = data[n * _BLOCK : (n + 1) * _BLOCK]
-        first, second, _, address, size, number, count, family = struct.unpack_from("<8I", block)
-        (end,) = struct.unpack_from("<I", block, _BLOCK - 4)
+    blocks = list(_LAYOUT.iter_unpack(data))
+    for n, block in enumerate(blocks):
+        first, second, _, address, size, number, count, family, content, end = block
         if (first, second, end) != (*_MAGIC, _END):
             raise InputError(f"{path} is no UF2 file, or damaged: block {n}")
         if family != _RP2040:
             raise InputError(f"{path} is not for an RP2040: block {n}")
         order = (number, count, size, address)
-        if order != (n, len(data) // _BLOCK, _PAYLOAD, _FLASH + n * _PAYLOAD):
+        if order != (n, len(blocks), _PAYLOAD, _FLASH + n * _PAYLOAD):
             raise InputError(f"{path} is not whole: block {n} is another one")
-        flash += block[32 : 32 + size]
+        flash += content[:size]
     return bytes(flash)

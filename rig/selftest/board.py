@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import zlib
-from collections import deque
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rig.link import messages as wire
-from rig.link.exchange import Exchange
+from rig.link.exchange import Answer, Exchange
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.gatewatch import GateStates, watch_gates
-from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label, unpack_label
+from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
 from rig.link.transcript import Incoming
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
     from rig.clock.host import Clock
     from rig.link.port import Port
 
-Answer = TypeVar("Answer", bound=wire.DeviceMessage)
-
+Check: TypeAlias = "Callable[[BoardUnderTest], str | None]"
+"""What a check finds, in words; or it raises why it ended."""
 LABEL = pack_label(TEST_RUN, 1)
 OTHER_LABEL = pack_label(TEST_RUN, 2)
 RECORD_MS = 60
@@ -31,6 +30,7 @@ _TRIES = 3
 _ANSWER_S = 0.3
 _END_S = 1.0  # at most, from the end of a recording to its certificate
 _WATCH_S = 0.4
+_REST_MS = 5000  # above what any release needs after the longest pulse
 _QUIET = (
     "a gate that is clear and steady; on a bare board a wire from one gate input to ground, and "
     "for the sync output a wire to another one (--loopback GATE)"
@@ -80,17 +80,11 @@ def name_request(request: wire.HostMessage | RawRequest) -> str:
 class RecordedDrop:
     """A drop as the board sent it of its own accord."""
 
-    fired: wire.Fired
     events: tuple[wire.Event, ...]
-    certificate: wire.DropCertificate
-
-    @property
-    def crc32(self) -> int:
-        """CRC-32 over the events that came."""
-        return zlib.crc32(wire.pack_events(self.events))
+    certificate: wire.DropCertificate2
 
 
-class BoardUnderTest:
+class BoardUnderTest(Exchange):
     """One board during a self-test.
 
     No release is driven unless the options allow it: orders to arm pulse none, and where a check
@@ -105,8 +99,6 @@ class BoardUnderTest:
 
     Attributes
     ----------
-    identity
-        Known after the first check.
     foreign
         Label of a drop of somebody's session that the board holds, or 0.
     slowest_s
@@ -114,18 +106,13 @@ class BoardUnderTest:
     """
 
     def __init__(self, port: Port, clock: Clock, options: SelftestOptions) -> None:
-        self.line = Exchange(port, clock)
-        self.line.expect_boot = True  # to be restarted ends no check by itself
-        self.clock = clock
+        super().__init__(port, clock)
+        self.expect_boot = True  # to be restarted ends no check by itself
         self.options = options
-        self.identity: wire.Identity | None = None
         self.foreign = 0
         self.slowest_s = 0.0
-        self._seq = 0
-        self._waiting: deque[Incoming] = deque()  # came together with what somebody waited for
-        self._unasked: deque[Incoming] = deque()
+        self._heard: list[Incoming] = []  # and taken by nobody yet
         self._may_release = False
-        self._gates: GateStates | None = None
 
     # -- asking
 
@@ -137,7 +124,7 @@ class BoardUnderTest:
     def send(self, request: wire.HostMessage | RawRequest, seq: int) -> None:
         """Send a request once, be it a message or not."""
         code, payload = request if isinstance(request, RawRequest) else wire.pack(request)
-        self.line.write(encode(Frame(code, seq, 0, payload)))
+        self.write(encode(Frame(code, seq, 0, payload)))
 
     def ask(self, request: wire.HostMessage | RawRequest, seq: int = 0) -> wire.Message:
         """Send a request, a few times if need be, and give its answer.
@@ -159,9 +146,9 @@ class BoardUnderTest:
                 return heard.message
         raise CheckFailedError("no_answer", request=name_request(request))
 
-    def answer(self, message: wire.HostMessage, kind: type[Answer], seq: int = 0) -> Answer:
+    def answer(self, message: wire.HostMessage, kind: type[Answer]) -> Answer:
         """Ask, and insist on one kind of answer."""
-        answer = self.ask(message, seq)
+        answer = self.ask(message)
         if not isinstance(answer, kind):
             raise wrong_answer(name_request(message), kind.__name__, answer)
         return answer
@@ -181,45 +168,44 @@ class BoardUnderTest:
         return answer
 
     def wait(self, seconds: float, accepts: Callable[[Incoming], bool]) -> Incoming | None:
-        """Wait for a message, at most so long; what else comes unasked is kept for `unasked`."""
-        transcript, end_ns = self.line.transcript, self.clock.now_ns() + round(seconds * 1e9)
+        """Wait for a message, at most so long; what else comes unasked is kept."""
+        end_ns = self.clock.now_ns() + round(seconds * 1e9)
         while True:
-            while self._waiting:
-                heard = self._waiting.popleft()
+            for n, heard in enumerate(self._heard):
                 if accepts(heard):
-                    return heard
-                if heard.ack == 0:
-                    self._unasked.append(heard)
+                    return self._heard.pop(n)
+            self._heard = [heard for heard in self._heard if heard.ack == 0]
             if self.clock.now_ns() >= end_ns:
                 return None
-            before, records = transcript.unreadable, self.line.receive()
-            self._waiting += [record for record in records if isinstance(record, Incoming)]
-            if transcript.unreadable > before:
-                raise CheckFailedError("invalid_message", text=transcript.misreading)
+            before, records = self.transcript.unreadable, self.receive()
+            self._heard += [record for record in records if isinstance(record, Incoming)]
+            if self.transcript.unreadable > before:
+                raise CheckFailedError("invalid_message", text=self.transcript.misreading)
 
     def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Incoming | None:
         """Give the next message of some kinds that came, or comes in time, of its own accord."""
-        while self._unasked:
-            heard = self._unasked.popleft()
-            if isinstance(heard.message, kinds):
-                return heard
         return self.wait(seconds, lambda h: h.ack == 0 and isinstance(h.message, kinds))
 
     # -- arming and drops
 
     def order(self, **changes: int) -> wire.Arm:
-        """Make an order of a quiet gate that drives nothing."""
-        gates = changes.pop("gates", None)
-        gates = self.quiet_gate() if gates is None else gates
-        return replace(wire.Arm(LABEL, gates, 0, 0, 5000, RECORD_MS), **changes)
-
-    def releasing_order(self, **changes: int) -> wire.Arm:
-        """Make an order that would pulse release 0 for 50 ms, if it were fired."""
-        return replace(self.order(), release=1, pulse_us=PULSE_US, **changes)
+        """Make an order of a quiet gate that drives nothing, of a board that is idle."""
+        self.need_idle()
+        if "gates" not in changes:
+            changes["gates"] = self.quiet_gate()
+        return replace(wire.Arm(LABEL, 0, 0, 0, 5000, RECORD_MS), **changes)
 
     def arm(self, **changes: int) -> int:
-        """Arm without a release; give the token."""
-        return self.read_token(self.ask(self.order(**changes)))
+        """Arm, after a release that the order pulses has rested; give the token."""
+        order = self.order(**changes)
+        answer = self.ask(order)
+        match answer:
+            case wire.Refused(reason=RefusalReason.COOLING, detail=ms) if (
+                order.release and ms < _REST_MS
+            ):
+                self.clock.sleep(1.02e-3 * ms)
+                answer = self.ask(order)
+        return self.read_token(answer)
 
     def read_token(self, answer: wire.Message) -> int:
         """Take the token from an answer to ARM.
@@ -244,11 +230,10 @@ class BoardUnderTest:
 
     def drop(self, **changes: int) -> RecordedDrop:
         """Arm, fire, and take what the board sends until its certificate."""
-        return self.collect_drop(
-            self.fire(self.arm(**changes)), changes.get("record_ms", RECORD_MS)
-        )
+        self.fire(self.arm(**changes))
+        return self.collect_drop()
 
-    def collect_drop(self, fired: wire.Fired, record_ms: int = 0) -> RecordedDrop:
+    def collect_drop(self, record_ms: int = RECORD_MS) -> RecordedDrop:
         """Take what the board sends of a drop, up to its certificate."""
         events: list[wire.Event] = []
         deadline = self.clock.now_ns() + round((record_ms / 1000 + _END_S) * 1e9)
@@ -257,8 +242,10 @@ class BoardUnderTest:
             match heard and heard.message:
                 case wire.EventsFrame(snapshots=snapshots):
                     events += snapshots
+                case wire.DropCertificate2() as certificate:
+                    return RecordedDrop(tuple(events), certificate)
                 case wire.DropCertificate() as certificate:
-                    return RecordedDrop(fired, tuple(events), certificate)
+                    raise wrong_answer("a drop", "DropCertificate2", certificate)
         raise CheckFailedError("no_certificate")
 
     def acknowledge(self, recorded: RecordedDrop) -> None:
@@ -268,15 +255,26 @@ class BoardUnderTest:
 
     # -- rest
 
-    def phase(self) -> Phase:
+    def state(self) -> wire.State:
         """Ask what the board is doing."""
-        return self.answer(wire.Status(), wire.State).phase
+        return self.answer(wire.Status(), wire.State)
 
-    def insist_phase(self, phase: Phase, event: str) -> None:
-        """Insist on what the board is doing after an event."""
-        actual = self.phase()
-        if actual is not phase:
-            raise wrong_answer(f"Status after {event}", phase.name, actual.name)
+    def insist_state(self, event: str, **fields: Any) -> None:
+        """Insist on some of what the board says of its state after an event."""
+        state = self.state()
+        insist(f"Status after {event}", state, replace(state, **fields))
+
+    def wait_disarmed(self, event: str, reason: DisarmReason, seconds: float) -> int:
+        """Insist on being disarmed for a reason after an event; give the host time, ns."""
+        heard = self.wait_unasked(seconds, wire.Disarmed)
+        message = heard.message if heard else "no message"
+        insist(event, message, wire.Disarmed(LABEL, reason))
+        self.insist_state("Disarmed", phase=Phase.IDLE)
+        return heard.host_ns if heard else 0
+
+    def abort(self) -> None:
+        """Disarm the board, or end its recording."""
+        self.answer(wire.Abort(), wire.Done)
 
     def settle(self) -> None:
         """Bring the board back to IDLE; somebody else's drop is left as it is.
@@ -285,11 +283,15 @@ class BoardUnderTest:
         ------
         CheckFailedError
             It does not come to rest.
+        NotPossibleError
+            It is not known who it is.
         """
-        self.line.write(DELIMITER)
-        self._unasked.clear()
+        if self.transcript.identity is None:
+            raise NotPossibleError("no_identity")
+        self.write(DELIMITER)
+        self._heard.clear()
         for _ in range(4):
-            state = self.answer(wire.Status(), wire.State)
+            state = self.state()
             own = unpack_label(state.label)[0] == TEST_RUN
             if state.phase is Phase.IDLE:
                 self._may_release = False
@@ -301,7 +303,7 @@ class BoardUnderTest:
                 held = self.answer(wire.Read(state.label, 0, 0), wire.DropCertificate)
                 self.ask(wire.Acknowledge(held.label, held.crc32))
             else:
-                self.answer(wire.Abort(), wire.Done)
+                self.abort()
                 self.wait(_ANSWER_S, lambda h: isinstance(h.message, wire.DropCertificate))
         raise wrong_answer("Abort", "an idle board", state.phase.name)
 
@@ -319,13 +321,10 @@ class BoardUnderTest:
 
     # -- gates
 
+    @cached_property
     def gates(self) -> GateStates:
-        """Watch all gates for a moment, once."""
-        if self._gates is None:
-            self._gates = watch_gates(
-                lambda: self.answer(wire.Status(), wire.State).gates, self.clock, _WATCH_S
-            )
-        return self._gates
+        """All gates, watched for a moment, once."""
+        return watch_gates(lambda: self.state().gates, self.clock, _WATCH_S)
 
     def quiet_gate(self) -> int:
         """Mask of one gate that is clear and steady, and not at the end of the loop-back wire.
@@ -335,14 +334,15 @@ class BoardUnderTest:
         NotPossibleError
             There is none.
         """
-        states = self.gates()
+        states = self.gates
         restless = states.stuck | states.flickering
-        for gate in reversed(range(self.known_identity().gates)):
+        for gate in reversed(range(self.identity.gates)):
             if not restless >> gate & 1 and gate != self.options.loopback:
                 return 1 << gate
         raise NotPossibleError("check_needs", needed=_QUIET)
 
-    def known_identity(self) -> wire.Identity:
+    @property
+    def identity(self) -> wire.Identity:
         """Who the board is."""
-        assert self.identity is not None, "the handshake comes first"
-        return self.identity
+        assert self.transcript.identity is not None, "the handshake comes first"
+        return self.transcript.identity

@@ -5,7 +5,7 @@ The last one needs a wire, from the sync output to a gate input.
 
 from __future__ import annotations
 
-from dataclasses import replace
+import zlib
 from statistics import fmean, stdev
 
 from rig.link import messages as wire
@@ -19,36 +19,35 @@ _BUSY_MS = 400
 
 def compare_certificate(board: BoardUnderTest) -> None:
     """See that the certificate is about what was ordered and what was sent."""
-    order = board.order()
-    recorded = board.drop(gates=order.gates)
+    gate = board.quiet_gate()
+    fired = board.fire(board.arm(gates=gate))
+    recorded = board.collect_drop()
     seal, events = recorded.certificate, len(recorded.events)
     certified = (seal.label, seal.gates, seal.initial_state, seal.fire_tick, seal.events)
-    sent = (LABEL, order.gates, 0, recorded.fired.tick, events)
-    insist("the certificate of a drop", (*certified, seal.crc32), (*sent, recorded.crc32))
-    state = board.answer(wire.Status(), wire.State)
-    held = replace(state, phase=Phase.HOLDING, label=LABEL, events=events)
-    insist("Status after a drop", state, held)
+    sent = (LABEL, gate, 0, fired.tick, events)
+    crc32 = zlib.crc32(wire.pack_events(recorded.events))
+    insist("the certificate of a drop", (*certified, seal.crc32), (*sent, crc32))
+    board.insist_state("a drop", phase=Phase.HOLDING, label=LABEL, events=events)
 
 
 def ask_while_recording(board: BoardUnderTest) -> None:
     """See that nothing else is begun while the board records."""
     token = board.arm(record_ms=_BUSY_MS)
-    fired = board.fire(token)
-    state = board.answer(wire.Status(), wire.State)
-    insist("Status after Fire", state, replace(state, phase=Phase.RECORDING, label=LABEL))
+    board.fire(token)
+    board.insist_state("Fire", phase=Phase.RECORDING, label=LABEL)
     board.refuse(board.order(label=OTHER_LABEL), RefusalReason.BUSY)
     board.refuse(wire.Read(LABEL, 0, 0), RefusalReason.BUSY)
     board.refuse(wire.Acknowledge(LABEL, 0), RefusalReason.BUSY)
     board.refuse(wire.Fire(token), RefusalReason.NOT_ARMED)
-    board.collect_drop(fired, _BUSY_MS)
+    board.collect_drop(_BUSY_MS)
 
 
 def abort_a_recording(board: BoardUnderTest) -> None:
     """See that ABORT ends a recording at once and keeps what there is."""
-    fired = board.fire(board.arm(record_ms=20_000))
-    board.answer(wire.Abort(), wire.Done)
-    board.collect_drop(fired)
-    board.insist_phase(Phase.HOLDING, "Abort")
+    board.fire(board.arm(record_ms=20_000))
+    board.abort()
+    board.collect_drop()
+    board.insist_state("Abort", phase=Phase.HOLDING)
 
 
 def arm_while_holding(board: BoardUnderTest) -> None:
@@ -56,7 +55,7 @@ def arm_while_holding(board: BoardUnderTest) -> None:
     board.drop()
     for label in (LABEL, OTHER_LABEL):
         board.refuse(board.order(label=label), RefusalReason.HOLDING_A_DROP, TEST_RUN)
-    board.answer(wire.Abort(), wire.Done)
+    board.abort()
     board.refuse(board.order(label=OTHER_LABEL), RefusalReason.HOLDING_A_DROP, TEST_RUN)
     board.arm()
 
@@ -82,7 +81,7 @@ def acknowledge_drop(board: BoardUnderTest) -> None:
     board.refuse(wire.Acknowledge(LABEL, crc32 ^ 1), RefusalReason.WRONG_CRC)
     board.refuse(wire.Acknowledge(OTHER_LABEL, crc32), RefusalReason.NO_SUCH_DROP)
     board.acknowledge(recorded)
-    board.insist_phase(Phase.IDLE, "Acknowledge")
+    board.insist_state("Acknowledge", phase=Phase.IDLE)
     board.refuse(wire.Acknowledge(LABEL, crc32), RefusalReason.NO_SUCH_DROP)
 
 
@@ -90,16 +89,16 @@ def arm_while_cooling(board: BoardUnderTest) -> str:
     """See that a release rests after its pulse. Drives release 0."""
     if not board.options.release:
         raise NotPossibleError("check_needs", needed="leave to drive release 0: --release")
-    order = board.releasing_order()
-    recorded = board.collect_drop(board.fire(board.read_token(board.ask(order))), order.record_ms)
-    board.acknowledge(recorded)
+    pulse = {"release": 1, "pulse_us": PULSE_US}
+    board.fire(board.arm(**pulse))
+    board.acknowledge(board.collect_drop())
     # It must rest for 150 ms, of which a slow line takes some.
-    refused = board.refuse(order, RefusalReason.COOLING)
+    refused = board.refuse(board.order(**pulse), RefusalReason.COOLING)
     if not 0 < refused.detail <= 3 * PULSE_US // 1000 + 1:
         limit = f"a rest of at most {3 * PULSE_US // 1000} ms"
         raise wrong_answer("Arm after a pulse", limit, f"{refused.detail} ms")
     board.clock.sleep(1.02e-3 * refused.detail)
-    board.read_token(board.ask(order))
+    board.read_token(board.ask(board.order(**pulse)))
     return f"{refused.detail} ms more"
 
 
@@ -112,11 +111,11 @@ def measure_sync_edges(board: BoardUnderTest) -> str:
     if gate is None:
         wire_needed = "a wire from the sync output to a gate: --loopback GATE"
         raise NotPossibleError("check_needs", needed=wire_needed)
-    identity = board.known_identity()
+    identity = board.identity
     if gate >= identity.gates:
         gates = f"gate {gate}, and this board has gates 0 to {identity.gates - 1}"
         raise NotPossibleError("check_needs", needed=gates)
-    states = board.gates()
+    states = board.gates
     if (states.stuck | states.flickering) >> gate & 1:
         raise CheckFailedError("sync_blocked", gate=gate)
     late = [_sync_edge(board, gate) for _ in range(board.options.drops)]

@@ -79,9 +79,8 @@ def make_check(name: str, check: Callable[..., str | None], *facts: object) -> F
 
 def wrong_answer(request: str, expected: object, answer: object) -> CheckFailedError:
     """Return the failure of a board that gave another answer than expected."""
-    texts = {"expected": str(expected), "answer": str(answer)}
-    values = {name: _ENUM.sub(r"\1", text) for name, text in texts.items()}
-    return CheckFailedError("wrong_answer", request=request, **values)
+    expected, answer = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
+    return CheckFailedError("wrong_answer", request=request, expected=expected, answer=answer)
 
 
 def insist(request: str, answer: object, expected: object) -> None:

@@ -12,9 +12,9 @@ from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
 from rig.link.assembly import ticks_since
 from rig.link.gatewatch import name_gates
-from rig.link.messages import DisarmReason, DropCertificate2, Phase, PulseEnd, RefusalReason
-from rig.selftest.board import LABEL, BoardUnderTest, RecordedDrop
-from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
+from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
+from rig.selftest.findings import CheckFailedError, insist
 from rig.selftest.requests import identify
 
 RELEASE, SYNC, QUIET = 1, 2, 4
@@ -32,37 +32,37 @@ _PULSE_LIMIT_US = 30.0
 """Within these the stop acts and a pulse is as long as ordered: firmware/PROTOCOL.md."""
 
 
-class JudgeBoard:
-    """The second board, which is wired to the first.
+class JudgeBoard(BoardUnderTest):
+    """The second board, which is wired to the first."""
 
-    Parameters
-    ----------
-    board
-        The second board.
-    """
+    rate = 1.0
+    """Ticks of the first board in one of the second."""
 
-    def __init__(self, board: BoardUnderTest) -> None:
-        self.board = board
-        self.rate = 1.0  # ticks of the first board in one of the second
-
-    def identify(self, _: BoardUnderTest) -> str:
-        """See who judges."""
-        return identify(self.board)
+    def checks(self) -> dict[str, Check]:
+        """Give the checks of the first board, of which some replace those that need a hand."""
+        return {
+            "judge": lambda _: identify(self),
+            "stamps": self.measure_stamps,
+            "release pulse": self.measure_release,
+            "emergency stop": self.measure_stop,
+            "STOPPED": self.open_stop,
+            "GATE_UNSTEADY": self.disturb_beam,
+        }
 
     def measure_stamps(self, board: BoardUnderTest) -> str:
         """See how exactly all gates stamp pulses whose length is known, from 1 µs on."""
         recorded, judged = self._pulse(board, BEAMS, _LONG_US, AT_BEAMS)
-        self.rate = _flanks(recorded, AT_BEAMS)[1] / _certificate(judged).pulse_ticks
-        hz = board.known_identity().tick_hz
-        off = self.rate * self.board.known_identity().tick_hz / hz - 1
+        self.rate = _flanks(recorded, AT_BEAMS)[1] / judged.certificate.pulse_ticks
+        hz = board.identity.tick_hz
+        off = self.rate * self.identity.tick_hz / hz - 1
         _limit("the clocks differ by", [1e6 * off], 2e6 * RESONATOR_TOLERANCE, "ppm")
         errors, skews = [], []
         for n in range(board.options.drops):
             recorded, judged = self._pulse(board, BEAMS, 1 + _STEP_US * n, AT_BEAMS)
             skew, length = _flanks(recorded, AT_BEAMS)
-            errors.append(1e9 / hz * (length - _certificate(judged).pulse_ticks * self.rate))
+            errors.append(1e9 / hz * (length - judged.certificate.pulse_ticks * self.rate))
             skews.append(1e9 / hz * skew)
-        _limit("a stamp is off by", errors + skews, 1e9 / hz * _late(board), "ns")
+        _limit("a stamp is off by", errors + skews, 1e9 / hz * board.identity.late_ticks, "ns")
         scatter = f"{stdev(errors) / 2**0.5:.0f} ns" if len(errors) > 1 else "unknown"
         worst = max(map(abs, errors))
         return (
@@ -72,23 +72,24 @@ class JudgeBoard:
 
     def measure_release(self, board: BoardUnderTest) -> str:
         """See that release pulses are as long as ordered and as recorded, and begin at FIRE."""
-        us = 1e6 / board.known_identity().tick_hz
+        us = 1e6 / board.identity.tick_hz
         ordered, written, skews = [], [], []
         for pulse_us in _PULSES_US:
             record_ms = 100 + pulse_us // 1000
             order = {"release": 1, "pulse_us": pulse_us, "record_ms": record_ms}
             watch = {"gates": RELEASE | SYNC, "record_ms": record_ms + 50}
             token, judge_token = self._arm_both(board, order | {"gates": AT_BEAMS}, watch)
-            judge_fired = self.board.fire(judge_token)
-            recorded = _finish(board, board.fire(token))
-            judged = _finish(self.board, judge_fired)
+            self.fire(judge_token)
+            board.fire(token)
+            recorded, judged = _finish(board), _finish(self)
             (on, off), (high, _) = _changes(judged, RELEASE), _changes(judged, SYNC)
             length = (off - on) * self.rate
             ordered.append(length * us - pulse_us)
-            written.append((length - _certificate(recorded).pulse_ticks) * us)
+            written.append((length - recorded.certificate.pulse_ticks) * us)
             skews.append((high - on) * self.rate * us)
         _limit("a pulse is off by", ordered, _PULSE_LIMIT_US, "µs")
-        _limit("a pulse and its record differ by", written + skews, _late(board) * us, "µs")
+        late_us = board.identity.late_ticks * us
+        _limit("a pulse and its record differ by", written + skews, late_us, "µs")
         worst = (f"{1e3 * max(map(abs, us)):.0f} ns" for us in (ordered, written, skews))
         return "{} off at most; its record {}; sync {} from the release".format(*worst)
 
@@ -97,32 +98,30 @@ class JudgeBoard:
         delays, release = [], {"release": 1, "pulse_us": _LONG_US}  # or to the recording's end
         for _ in range(max(1, board.options.drops // 4)):
             recorded, _ = self._pulse(board, STOP, 10_000, AT_STOP, **release)
-            seal = _certificate(recorded)
+            seal = recorded.certificate
             insist("the stop in a pulse", PulseEnd(seal.pulse_end).name, "STOPPED")
             ticks = seal.pulse_ticks - _changes(recorded, AT_STOP)[0]
-            delays.append(1e6 / board.known_identity().tick_hz * ticks)
+            delays.append(1e6 / board.identity.tick_hz * ticks)
         _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
         recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **release)
-        insist("a spike", PulseEnd(_certificate(recorded).pulse_end).name, "ORDERED")
+        insist("a spike", PulseEnd(recorded.certificate.pulse_end).name, "ORDERED")
         return f"after {max(delays):.0f} µs at most; {_SPIKE_US} µs are ignored"
 
     def open_stop(self, board: BoardUnderTest) -> None:
         """See that an open emergency stop disarms the board and forbids arming."""
         order = {"release": STOP, "pulse_us": _LONG_US, "record_ms": _LONG_US // 1000}
         _, judge_token = self._arm_both(board, {"gates": AT_BEAMS}, order)
-        fired = self.board.fire(judge_token)
-        heard = board.wait_unasked(0.1, wire.Disarmed)
-        message = heard.message if heard else None
-        insist("an open stop", message, wire.Disarmed(LABEL, DisarmReason.STOPPED))
-        board.insist_phase(Phase.IDLE, "the stop")
+        self.fire(judge_token)
+        board.wait_disarmed("an open stop", DisarmReason.STOPPED, 0.1)
         board.refuse(board.order(gates=AT_BEAMS), RefusalReason.STOPPED)
-        _finish(self.board, fired)
+        _finish(self)
 
     def disturb_beam(self, board: BoardUnderTest) -> None:
         """See that a beam that was broken since ARM forbids firing."""
         order = {"release": BEAMS, "pulse_us": 1000}
         token, judge_token = self._arm_both(board, {"gates": AT_BEAMS}, order)
-        _finish(self.board, self.board.fire(judge_token))
+        self.fire(judge_token)
+        _finish(self)
         board.refuse(wire.Fire(token), RefusalReason.GATE_UNSTEADY, AT_BEAMS)
 
     def _pulse(
@@ -133,48 +132,26 @@ class JudgeBoard:
         order = {"release": output, "pulse_us": length_us, "record_ms": record_ms}
         own |= {"gates": gates, "record_ms": record_ms}
         token, judge_token = self._arm_both(board, own, order)
-        fired = board.fire(token)
-        judge_fired = self.board.fire(judge_token)
-        return _finish(board, fired), _finish(self.board, judge_fired)
+        board.fire(token)
+        self.fire(judge_token)
+        return _finish(board), _finish(self)
 
     def _arm_both(
         self, board: BoardUnderTest, own: dict[str, int], order: dict[str, int]
     ) -> tuple[int, int]:
         """Arm both at once, when both releases have rested; give the tokens."""
-        if self.board.identity is None:
-            raise NotPossibleError("no_identity")
-        self.board.settle()
-        self.board.need_idle()
+        self.settle()
+        board.need_idle()
         order = {"gates": QUIET} | order
-        _arm(self.board, **order)
-        token = _arm(board, **own)
-        return token, _arm(self.board, **order)
+        self.arm(**order)
+        token = board.arm(**own)
+        return token, self.arm(**order)
 
 
-def _arm(board: BoardUnderTest, **changes: int) -> int:
-    """Arm a board, after its release has rested."""
-    order = board.order(**changes)
-    while True:
-        answer = board.ask(order)
-        if not (isinstance(answer, wire.Refused) and answer.reason is RefusalReason.COOLING):
-            return board.read_token(answer)
-        board.clock.sleep(1.02e-3 * answer.detail)
-
-
-def _finish(board: BoardUnderTest, fired: wire.Fired) -> RecordedDrop:
-    recorded = board.collect_drop(fired, 1000)
+def _finish(board: BoardUnderTest) -> RecordedDrop:
+    recorded = board.collect_drop(1000)
     board.acknowledge(recorded)
     return recorded
-
-
-def _certificate(recorded: RecordedDrop) -> DropCertificate2:
-    if not isinstance(recorded.certificate, DropCertificate2):
-        raise wrong_answer("a drop", "DropCertificate2", recorded.certificate)
-    return recorded.certificate
-
-
-def _late(board: BoardUnderTest) -> int:
-    return board.known_identity().late_ticks
 
 
 def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:

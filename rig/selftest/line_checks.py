@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Sequence
 from statistics import median
+from typing import TYPE_CHECKING
 
 from rig.clock.epochs import RESONATOR_TOLERANCE, epochs
 from rig.clock.rate import ping_rate
@@ -12,8 +13,10 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
 from rig.records import ClockSample
-from rig.selftest.board import LABEL, BoardUnderTest
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+
+if TYPE_CHECKING:
+    from rig.selftest.board import BoardUnderTest
 
 _PINGS = 60
 _LATE = 6  # of them, above which it is not the computer that was busy
@@ -38,7 +41,7 @@ def measure_round_trips(board: BoardUnderTest) -> str:
     late = sum(trip > limit_s for trip in trips)
     if late > _LATE:
         raise CheckFailedError("slow_answers", slowest_s=trips[-1])
-    clock = judge_clock(pings, board.known_identity().tick_hz)
+    clock = judge_clock(pings, board.identity.tick_hz)
     if late:
         raise NotPossibleError("computer_busy", interval_s=limit_s)
     low, middle, high = (1e3 * trip for trip in (trips[0], median(trips), trips[-1]))
@@ -68,7 +71,7 @@ def let_arming_time_out(board: BoardUnderTest) -> str:
     board.arm(timeout_ms=_TIMEOUT_MS)
     for _ in range(3):
         board.wait(_ASK_S, lambda _: False)
-        phase, now_ns = board.phase(), board.clock.now_ns()
+        phase, now_ns = board.state().phase, board.clock.now_ns()
         if phase is not Phase.ARMED:
             if now_ns - asked > HOST_SILENCE_MS * 10**6 or now_ns - sent > _TIMEOUT_MS * 10**6:
                 board.wait_unasked(_QUIET_S, wire.Disarmed)
@@ -90,33 +93,29 @@ def stay_silent(board: BoardUnderTest) -> str:
 def _insist_disarmed(board: BoardUnderTest, reason: DisarmReason, ms: int, sent_ns: int) -> str:
     """Wait in silence for DISARMED, neither early nor late."""
     silence = f"{ms} ms of silence"
-    heard = board.wait_unasked(ms / 1000 + 0.3, wire.Disarmed)
-    if heard is None:
-        raise wrong_answer(silence, "Disarmed", "no message")
-    insist(silence, heard.message, wire.Disarmed(LABEL, reason))
-    delay = (heard.host_ns - sent_ns) * 1e-6
+    delay = (board.wait_disarmed(silence, reason, ms / 1000 + 0.3) - sent_ns) * 1e-6
     room = 1e3 * (_SLACK_S + 2 * board.slowest_s)
     if not ms * (1 - RESONATOR_TOLERANCE) - 1 <= delay <= ms * (1 + RESONATOR_TOLERANCE) + room:
         raise wrong_answer(silence, f"Disarmed after {ms} ms", f"Disarmed after {delay:.0f} ms")
-    board.insist_phase(Phase.IDLE, "Disarmed")
     return f"after {delay:.0f} ms"
 
 
 def repeat_requests(board: BoardUnderTest) -> None:
     """See that a repeated request is answered as before and not executed again."""
-    order = board.order()
+    token = board.read_token(_repeat(board, board.order()))
+    fired = _repeat(board, wire.Fire(token))
+    certificate = board.collect_drop().certificate
+    insist("a repeated Fire", fired, wire.Fired(certificate.fire_tick))
+    done = _repeat(board, wire.Acknowledge(certificate.label, certificate.crc32))
+    insist("a repeated Acknowledge", done, wire.Done())
+
+
+def _repeat(board: BoardUnderTest, request: wire.HostMessage) -> wire.Message:
+    """Send a request twice, and insist on the same answer."""
     seq = board.next_seq()
-    armed = board.ask(order, seq)
-    token = board.read_token(armed)
-    insist("a repeated Arm", board.ask(order, seq), armed)
-    seq = board.next_seq()
-    fired = board.answer(wire.Fire(token), wire.Fired, seq)
-    insist("a repeated Fire", board.ask(wire.Fire(token), seq), fired)
-    recorded = board.collect_drop(fired, order.record_ms)
-    insist("a repeated Fire", recorded.certificate.fire_tick, fired.tick)
-    seq = board.next_seq()
-    done = wire.Acknowledge(recorded.certificate.label, recorded.certificate.crc32)
-    insist("a repeated Acknowledge", [board.ask(done, seq) for _ in range(2)], [wire.Done()] * 2)
+    answer = board.ask(request, seq)
+    insist(f"a repeated {type(request).__name__}", board.ask(request, seq), answer)
+    return answer
 
 
 def send_without_seq(board: BoardUnderTest) -> None:
@@ -129,8 +128,9 @@ def send_without_seq(board: BoardUnderTest) -> None:
 
 def send_junk(board: BoardUnderTest) -> str:
     """See that junk on the line disturbs nothing."""
+    board.need_idle()
     noise = random.Random(3)
     for _ in range(_BURSTS):
-        board.line.write(noise.randbytes(noise.randrange(1, 300)) + DELIMITER)
-        board.insist_phase(Phase.IDLE, "junk")
+        board.write(noise.randbytes(noise.randrange(1, 300)) + DELIMITER)
+        board.insist_state("junk", phase=Phase.IDLE)
     return f"{_BURSTS} bursts"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 from rig.boards import GATES, RELEASES
@@ -11,7 +10,7 @@ from rig.link.client import BOOT_WAIT_S
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import name_gates
 from rig.link.messages import PROTOCOL_VERSION, Phase, RefusalReason
-from rig.selftest.board import LABEL, BoardUnderTest, RawRequest
+from rig.selftest.board import LABEL, PULSE_US, BoardUnderTest, RawRequest
 from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
 
 BAD_ORDERS: tuple[dict[str, int], ...] = (
@@ -32,26 +31,21 @@ _UNKNOWN_CODES = (0x55, 0x00, 0x82, 0xFF)
 
 def identify(board: BoardUnderTest) -> str:
     """See that the board introduces itself, sensibly and twice alike."""
-    board.line.write(DELIMITER)
+    board.write(DELIMITER)
     board.wait_unasked(BOOT_WAIT_S, wire.Boot)
     identity = board.answer(wire.Identify(), wire.Identity)
-    board.identity = identity
-    faults = [
-        fault
-        for fault, present in (
-            ("no name", not (identity.board and identity.firmware)),
-            ("no id", not any(identity.unique_id)),
-            ("no gates", not identity.gates),
-            ("gates without a name", len(identity.channels.split()) != identity.gates),
-            ("no release", not identity.releases),
-            ("an impossible tick rate", identity.tick_hz < 1_000_000),
-            ("hardly any memory", identity.capacity < 100),
-        )
-        if present
-    ]
-    if faults:
-        values = {"expected": "a complete identity", "answer": ", ".join(faults)}
-        raise CheckFailedError("wrong_answer", request="Identify", **values)
+    faults = {
+        "no name": not (identity.board and identity.firmware),
+        "no id": not any(identity.unique_id),
+        "no gates": not identity.gates,
+        "gates without a name": len(identity.channels.split()) != identity.gates,
+        "no release": not identity.releases,
+        "an impossible tick rate": identity.tick_hz < 1_000_000,
+        "hardly any memory": identity.capacity < 100,
+    }
+    if any(faults.values()):
+        answer = ", ".join(fault for fault, present in faults.items() if present)
+        raise wrong_answer("Identify", "a complete identity", answer)
     insist("a second Identify", board.answer(wire.Identify(), wire.Identity), identity)
     return f"{identity.board}, {identity.firmware}, id {identity.unique_id.hex()}"
 
@@ -65,10 +59,10 @@ def ask_other_versions(board: BoardUnderTest) -> None:
 def ask_every_message(board: BoardUnderTest) -> None:
     """See that each request gets its own kind of answer; those about drops have their own tests."""
     board.answer(wire.Ping(), wire.Pong)
-    board.answer(wire.Status(), wire.State)
+    board.state()
     board.answer(wire.Reference(), wire.ReferencePulse)
     board.need_idle()  # ABORT would let a held drop be discarded
-    board.answer(wire.Abort(), wire.Done)
+    board.abort()
 
 
 def send_unknown_messages(board: BoardUnderTest) -> None:
@@ -78,32 +72,41 @@ def send_unknown_messages(board: BoardUnderTest) -> None:
 
 
 def send_other_lengths(board: BoardUnderTest) -> None:
-    """See that a request that is too long or too short is refused."""
-    for request in _wrong_lengths(wire.Arm(1, 1, 0, 0, 1, 1)):
-        board.refuse(request, RefusalReason.BAD_PARAMETER, 0)
+    """See that every request with a byte too many, or one too few, is refused."""
+    order = wire.Arm(1, 1, 0, 0, 1, 1)  # of the right length it would be accepted
+    orders = order, wire.Fire(1), wire.Read(1, 0, 1), wire.Acknowledge(1, 0)
+    examples: dict[type[wire.Message], wire.Message] = {type(each): each for each in orders}
+    for code, kind in wire.TABLE.items():
+        if code < 0x80 and kind is not wire.Flash:  # not every board knows it
+            _, payload = wire.pack(examples.get(kind) or kind())
+            for other in (payload + b"\1", payload[:-1]):
+                if other != payload:  # nothing is one byte less than nothing
+                    board.refuse(RawRequest(code, other), RefusalReason.BAD_PARAMETER, 0)
 
 
 def look_at_gates(board: BoardUnderTest) -> str:
     """See that every gate in use is clear and keeps still."""
-    states, fitted = board.gates(), (1 << board.known_identity().gates) - 1
+    states, fitted = board.gates, (1 << board.identity.gates) - 1
     in_use = board.options.gates
     counted = fitted if in_use is None else in_use
-    if absent := counted & ~fitted:
-        raise CheckFailedError("gates_not_fitted", gates_listed=name_gates(absent))
-    if restless := states.flickering & counted:
-        raise CheckFailedError("gates_flicker", gates_listed=name_gates(restless))
-    stuck = name_gates(states.stuck) if states.stuck else ""
-    if in_use is None and stuck:
+    faults = {
+        "gates_not_fitted": counted & ~fitted,
+        "gates_flicker": states.flickering & counted,
+        "gates_blocked": states.stuck & (in_use or 0),
+    }
+    for code, mask in faults.items():
+        if mask:
+            raise CheckFailedError(code, gates_listed=name_gates(mask))
+    stuck = name_gates(states.stuck)
+    if in_use is None and states.stuck:
         raise NotPossibleError("gates_unused", gates_listed=stuck)
-    if states.stuck & counted:
-        raise CheckFailedError("gates_blocked", gates_listed=name_gates(states.stuck & counted))
-    unused = f"; not in use and blocked: {stuck}" if stuck else ""
+    unused = f"; not in use and blocked: {stuck}" if states.stuck else ""
     return f"{counted.bit_count()} gates clear{unused}"
 
 
 def arm_blocked_gate(board: BoardUnderTest) -> str:
     """See that a gate that is blocked forbids arming."""
-    stuck = board.gates().stuck
+    stuck = board.gates.stuck
     if not stuck:
         raise NotPossibleError("check_needs", needed="a gate that is blocked by hand")
     gate = stuck & -stuck
@@ -117,15 +120,15 @@ def arm_blocked_gate(board: BoardUnderTest) -> str:
 def arm_and_abort(board: BoardUnderTest) -> None:
     """See that a board that was armed says so, and that ABORT disarms it."""
     token = board.arm()
-    state = board.answer(wire.Status(), wire.State)
-    insist("Status when armed", state, replace(state, phase=Phase.ARMED, label=LABEL, events=0))
-    board.answer(wire.Abort(), wire.Done)
-    board.insist_phase(Phase.IDLE, "Abort")
+    board.insist_state("Arm", phase=Phase.ARMED, label=LABEL, events=0)
+    board.abort()
+    board.insist_state("Abort", phase=Phase.IDLE)
     board.refuse(wire.Fire(token), RefusalReason.NOT_ARMED)
 
 
 def fire_unarmed(board: BoardUnderTest) -> None:
     """See that FIRE alone does nothing."""
+    board.need_idle()
     board.refuse(wire.Fire(1), RefusalReason.NOT_ARMED)
 
 
@@ -140,8 +143,13 @@ def send_wrong_tokens(board: BoardUnderTest) -> None:
 
 def send_bad_orders(board: BoardUnderTest) -> str:
     """See that no order is accepted that its table excludes, and that refusing changes nothing."""
-    variants = [*BAD_ORDERS, *_beyond(board.known_identity())]
-    good = board.releasing_order()
+    identity = board.identity
+    variants = [*BAD_ORDERS, {"pulse_us": identity.max_pulse_us + 1}]
+    if identity.gates < GATES:
+        variants.append({"gates": 1 << identity.gates})
+    if identity.releases < RELEASES:
+        variants.append({"release": 1 << identity.releases})
+    good = board.order(release=1, pulse_us=PULSE_US)  # if it were fired
     for changes in variants:
         name = "Arm with " + ", ".join(f"{name} {value}" for name, value in changes.items())
         board.refuse(replace(good, **changes), RefusalReason.BAD_PARAMETER, 0, name)
@@ -149,43 +157,12 @@ def send_bad_orders(board: BoardUnderTest) -> str:
     token = board.arm()
     board.refuse(board.order(gates=0), RefusalReason.BAD_PARAMETER)
     board.refuse(wire.Fire(token ^ 1), RefusalReason.WRONG_TOKEN)
-    board.insist_phase(Phase.ARMED, "a refused order")
+    board.insist_state("a refused order", phase=Phase.ARMED)
     return f"{len(variants)} orders"
 
 
 def read_no_drop(board: BoardUnderTest) -> None:
     """See that nothing is read or acknowledged while nothing is held."""
+    board.need_idle()
     board.refuse(wire.Read(LABEL, 0, 1), RefusalReason.NO_SUCH_DROP)
     board.refuse(wire.Acknowledge(LABEL, 0), RefusalReason.NO_SUCH_DROP)
-
-
-def _beyond(identity: wire.Identity) -> Iterator[dict[str, int]]:
-    """Ask for what this very device says it has not."""
-    yield {"pulse_us": identity.max_pulse_us + 1}
-    if identity.gates < GATES:
-        yield {"gates": 1 << identity.gates}
-    if identity.releases < RELEASES:
-        yield {"release": 1 << identity.releases}
-
-
-def _wrong_lengths(order: wire.Arm) -> Iterator[RawRequest]:
-    """Give every request with a byte too many, and with one too few.
-
-    Parameters
-    ----------
-    order
-        An ARM that would be accepted.
-    """
-    examples: dict[type[wire.Message], wire.Message] = {
-        wire.Arm: order,
-        wire.Fire: wire.Fire(1),
-        wire.Read: wire.Read(order.label, 0, 1),
-        wire.Acknowledge: wire.Acknowledge(order.label, 0),
-    }
-    for code, kind in wire.TABLE.items():
-        if code < 0x80 and kind is not wire.Flash:  # not every board knows it
-            example = examples[kind] if kind in examples else kind()
-            _, payload = wire.pack(example)
-            yield RawRequest(code, payload + b"\1")
-            if payload:
-                yield RawRequest(code, payload[:-1])

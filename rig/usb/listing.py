@@ -102,13 +102,14 @@ def _describe(info: ListPortInfo) -> SerialPort:
     """Say what a port is and whether it may be a board's."""
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
     kinds = [kind for kind in KNOWN if numbers in kind.numbers.split()]
+    boards = [kind for kind in kinds if kind.board]
     if info.vid is None or info.pid is None:
         skipped = "no USB device"
     elif not kinds:
         skipped = "no board's USB numbers: name it with --port if it is one"
-    elif not any(kind.board for kind in kinds):
+    elif not boards:
         skipped = "a chip that boards and other instruments have: name it with --port"
-    elif not any(kind.board and (info.product or "").startswith(kind.product) for kind in kinds):
+    elif not any((info.product or "").startswith(board.product) for board in boards):
         skipped = "a board with another program: name it with --port if it is one of this rig"
     else:
         skipped = ""
@@ -139,7 +140,7 @@ def sole_port() -> str:
     return paths[0]
 
 
-def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> str | None:
+def path_of(serial_number: str, ports: Iterable[SerialPort]) -> str | None:
     """Find a board again, wherever it is plugged in now.
 
     Parameters
@@ -147,7 +148,7 @@ def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> st
     serial_number
         From `serial_number_at`.
     ports
-        Where to look; by default at everything that is there.
+        Where to look.
 
     Returns
     -------
@@ -159,7 +160,6 @@ def path_of(serial_number: str, ports: Iterable[SerialPort] | None = None) -> st
     DeviceError
         Several have this number, as some copies of boards do.
     """
-    ports = serial_ports() if ports is None else ports
     paths = [port.path for port in ports if port.serial_number == serial_number]
     if len(paths) > 1:
         raise DeviceError(
@@ -177,7 +177,7 @@ def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> st
     path
         Device path, or a link to one as in ``/dev/serial/by-id``.
     ports
-        As in `path_of`.
+        Where to look; by default at everything that is there.
 
     Returns
     -------

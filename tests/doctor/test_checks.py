@@ -11,6 +11,7 @@ from rig.doctor.board import BOARD_CHECKS, BoardFacts, mains_ripple
 from rig.doctor.session import check_restarts, check_whole, describe_supply
 from rig.link.gatewatch import GateStates
 from rig.link.transcript import Restart
+from rig.reasons import make_reason
 from rig.records import Certificate, ClockSample, Drop, Edge
 from rig.selftest.findings import make_check
 from sim.board import VirtualBoard
@@ -18,6 +19,8 @@ from tests.link.bench import ScriptedLab
 
 HZ = 16_000_000
 FLICKER = GateStates(0, 4)
+HELD = make_reason("drop_held", run=7, attempt=2)
+BLOCKED = make_reason("gates_blocked", gates_listed="gate 1")
 
 
 def pings(ppm=0.0, trip_ns=1_000_000, count=30):
@@ -32,7 +35,6 @@ BOARD = BoardFacts(
     identity=VirtualBoard(ScriptedLab()).identity,
     shipped="sim",
     pings=pings(),
-    held=None,
     states=GateStates(0, 0),
     edges=(),
 )
@@ -49,7 +51,7 @@ def edges(times_s):
         *((name, {}) for name in BOARD_CHECKS),
         ("firmware", {"shipped": ""}),
         ("clock", {"pings": pings(ppm=4000)}),
-        ("flickering gates", {"edges": None, "unwatched": "a drop is held"}),
+        ("flickering gates", {"edges": BLOCKED}),
     ],
 )
 def test_what_is_well_needs_no_advice(check, facts):
@@ -62,15 +64,20 @@ def test_what_is_well_needs_no_advice(check, facts):
     ("check", "facts", "says", "advises"),
     [
         ("firmware", {"shipped": "chainrig 9"}, "but chainrig 9", "rig flash"),
-        ("held drop", {"held": (7, 2)}, "run 7, attempt 2", "rig run"),
+        (
+            "held drop",
+            {"edges": HELD},
+            "run 7, attempt 2",
+            "rig run",
+        ),
         ("clock", {"pings": ()}, "from 0 pings", "cable"),
         ("clock", {"pings": pings(5700, 1000)}, "+5700", "resonator"),
         ("round trip", {"pings": ()}, "no ping", "cable"),
         ("round trip", {"pings": pings(trip_ns=130_000_000)}, "130.0 ms", "busy"),
-        ("emergency stop", {"edges": None, "stopped": True}, "open", "close it"),
+        ("emergency stop", {"edges": make_reason("refused_stopped")}, "open", "close it"),
         ("blocked gates", {"states": GateStates(0x102, 0)}, "gates 1, 8", "leave it"),
         ("flickering gates", {"states": FLICKER}, "gate 2", "clear the beam"),
-        ("flickering gates", {"states": FLICKER, "edges": None}, "gate 2", "clear the beam"),
+        ("flickering gates", {"states": FLICKER, "edges": BLOCKED}, "gate 2", "clear the beam"),
         (
             "flickering gates",
             {"edges": edges([0.1, 0.3])},

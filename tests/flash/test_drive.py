@@ -38,10 +38,9 @@ def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
     lines = ["proc /proc proc rw 0 0", f"/dev/sdb1 {folder}/stick vfat rw 0 0"]
     lines += [f"/dev/sdc1 {str(one).replace(' ', chr(92) + '040')} vfat rw 0 0" for one in made]
     (mounts := folder / "mounts").write_text("\n".join(lines) + "\n")
-    monkeypatch.setattr(drives.waiting_drives, "__defaults__", (mounts,))
+    monkeypatch.setattr(drives, "_MOUNTS", mounts)
     (folder / "usb").mkdir()
-    monkeypatch.setattr(drives.choose_drive, "__defaults__", (mounts, folder / "usb"))
-    monkeypatch.setattr(drives.sees_boot_pico, "__defaults__", (folder / "usb",))
+    monkeypatch.setattr(drives, "_USB", folder / "usb")
     return made
 
 

@@ -127,9 +127,9 @@ def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):
     assert [*map(serial_number_at, places)] == ["85430", "85430", None, None]
     other = info("/dev/ttyACM3", 0x2341, 0x43, "other")
     plugged(other)
-    assert path_of("85430") is None
+    assert path_of("85430", serial_ports()) is None
     plugged(other, info("/dev/ttyACM9", 1, 2, "85430"))
-    assert path_of("85430") == "/dev/ttyACM9"
+    assert path_of("85430", serial_ports()) == "/dev/ttyACM9"
 
 
 def test_a_pico_with_another_program_is_not_opened(plugged):
@@ -150,7 +150,7 @@ def test_a_pico_with_another_program_is_not_opened(plugged):
 def test_copies_that_share_a_number_are_not_confused(plugged):
     plugged(info("/dev/ttyUSB0", serial_number="0001"), info("/dev/ttyUSB1", serial_number="0001"))
     with pytest.raises(DeviceError, match="/dev/ttyUSB0 and /dev/ttyUSB1 have the same"):
-        path_of("0001")
+        path_of("0001", serial_ports())
 
 
 def test_this_computer_can_be_looked_at():
