@@ -66,7 +66,9 @@ def hanging(model: Model, desk: Desk) -> tuple[tuple[ChainFall, ...], Drawing | 
     if protocol is None or run is None:
         return (), None
     falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
-    return falls, drawing(protocol, run, falls, model.indicators, 0.0)
+    seen = protocol, run, model.indicators.blocked
+    rig = desk.latest("rig", seen, lambda: drawing(protocol, run, falls, model.indicators, 0.0))
+    return falls, rig
 
 
 def steps(model: Model) -> Content:

@@ -75,7 +75,8 @@ class Page(Vertical):
             self.query_one(f"#{part}").display = part in shown
         if face.drawing is not None and "drawing" in shown:
             view = self.query_one("#drawing", SpanView)
-            view.take(painted(face.drawing, view.size.width or 38, view.size.height or 16))
+            seen = face.drawing, view.size.width or 38, view.size.height or 16
+            view.take(desk.latest("painted", seen, lambda: painted(*seen)))
         pairs = 2 if columns >= _WIDE and lines >= 40 else 1
         most = face.beside * pairs if columns >= _NORMAL else 1
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
