@@ -108,7 +108,7 @@ def _connect(app: RigApp, row: Beginning) -> None:
 def _flash(app: RigApp, row: Beginning) -> None:
     question = "What was on the board is replaced."
     _confirm(app, "Write the firmware?", question, "flash",
-             lambda: app.begin(_run(app, "flash", *row.value.split())))  # fmt: skip
+             lambda: app.begin(_run(app, "flash", "--board", row.value)))  # fmt: skip
 
 
 def _new(app: RigApp, row: Beginning) -> None:

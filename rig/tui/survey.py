@@ -114,10 +114,17 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
         boards.append(Beginning("Connect a board", "board", "none is plugged in"))
     sessions = session_list(Path())
     going = [
-        Beginning("Continue", "open", f"{entry.path.stem}, {entry.over} of {entry.runs}",
-            named[entry.source], "sim://" * entry.simulated, entry.path)
-        for entry in sessions if entry.over < entry.runs and entry.source in named
-    ]  # fmt: skip
+        Beginning(
+            "Continue",
+            "open",
+            f"{entry.title or entry.path.stem:.24}, {entry.over} of {entry.runs}",
+            named[entry.source],
+            "sim://" * entry.simulated,
+            entry.path,
+        )
+        for entry in sessions
+        if entry.over < entry.runs and entry.source in named
+    ]
     return [
         *(row for row in scenes if row.kind == "try"),
         *boards,
@@ -151,7 +158,7 @@ def _boards() -> Iterator[Beginning]:
     from rig.usb.listing import serial_ports  # noqa: PLC0415 - nor is this
 
     for _ in waiting_drives():
-        title = "Raspberry Pi Pico: put the firmware on it"
+        title = "Pico: put the firmware on it"
         yield Beginning("Connect a board", "flash", title, value="pico")
     for port in serial_ports():
         if port.candidate:

@@ -3,6 +3,8 @@
 import shutil
 
 from rig.campaign.machine import Stage
+from rig.cli import _parser
+from rig.tui import commands
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from tests.tui.lab import KEYS, Operator, flat, run, short_folder
@@ -50,3 +52,29 @@ def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
     run(work())
     assert len(pressed) <= KEYS_AT_MOST
     shutil.rmtree(folder)
+
+
+def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("rig.flash.drive.waiting_drives", lambda: [tmp_path])
+    asked = []
+
+    async def record(_, *command, done=""):
+        asked.append((command[0], _parser().parse(command).board))
+
+    monkeypatch.setattr(commands, "_run", record)
+
+    async def work():
+        folder = short_folder()
+        app = RigApp(Options(socket=folder / "rig.sock"), KEYS)
+        async with app.run_test(size=(80, 24)) as pilot:
+            op = Operator(app, pilot)
+            await op.sees("Pico: put the firmware on it")
+            await op.press("down", "down", "enter")
+            await op.sees("Write the firmware?")
+            await op.means()
+            await op.until(lambda: asked)
+        shutil.rmtree(folder)
+
+    run(work())
+    assert asked == [("flash", "pico")]
