@@ -66,7 +66,7 @@ def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tm
 
     async def work():
         folder = short_folder()
-        app = RigApp(Options(socket=folder / "rig.sock"), KEYS)
+        app = RigApp(Options(socket=folder / "rig.sock", still_s=0.0), KEYS)
         async with app.run_test(size=(80, 24)) as pilot:
             op = Operator(app, pilot)
             await op.sees("Pico: put the firmware on it")
