@@ -9,7 +9,8 @@ from typing import Any
 from rig.cache.entry import CacheEntry
 from rig.commands.output import print_json, progress, say, tell_damage
 from rig.files import make_folder
-from rig.report.estimate import estimate_pictures, estimate_text
+from rig.report.estimate import estimate_text
+from rig.report.estimate_figures import estimate_pictures
 from rig.results import check_open, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections

@@ -13,7 +13,8 @@ from rig.cli import main
 from rig.errors import InputError
 from rig.estimate.posterior import Posterior
 from rig.estimate.session import Coefficient
-from rig.report.estimate import estimate_pictures, estimate_text, page_parts
+from rig.report.estimate import estimate_text, page_parts
+from rig.report.estimate_figures import estimate_pictures
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
 from rig.results import results
