@@ -166,7 +166,9 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
         lambda mask: mask < 1 << GATES,
     ),
     "length": _accept(
-        "a length above 0", lambda text: _quantity(text, "LENGTH"), lambda metres: metres > 0.0
+        "a length above 0, such as 60 mm",
+        lambda text: _quantity(text, "LENGTH"),
+        lambda metres: metres > 0.0,
     ),
     "name": _accept("letters, digits, - and _", str, _is_name),
     "rig": lambda _: {"dest": "socket"} | _accept("letters, digits, - and _", _socket, bool)(""),

@@ -26,9 +26,11 @@ async def serve(address: str, listener: socket.socket) -> None:
     over, loop = asyncio.Event(), asyncio.get_running_loop()
 
     def hear() -> None:
-        if lines := os.read(0, 1 << 16).splitlines():
-            news.update(json.loads(lines[-1]))
-        else:
+        lines = os.read(0, 1 << 16).splitlines()
+        for line in map(json.loads, lines):
+            # A session that was closed stays on the page, however short it was.
+            news.update(line, session=line["session"] or news.get("session"))
+        if not lines:
             over.set()
 
     loop.add_reader(0, hear)

@@ -66,7 +66,7 @@ class BoardPage:
         Parameters
         ----------
         news
-            What the daemon told last: its session's path, and the drop in hand.
+            What the daemon told last: the path of its latest session, and the drop in hand.
         """
         path = Path(news["session"]) if news.get("session") else None
         if path is not None and (self._live is None or self._live.path != path):

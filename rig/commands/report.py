@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cache.entry import recall
 from rig.commands.output import progress, say, stage, tell_damage
+from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.films import film_digest
 from rig.report.session_page import session_page
@@ -39,6 +41,8 @@ def main(arguments: Namespace) -> int:
         from rig.report.pdf import write_pdf  # noqa: PLC0415 - an extra that few need
 
         check_place(arguments.pdf)
+        if os.path.realpath(arguments.pdf) == os.path.realpath(arguments.output):
+            raise InputError(f"--pdf {arguments.pdf} is the page's own file", "name another one")
     with Session.open(arguments.session, readonly=True) as session:
         fresh, estimate = arguments.fresh, arguments.estimate
         outcome = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=estimate)
@@ -60,6 +64,7 @@ def main(arguments: Namespace) -> int:
         stage("")
     if arguments.pdf is not None:
         write_pdf(arguments.pdf, report.html, report.figures)
+        say(f"PDF: {arguments.pdf}")
     say("\n".join((*report.failed, f"report: {arguments.output}")))
     return tell_damage(outcome.analysis)
 

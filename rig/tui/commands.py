@@ -295,8 +295,9 @@ async def _run(app: RigApp, *command: str, done: str = "") -> None:
         await process.wait()
         raise
     lines = [line for line in output.decode("utf-8", "replace").splitlines() if line.strip()]
-    last_lines = [done or lines[-1]] if process.returncode == 0 else lines[-2:]
-    app.tell("; ".join(last_lines) or f"rig {command[0]} ended with {process.returncode}")
+    if process.returncode == 0:
+        lines = [done] if done else lines[-1:]
+    app.tell("; ".join(lines[-2:]) or f"rig {command[0]} ended with {process.returncode}")
 
 
 def _reject(app: RigApp) -> None:

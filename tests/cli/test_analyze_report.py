@@ -92,6 +92,13 @@ def test_what_cannot_be_written_is_not_begun(
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
+def test_a_pdf_does_not_take_the_place_of_its_page(call, finished, tmp_path):
+    page = tmp_path / "a.html"
+    done = call("report", finished.session, "-o", page, "--pdf", tmp_path / "x/../a.html")
+    assert (done.code, page.exists()) == (2, False)
+    assert "is the page's own file" in done.err
+
+
 def test_bars_are_as_long_as_the_analysis_says(finished):
     with Session.open(finished.session, readonly=True) as session:
         drawn = detailed(session)[0].summary[0]

@@ -6,6 +6,7 @@ import re
 import socket
 import subprocess
 import sys
+import time
 from contextlib import ExitStack, suppress
 from http.client import HTTPConnection
 from urllib.parse import urlsplit
@@ -14,6 +15,7 @@ import pytest
 
 from rig.board.page import BoardPage
 from rig.daemon.client import Client
+from rig.ready import ready_protocol
 from rig.results.live import LiveAnalysis
 from rig.tui.indicators import Indicators
 from rig.tui.motion import motions
@@ -98,6 +100,16 @@ def test_whatever_clients_do_stop_and_page_are_there(daemon):
     assert raw.recv(100).startswith(b"HTTP/1.1 400 ")
     raw.close()
     assert process.poll() is None
+
+
+def test_a_session_is_shown_however_short_it_was(daemon, tmp_path):
+    client = Client(daemon[1], "a test")
+    client.take_control()
+    client.open_session(str(ready_protocol("falling-ball")), str(tmp_path / "a.session"))
+    time.sleep(0.6)  # in which the daemon tells the page, which need not have looked
+    client.close_session()
+    client.close()
+    until(lambda: b"A ball past four gates" in ask(daemon[2])[1])
 
 
 @pytest.mark.parametrize("place", [":x", "nowhere.invalid:8080", ":99999", "a b:80", "", "TAKEN"])
