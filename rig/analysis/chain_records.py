@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rig.analysis.air import unlike
 from rig.analysis.trajectory import ONE
 from rig.errors import DomainError
 from rig.model.fall import kicks
@@ -159,6 +160,10 @@ class ChainRecord:
     air
         κ of each leg in units of that of the first chain as a whole, as in
         `rig.analysis.trajectory.Trajectory`.
+    unlike
+        How much more the air takes from each rod than from its chain, see `rig.analysis.air`.
+    incline_deg
+        Of the surface that it strikes.
     condition
         Under which it strikes, in words; drops of the same one have the contact in common.
     higher
@@ -174,6 +179,8 @@ class ChainRecord:
     ratios: Array | None = None
     alpha: float = 0.0
     air: Array = field(default_factory=lambda: ONE)
+    unlike: Array = field(default_factory=lambda: np.zeros(1))
+    incline_deg: float = 0.0
     condition: str = ""
     higher: tuple[float, ...] = ()
     aside: tuple[EdgeTrain, ...] = ()
@@ -269,8 +276,10 @@ def chain_records(
     records = []
     shares = air_shares(protocol)
     for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop.edges, hz)):
-        air = np.array(shares[chain.name])
-        record = ChainRecord(role, chain, trains, air=air[:1])
+        name = run.impact if role == "impact" else run.free
+        assert name is not None
+        air, more = np.array(shares[name]), unlike(chain.chain, shares[name])
+        record = ChainRecord(role, chain, trains, air=air[:1], unlike=more)
         if role == "impact":
             assert protocol.surface is not None
             # γ is the same at every incline, and level ground always in the domain of Eq. 13.
@@ -287,6 +296,7 @@ def chain_records(
                 alpha=alpha,
                 # Behind the last leg nothing falls any more, but edges are asked for all the same.
                 air=np.append(air, air[-1]) if np.ptp(air) else air[:1],
+                incline_deg=run.incline_deg or 0.0,
                 condition=str(protocol.condition(run)),
                 higher=higher_contacts(protocol, run.incline_deg, chain),
             )

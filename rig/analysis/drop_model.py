@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from rig.analysis.air import prior_air
 from rig.analysis.annealing import Guess, Pairing
 from rig.analysis.components import Components, stated
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
@@ -24,7 +25,6 @@ from rig.analysis.trajectory import (
     struck_trajectory,
 )
 from rig.analysis.unknowns import Unknowns, side_slopes
-from rig.predictions import air_of
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -385,11 +385,17 @@ def _model_of(condition: _Condition) -> DropModel:
 
 def _expectations(record: ChainRecord) -> tuple[object, ...]:
     """Everything that a record has but its edges."""
-    arrays = [record.air, *(() if record.ratios is None else (record.ratios,))]
+    arrays = [record.air, record.unlike, *(() if record.ratios is None else (record.ratios,))]
     arrays += [part for train in record.trains for part in (train.rods, train.blocks, train.levels)]
     gates = *(train.gate for train in record.trains), *(train.gate for train in record.aside)
-    fields = record.role, record.chain, record.alpha, record.condition, record.higher
-    return (*fields, gates, len(record.trains), *(array.tobytes() for array in arrays))
+    fields = record.role, record.chain, record.alpha, record.incline_deg, record.higher
+    return (
+        *fields,
+        record.condition,
+        gates,
+        len(record.trains),
+        *(array.tobytes() for array in arrays),
+    )
 
 
 def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
@@ -411,11 +417,3 @@ def _widths(record: ChainRecord) -> Sequence[float]:
 def _loose(path: Trajectory, times: Array, seen: Seen) -> Array:
     """How loose a chain is at each edge, see `Trajectory.loose`; the top rod alone is no chain."""
     return np.where(seen.alone, 0.0, path.loose(times))
-
-
-def prior_air(protocol: Protocol) -> tuple[float, float]:
-    """κ of the first chain as a whole as it is known beforehand, 1/m, and its uncertainty."""
-    if protocol.drag is None:
-        return 0.0, protocol.priors.drag
-    kappa = air_of(protocol, next(iter(protocol.chains)))[0]
-    return kappa, kappa * protocol.drag.relative_u

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.square_root import EquationRows
-from rig.analysis.swing import drawn, lever
+from rig.analysis.swing import drawn, lever, strike_shifts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -148,6 +148,8 @@ class Expected(NamedTuple):
             u = np.where(rods < strikes.size - 1, np.maximum(u, before), u)
         to_strike = np.full(rods.size, np.inf)  # of each rod's way until it strikes
         if record.ratios is not None:
+            if strikes.size > 1:
+                u = np.hypot(u, protocol.priors.swing * strike_shifts(record, protocol)[rods])
             to_strike = levels + strikes[rods] - protocol.contact.strike.value
         return cls(
             rods,

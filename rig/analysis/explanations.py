@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.air import prior_air
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import chain_records
-from rig.analysis.drop_model import DropModel, prior_air
+from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, faults
 from rig.analysis.fit import match, settle
 from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weighed, well_read

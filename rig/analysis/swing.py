@@ -15,6 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rig.analysis.chain_records import ChainRecord
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
 
@@ -48,6 +49,19 @@ def drawn(lever: Array, protocol: Protocol, levels: Array) -> Array:
         m, of that shape.
     """
     return lever * np.maximum(protocol.drop.value - levels, 0.0) / protocol.gravity.value
+
+
+def strike_shifts(record: ChainRecord, protocol: Protocol) -> Array:
+    """How much lower on an inclined board each rod strikes for being carried along it, m.
+
+    For a bottom rod that is let go down the slope with 1 m/s, and a top rod that rests.
+    """
+    chain = record.chain.chain
+    share = (chain.heights[-1] - np.array(chain.heights)) / chain.length
+    fallen = np.maximum(protocol.drop.value + record.strikes, 0.0)
+    carried = share * np.sqrt(2.0 * fallen / protocol.gravity.value)
+    lower: Array = carried * math.tan(math.radians(record.incline_deg))
+    return lower
 
 
 def swing_sd(chain: Chain, protocol: Protocol) -> float:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from rig.analysis.air import lags, prior_air
 from rig.analysis.components import above
 from rig.analysis.discrepancy import MODES
 from rig.analysis.swing import drawn, lever, swing_sd
@@ -207,6 +208,17 @@ def _late_sd(side: Side) -> float:
     return bounce * priors.late_pull
 
 
+def _lag_sd(side: Side) -> list[float] | None:
+    if not any(record.unlike.any() for record in side.model.records.values()):
+        return None
+    kappa, kappa_u = prior_air(side.protocol)
+    return [math.hypot(kappa, kappa_u)] * 2
+
+
+def _lag(side: Side) -> Array:
+    return -lags(side.record, side.protocol.drop.value, side.edges.rods, side.edges.levels)
+
+
 def _strike_sd(side: Side) -> float:
     """Where not all rods pass the lowest beams, the top rod may strike as high as these are."""
     lying = [side.gates.gates[train.gate].height for train in side.record.aside]
@@ -270,6 +282,7 @@ TABLE = (
         moves="drag",
         absent=lambda side: float(side.protocol.drag is None),
     ),
+    _rig("air lag", "air", _lag_sd, of="each", level=_lag, absent=_all),
     Unknown(
         "datum",
         "datum",

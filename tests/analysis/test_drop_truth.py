@@ -158,7 +158,7 @@ def test_stated_uncertainties_are_the_real_ones(scene):
     # The simulation has no scatter of these kinds; allowed for, they make u larger than it is.
     components = replace(STATED, floor=1e-6, landed=0.0)
     protocol = replace(SCENES[scene], accept=replace(SCENES[scene].accept, release_skew=1.0))
-    protocol = replace(protocol, priors=replace(protocol.priors, late_pull=0.0))
+    protocol = replace(protocol, priors=replace(protocol.priors, late_pull=0.0, drag=0.0))
     fence_bars = replace(AS_ASSUMED, rod_sd=0.1e-3)
     rng = np.random.default_rng(11)
     ratios: dict[str, list[float]] = {}

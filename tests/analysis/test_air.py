@@ -1,0 +1,62 @@
+"""Rods of unlike thickness in air, beside each rod's fall in closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.air import lags, unlike
+from rig.analysis.chain_records import chain_records
+from rig.analysis.swing import strike_shifts
+from rig.predictions import air_shares
+from tests.analysis.drops import SCENES, case
+from tests.analysis.sessions import MILD
+
+
+def record_of(scene, role, incline=None):
+    one = case(SCENES[scene], MILD, incline=incline)
+    records = chain_records(one.protocol, one.run, one.drop, one.scale.hz)
+    return next(record for record in records if record.role == role)
+
+
+@pytest.mark.parametrize("scene", ["uniform", "single"])
+def test_rods_that_are_alike_do_not_lag(scene):
+    record = record_of(scene, "impact")
+    assert not lags(record, 0.18, np.arange(record.chain.chain.rods), np.zeros(1)).any()
+
+
+def test_what_air_takes_goes_with_width_over_mass_and_adds_up_to_the_chain():
+    protocol = SCENES["graded"]
+    rods = protocol.chains["A"]
+    more = unlike(rods.chain, air_shares(protocol)["A"])
+    masses, diameters = np.array(rods.chain.masses), np.array(rods.diameters)
+    assert (masses @ more) / masses.sum() == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose((1.0 + more) * diameters, (1.0 + more[0]) * diameters[0], rtol=1e-9)
+
+
+def test_a_rod_left_alone_lags_as_its_own_fall_does():
+    protocol = SCENES["graded"]
+    record = record_of("graded", "free")
+    drop, gravity, kappa, time = protocol.drop.value, protocol.gravity.value, 1e-4, 0.4
+
+    def fallen(drag):  # v' = g − κv²
+        return math.log(math.cosh(math.sqrt(gravity * drag) * time)) / drag
+
+    way = 0.5 * gravity * time**2
+    rods = np.arange(record.chain.chain.rods)
+    found = kappa * lags(record, drop, rods, np.full(rods.size, drop - way))[:, 0]
+    expected = [fallen(kappa) - fallen(kappa * (1.0 + more)) for more in record.unlike]
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
+def test_a_rod_strikes_lower_the_further_a_swing_carries_it():
+    protocol = SCENES["uniform"]
+    record = record_of("uniform", "impact", 60.0)
+    lower = strike_shifts(record, protocol)
+    lasted = math.sqrt(2.0 * protocol.drop.value / protocol.gravity.value)
+    assert lower[0] == pytest.approx(math.tan(math.radians(60.0)) * lasted)
+    assert lower[-1] == 0.0
+    assert not strike_shifts(replace(record, incline_deg=0.0), protocol).any()
