@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.drop_model import prior_air
+from rig.analysis.air import prior_air
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
 from rig.model.rods import rod_impacts
 from rig.units import Quantity

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.air import prior_air
 from rig.analysis.comparison import Comparison, compare
-from rig.analysis.drop_model import prior_air
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.summary import good_cases
