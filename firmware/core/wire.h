@@ -1,4 +1,4 @@
-/* Written by rig/link/cheader.py from rig/link/messages.py: change that file, not this one.
+/* What rig/link/messages.py defines; tests/link/test_wire_header.py compares each value.
  *
  * MSG_X is a message's code, X_F where its field F begins in the payload (as long as nothing of
  * variable length stands before it), X_SIZE the payload's size without such fields. */

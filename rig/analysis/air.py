@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
 
-_NOTHING = 1e-6
-"""Differences of shares that are rounding."""
-
 
 def prior_air(protocol: Protocol) -> tuple[float, float]:
     """κ of the first chain as a whole as it is known beforehand, 1/m, and its uncertainty."""
@@ -55,7 +52,7 @@ def unlike(chain: Chain, shares: Sequence[float]) -> Array:
     masses = np.array(chain.masses)
     force = np.array(shares) * np.cumsum(masses[::-1])[::-1]
     more: Array = -np.diff(force, append=0.0) / masses - shares[0]
-    return more if np.abs(more).max() > _NOTHING else np.zeros(1)
+    return more if np.ptp(shares) else np.zeros(1)
 
 
 def lags(record: ChainRecord, drop: float, rods: Index, levels: Array) -> Array:

@@ -209,10 +209,8 @@ def _late_sd(side: Side) -> float:
 
 
 def _lag_sd(side: Side) -> list[float] | None:
-    if not any(record.unlike.any() for record in side.model.records.values()):
-        return None
-    kappa, kappa_u = prior_air(side.protocol)
-    return [math.hypot(kappa, kappa_u)] * 2
+    unlike = any(record.unlike.any() for record in side.model.records.values())
+    return [math.hypot(*prior_air(side.protocol))] * 2 if unlike else None
 
 
 def _lag(side: Side) -> Array:

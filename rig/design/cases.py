@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.air import prior_air
 from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import ChainRecord, EdgeTrain, chain_records
-from rig.analysis.air import prior_air
 from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
 from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
