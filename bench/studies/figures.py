@@ -11,6 +11,8 @@ from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, canvas
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from rig.report.canvas import Canvas
+
 _ESTIMATOR_PANELS = (("separation_rms_m", 1e3, "rms error of Δz (mm)"),
            ("speed_rms_m_s", 1e3, "rms error of V (mm/s)"))  # fmt: skip
 _ROW_IN = 0.17
@@ -35,7 +37,7 @@ def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
     str
         SVG.
     """
-    with canvas((3.2, 3.0), simulated=True) as drawing:
+    with canvas((3.2, 3.0)) as drawing:
         for axes, (field, scale, label) in zip(drawing.axes, _ESTIMATOR_PANELS, strict=True):
             styles = iter(_STYLES)
             for name, group in groupby(found, key=itemgetter("name")):
@@ -53,7 +55,7 @@ def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
             axes.set_ylabel(label)
         drawing.axes[-1].set_xlabel("processor time per run (s)")
         drawing.axes[0].legend(ncols=2)
-    return drawing.svg
+    return _stamped(drawing)
 
 
 def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
@@ -76,9 +78,7 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
         ("void drops", "void_share", _VOID_DARKEST),
         ("good drops with a wrong rod", "wrong", 1.0),
     )
-    with canvas(
-        (_ROW_IN * len(rows) + 0.6,), 8.0, simulated=True, columns=2, sharex=False
-    ) as drawing:
+    with canvas((_ROW_IN * len(rows) + 0.6,), 8.0, columns=2, sharex=False) as drawing:
         for axes, (title, field, darkest) in zip(drawing.axes, panels, strict=True):
             values = [one[field] for one in found]
             table = [values[n : n + len(columns)] for n in range(0, len(values), len(columns))]
@@ -99,4 +99,10 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
             for chain, gates, heights in rows
         ]
         drawing.axes[0].set_yticks(range(len(rows)), labels, fontsize=6.5)
+    return _stamped(drawing)
+
+
+def _stamped(drawing: Canvas) -> str:
+    """Say what it is in a strip of its own, where it hides nothing and nothing hides it; as SVG."""
+    drawing.figure.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)
     return drawing.svg

@@ -172,14 +172,13 @@ class Adjusted:
 
     def top(self, role: str, levels: Dual) -> Dual:
         """Where its top rod is, its reference point being at some levels, shape ``(n,)``."""
-        record, protocol = self.model.records[role], self.model.protocol
-        chain = record.chain.chain
+        chain, protocol = self.model.records[role].chain.chain, self.model.protocol
         level = levels + chain.length + self.linear(f"{role} rods", np.eye(chain.rods)[-1])
         # A chain that turned is lower at its top, the more the further it fell.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
         level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
         highest = np.full(levels.value.shape, chain.rods - 1)
-        behind = lags(record, protocol.drop.value, highest, levels.value)
+        behind = lags(self.model.records[role], protocol.drop.value, highest, levels.value)
         level += self.linear(f"{role} air lag", behind)
         if role == "free":
             return level

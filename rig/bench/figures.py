@@ -44,7 +44,7 @@ def choice_figure(lines: Mapping[str, Sequence[Point]]) -> str:
 
 
 def _picture(title: str, lines: Mapping[str, Sequence[Point]], columns: int) -> str:
-    with canvas((4.4,), simulated=False) as drawing:
+    with canvas((4.4,)) as drawing:
         (panel,) = drawing.axes
         for (label, points), (marker, color, fill) in zip(lines.items(), _LOOKS, strict=False):
             times = [point.cpu_s for point in points]
@@ -69,7 +69,7 @@ def _picture(title: str, lines: Mapping[str, Sequence[Point]], columns: int) -> 
 
 def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
     """Draw errors against what the inputs' own rounding explains; return SVG."""
-    with canvas((4.4,), simulated=False) as drawing:
+    with canvas((4.4,)) as drawing:
         (panel,) = drawing.axes
         for label, field, color, marker in (
             ("the equations computed as printed", "naive_error", MUTED, "x"),
@@ -91,7 +91,7 @@ def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
 
 def scenes_figure(names: Sequence[str], panels: Mapping[str, Sequence[float]]) -> str:
     """Draw what scenes cost beside the whole, a panel a kind of cost; return SVG."""
-    with canvas((1.25,) * (len(panels) - 1) + (1.75,), simulated=False) as drawing:
+    with canvas((1.25,) * (len(panels) - 1) + (1.75,)) as drawing:
         for panel, (label, shares) in zip(drawing.axes, panels.items(), strict=True):
             bars = panel.bar(names, shares, color=MODEL)
             panel.bar_label(bars, fmt="{:.2g}", fontsize=6.5)

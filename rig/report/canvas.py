@@ -86,7 +86,6 @@ def canvas(
     heights: tuple[float, ...],
     width_in: float = 7.0,
     *,
-    simulated: bool,
     columns: int = 1,
     sharex: bool = True,
 ) -> Iterator[Canvas]:
@@ -98,8 +97,6 @@ def canvas(
         Of the panels, inches.
     width_in
         Of the figure, inches.
-    simulated
-        Whether to stamp the figure.
     columns
         Panels side by side in each row.
     sharex
@@ -115,9 +112,6 @@ def canvas(
         )
         yield Canvas(figure, list(panels.flat))
         figure.align_ylabels(panels.flat)
-        if simulated:
-            # In a strip of its own, where it hides nothing and nothing hides it.
-            figure.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)
 
 
 def write_figure(path: Path, figure: Chart) -> None:

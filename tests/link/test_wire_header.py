@@ -1,4 +1,4 @@
-"""The firmware's header has the values of `rig.link.messages`, and says where `pack` puts things."""
+"""The firmware's header has the values of `rig.link.messages`, and the places of `pack`."""
 
 import re
 from pathlib import Path
