@@ -34,7 +34,7 @@ def bring(call, finished, exported, tmp_path):
 
 
 def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_path):
-    done = bring("--clock-uncertainty", "10 ppm", "--simulated")
+    done = bring("--clock-uncertainty", "1 ppm", "--simulated")
     assert (done.code, done.out) == (0, "")
     edges = sum(run["edges"]["received"] for run in analysis["runs"])
     assert done.err == f"{edges} edges of 4 runs → {tmp_path / 'imported'}\n"
@@ -54,7 +54,7 @@ def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_p
     for one, two in zip(analysis["summary"], again["summary"], strict=True):
         assert one["separation_m"]["value"] == pytest.approx(two["separation_m"]["value"], abs=1e-6)
         assert one["speed_m_s"]["value"] == pytest.approx(two["speed_m_s"]["value"], abs=1e-4)
-    assert again["clock"] == {"source": "times as the file gives them", "relative_u": 1e-5}
+    assert again["clock"] == {"source": "times as the file gives them", "relative_u": 1e-6}
 
 
 def test_a_clock_that_is_hardly_known_widens_the_uncertainties(bring, call, tmp_path):

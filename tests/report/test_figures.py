@@ -153,7 +153,7 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
     drawings = []
 
     def drawn() -> None:
-        with canvas((1.0,), simulated=True) as drawing:
+        with canvas((1.0,)) as drawing:
             signal.raise_signal(signal.SIGINT)
             drawings.append(drawing)
 
