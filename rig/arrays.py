@@ -9,3 +9,7 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 """Numbers of any shape."""
+Flags: TypeAlias = NDArray[np.bool_]
+"""Yes or no."""
+Index: TypeAlias = NDArray[np.intp]
+"""Places in other arrays."""

@@ -11,13 +11,11 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.result import DropResult
+    from rig.arrays import Array
     from rig.protocol.protocol import Gate, Protocol, Side
     from rig.records import Drop
 
-    Array = NDArray[np.float64]
 
 _FLICKER = 0.3e-3  # s: no rod is that fast
 

@@ -15,13 +15,10 @@ from rig.analysis.square_root import square_root
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.drop_model import DropModel
     from rig.analysis.square_root import EquationRows, Root
+    from rig.arrays import Array, Index
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
     Matches = Mapping[str, Sequence[Index]]
 
 STEPS = 60

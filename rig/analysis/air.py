@@ -18,14 +18,10 @@ from rig.predictions import air_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
+    from rig.arrays import Array, Index
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
-
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
 
 
 def prior_air(protocol: Protocol) -> tuple[float, float]:

@@ -31,9 +31,8 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.drop_model import DropModel
     from rig.analysis.trajectory import Trajectory
+    from rig.arrays import Array, Index
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
 
 Item = TypeVar("Item", bound=np.generic)
 Span = tuple[float, float]

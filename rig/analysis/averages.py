@@ -21,9 +21,8 @@ from rig.analysis.result import Measured
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
 
 ABBA = (True, False, False, True)
 """Whether the first chain strikes in each run of a block."""

@@ -29,17 +29,13 @@ from rig.analysis.unknowns import Side
 from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rig.analysis.drop_model import DropModel
     from rig.analysis.dual import Dual
     from rig.analysis.gate_passages import GatePassage
     from rig.analysis.joint_fit import JointFit
     from rig.analysis.joint_step import JointDrop
+    from rig.arrays import Array, Flags, Index
 
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.intp]
 
 _LINES = {name: place for place, name in enumerate(BUDGET)}
 _GUESSED = [_LINES[name] for name in ("side", "contact")]

@@ -27,12 +27,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from rig.arrays import Array, Flags, Index
     from rig.protocol.protocol import Gate, Protocol, RodChain, Run
     from rig.records import Drop
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.intp]
 
 
 QUICK = 0.3e-3

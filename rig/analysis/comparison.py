@@ -24,12 +24,10 @@ from rig.protocol.protocol import GUESSED
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.result import DropResult
+    from rig.arrays import Array
     from rig.protocol.protocol import Condition, Protocol
 
-    Array = NDArray[np.float64]
 
 _ROUNDING = 1e-12
 

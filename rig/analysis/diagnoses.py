@@ -21,13 +21,11 @@ from rig.wordings import Severity
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.fit import Fit
+    from rig.arrays import Index
     from rig.protocol.protocol import Protocol
 
-    Index = NDArray[np.intp]
 
 STRANGE = 0.5
 """Share of its expected edges below which a gate sees something else than its chain; below `RIGHT`

@@ -18,15 +18,12 @@ import numpy as np
 from rig.analysis.trajectory import struck_trajectory
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.equations import Expected
     from rig.analysis.trajectory import Trajectory
+    from rig.arrays import Array, Index
     from rig.protocol.protocol import Protocol
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
 
 LOWEST_START = 1e-3
 """Where a struck chain hangs at least, m: an adjustment of nonsense tries what is below ground."""

@@ -31,19 +31,16 @@ from rig.wordings import Severity
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.fit import Begun, Fit
     from rig.analysis.identified import Identified
     from rig.analysis.result import Deviation
+    from rig.arrays import Array
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
     from rig.reasons import Reason
     from rig.records import Drop
-
-    Array = NDArray[np.float64]
 
 
 _SKEW = {"release_skew"}  # no way to pass makes that better

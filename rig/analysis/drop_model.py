@@ -30,16 +30,12 @@ from rig.units import Quantity
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.trajectory import Trajectory
     from rig.analysis.unknowns import Unknown
+    from rig.arrays import Array, Flags, Index
     from rig.protocol.protocol import Protocol
 
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.intp]
 
 T = TypeVar("T")
 

@@ -21,15 +21,12 @@ from rig.analysis.plain_data import attributes
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
     from rig.analysis.fit import Fit
     from rig.analysis.joint_step import JointDrop
     from rig.analysis.trajectory import Trajectory
+    from rig.arrays import Array, Index
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
 
 EdgeClass = Literal[
     "missed",

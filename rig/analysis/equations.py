@@ -14,15 +14,11 @@ from rig.analysis.swing import drawn, lever, strike_shifts
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.drop_model import DropModel
+    from rig.arrays import Array, Flags, Index
     from rig.protocol.protocol import Protocol
 
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Index = NDArray[np.intp]
     Matches = Mapping[str, Sequence[Index]]
 
 HUBER = 4.0

@@ -23,14 +23,11 @@ from rig.analysis.equations import STRAY
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.components import Components
     from rig.analysis.drop_model import DropModel
     from rig.analysis.equations import Residuals
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 Size = TypeVar("Size", float, "Array")
 

@@ -30,19 +30,17 @@ from rig.reasons import make_reason
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.faults import Premise
     from rig.analysis.fit import Fit
     from rig.analysis.identify import Reading
     from rig.analysis.score_test import Score
+    from rig.arrays import Array
     from rig.reasons import Reason
     from rig.records import Drop
     from rig.vocabulary import Vocabulary
 
-    Array = NDArray[np.float64]
 
 CLEAR = math.log(100.0)
 """Log odds by which a fault must beat every other one, and the protocol as it is, to be named."""

@@ -19,12 +19,10 @@ from rig.units import Quantity
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.drop_model import DropModel
+    from rig.arrays import Array
     from rig.protocol.protocol import Gate, Gates, Protocol, RodChain, Run
 
-    Array = NDArray[np.float64]
 
 _MORE = 3  # rods by which a chain may differ
 _WIDER = 0.5  # of its thinnest rod, by which rods may look thicker or thinner

@@ -14,13 +14,10 @@ from rig.analysis.equations import STRAY
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.annealing import Guess
     from rig.analysis.drop_model import DropModel
+    from rig.arrays import Array, Index
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
     Matches = dict[str, list[Index]]
 
 CLOSE = 0.05

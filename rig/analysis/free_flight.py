@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
 
 NONE = 1e-15
 """κ in place of none, 1/m: of a metre it takes less than an atom's width, and no digit."""

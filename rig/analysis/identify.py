@@ -25,15 +25,12 @@ from rig.protocol.gates import CLEARANCE_M
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.annealing import Annealed, Span
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
+    from rig.arrays import Index
     from rig.protocol.protocol import Protocol
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
 
 Weighed = TypeVar("Weighed", "Annealed", "Reading")
 

@@ -30,14 +30,12 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.components import Components
     from rig.analysis.equations import Residuals
     from rig.analysis.fit import Fit, Matched
     from rig.analysis.likeness import Likeness
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
 
 FEWEST = 4
 """Drops that a session must have for a joint fit: one block of A, B, B, A."""

@@ -14,13 +14,9 @@ from rig.analysis.square_root import EquationRows, condensed, eliminate, square_
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.square_root import Root
     from rig.analysis.unknowns import SharedUnknowns
-
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
+    from rig.arrays import Array, Index
 
 
 @dataclass(frozen=True, slots=True)

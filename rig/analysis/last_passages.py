@@ -22,11 +22,9 @@ from rig.reasons import Reason, make_reason
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
     from rig.analysis.fit import Fit
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
 
 _NEAR = 0.02
 """How far from the moment that is asked for a passage of the free chain may be, s."""

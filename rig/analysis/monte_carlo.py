@@ -21,15 +21,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from numpy.random import Generator
-    from numpy.typing import NDArray
 
     from rig.analysis.drop_model import DropModel
     from rig.analysis.fit import Fit
     from rig.analysis.joint_fit import JointFit
     from rig.analysis.joint_step import JointDrop
     from rig.analysis.result import Measured
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
 
 PROBABILITY = 0.95
 BLOCK = 10_000

@@ -18,12 +18,9 @@ from rig.protocol.protocol import GUESSED
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from numpy.typing import NDArray
-
     from rig.analysis.drop_model import DropModel
     from rig.analysis.trajectory import Trajectory
-
-    Array = NDArray[np.float64]
+    from rig.arrays import Array
 
 
 class BudgetLine(NamedTuple):

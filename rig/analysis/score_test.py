@@ -13,11 +13,9 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.fit import Fit
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
 
 _UNTOLD = 1e-12  # of what the edges tell, below which the other unknowns do it as well
 

@@ -13,13 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
+    from rig.arrays import Array
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
-
-    Array = NDArray[np.float64]
 
 
 @lru_cache(maxsize=64)  # a session asks for the same two again and again

@@ -25,10 +25,8 @@ from rig.analysis.free_flight import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from rig.arrays import Array, Index
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
 
 ONE = np.ones(1)
 COMMON = 4

@@ -25,16 +25,13 @@ from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.drop_model import DropModel
     from rig.analysis.equations import Expected
+    from rig.arrays import Array, Index
     from rig.protocol.protocol import Gates, Protocol
 
-    Array = NDArray[np.float64]
-    Index = NDArray[np.intp]
     Effect = Callable[["Side"], Array]
 
 ANYTHING = 1.0

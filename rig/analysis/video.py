@@ -10,9 +10,8 @@ import numpy as np
 from rig.analysis.result import Measured
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from rig.arrays import Array
 
-    Array = NDArray[np.float64]
 
 _BENT = 0.5
 """Correlation of neighbours' residuals above which frames follow another curve."""

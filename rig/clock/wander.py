@@ -17,9 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from rig.arrays import Array
+    from rig.arrays import Array, Index
 
-    Index = NDArray[np.intp]
 
 STEADY = 5e-6 / 60.0
 """Walk of a rate nobody saw wander, relative per √s: 5 ppm in an hour, a steady room."""

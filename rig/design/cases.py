@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.components import Components
-    from rig.arrays import Array
+    from rig.arrays import Array, Index
 
-    Index = NDArray[np.intp]
 
 CLOCK_U = 1e-6
 """Of a board's rate after some minutes of comparing it with the computer's clock, relative."""

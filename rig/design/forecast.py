@@ -18,14 +18,10 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from rig.arrays import Array
+    from rig.arrays import Array, Index
     from rig.model.chain import Chain
     from rig.protocol.protocol import Condition, Protocol
     from rig.units import Quantity
-
-    Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)

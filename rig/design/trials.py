@@ -26,13 +26,11 @@ from rig.threads import one_thread
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.chain_records import ChainRecord
+    from rig.arrays import Index
     from rig.protocol.protocol import Protocol, Run
     from rig.vocabulary import Vocabulary
 
-    Index = NDArray[np.intp]
 
 DROPS = 20
 """Trials of a layout: one drop in twenty that fails shows in two lists of three."""

@@ -16,15 +16,12 @@ from rig.units import Quantity
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from rig.arrays import Array
+    from rig.arrays import Array, Index
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.model.surface import Surface
     from rig.protocol.protocol import Protocol
 
-    Index = NDArray[np.intp]
     AlphasAndSlopes = tuple[Array, Array]
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"

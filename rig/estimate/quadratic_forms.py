@@ -23,16 +23,13 @@ from rig.analysis.trajectory import COMMON, DRAG, Trajectory
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from rig.analysis.drop_model import DropModel
     from rig.analysis.joint_step import JointDrop
     from rig.analysis.unknowns import SharedUnknowns
-    from rig.arrays import Array
+    from rig.arrays import Array, Index
     from rig.model.chain import Chain
     from rig.protocol.protocol import Run
 
-    Index = NDArray[np.intp]
 
 EXTRA = ("contact", "drag")
 """Columns behind those of the rods: height of the contact point, m, and κ of the air, 1/m."""
