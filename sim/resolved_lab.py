@@ -270,10 +270,10 @@ class ResolvedLab(ChainLab):
             board = Board(math.radians(incline_deg), _bounce(surface, world))
             if world.rods_touch > 0.0:
                 touching = Bounce(world.rod_restitution, world.rod_time, world.rod_friction)
-        thin = np.array([1.0 / d for d in spec.diameters])
-        masses = rods.masses
-        # What air takes from a rod goes with its width over its mass; `drag` is the chain's own.
-        drag = dials.drag * thin * masses.sum() / float((masses * thin).sum())
+        # What air takes from a rod goes with its width over its mass; `drag` is the first chain's.
+        first = self._nominal(next(iter(self.protocol.chains.values())))
+        across, first_across = (of.diameters * of.length for of in (rods, first))
+        drag = dials.drag * across / rods.masses * first.masses.sum() / float(first_across.sum())
         drag += stated_air(self.protocol, spec)
         return Chain(
             rods, Strings(world.string_restitution, world.string_strain), self.hang_height + hang,

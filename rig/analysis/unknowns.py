@@ -205,6 +205,13 @@ def _late_sd(side: Side) -> float:
     return bounce * priors.late_pull
 
 
+def _unlike_air_sd(side: Side) -> float | None:
+    """Of the κ of a chain unlike the first: widths alone do not tell of which wood each is."""
+    more = abs(float(side.record.air[0]) - 1.0)
+    stated = side.protocol.drag is not None or side.record.chain.weighed
+    return None if stated or not more else more * side.model.kappa_u
+
+
 def _lag_sd(side: Side) -> list[float] | None:
     unlike = any(record.unlike.any() for record in side.model.records.values())
     return [math.hypot(*prior_air(side.protocol))] * 2 if unlike else None
@@ -276,6 +283,15 @@ TABLE = (
         lambda side: side.model.kappa_u,
         moves="drag",
         absent=lambda side: float(side.protocol.drag is None),
+    ),
+    _chain(
+        "air",
+        "air",
+        _unlike_air_sd,
+        shared="chain",
+        moves="drag",
+        path=lambda side: 1.0 / side.record.air[:1],
+        absent=_all,
     ),
     _rig("air lag", "air", _lag_sd, of="each", level=_lag, absent=_all),
     Unknown(

@@ -10,9 +10,10 @@ import pytest
 
 from rig.analysis.air import lags, unlike
 from rig.analysis.chain_records import chain_records
+from rig.analysis.session import analyze
 from rig.analysis.swing import strike_shifts
 from rig.predictions import air_shares
-from tests.analysis.drops import SCENES, case
+from tests.analysis.drops import SCENES, case, true_value
 from tests.analysis.sessions import MILD
 
 
@@ -60,3 +61,24 @@ def test_a_rod_strikes_lower_the_further_a_swing_carries_it():
     assert lower[0] == pytest.approx(math.tan(math.radians(60.0)) * lasted)
     assert lower[-1] == 0.0
     assert not strike_shifts(replace(record, incline_deg=0.0), protocol).any()
+
+
+def test_a_chain_of_another_wood_needs_not_fall_as_its_width_says():
+    """Thick rods that weigh as much more: air takes as much of both chains, and nobody weighed."""
+    chains = SCENES["uniform"].chains
+    thick = replace(
+        chains["B"],
+        diameters=tuple(2.0 * d for d in chains["B"].diameters),
+        widths=tuple(2.0 * width for width in chains["B"].widths),
+    )
+    stated = replace(SCENES["uniform"], chains={"A": chains["A"], "B": thick})
+    heavy = replace(
+        thick, weighed=True, chain=replace(thick.chain, masses=(2.0,) * thick.chain.rods)
+    )
+    true = replace(stated, chains={"A": replace(chains["A"], weighed=True), "B": heavy})
+    drops = [case(true, replace(MILD, drag=0.02), seed=3, run=run) for run in (1, 2, 3, 4)]
+    found = analyze(stated, [one.drop for one in drops], lambda _: drops[0].scale)
+    for one, result in zip(drops, found.runs, strict=True):
+        assert result.learned
+        for name, measured in result.quantities.items():
+            assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u, name

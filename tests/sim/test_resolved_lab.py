@@ -227,6 +227,16 @@ def test_air_takes_from_a_chain_what_the_dial_says(scene):
     assert np.isclose(mean, 0.05, rtol=1e-12)
 
 
+def test_air_takes_less_from_a_chain_of_thicker_rods(scene):
+    protocol = reader.read(scene)
+    thin = next(iter(protocol.chains.values()))
+    thick = replace(thin, name="B", diameters=tuple(2.0 * d for d in thin.diameters))
+    both = replace(protocol, chains={thin.name: thin, thick.name: thick})
+    lab = ResolvedLab(both, replace(Dials.quiet(), drag=0.05), 3, world=ResolvedDials())
+    chains = lab.chains(pack_label(1, 1)).values()
+    assert sorted({round(float(chain.drag[0]), 12) for chain in chains}) == [0.025, 0.05]
+
+
 def test_a_film_shows_rods_whole_and_above_the_board(dropped):
     lab, _, _ = dropped
     chain = lab.chains(pack_label(1, 1))["impact"]
