@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import lags
+from rig.analysis.air import lags, slack
 from rig.analysis.discrepancy import STRETCHES
 from rig.analysis.dual import Dual
 from rig.analysis.swing import lever
@@ -174,9 +174,10 @@ class Adjusted:
         # A chain that turned is lower at its top, the more the further it fell.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
         level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
-        highest = np.full(levels.value.shape, chain.rods - 1)
-        behind = lags(self.model.records[role], protocol.drop.value, highest, levels.value)
-        level += self.linear(f"{role} air lag", behind)
+        record, highest = self.model.records[role], np.full(levels.value.shape, chain.rods - 1)
+        for name, behind in (("air lag", lags), ("slack", slack)):
+            parts = behind(record, protocol.drop.value, highest, levels.value)
+            level += self.linear(f"{role} {name}", parts)
         if role == "free":
             return level
         last: Array = levels.value < self._path(role).height[chain.rods - 1]  # of all that fall

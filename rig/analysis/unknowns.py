@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import lags, prior_air
+from rig.analysis.air import lags, prior_air, slack
 from rig.analysis.components import above
 from rig.analysis.discrepancy import MODES
 from rig.analysis.swing import drawn, lever, swing_sd
@@ -221,6 +221,15 @@ def _lag(side: Side) -> Array:
     return -lags(side.record, side.protocol.drop.value, side.edges.rods, side.edges.levels)
 
 
+def _slack_sd(side: Side) -> list[float] | None:
+    """Of a rod that one other holds, as of the top rod while two are left."""
+    return [_top_sd(side)] * side.rods if side.record.unlike.any() else None
+
+
+def _slack(side: Side) -> Array:
+    return -slack(side.record, side.protocol.drop.value, side.edges.rods, side.edges.levels)
+
+
 def _strike_sd(side: Side) -> float:
     """Where not all rods pass the lowest beams, the top rod may strike as high as these are."""
     lying = [side.gates.gates[train.gate].height for train in side.record.aside]
@@ -294,6 +303,7 @@ TABLE = (
         absent=_all,
     ),
     _rig("air lag", "air", _lag_sd, of="each", level=_lag, absent=_all),
+    Unknown("free slack", "air", _slack_sd, of="free", shared="chain", level=_slack, absent=_all),
     Unknown(
         "datum",
         "datum",
