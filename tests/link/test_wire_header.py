@@ -46,7 +46,15 @@ def test_every_name_is_there_with_its_value():
     codes = {f"MSG_{in_c(kind.__name__)}": code for code, kind in wire.TABLE.items()}
     expected = limits | enums | codes
     assert {name: C[name] for name in expected} == expected
-    assert {name for name in C if name.startswith(("MSG_", "REASON_", "PHASE_"))} <= set(expected)
+    places = {
+        f"{in_c(kind.__name__)}_{place}"
+        for kind, fields in wire.FIELDS.items()
+        for place in (
+            *("SIZE", "RECORD"),
+            *(f"{one.name.upper()}{end}" for one in fields for end in ("", "_LIMIT")),
+        )
+    }
+    assert set(C) <= set(expected) | places
 
 
 @given(MESSAGES)
