@@ -336,16 +336,14 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
             if flow.verdict != "rejected":
                 flow = replace(flow, judged=(flow.verdict, flow.reasons))
-            return _log_again(
-                flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow))
-            )
+            return _log(flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow)))
         case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
             verdict, reasons = flow.judged
-            return _log_again(flow, verdict, (*_noteless(reasons), *_notes(flow)))
+            return _log(flow, verdict, (*_noteless(reasons), *_notes(flow)))
         case Note(text) if flow.stage is Stage.RESULT:
             note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
             if note != _notes(flow):  # what was noted before stays in the log
-                return _log_again(flow, flow.verdict, (*_noteless(flow.reasons), *note))
+                return _log(flow, flow.verdict, (*_noteless(flow.reasons), *note))
     return flow, ()
 
 
@@ -359,10 +357,8 @@ def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
 
 def _stop(flow: Flow) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
-        message = "stopped: the release is off"
-        if flow.stage is not Stage.TESTING:
-            message = "stopped: nothing fell"
-        return flow.to(flow.home, message), (Stop(),)
+        why_safe = "the release is off" if flow.stage is Stage.TESTING else "nothing fell"
+        return flow.to(flow.home, f"stopped: {why_safe}"), (Stop(),)
     return flow, (Stop(),)
 
 
@@ -442,12 +438,8 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
 def _take_verdict(flow: Flow, event: DropVerdict) -> Outcome:
     if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
         return flow, ()
-    job, verdict, reasons = flow.job, event.verdict, event.reasons
-    assert job is not None
-    flow = replace(flow, verdict=verdict, reasons=reasons, logged=False)
-    before = flow.row if event.row is None else event.row
-    row = after(before, job, verdict, reasons)
-    return replace(flow.to(Stage.RESULT), row=row), (Log(job, verdict, reasons),)
+    row = flow.row if event.row is None else event.row
+    return _log(replace(flow, row=row), event.verdict, event.reasons)
 
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
@@ -472,11 +464,10 @@ def _onward(flow: Flow, job: Job | None) -> Outcome:
     return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
-def _log_again(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
-    """Log the drop once more."""
+def _log(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
+    """Have a verdict logged, the drop's first or another one."""
     job = flow.job
     assert job is not None
-    flow = replace(flow, verdict=state, reasons=reasons, logged=False)
     row = after(flow.row, job, state, reasons)
-    flow = replace(flow, ticket=flow.ticket + 1, trouble="", row=row)
+    flow = replace(flow.to(Stage.RESULT), verdict=state, reasons=reasons, logged=False, row=row)
     return flow, (Log(job, state, reasons),)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import serial
@@ -15,7 +16,7 @@ from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rig.clock.host import Clock
     from rig.link.port import Port
@@ -179,10 +180,8 @@ class Exchange:
         DeviceError
             The board restarted, or the connection broke.
         """
-        try:
+        with _line():
             data = self._port.read(min(max(1, self._port.in_waiting), _AT_ONCE))
-        except OSError as error:  # SerialException is one
-            raise _lost(error) from error
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
             lacking = (
@@ -218,10 +217,8 @@ class Exchange:
             self._log_part()
         self.tx_bytes += len(data)
         self._log("tx", data)
-        try:
+        with _line():
             self._port.write(data)
-        except OSError as error:
-            raise _lost(error) from error
 
     def set_rate(self, baudrate: int) -> None:
         """Change the line's rate, bit/s.
@@ -231,10 +228,8 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        try:
+        with _line():
             self._port.baudrate = baudrate
-        except OSError as error:
-            raise _lost(error) from error
 
     def abort_past(self) -> None:
         """Send ABORT at once, from any thread, past a request that is under way.
@@ -257,10 +252,8 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        try:
+        with _line():
             return self._port.in_waiting
-        except OSError as error:
-            raise _lost(error) from error
 
     def _log_part(self) -> list[Record]:
         part, self._part = self._part, b""
@@ -283,8 +276,13 @@ class Exchange:
         return records
 
 
-def _lost(error: OSError) -> DeviceError:
-    # Of a serial port that is gone the cause is pyserial's own, and not the system's.
-    is_gone = isinstance(error.__context__, serial.SerialException)
-    text = "the port is gone" if is_gone else str(error)
-    return make_error(DeviceError, "connection_lost", text=text)
+@contextmanager
+def _line() -> Iterator[None]:
+    """Say of a port that fails that the connection is lost."""
+    try:
+        yield
+    except OSError as error:  # SerialException is one
+        # Of a serial port that is gone the cause is pyserial's own, and not the system's.
+        is_gone = isinstance(error.__context__, serial.SerialException)
+        text = "the port is gone" if is_gone else str(error)
+        raise make_error(DeviceError, "connection_lost", text=text) from error
