@@ -229,8 +229,7 @@ LOOKS = 5
 """How often what a device refuses is tried when nobody is there to help."""
 LOOK_S = 1.0
 
-_LET_GO = (Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
-BEFORE_RELEASE = (Stage.TESTING, Stage.SETTLING, *_LET_GO)
+BEFORE_RELEASE = (Stage.TESTING, Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 _VERDICT = (Stage.RESULT, Stage.HALTED)
@@ -313,14 +312,17 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return _lost(flow, trouble)
         case Notice(trouble):
             return replace(flow, trouble=flow.trouble or trouble), ()
-        case EffectDone(ticket, token):
-            return _take_answer(flow, ticket, token)
-        case EffectFailure():
+        case EffectDone(flow.ticket, token):
+            return _take_answer(flow, token)
+        case EffectDone(token=int()):
+            # What was stopped while the device was arming must not stay armed.
+            return flow, (Stop(),)
+        case EffectFailure(flow.ticket):
             return _effect_failed(flow, event)
-        case Tick(seconds):
+        case Tick(seconds) if flow.stage is Stage.COUNTDOWN:
             return _tick(flow, seconds)
-        case DropVerdict():
-            return _take_verdict(flow, event)
+        case DropVerdict(flow.ticket, verdict, reasons, row) if flow.stage is Stage.JUDGING:
+            return _log(replace(flow, row=flow.row if row is None else row), verdict, reasons)
         case GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
         case Try() if flow.stage in _IDLE:
@@ -372,10 +374,7 @@ def _lost(flow: Flow, trouble: str) -> Outcome:
     return flow, ()
 
 
-def _take_answer(flow: Flow, ticket: int, token: int | None) -> Outcome:
-    if ticket != flow.ticket:
-        # What was stopped while the device was arming must not stay armed.
-        return flow, () if token is None else (Stop(),)
+def _take_answer(flow: Flow, token: int | None) -> Outcome:
     if flow.stage is Stage.TESTING:
         return flow.to(flow.home), ()
     job = flow.job
@@ -394,8 +393,6 @@ def _take_answer(flow: Flow, ticket: int, token: int | None) -> Outcome:
 
 
 def _effect_failed(flow: Flow, event: EffectFailure) -> Outcome:
-    if event.ticket != flow.ticket:
-        return flow, ()
     if flow.stage is Stage.ARMING:
         return _not_armed(flow, event)
     if flow.stage is Stage.FIRING:
@@ -427,19 +424,10 @@ def _not_fired(flow: Flow, event: EffectFailure) -> Outcome:
 
 
 def _tick(flow: Flow, seconds: float) -> Outcome:
-    if flow.stage is not Stage.COUNTDOWN:
-        return flow, ()
     seconds_left = flow.left_s - seconds
     if seconds_left > 0.0:
         return replace(flow, left_s=seconds_left), ()
     return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
-
-
-def _take_verdict(flow: Flow, event: DropVerdict) -> Outcome:
-    if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
-        return flow, ()
-    row = flow.row if event.row is None else event.row
-    return _log(replace(flow, row=row), event.verdict, event.reasons)
 
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:

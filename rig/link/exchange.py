@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import serial
 
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
     from rig.clock.host import Clock
     from rig.link.port import Port
-
-    Tap: TypeAlias = Callable[[Direction, int, bytes], None]
-    OnRecord: TypeAlias = Callable[[Record], None]
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 
@@ -72,8 +69,8 @@ class Exchange:
         self,
         port: Port,
         clock: Clock,
-        tap: Tap = lambda *_: None,
-        on_record: OnRecord = lambda _: None,
+        tap: Callable[[Direction, int, bytes], None] = lambda *_: None,
+        on_record: Callable[[Record], None] = lambda _: None,
         tries: int = 8,
         give_way: Callable[[], None] = lambda: None,
     ) -> None:
