@@ -229,8 +229,7 @@ LOOKS = 5
 """How often what a device refuses is tried when nobody is there to help."""
 LOOK_S = 1.0
 
-_LET_GO = (Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
-BEFORE_RELEASE = (Stage.TESTING, Stage.SETTLING, *_LET_GO)
+BEFORE_RELEASE = (Stage.TESTING, Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING)
 """Stages that any key ends."""
 _IDLE = (Stage.DEVICE, Stage.PREPARE, Stage.DONE)
 _VERDICT = (Stage.RESULT, Stage.HALTED)
@@ -313,14 +312,17 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return _lost(flow, trouble)
         case Notice(trouble):
             return replace(flow, trouble=flow.trouble or trouble), ()
-        case EffectDone(ticket, token):
-            return _take_answer(flow, ticket, token)
-        case EffectFailure():
+        case EffectDone(flow.ticket, token):
+            return _take_answer(flow, token)
+        case EffectDone(token=int()):
+            # What was stopped while the device was arming must not stay armed.
+            return flow, (Stop(),)
+        case EffectFailure(flow.ticket):
             return _effect_failed(flow, event)
-        case Tick(seconds):
+        case Tick(seconds) if flow.stage is Stage.COUNTDOWN:
             return _tick(flow, seconds)
-        case DropVerdict():
-            return _take_verdict(flow, event)
+        case DropVerdict(flow.ticket, verdict, reasons, row) if flow.stage is Stage.JUDGING:
+            return _log(replace(flow, row=flow.row if row is None else row), verdict, reasons)
         case GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
         case Try() if flow.stage in _IDLE:
@@ -336,16 +338,14 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
             if flow.verdict != "rejected":
                 flow = replace(flow, judged=(flow.verdict, flow.reasons))
-            return _log_again(
-                flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow))
-            )
+            return _log(flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow)))
         case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
             verdict, reasons = flow.judged
-            return _log_again(flow, verdict, (*_noteless(reasons), *_notes(flow)))
+            return _log(flow, verdict, (*_noteless(reasons), *_notes(flow)))
         case Note(text) if flow.stage is Stage.RESULT:
             note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
             if note != _notes(flow):  # what was noted before stays in the log
-                return _log_again(flow, flow.verdict, (*_noteless(flow.reasons), *note))
+                return _log(flow, flow.verdict, (*_noteless(flow.reasons), *note))
     return flow, ()
 
 
@@ -359,10 +359,8 @@ def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
 
 def _stop(flow: Flow) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
-        message = "stopped: the release is off"
-        if flow.stage is not Stage.TESTING:
-            message = "stopped: nothing fell"
-        return flow.to(flow.home, message), (Stop(),)
+        why_safe = "the release is off" if flow.stage is Stage.TESTING else "nothing fell"
+        return flow.to(flow.home, f"stopped: {why_safe}"), (Stop(),)
     return flow, (Stop(),)
 
 
@@ -376,10 +374,7 @@ def _lost(flow: Flow, trouble: str) -> Outcome:
     return flow, ()
 
 
-def _take_answer(flow: Flow, ticket: int, token: int | None) -> Outcome:
-    if ticket != flow.ticket:
-        # What was stopped while the device was arming must not stay armed.
-        return flow, () if token is None else (Stop(),)
+def _take_answer(flow: Flow, token: int | None) -> Outcome:
     if flow.stage is Stage.TESTING:
         return flow.to(flow.home), ()
     job = flow.job
@@ -398,8 +393,6 @@ def _take_answer(flow: Flow, ticket: int, token: int | None) -> Outcome:
 
 
 def _effect_failed(flow: Flow, event: EffectFailure) -> Outcome:
-    if event.ticket != flow.ticket:
-        return flow, ()
     if flow.stage is Stage.ARMING:
         return _not_armed(flow, event)
     if flow.stage is Stage.FIRING:
@@ -431,23 +424,10 @@ def _not_fired(flow: Flow, event: EffectFailure) -> Outcome:
 
 
 def _tick(flow: Flow, seconds: float) -> Outcome:
-    if flow.stage is not Stage.COUNTDOWN:
-        return flow, ()
     seconds_left = flow.left_s - seconds
     if seconds_left > 0.0:
         return replace(flow, left_s=seconds_left), ()
     return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
-
-
-def _take_verdict(flow: Flow, event: DropVerdict) -> Outcome:
-    if event.ticket != flow.ticket or flow.stage is not Stage.JUDGING:
-        return flow, ()
-    job, verdict, reasons = flow.job, event.verdict, event.reasons
-    assert job is not None
-    flow = replace(flow, verdict=verdict, reasons=reasons, logged=False)
-    before = flow.row if event.row is None else event.row
-    row = after(before, job, verdict, reasons)
-    return replace(flow.to(Stage.RESULT), row=row), (Log(job, verdict, reasons),)
 
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
@@ -472,11 +452,10 @@ def _onward(flow: Flow, job: Job | None) -> Outcome:
     return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
-def _log_again(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
-    """Log the drop once more."""
+def _log(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
+    """Have a verdict logged, the drop's first or another one."""
     job = flow.job
     assert job is not None
-    flow = replace(flow, verdict=state, reasons=reasons, logged=False)
     row = after(flow.row, job, state, reasons)
-    flow = replace(flow, ticket=flow.ticket + 1, trouble="", row=row)
+    flow = replace(flow.to(Stage.RESULT), verdict=state, reasons=reasons, logged=False, row=row)
     return flow, (Log(job, state, reasons),)

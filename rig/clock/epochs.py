@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.clock.samples import RECV, SEND, TICK, Samples, middles_ns, samples
+from rig.clock.samples import RECV, SEND, TICK, Samples, samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -133,7 +133,8 @@ def epochs(
 def _steps(columns: Samples, nominal_hz: int) -> NDArray[np.int64]:
     """Count ticks from each sample to the next; `_BROKEN` when they cannot be of one count."""
     trips_ns = columns[:, RECV] - columns[:, SEND]
-    expected = np.diff(middles_ns(columns)) * 1e-9 * nominal_hz
+    middles_ns = (columns[:, SEND] + columns[:, RECV]) // 2
+    expected = np.diff(middles_ns) * 1e-9 * nominal_hz
     slack = np.abs(expected) * _SEARCH + (trips_ns[1:] + trips_ns[:-1]) * 1e-9 * nominal_hz / 2 + 2
     rounded = np.rint(expected).astype(np.int64)
     # Nearest to the expectation among the values that agree with the 32 bits seen.

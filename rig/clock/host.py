@@ -57,18 +57,16 @@ class HostClocks(NamedTuple):
 
 def read_clocks() -> HostClocks:
     """Read them as close together as the system allows."""
-    best: tuple[int, HostClocks] | None = None
+    readings: list[tuple[int, HostClocks]] = []
     for _ in range(_TRIES):
         before = time.monotonic_ns()
         boottime = None if _BOOTTIME is None else time.clock_gettime_ns(_BOOTTIME)
         wall = time.time_ns()
         took = time.monotonic_ns() - before
-        if best is None or took < best[0]:
-            best = took, HostClocks(before + took // 2, boottime, wall)
+        readings.append((took, HostClocks(before + took // 2, boottime, wall)))
         if took < _QUICK_NS:
             break
-    assert best is not None
-    return best[1]
+    return min(readings)[1]
 
 
 class HostWatch:

@@ -29,12 +29,6 @@ def samples(pings: Iterable[ClockSample] | Samples) -> Samples:
     return np.asarray(rows, np.int64).reshape(-1, 3)
 
 
-def middles_ns(columns: Samples) -> NDArray[np.int64]:
-    """Host time in the middle of each round trip."""
-    middle: NDArray[np.int64] = (columns[:, SEND] + columns[:, RECV]) // 2
-    return middle
-
-
 class Stretch(NamedTuple):
     """From when on, by the host's clock, what is added to put a time on the axis."""
 

@@ -37,11 +37,11 @@ class Assembly:
     ----------
     label
         The drop's label.
+    gates
+        Mask of the gates that count (from ARM; the certificate repeats it).
 
     Attributes
     ----------
-    gates
-        Mask of the gates that count (from ARM; the certificate repeats it).
     fire_tick
         From FIRED (the certificate repeats it), or `None`.
     certificate
@@ -52,9 +52,9 @@ class Assembly:
         Number of the oldest event that can still be read, as far as the device has said so.
     """
 
-    def __init__(self, label: int) -> None:
+    def __init__(self, label: int, gates: int = ALL_GATES) -> None:
         self.label = label
-        self.gates = ALL_GATES
+        self.gates = gates
         self.fire_tick: int | None = None
         self.certificate: DropCertificate | None = None
         self.reset = False

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, TypeAlias, TypeVar
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeVar
 
 import serial
 
@@ -15,13 +16,10 @@ from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rig.clock.host import Clock
     from rig.link.port import Port
-
-    Tap: TypeAlias = Callable[[Direction, int, bytes], None]
-    OnRecord: TypeAlias = Callable[[Record], None]
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 
@@ -71,8 +69,8 @@ class Exchange:
         self,
         port: Port,
         clock: Clock,
-        tap: Tap = lambda *_: None,
-        on_record: OnRecord = lambda _: None,
+        tap: Callable[[Direction, int, bytes], None] = lambda *_: None,
+        on_record: Callable[[Record], None] = lambda _: None,
         tries: int = 8,
         give_way: Callable[[], None] = lambda: None,
     ) -> None:
@@ -179,10 +177,8 @@ class Exchange:
         DeviceError
             The board restarted, or the connection broke.
         """
-        try:
+        with _line():
             data = self._port.read(min(max(1, self._port.in_waiting), _AT_ONCE))
-        except OSError as error:  # SerialException is one
-            raise _lost(error) from error
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
             lacking = (
@@ -218,10 +214,8 @@ class Exchange:
             self._log_part()
         self.tx_bytes += len(data)
         self._log("tx", data)
-        try:
+        with _line():
             self._port.write(data)
-        except OSError as error:
-            raise _lost(error) from error
 
     def set_rate(self, baudrate: int) -> None:
         """Change the line's rate, bit/s.
@@ -231,10 +225,8 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        try:
+        with _line():
             self._port.baudrate = baudrate
-        except OSError as error:
-            raise _lost(error) from error
 
     def abort_past(self) -> None:
         """Send ABORT at once, from any thread, past a request that is under way.
@@ -257,10 +249,8 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        try:
+        with _line():
             return self._port.in_waiting
-        except OSError as error:
-            raise _lost(error) from error
 
     def _log_part(self) -> list[Record]:
         part, self._part = self._part, b""
@@ -283,8 +273,13 @@ class Exchange:
         return records
 
 
-def _lost(error: OSError) -> DeviceError:
-    # Of a serial port that is gone the cause is pyserial's own, and not the system's.
-    is_gone = isinstance(error.__context__, serial.SerialException)
-    text = "the port is gone" if is_gone else str(error)
-    return make_error(DeviceError, "connection_lost", text=text)
+@contextmanager
+def _line() -> Iterator[None]:
+    """Say of a port that fails that the connection is lost."""
+    try:
+        yield
+    except OSError as error:  # SerialException is one
+        # Of a serial port that is gone the cause is pyserial's own, and not the system's.
+        is_gone = isinstance(error.__context__, serial.SerialException)
+        text = "the port is gone" if is_gone else str(error)
+        raise make_error(DeviceError, "connection_lost", text=text) from error

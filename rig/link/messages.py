@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
 from itertools import takewhile
-from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar, dataclass_transform
+from typing import Annotated, Any, NamedTuple, TypeAlias, dataclass_transform
 
 from rig.boards import Capabilities
 from rig.errors import DeviceError
@@ -198,60 +198,43 @@ class PulseEnd(IntEnum):
     DEVICE = 3  # the device, to be safe: its main loop stood still, or the pin did not obey
 
 
-class Message:
-    """A request or an answer."""
+TABLE: dict[int, type[Message]] = {}
+"""Every message by its code."""
 
-    __slots__ = ()
+
+@dataclass_transform(frozen_default=True)
+class Message:
+    """A request or an answer; a class that has a code is entered into the table."""
+
+    def __init_subclass__(cls, code: int | None = None) -> None:
+        dataclass(frozen=True)(cls)
+        if code is not None:
+            TABLE[code] = cls
 
 
 class HostMessage(Message):
     """A request."""
 
-    __slots__ = ()
-
 
 class DeviceMessage(Message):
     """An answer, or what the device says of its own accord."""
 
-    __slots__ = ()
 
-
-TABLE: dict[int, type[Message]] = {}
-"""Every message by its code."""
-_Kind = TypeVar("_Kind", bound=Message)
-
-
-@dataclass_transform(frozen_default=True)
-def _message(code: int) -> Callable[[type[_Kind]], type[_Kind]]:
-    """Enter a message into the table."""
-
-    def enter(kind: type[_Kind]) -> type[_Kind]:
-        entry = dataclass(frozen=True, slots=True)(kind)
-        TABLE[code] = entry
-        return entry
-
-    return enter
-
-
-@_message(0x01)
-class Identify(HostMessage):
+class Identify(HostMessage, code=0x01):
     """Ask who is there; the first request on a line."""
 
     protocol_version: U8 = PROTOCOL_VERSION
 
 
-@_message(0x02)
-class Ping(HostMessage):
+class Ping(HostMessage, code=0x02):
     """Ask for the device's tick."""
 
 
-@_message(0x03)
-class Status(HostMessage):
+class Status(HostMessage, code=0x03):
     """Ask what the device is doing."""
 
 
-@_message(0x04)
-class Arm(HostMessage):
+class Arm(HostMessage, code=0x04):
     """Prepare a drop.
 
     Attributes
@@ -278,20 +261,17 @@ class Arm(HostMessage):
     record_ms: U16
 
 
-@_message(0x05)
-class Fire(HostMessage):
+class Fire(HostMessage, code=0x05):
     """Let go; `token` is from ARMED, so that no stray frame can fire."""
 
     token: U32
 
 
-@_message(0x06)
-class Abort(HostMessage):
+class Abort(HostMessage, code=0x06):
     """Switch the release off; disarm; end a recording now. A held drop may then be re-armed."""
 
 
-@_message(0x07)
-class Read(HostMessage):
+class Read(HostMessage, code=0x07):
     """Ask for events again (answer EVENTS, perhaps fewer); count 0 asks for the CERTIFICATE."""
 
     label: U32
@@ -299,26 +279,22 @@ class Read(HostMessage):
     count: U8
 
 
-@_message(0x08)
-class Acknowledge(HostMessage):
+class Acknowledge(HostMessage, code=0x08):
     """The drop is safe with the host: the device may forget it."""
 
     label: U32
     crc32: U32
 
 
-@_message(0x09)
-class Reference(HostMessage):
+class Reference(HostMessage, code=0x09):
     """Ask for the latest pulse of the 1 Hz reference."""
 
 
-@_message(0x0A)
-class Flash(HostMessage):
+class Flash(HostMessage, code=0x0A):
     """Start the program that takes firmware; a board without one does not know this request."""
 
 
-@_message(0x81)
-class Identity(DeviceMessage):
+class Identity(DeviceMessage, code=0x81):
     """Who the device is and what it can do.
 
     Attributes
@@ -362,15 +338,13 @@ class Identity(DeviceMessage):
         )
 
 
-@_message(0x82)
-class Pong(DeviceMessage):
+class Pong(DeviceMessage, code=0x82):
     """The tick when PING was executed."""
 
     tick: U32
 
 
-@_message(0x83)
-class State(DeviceMessage):
+class State(DeviceMessage, code=0x83):
     """What the device is doing; `label` 0 and `events` 0 when idle."""
 
     phase: Annotated[Phase, _BYTE]
@@ -379,35 +353,30 @@ class State(DeviceMessage):
     events: U16
 
 
-@_message(0x84)
-class Armed(DeviceMessage):
+class Armed(DeviceMessage, code=0x84):
     """Answer to ARM."""
 
     token: U32
 
 
-@_message(0x85)
-class Fired(DeviceMessage):
+class Fired(DeviceMessage, code=0x85):
     """Answer to FIRE: the tick of the release."""
 
     tick: U32
 
 
-@_message(0x86)
-class Refused(DeviceMessage):
+class Refused(DeviceMessage, code=0x86):
     """The request was understood and not executed."""
 
     reason: Annotated[RefusalReason, _BYTE]
     detail: U16
 
 
-@_message(0x87)
-class Done(DeviceMessage):
+class Done(DeviceMessage, code=0x87):
     """ABORT or ACKNOWLEDGE was executed."""
 
 
-@_message(0x88)
-class EventsFrame(DeviceMessage):
+class EventsFrame(DeviceMessage, code=0x88):
     """Events number `first` and on. Stamps are already corrected for the board's mean latency.
 
     An event with the state of the one before it is a glitch: a pulse over before it was looked at.
@@ -424,8 +393,7 @@ class EventsFrame(DeviceMessage):
         return tuple(map(Event._make, EVENT.iter_unpack(self.events)))
 
 
-@_message(0x89)
-class DropCertificate(DeviceMessage):
+class DropCertificate(DeviceMessage, code=0x89):
     """The device's own account of a drop, as version 1 sent it.
 
     Attributes
@@ -453,16 +421,14 @@ class DropCertificate(DeviceMessage):
     sense_tick: U32
 
 
-@_message(0x8A)
-class Disarmed(DeviceMessage):
+class Disarmed(DeviceMessage, code=0x8A):
     """The device disarmed by itself."""
 
     label: U32
     reason: Annotated[DisarmReason, _BYTE]
 
 
-@_message(0x8B)
-class Boot(DeviceMessage):
+class Boot(DeviceMessage, code=0x8B):
     """The device has (re)started; `cause` has the AVR's MCUSR bits.
 
     A delimiter goes before it, since the reset may have cut another frame short.
@@ -471,16 +437,14 @@ class Boot(DeviceMessage):
     cause: U8
 
 
-@_message(0x8C)
-class ReferencePulse(DeviceMessage):
+class ReferencePulse(DeviceMessage, code=0x8C):
     """Answer to REFERENCE: how many pulses there were, and the tick of the latest."""
 
     count: U16
     tick: U32
 
 
-@_message(0x8D)
-class DropCertificate2(DropCertificate):
+class DropCertificate2(DropCertificate, code=0x8D):
     """The device's own account of a drop.
 
     Attributes

@@ -98,8 +98,7 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
         if _scheme(url) == "emu":  # pyserial says no more of a handler it cannot import
             raise make_error(DeviceError, "emulator_missing") from error
         raise make_error(DeviceError, "port_failed", port=url, text=error) from error
-    opened: Port = NetworkPort(port) if _scheme(url) == "socket" else port
-    return opened
+    return NetworkPort(port) if _scheme(url) == "socket" else port
 
 
 def check_url(url: str) -> None:

@@ -234,7 +234,9 @@ class Transcript:
             case wire.Armed(token):
                 self.disarmed = None
                 if isinstance(asked, wire.Arm):
-                    self._begin_drop(token, asked)
+                    self._tokens = {token: asked.label}
+                    self._given.discard(asked.label)
+                    self._drops[asked.label] = Assembly(asked.label, asked.gates)
             case wire.Disarmed(_, reason):
                 self.disarmed = reason
             case wire.Fired(tick=tick) if isinstance(asked, wire.Fire):
@@ -266,9 +268,3 @@ class Transcript:
             return [Restart(host_ns, cause)]
         label, fired_ns = fired
         return [Restart(host_ns, cause, label, (host_ns - fired_ns) * 1e-9, self._start_up_s)]
-
-    def _begin_drop(self, token: int, request: wire.Arm) -> None:
-        self._tokens = {token: request.label}
-        self._given.discard(request.label)
-        drop = self._drops[request.label] = Assembly(request.label)
-        drop.gates = request.gates

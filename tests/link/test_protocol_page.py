@@ -87,7 +87,7 @@ def test_phases_and_reasons_have_their_numbers():
 def test_limits_are_those_of_the_code():
     for said in (
         f"{BAUDRATE:,} baud",
-        f"Version {wire.PROTOCOL_VERSION}.",
+        f"Version {wire.PROTOCOL_VERSION}:",
         f"0 to {frames.PAYLOAD_LIMIT} |",
         f"at most {frames.FRAME_LIMIT} bytes",
         f"longer than {frames.FRAME_LIMIT - 2} ",
