@@ -47,12 +47,13 @@ def read_chains(
         if not name.isidentifier() or len(name) > _LONGEST_NAME:
             message = "this name needs to be one word of letters and digits, such as A"
             faults.add(place, join("chains", name), message)
-    described: dict[str, Mapping | None] = {
-        name: read_value(Plain.MAPPED, own, join("chains", name), "chains", faults)
-        for name, own in nodes.items()
+    described: dict[str, Mapping] = {
+        name: own
+        for name, node in nodes.items()
+        if (own := read_value(Plain.MAPPED, node, join("chains", name), "chains", faults))
     }
     keys = {
-        name: unique_entries(own, join("chains", name), faults)[1] if own else {}
+        name: unique_entries(own, join("chains", name), faults)[1]
         for name, own in described.items()
     }
     bases = {
@@ -60,19 +61,16 @@ def read_chains(
         for name, own in keys.items()
         if isinstance(like := own.get("like"), ScalarNode) and like.kind == "text"
     }
-    chains: dict[str, RodChain | None] = {}
-    for name in sorted(nodes, key=lambda name: name in bases):
+    chains: dict[str, RodChain | None] = dict.fromkeys(nodes.keys() - described.keys())
+    for name in sorted(described, key=lambda name: name in bases):
         path, own, lenient = join("chains", name), described[name], False
-        if own is None:
-            chains[name] = None
-            continue
         if name in bases:
             base = bases[name].text
             message = _base_problem(base, chains, [chain for chain in nodes if chain != name])
             if message:
                 faults.add(bases[name].place, f"{path}.like", message)
-            if inherited := described.get(base):
-                own = _inherit(own, inherited, keys[name], keys[base])
+            if base in described:
+                own = _inherit(own, described[base], keys[name], keys[base])
             lenient = chains.get(base) is None
         section = Section(own, path, "chains.*", faults, lenient=lenient)
         chains[name] = _build_chain(name, section, seen_by_gates=seen_by_gates, struck=struck)
@@ -99,7 +97,7 @@ def _inherit(
     if "length" in own_keys and isinstance(base_keys.get("spacing"), Sequence):
         hidden.add("spacing")
     entries = [entry for entry in base.entries if getattr(entry[0], "text", None) not in hidden]
-    return Mapping(own.place, [*own.entries, *entries], own.size)
+    return Mapping(own.place, [*own.entries, *entries])
 
 
 def _build_chain(
@@ -109,16 +107,15 @@ def _build_chain(
     rods = list_rods(section, seen_by_gates=seen_by_gates, struck=struck)
     is_object = rods is not None and len(rods.diameters) == 1
     if is_object:
-        for key in section.keys.keys() & {"length", "spacing"}:
-            section.fault(key, f"one object has no {key}; leave it out", at_key=True)
+        section.refuse("one object has no {}; leave it out", "length", "spacing")
     elif not isinstance(section.nodes.get("spacing"), Sequence):
         section.need("length")
-    elif "length" in section:
-        section.fault("length", "follows from the listed spacing; leave it out", at_key=True)
+    else:
+        section.refuse("follows from the listed spacing; leave it out", "length")
     if rods is None:
         return None
-    if "masses" in section and rods.weighed:
-        section.fault("masses", "mass is also given; keep one of them", at_key=True)
+    if rods.weighed:
+        section.refuse("mass is also given; keep one of them", "masses")
     heights = place_rods(section, rods.diameters) if section.is_sound("length", "spacing") else None
     if heights is None or not section.is_sound("tilt", "rod_length"):
         return None

@@ -68,9 +68,8 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
 def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
     """Note drag stated twice or not at all, and rods too little known for a coefficient."""
     stated = drag.need("coefficient", "terminal_speed")
-    if stated == "terminal_speed" and "air_density" in drag:
-        message = "not used with terminal_speed; leave air_density out"
-        drag.fault("air_density", message, at_key=True)
+    if stated == "terminal_speed":
+        drag.refuse("not used with terminal_speed; leave {} out", "air_density")
     if stated == "coefficient":
         for rods in chains:
             if rods.missing_keys:
@@ -81,8 +80,8 @@ def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
 
 def _check_plan(plan: Section, *, struck: bool, turns: bool) -> None:
     """Note inclines and turns that a scene does not have, repeated inclines, and too many runs."""
-    if "incline" in plan and not struck:
-        plan.fault("incline", "the scene has no surface; leave incline out", at_key=True)
+    if not struck:
+        plan.refuse("the scene has no surface; leave {} out", "incline")
     if "order" in plan and plan["order"] in {"ABBA", "alternate"} and not turns:
         message = f"found {plan['order']}, which needs two chains; leave order out"
         plan.fault("order", message)

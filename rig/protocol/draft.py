@@ -152,11 +152,10 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
 
 
 def _even(protocol: Protocol, number: int) -> list[float]:
-    """Evenly from just below where it begins down to near the lowest level."""
+    """Evenly from near the lowest level up to just below where it begins."""
     (body,), drop = protocol.chains.values(), protocol.drop
     clear = max(body.widths) / 2.0 + max(_CLEAR, drop.u)
     first = drop.value - max(clear + _CLEAR, _FIRST * drop.value)
     last = _LAST * drop.value
-    if number == 1:
-        return [last]
-    return [first + (last - first) * n / (number - 1) for n in range(number)]
+    step = (first - last) / max(number - 1, 1)
+    return [last + step * n for n in range(number)]

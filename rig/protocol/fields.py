@@ -109,6 +109,11 @@ class Section:
             self.faults.add(self.node.place, self.key(names[0]), message)
         return None
 
+    def refuse(self, why: str, *names: str) -> None:
+        """Note those of some keys that are there although nothing can use them."""
+        for name in filter(self.__contains__, names):
+            self.fault(name, why.format(name), at_key=True)
+
     def key(self, name: str) -> str:
         """Return the full path of one of its keys."""
         return join(self.path, name)

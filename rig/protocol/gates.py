@@ -30,15 +30,13 @@ def check_sides(section: Section, *, surface: bool, chains: int) -> None:
     chains
         Number of chains in the scene.
     """
-    if "impact" in section and not surface:
-        message = "the scene has no surface; put the gates under free"
-        section.fault("impact", message, at_key=True)
-    if "free" in section and surface and chains == 1:
-        message = "the only chain strikes the surface; put the gates under impact"
-        section.fault("free", message, at_key=True)
     if surface:
         section.need("impact")
-    if not surface or chains > 1:
+    else:
+        section.refuse("the scene has no surface; put the gates under free", "impact")
+    if surface and chains == 1:
+        section.refuse("the only chain strikes the surface; put the gates under impact", "free")
+    elif not surface or chains > 1:
         section.need("free")
     lines: dict[int, int] = {}
     for gate in _sections(section):

@@ -114,14 +114,14 @@ class Key(NamedTuple):
         What it may be.
     default
         What it is where it is left out, as written in a file; empty where it then is not there.
-    meaning
-        In words.
-    example
-        As written in a file.
     required
         Whether it must be there.
     in_words
         Whether the default follows from something else, which it names.
+    meaning
+        In words.
+    example
+        As written in a file.
     scene
         What a scene needs for this key to matter: empty, or one of `rig.protocol.describe.SCENES`.
     source
@@ -131,10 +131,10 @@ class Key(NamedTuple):
     path: str
     accepted: Accepted
     default: str
+    required: bool
+    in_words: bool
     meaning: str
     example: str
-    required: bool = False
-    in_words: bool = False
     scene: str = ""
     source: str = ""
 
@@ -166,24 +166,27 @@ def _read_accepted(text: str) -> Accepted:
     return _read_range(text)
 
 
-def _read_key(row: str) -> Key:
-    columns = [*map(str.strip, row.split("|")), "", ""]
-    path, accepted, default, meaning, example, scene, source = columns[:7]
+def read_key(row: str) -> Key:
+    """Return the key of a row of ``keys.txt``, whose columns are those of `Key`.
+
+    Parameters
+    ----------
+    row
+        Columns parted by ``|``, as the head of that file explains; the last two may be left out.
+    """
+    path, accepted, default, *texts = map(str.strip, row.split("|"))
     return Key(
         path.removesuffix("!"),
         _read_accepted(accepted),
         default.strip("()"),
-        meaning,
-        example,
-        required=path.endswith("!"),
-        in_words=default.startswith("("),
-        scene=scene,
-        source=source,
+        path.endswith("!"),
+        default.startswith("("),
+        *texts,
     )
 
 
 _LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-_ROWS = (_read_key(line) for line in _LINES if line and not line.startswith("#"))
+_ROWS = (read_key(line) for line in _LINES if line and not line.startswith("#"))
 KEYS = {key.path: key for key in _ROWS}
 """By path, in the order in which a file is written."""
 

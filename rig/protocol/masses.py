@@ -27,16 +27,13 @@ def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses | None:
     """
     masses, rods = chain["masses"], len(heights)
     if isinstance(masses, tuple):
-        if len(masses) != rods:
-            message = f"found {len(masses)} masses for {rods} rods; state one for each rod"
-            chain.fault("masses", message)
-        return masses if len(masses) == rods and chain.is_sound("masses") else None
-    if masses is None:
+        if len(masses) == rods:
+            return masses
+        message = f"found {len(masses)} masses for {rods} rods; state one for each rod"
+        chain.fault("masses", message)
         return None
-    profile = masses.need("exponential", "table")
-    if profile is None:
-        return None
-    if not masses.is_sound():
+    profile = masses and masses.need("exponential", "table")
+    if not profile or not masses.is_sound():
         return None
     if profile == "table":
         return _interpolate(masses, heights)

@@ -347,11 +347,9 @@ class Protocol:
     @property
     def vocabulary(self) -> Vocabulary:
         """The words of this kind of scene."""
-        return (
-            TRACK
-            if self.track
-            else vocabulary_of(self.chains.values(), struck=self.surface is not None)
-        )
+        if self.track:
+            return TRACK
+        return vocabulary_of(self.chains.values(), struck=self.surface is not None)
 
     @property
     def zero(self) -> str:

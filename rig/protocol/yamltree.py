@@ -50,7 +50,6 @@ class ScalarNode:
     text: str
     plain: bool
     place: Place
-    size: int = 1
 
     @property
     def kind(self) -> str:
@@ -73,7 +72,6 @@ class Sequence:
 
     place: Place
     items: list[Node]
-    size: int
 
     def __str__(self) -> str:
         return "a list" if self.items else "an empty list"
@@ -85,7 +83,6 @@ class Mapping:
 
     place: Place
     entries: list[tuple[Node, Node]]
-    size: int
 
     def __str__(self) -> str:
         return "a mapping"
@@ -188,7 +185,7 @@ class _Builder:
 
     def __init__(self, text: str) -> None:
         self.events: Iterator[Any] = yaml.parse(text, Loader=yaml.SafeLoader)
-        self.anchors: dict[str, Node] = {}
+        self.anchors: dict[str, tuple[Node, int]] = {}
         self.nodes = 0
 
     def build(self) -> Node:
@@ -212,11 +209,12 @@ class _Builder:
 
     def _node(self, event: Any, place: Place, depth: int) -> Node:
         node: Node
+        before, size = self.nodes, 1
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
                 name = quoted(str(event.anchor))
                 raise _RefusalError(place, f"no anchor stands before the alias {name}")
-            node = self.anchors[event.anchor]
+            node, size = self.anchors[event.anchor]
         elif event.tag is not None:
             raise _RefusalError(place, f"the tag {quoted(event.tag)} is not accepted; leave it out")
         elif isinstance(event, yaml.ScalarEvent):
@@ -227,16 +225,14 @@ class _Builder:
         elif depth >= MAX_DEPTH:
             raise _RefusalError(place, f"more than {MAX_DEPTH} levels of brackets or indents")
         elif isinstance(event, yaml.SequenceStartEvent):
-            items = self._list(yaml.SequenceEndEvent, depth)
-            node = Sequence(place, items, 1 + sum(item.size for item in items))
+            node = Sequence(place, self._list(yaml.SequenceEndEvent, depth))
         else:
             parts = self._list(yaml.MappingEndEvent, depth)
-            entries = list(zip(parts[::2], parts[1::2], strict=True))
-            node = Mapping(place, entries, 1 + sum(part.size for part in parts))
+            node = Mapping(place, list(zip(parts[::2], parts[1::2], strict=True)))
         # The parts of a list were counted as they came, but for those of an alias.
-        self.nodes += node.size if isinstance(event, yaml.AliasEvent) else 1
+        self.nodes += size
         if self.nodes > MAX_NODES:
             raise _RefusalError(place, f"more than {MAX_NODES} values, aliases expanded")
         if event.anchor:
-            self.anchors[event.anchor] = node
+            self.anchors[event.anchor] = node, self.nodes - before
         return node
