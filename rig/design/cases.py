@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.air import prior_air
 from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import ChainRecord, EdgeTrain, chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
-from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
+from rig.analysis.square_root import EquationRows
 from rig.analysis.unknowns import SharedUnknowns
 from rig.model.rods import rod_impacts
 from rig.protocol.contact import at_contact
@@ -24,7 +23,7 @@ from rig.records import Drop
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -40,22 +39,6 @@ RELEASE_S = 0.02
 _BEAMS = ("beams", "ripple")
 BEAM = len(_BEAMS)
 """Unknowns that a beam has for itself: its height, and how far off the rods' middle it is."""
-
-
-@dataclass(frozen=True, slots=True)
-class Block:
-    """What one beam says of one drop: its observation equations in standard deviations.
-
-    Attributes
-    ----------
-    columns
-        Unknowns of the drop that it knows of.
-    slopes
-        By these and the beam's own, in units of prior uncertainties; one row an edge.
-    """
-
-    columns: Index
-    slopes: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +58,8 @@ class Case:
     gradients
         Of each measurand by all these unknowns: own, α, common.
     blocks
-        One a beam.
+        What each beam says of one drop, in units of prior uncertainties; one row an edge. The
+        places of its own unknowns, at most `BEAM`, are behind all these.
     """
 
     run: Run
@@ -86,12 +70,17 @@ class Case:
     shared: int
     by_chance: Index
     gradients: dict[str, Array]
-    blocks: tuple[Block, ...]
+    blocks: tuple[EquationRows, ...]
 
     @property
     def core(self) -> int:
         """Number of unknowns that are no beam's."""
         return self.own + self.here.size + self.struck
+
+    def block(self, beam: int, place: int) -> EquationRows:
+        """Return what a beam says, if its own unknowns have this place among those of beams."""
+        rows = self.blocks[beam]
+        return rows._replace(columns=rows.columns + BEAM * place * (rows.columns >= self.core))
 
 
 def beams_of(protocol: Protocol) -> list[tuple[Role, float]]:
@@ -157,79 +146,46 @@ def _places(blocks: Mapping[str, slice], *names: str) -> Index:
     return np.concatenate([np.zeros(0, dtype=np.intp), *every])
 
 
-def perfect(protocol: Protocol, run: Run, lower: float = 0.0) -> list[tuple[ChainRecord, Array]]:
-    """Each chain of a drop as the model predicts it, with every edge seen.
+def predicted(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
+    """Return a drop that no beam has seen yet, and its unknowns as the model predicts them.
 
     Parameters
     ----------
-    lower
-        By how much the chains hang lower than stated, m.
-
-    Returns
-    -------
-    list
-        Records with their trains, and α of each rod, shape ``(rods,)``; empty for a free chain.
+    protocol
+        With heights counted from the contact point.
     """
+    records = chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0)
+    alphas = np.zeros(1)
+    if run.impact is not None and protocol.surface is not None:
+        chain = protocol.chains[run.impact].chain
+        impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
+        alphas = np.array([impact.alpha for impact in impacts])
+    guess = Guess(
+        RELEASE_S, protocol.drop.value, float(alphas.mean())
+    )  # a free chain leaves α alone
+    guesses: dict[str, Guess] = {record.role: guess for record in records}
+    model = DropModel(protocol, records, guesses, CLOCK_U, components)
+    x = np.zeros(len(model.unknowns))
+    if "impulses" in model.unknowns:
+        x[model.unknowns["impulses"]] = alphas - alphas.mean()
+    return model, x
+
+
+def perfect(model: DropModel, x: Array) -> list[ChainRecord]:
+    """Each chain of a drop with every edge seen where it should be."""
     collected = []
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
-    for record in records_of(protocol, run):
-        alphas = model_alphas(protocol, record, run)
-        path = trajectory(protocol, record, RELEASE_S, protocol.drop.value - lower, alphas)
-        trains = tuple(
-            with_edges(train, path.times(train.levels), train.blocks) for train in record.trains
-        )
-        collected.append((replace(record, trains=trains), alphas))
+    for role, record in model.records.items():
+        path = model.trajectory(role, x)
+        trains = (with_edges(t, path.times(t.levels), t.blocks) for t in record.trains)
+        collected.append(replace(record, trains=tuple(trains)))
     return collected
-
-
-def records_of(protocol: Protocol, run: Run) -> list[ChainRecord]:
-    """Return the chains of a drop that no beam has seen yet."""
-    return chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0)
-
-
-def model_alphas(protocol: Protocol, record: ChainRecord, run: Run) -> Array:
-    """α of each rod by the model, shape ``(rods,)``; empty for a free chain."""
-    if record.ratios is None:
-        return np.zeros(0)
-    assert protocol.surface is not None
-    impacts = rod_impacts(protocol.surface, record.chain.chain, run.incline_deg)
-    return np.array([impact.alpha for impact in impacts])
-
-
-def trajectory(
-    protocol: Protocol,
-    record: ChainRecord,
-    release: float,
-    start: float,
-    alphas: Array,
-    rods: Array | float = 0.0,
-) -> Trajectory:
-    """Let a chain fall whose rods hang so much higher than stated, m."""
-    gravity, kappa = protocol.gravity.value, prior_air(protocol)[0]
-    if record.ratios is None:
-        return free_trajectory(release, start, gravity, kappa, record.air)
-    strikes = record.strikes + rods
-    return struck_trajectory(
-        release, start, gravity, alphas, record.ratios, strikes, kappa, record.air
-    )
 
 
 def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
     """The equations of the drop as the model predicts it."""
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
-    records = perfect(protocol, run)
-    guesses: dict[str, Guess] = {
-        record.role: Guess(
-            RELEASE_S, protocol.drop.value, float(alphas.mean()) if alphas.size else 0.0
-        )
-        for record, alphas in records
-    }
-    model = DropModel(protocol, [record for record, _ in records], guesses, CLOCK_U, components)
-    x = np.zeros(len(model.unknowns))
-    for _, alphas in records:
-        if alphas.size:
-            x[model.unknowns["impulses"]] = alphas - alphas.mean()
-    return model, x
+    model, x = predicted(at_contact(protocol, run.incline_deg, run.impact), run, components)
+    records = perfect(model, x)
+    return DropModel(model.protocol, records, model.guesses, CLOCK_U, components), x
 
 
 def with_edges(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> EdgeTrain:
@@ -252,9 +208,7 @@ def _case(
     order = np.concatenate([own, alpha, common])
     place = np.full(len(at), -1)
     place[order] = np.arange(order.size)
-    blocks: dict[int, Block] = {}
-    for role, record in model.records.items():
-        blocks |= _blocks(model, record, role, x, place)
+    blocks = dict(_blocks(model, x, place))
     return Case(
         alike[0],
         len(alike),
@@ -268,25 +222,19 @@ def _case(
     )
 
 
-_BLIND = Block(np.zeros(0, dtype=np.intp), np.zeros((0, BEAM)))
+_BLIND = EquationRows(np.zeros((0, 0)), np.zeros(0), np.zeros(0, dtype=np.intp))
 
 
-def _blocks(
-    model: DropModel, record: ChainRecord, role: str, x: Array, place: Index
-) -> dict[int, Block]:
-    """Split the equations of one chain by beam."""
+def _blocks(model: DropModel, x: Array, place: Index) -> Iterator[tuple[int, EquationRows]]:
+    """Yield the equations of each beam, by its number."""
     at, sd = model.unknowns, model.unknowns.sd
-    rows = model.equations(role, x, [np.arange(train.times.size) for train in record.trains])
-    slopes = rows.slopes * (sd[rows.columns] / rows.residuals.sigma[:, None])
-    gate = model.expected[role].gate
-    columns = np.flatnonzero(place[rows.columns] >= 0)
-    where = np.full(len(at), -1)
-    where[rows.columns] = np.arange(rows.columns.size)
-    collected = {}
-    for train in record.trains:
-        own = [where[at[name].start + train.gate] for name in _BEAMS if name in at]
-        chosen = slopes[gate == train.gate][:, [*columns, *own]]
-        part = np.zeros((chosen.shape[0], columns.size + BEAM))
-        part[:, : chosen.shape[1]] = chosen
-        collected[train.gate] = Block(place[rows.columns[columns]], part)
-    return collected
+    for role, record in model.records.items():
+        rows = model.equations(role, x, [np.arange(train.times.size) for train in record.trains])
+        slopes = rows.slopes * (sd[rows.columns] / rows.residuals.sigma[:, None])
+        for train in record.trains:
+            own = [at[name].start + train.gate for name in _BEAMS if name in at]
+            places = place.copy()
+            places[own] = place.max() + 1 + np.arange(len(own))
+            seen, known = model.expected[role].gate == train.gate, places[rows.columns] >= 0
+            part = slopes[np.ix_(seen, known)]
+            yield train.gate, EquationRows(part, np.zeros(len(part)), places[rows.columns[known]])

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.components import stated
 from rig.analysis.verdict import LEAD
-from rig.design.cases import beams_of, cases, perfect, with_beams
+from rig.design.cases import beams_of, cases, perfect, predicted, with_beams
 from rig.design.forecast import GateLayout, forecast
 from rig.design.trials import read_drop
 from rig.measurands import averaged
@@ -174,12 +175,14 @@ def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
     ends = {run.incline_deg: run for run in reversed(runs(protocol))}
     least = MARGIN
     for incline in {min(ends), max(ends)}:
+        here = at_contact(protocol, incline, ends[incline].impact)
+        model, x = predicted(here, ends[incline], stated(here))
         for off in (-_OFF, _OFF):
+            x[model.unknowns["drop"]] = off * protocol.drop.u
             fallen = [
                 (record, [np.arange(train.rods.size) for train in record.trains])
-                for record, _ in perfect(protocol, ends[incline], off * protocol.drop.u)
+                for record in perfect(model, x)
             ]
-            here = at_contact(protocol, incline, ends[incline].impact)
             identification, unclear = read_drop(here, fallen)
             if identification.fit is None or unclear:
                 return -math.inf

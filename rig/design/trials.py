@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.annealing import EVER, MISSED
-from rig.analysis.components import above, stated
+from rig.analysis.components import stated
 from rig.analysis.identify import Identification, deciding_gate, identify
 from rig.analysis.verdict import pattern_faults
-from rig.design.cases import CLOCK_U, RELEASE_S, model_alphas, records_of, trajectory, with_edges
+from rig.design.cases import CLOCK_U, predicted, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -73,11 +73,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     further_gate: tuple[str, float] | None = None
     for run in islice(cycle(kinds.values()), drops):
         protocol_here = at_contact(protocol, run.incline_deg, run.impact)
-        start = protocol_here.drop.value + protocol_here.drop.u * rng.standard_normal()
-        fallen = [
-            _fallen(protocol_here, record, run, start, rng)
-            for record in records_of(protocol_here, run)
-        ]
+        fallen = _fall(protocol_here, run, rng)
         identification, wrong = read_drop(protocol_here, fallen, _WINDOW)
         read += not wrong
         failing.update(wrong)
@@ -91,38 +87,49 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     return Trials(drops, read, tuple(failing.items()), further_gate)
 
 
-def _fallen(
-    protocol: Protocol, record: ChainRecord, run: Run, start: float, rng: np.random.Generator
-) -> tuple[ChainRecord, list[Index]]:
-    """Let one chain fall that hangs and is let go a little off, with impulses that scatter.
+def _fall(
+    protocol: Protocol, run: Run, rng: np.random.Generator
+) -> list[tuple[ChainRecord, list[Index]]]:
+    """Let chains fall that hang and are let go a little off, with impulses that scatter.
 
-    With it, for each train, which edge each expected edge is.
+    With each, for each of its trains, which edge each expected edge is.
     """
     assert protocol.gates is not None
-    chain = record.chain
-    rods = chain.position_u * rng.standard_normal(chain.chain.rods)
-    wider = chain.width_u * rng.standard_normal()
-    start += protocol.priors.hang * rng.standard_normal()
-    release = RELEASE_S + 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
-    alphas = model_alphas(protocol, record, run)
-    if alphas.size:
-        scatter = stated(protocol).impulses(alphas.mean(), above(chain.chain))
-        alphas += scatter * rng.standard_normal(alphas.size)
-    path = trajectory(protocol, record, release, start, alphas, rods)
-    datum = protocol.gates.datum_u * rng.standard_normal()
-    trains, truth = [], []
-    for train in record.trains:
-        beam = datum + protocol.gates.height_u * rng.standard_normal()
-        levels = train.levels + beam - rods[train.rods]
-        levels -= np.where(train.blocks, -0.5, 0.5) * wider
-        seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
-        times = path.times(levels[seen]) + protocol.priors.jitter * rng.standard_normal(seen.size)
-        order = np.argsort(times, kind="stable")
-        edges = np.full(levels.size, -1)
-        edges[seen[order]] = np.arange(seen.size)
-        trains.append(with_edges(train, times[order], train.blocks[seen[order]]))
-        truth.append(edges)
-    return replace(record, trains=tuple(trains)), truth
+    model, x = predicted(protocol, run, stated(protocol))
+    at, sd, fallen = model.unknowns, model.unknowns.sd, []
+
+    def shake(name: str, member: int | None = None) -> None:
+        block = (
+            at[name]
+            if member is None
+            else slice(at[name].start + member, at[name].start + member + 1)
+        )
+        x[block] += sd[block] * rng.standard_normal(sd[block].size)
+
+    shake("drop")
+    for role, record in model.records.items():
+        for name in ("rods", "width", "hang"):
+            shake(f"{role} {name}")
+        x[at[f"{role} release"]] = 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
+        if record.ratios is not None:
+            shake("impulses")
+        shake("datum", protocol.gates.posts.index(record.role))
+        path = model.trajectory(role, x)
+        trains, truth = [], []
+        for train in record.trains:
+            shake("beams", train.gate)
+            levels = model.all_levels(role, x)[model.expected[role].gate == train.gate]
+            seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
+            times = path.times(levels[seen]) + protocol.priors.jitter * rng.standard_normal(
+                seen.size
+            )
+            order = np.argsort(times, kind="stable")
+            edges = np.full(levels.size, -1)
+            edges[seen[order]] = np.arange(seen.size)
+            trains.append(with_edges(train, times[order], train.blocks[seen[order]]))
+            truth.append(edges)
+        fallen.append((replace(record, trains=tuple(trains)), truth))
+    return fallen
 
 
 def read_drop(

@@ -120,11 +120,10 @@ def end_correction(protocol: Protocol, problem: CoefficientProblem) -> EndCorrec
         return None
     cases = one_alpha(problem.forms, lambda form: protocol.condition(form.run))
     inclines = with_nuisances(protocol, cases, problem.inclines)
-    open_ = fit(problem.forms, with_end_correction(inclines, gammas, None))
-    chi2 = {
-        "open": open_.chi2,
-        "eq10": fit(problem.forms, inclines).chi2,
-        "without": fit(problem.forms, with_end_correction(inclines, gammas, 0.0)).chi2,
+    fits = {
+        name: fit(problem.forms, with_end_correction(inclines, gammas, scale))
+        for name, scale in {"open": None, "eq10": 1.0, "without": 0.0}.items()
     }
     same = by_eq10.pop() if len(by_eq10) == 1 else None
-    return EndCorrection(Measured(*open_[END]), chi2, same)
+    chi2 = {name: outcome.chi2 for name, outcome in fits.items()}
+    return EndCorrection(Measured(*fits["open"][END]), chi2, same)

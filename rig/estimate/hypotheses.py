@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from rig.units import Quantity
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rig.arrays import Array, Index
+    from rig.arrays import Array
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.model.surface import Surface
@@ -70,13 +70,10 @@ def alphas(
     alpha_name
         Name of this chain's α, where it is simply given.
     """
-    if alpha_name is not None and alpha_name in values:
-        slopes = np.zeros((chain.rods, len(values)))
-        slopes[:, [*values].index(alpha_name)] = 1.0
-        return np.full(chain.rods, values[alpha_name]), slopes
 
     def at(moved: Mapping[str, float]) -> Array:
-        impacts = rod_impacts(with_coefficients(surface, moved), chain, incline_deg)
+        given = chain if alpha_name is None else replace(chain, alpha=Quantity(moved[alpha_name]))
+        impacts = rod_impacts(with_coefficients(surface, moved), given, incline_deg)
         return np.array([impact.alpha for impact in impacts])
 
     slopes = np.zeros((chain.rods, len(values)))
@@ -88,15 +85,12 @@ def alphas(
 
 def with_coefficients(surface: Surface, values: Mapping[str, float]) -> Surface:
     """Return the surface with some of its coefficients replaced."""
-    pile = surface.pile
-    if pile is not None and PILE in values:
-        pile = replace(pile, restitution=Quantity(values[PILE]))
-    return replace(
-        surface,
-        restitution=Quantity(values[BETA]) if BETA in values else surface.restitution,
-        friction=Quantity(values[MU]) if MU in values else surface.friction,
-        pile=pile,
-    )
+    changes: dict[str, Any] = {
+        name: Quantity(values[name]) for name in (BETA, MU) if name in values
+    }
+    if surface.pile is not None and PILE in values:
+        changes["pile"] = replace(surface.pile, restitution=Quantity(values[PILE]))
+    return replace(surface, **changes)
 
 
 def one_alpha(
@@ -110,19 +104,18 @@ def one_alpha(
     `each_rod`: one for each rod but the top one, whose impact pulls on nothing.
     """
     parameters: list[Parameter] = []
-    sets: dict[object, list[tuple[int, Index]]] = {}
+    shares: dict[object, tuple[int, Array]] = {}
     for group in dict.fromkeys(map(key, forms)):
-        starts = np.array([form.alphas for form in forms if key(form) == group])
-        every = np.arange(starts.shape[1])
-        sets[group] = []
-        for rods in every[:-1, None] if each_rod else [every]:
-            sets[group].append((len(parameters), rods))
-            parameters.append(Parameter(f"α {group}", float(starts[:, rods].mean())))
+        begin = np.mean([form.alphas for form in forms if key(form) == group], axis=0)
+        share = np.eye(begin.size)[:, :-1] if each_rod else np.ones((begin.size, 1))
+        shares[group] = len(parameters), share
+        starts = (begin @ share / share.sum(axis=0)).tolist()
+        parameters += [Parameter(f"α {group}", start) for start in starts]
 
     def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
+        first, share = shares[key(form)]
         slopes = np.zeros((form.alphas.size, values.size))
-        for place, rods in sets[key(form)]:
-            slopes[rods, place] = 1.0
+        slopes[:, first : first + share.shape[1]] = share
         return slopes @ values, slopes
 
     return Hypothesis(tuple(parameters), alphas)
@@ -131,7 +124,7 @@ def one_alpha(
 def with_end_correction(
     inner: Hypothesis, gammas: Callable[[QuadraticForm], Array], scale: float | None
 ) -> Hypothesis:
-    """Suppose γ to be so many times that of Eq. 10, or (`None`) leave it open.
+    """Suppose γ to be exactly so many times that of Eq. 10, or (`None`) leave it open.
 
     Parameters
     ----------
@@ -140,16 +133,15 @@ def with_end_correction(
     """
 
     def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
-        factor, values = (values[-1], values[:-1]) if scale is None else (scale, values)
-        target, slopes = inner.alphas(form, values)
+        target, slopes = inner.alphas(form, values[:-1])
         # m/(M + γm) is here r/(1 + (γ − γ₀)r), with r = m/(M + γ₀m) as in the form.
         change = gammas(form) * form.ratios
-        ratio = 1.0 / (1.0 + (factor - 1.0) * change)
-        by_scale = [-target * change * ratio**2] if scale is None else []
-        return target * ratio, np.column_stack([slopes * ratio[:, None], *by_scale])
+        ratio = 1.0 / (1.0 + (values[-1] - 1.0) * change)
+        by_scale = -target * change * ratio**2
+        return target * ratio, np.column_stack([slopes * ratio[:, None], by_scale])
 
-    added = (Parameter(END, 1.0),) if scale is None else ()
-    return Hypothesis((*inner.parameters, *added), alphas)
+    added = Parameter(END, 1.0) if scale is None else Parameter(END, scale, (scale, 0.0))
+    return Hypothesis((*inner.parameters, added), alphas)
 
 
 def with_contact(inner: Hypothesis, inclines: Sequence[float]) -> Hypothesis:

@@ -118,7 +118,7 @@ def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
             beam = common + kinds[0].shared + BEAM * n + np.arange(BEAM)
             for slopes in block.slopes:
                 rows.append(np.zeros(size))
-                rows[-1][np.append(place[block.columns], beam)] = slopes
+                rows[-1][np.append(place, beam)[block.columns]] = slopes
     now = {"restitution": surface.restitution.value, "friction": surface.friction.value}
     chain = protocol.chains["A"].chain
     ties = [alphas(surface, chain, case.run.incline_deg, now)[1].mean(axis=0) for case in kinds]
