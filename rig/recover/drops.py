@@ -56,7 +56,6 @@ def _best(stored: Drop, replayed: Drop | None, fate: Fate) -> Drop:
         return stored
     if replayed is not None and fate is Fate.RESTORED:
         return replayed
-    longer = replayed is not None and len(replayed.edges) > len(stored.edges)
-    torn = replayed if replayed is not None and longer else stored
+    torn = max((stored, replayed or stored), key=lambda drop: len(drop.edges))
     # A drop that is not whole any more is void: its missing edges are no missed rods.
     return replace(torn, faults=(*torn.faults, make_reason("record_torn")))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -93,9 +92,7 @@ def examine(path: str | os.PathLike[str]) -> ExaminedFile:
     lost = {
         facts: "simulated" not in rows.meta,
         "the protocol file": rows.protocol is None,
-        "the protocol's text has changed since the session was made": (
-            rows.protocol and not protocol_sound(rows, rows.protocol[1])
-        ),
+        "the protocol's text has changed since the session was made": rows.protocol_altered,
         **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
         **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
     }
@@ -168,9 +165,3 @@ def _true(sentences: Mapping[str, object]) -> list[str]:
 
 def _describe_fate(recovered: RecoveredDrop) -> str:
     return f"{recovered.drop.job}: {recovered.fate}"
-
-
-def protocol_sound(rows: Rows, text: str) -> bool:
-    """Whether a protocol's text is the one that the session was made with, as far as known."""
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    return rows.meta.get("protocol_sha256", digest) == digest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -45,6 +46,14 @@ class Rows:
     def protocol(self) -> tuple[str, str] | None:
         """Name and text of the protocol file."""
         return next(((source, text) for _, source, text in self.tables["protocol"].values()), None)
+
+    @property
+    def protocol_altered(self) -> bool:
+        """Whether its text is there, and known not to be the one of the session's beginning."""
+        if self.protocol is None:
+            return False
+        digest = hashlib.sha256(self.protocol[1].encode()).hexdigest()
+        return self.meta.get("protocol_sha256", digest) != digest
 
     def any(self) -> bool:
         """Whether anything of a session was found."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from rig.errors import SessionError
 from rig.files import read_input
 from rig.ports import is_simulated
-from rig.recover.examine import protocol_sound
 from rig.session.schema import OLDER, RunState
 from rig.session.store import Session
 
@@ -73,7 +72,7 @@ def _protocol(examined: ExaminedFile, file: str | None) -> tuple[str, str]:
         except (OSError, UnicodeDecodeError) as error:
             raise SessionError(f"cannot read {file}: {error}") from error
     rows = examined.rows
-    if rows.protocol is None or not protocol_sound(rows, rows.protocol[1]):
+    if rows.protocol is None or rows.protocol_altered:
         raise SessionError(
             f"{examined.snapshot.path} has lost its protocol file", "give it: --protocol FILE"
         )

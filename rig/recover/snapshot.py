@@ -12,11 +12,9 @@ from tempfile import TemporaryDirectory
 from rig.errors import SessionError
 from rig.files import require_file
 from rig.session.database import copy_session
+from rig.session.faults import UNREADABLE
 from rig.session.lock import writer_of
 from rig.session.store import Session
-
-_TROUBLE = (sqlite3.Error, UnicodeDecodeError)
-"""What SQLite raises; where it names what is damaged by bytes that are no text, the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +85,7 @@ def _copy_beside_writer(place: Path, copy: Path) -> None:
             closing(sqlite3.connect(copy)) as target,
         ):
             source.backup(target)
-    except _TROUBLE:
+    except UNREADABLE:
         copy.write_bytes(place.read_bytes())
 
 
@@ -97,7 +95,7 @@ def _fold_in(copy: Path) -> int:
         with closing(sqlite3.connect(copy)) as connection:
             connection.execute("PRAGMA writable_schema = on")  # also into one that is damaged
             _, logged, _ = connection.execute("PRAGMA wal_checkpoint").fetchone()
-    except _TROUBLE:
+    except UNREADABLE:
         return 0
     return max(0, int(logged))
 
@@ -111,7 +109,7 @@ def _trouble(copy: Path, name: str) -> str:
             return f"SQLite cannot read it as it is: {complaints[0].splitlines()[0]}"
         with Session.open(copy, readonly=True) as session:
             session.check()
-    except _TROUBLE as error:
+    except UNREADABLE as error:
         return f"SQLite cannot read it as it is: {error}"
     except SessionError as error:
         return f"rig cannot read it as it is: {error.message.replace(str(copy), name)}"

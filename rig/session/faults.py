@@ -11,6 +11,8 @@ from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.wordings import WORDINGS
 
+UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
+"""What SQLite raises; where it names what is damaged by bytes that are no text, the second."""
 _SAME = {
     "sqlite_busy": "session_locked",
     "sqlite_locked": "session_locked",
@@ -25,9 +27,11 @@ def not_a_session(path: Path, why: str) -> SessionError:
     return make_error(SessionError, "not_a_session", path=path, text=why)
 
 
-def as_session_error(path: Path, error: sqlite3.Error) -> SessionError:
-    """Translate one SQLite error; the original words are kept in brackets."""
-    name = getattr(error, "sqlite_errorname", "")  # absent on errors of the Python wrapper
+def as_session_error(path: Path, error: Exception) -> SessionError:
+    """Translate an error of SQLite or of a row that Python refuses; its own words are kept."""
+    other = "sqlite_corrupt" if isinstance(error, UNREADABLE) else "sqlite_constraint"
+    plain = "" if isinstance(error, sqlite3.Error) else other
+    name = getattr(error, "sqlite_errorname", plain)  # absent on errors of the Python wrapper
     primary = "_".join(name.lower().split("_")[:2])  # of SQLITE_IOERR_WRITE
     code = _SAME.get(primary, primary if primary in WORDINGS else "sqlite_failed")
     return make_error(SessionError, code, path=path, text=error)
@@ -38,7 +42,5 @@ def translate_errors(path: Path) -> Iterator[None]:
     """Raise SQLite's errors inside the block as `SessionError`."""
     try:
         yield
-    except sqlite3.Error as error:
+    except UNREADABLE as error:
         raise as_session_error(path, error) from error
-    except UnicodeDecodeError as error:  # SQLite names what is damaged by bytes that are no text
-        raise make_error(SessionError, "sqlite_corrupt", path=path, text=error) from error

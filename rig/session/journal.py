@@ -9,8 +9,6 @@ from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
 
-from rig.errors import SessionError
-from rig.reasons import make_error
 from rig.session.faults import as_session_error
 from rig.session.hashes import ChainEnd, extend_chain
 
@@ -166,11 +164,8 @@ class Journal:
         return refusal
 
     def _report(self, refusal: Exception | None) -> None:
-        if isinstance(refusal, sqlite3.Error):
-            raise as_session_error(self._path, refusal) from refusal
         if refusal is not None:
-            failure = make_error(SessionError, "sqlite_constraint", path=self._path, text=refusal)
-            raise failure from refusal
+            raise as_session_error(self._path, refusal) from refusal
 
     def _apply(self, statements: tuple[Statement, ...]) -> None:
         # Even one executemany can fail half-way through its rows.

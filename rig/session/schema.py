@@ -233,17 +233,12 @@ CREATE TABLE result (run INTEGER NOT NULL, attempt INTEGER NOT NULL, analysis_ve
 """
 
 
-_MARK_OLDER = f"INSERT INTO hash VALUES (1, '{OLDER}', 0, x'');"  # noqa: S608 - a constant
-
-
 def create_script(version: int = SCHEMA_VERSION) -> str:
     """Return the script that makes an empty session of a format inside a transaction."""
-    tables = [(name, table) for name, table in TABLES.items() if table.since <= version]
-    return (
-        "".join(table.script(name, version) for name, table in tables)
-        + _BESIDES
-        + f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {version};\n"
-    )
+    known = {name: table for name, table in TABLES.items() if table.since <= version}
+    tables = "".join(table.script(name, version) for name, table in known.items())
+    numbers = f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {version};\n"
+    return tables + _BESIDES + numbers
 
 
 def upgrade_script(version: int) -> str:
@@ -252,7 +247,8 @@ def upgrade_script(version: int) -> str:
     for name, table in TABLES.items():
         if table.since == version:
             script += table.script(name, version)
-            script += _MARK_OLDER if name == "hash" else ""
+            if name == "hash":
+                script += f"INSERT INTO hash VALUES (1, '{OLDER}', 0, x'');"  # noqa: S608
         else:
             added = (column.sql for column in table.columns if column.since == version)
             script += "".join(f'ALTER TABLE "{name}" ADD COLUMN {sql};\n' for sql in added)

@@ -284,8 +284,7 @@ class Session(Reader):
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
         """Add one line to the log of run states."""
-        row = run, attempt, str(state), write_reasons(reasons), host_ns
-        self.add_rows("run_state", [row])
+        self.add_rows("run_state", [(run, attempt, str(state), write_reasons(reasons), host_ns)])
 
     def attach(self, name: str, data: bytes) -> None:
         """Add a file, such as a photograph of the rig."""
