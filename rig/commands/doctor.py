@@ -17,13 +17,15 @@ from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
 from rig.reasons import make_reason
 from rig.selftest.findings import Finding, explain, make_check
-from rig.usb.listing import serial_ports
+from rig.usb.listing import read_usb_advice, serial_ports
 
 
 def main(arguments: Namespace) -> int:
     """Say what is well, and of what is not, what to do."""
     if arguments.clear_cache:
         CacheFile().clear()
+    if arguments.port and (advice := read_usb_advice(arguments.port)):
+        say(f"note: {advice}")
     findings = []
     for finding in _findings(arguments.port, arguments.session):
         findings.append(finding)

@@ -13,6 +13,7 @@ from rig.reasons import remedies
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
+from rig.usb.listing import read_usb_advice
 
 
 def main(arguments: Namespace) -> int:
@@ -25,6 +26,8 @@ def main(arguments: Namespace) -> int:
     options = SelftestOptions(arguments.loopback, arguments.drops, release, gates)
     if options.release:
         say("releases will be driven: keep clear of them")
+    for advice in filter(None, map(read_usb_advice, [arguments.port, arguments.judge or ""])):
+        say(f"note: {advice}")
     findings = []
     judge_port = closing(open_port(arguments.judge)) if arguments.judge else nullcontext()
     with closing(open_port(arguments.port)) as port, judge_port as judge:

@@ -39,6 +39,7 @@ class Known:
     product: str = ""
 
 
+_NO_HUB = "use no hub"  # as the firmware has it in the product text of an early Pico
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
 _MEGAS = "2341:0010 2341:0042 2341:0210 2341:0242 2a03:0010 2a03:0042"
@@ -184,8 +185,35 @@ def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> st
     str or None
         `None` when it has none (CH340 chips have none), and for URLs.
     """
+    port = port_at(path, ports)
+    return port.serial_number if port else None
+
+
+def port_at(path: str, ports: Iterable[SerialPort] | None = None) -> SerialPort | None:
+    """Return what USB says of a port.
+
+    Parameters
+    ----------
+    path
+        Device path, or a link to one as in ``/dev/serial/by-id``.
+    ports
+        Where to look; by default at everything that is there.
+
+    Returns
+    -------
+    SerialPort or None
+        `None` for URLs, and where nothing is plugged in.
+    """
     place = os.path.realpath(path)
-    for port in serial_ports() if ports is None else ports:
-        if os.path.realpath(port.path) == place:
-            return port.serial_number
-    return None
+    listed = serial_ports() if ports is None else ports
+    return next((port for port in listed if os.path.realpath(port.path) == place), None)
+
+
+def read_usb_advice(path: str) -> str:
+    """Return what a board says of itself at USB when it wants no hub; empty for other boards.
+
+    An early Pico's chip has a fault in its USB part that shows behind a hub.
+    """
+    port = port_at(path)
+    product = (port and port.product) or ""
+    return product if _NO_HUB in product else ""
