@@ -83,6 +83,18 @@ def wrong_answer(request: str, expected: object, answer: object) -> CheckFailedE
     return CheckFailedError("wrong_answer", request=request, expected=expected, answer=answer)
 
 
+def fail_if(broken: object, code: str, **values: object) -> None:
+    """Let a check fail for a reason if that is so."""
+    if broken:
+        raise CheckFailedError(code, **values)
+
+
+def need(present: object, needed: str) -> None:
+    """Let a check be impossible, by saying what it needs, unless that is there."""
+    if not present:
+        raise NotPossibleError("check_needs", needed=needed)
+
+
 def insist(request: str, answer: object, expected: object) -> None:
     """Let a check fail unless a request had the expected answer."""
     if answer != expected:

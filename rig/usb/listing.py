@@ -114,16 +114,9 @@ def _describe(info: ListPortInfo) -> SerialPort:
         skipped = "a board with another program: name it with --port if it is one of this rig"
     else:
         skipped = ""
-    return SerialPort(
-        path=info.device,
-        vid=info.vid,
-        pid=info.pid,
-        serial_number=info.serial_number,
-        manufacturer=info.manufacturer,
-        product=info.product,
-        kinds=tuple(kind.name for kind in kinds),
-        skipped=skipped,
-    )
+    texts = info.serial_number, info.manufacturer, info.product
+    names = tuple(kind.name for kind in kinds)
+    return SerialPort(info.device, info.vid, info.pid, *texts, names, skipped)
 
 
 def sole_port() -> str:
