@@ -34,6 +34,11 @@ class Finding:
         """What to do about it; empty where all is well."""
         return "; ".join(remedies([self.reason])) if self.reason else ""
 
+    @property
+    def line(self) -> str:
+        """Name, verdict and words in one line."""
+        return ": ".join(filter(None, (self.name, self.verdict, self.what)))
+
     def json(self) -> dict[str, object]:
         """Return it as JSON has it."""
         verdict, codes = self.verdict.name.lower(), [self.reason.json()] if self.reason else []

@@ -202,11 +202,11 @@ def port_at(path: str, ports: Iterable[SerialPort] | None = None) -> SerialPort 
     return next((port for port in listed if os.path.realpath(port.path) == place), None)
 
 
-def read_usb_advice(path: str) -> str:
-    """Return what a board says of itself at USB when it wants no hub; empty for other boards.
+def note_early_boards(*paths: str | None) -> list[str]:
+    """Return a note for each port with a board that wants no hub, by its text at USB.
 
     An early Pico's chip has a fault in its USB part that shows behind a hub.
     """
-    port = port_at(path)
-    product = (port and port.product) or ""
-    return product if _NO_HUB in product else ""
+    ports = [port_at(path) for path in paths if path]
+    products = [port.product for port in ports if port and port.product]
+    return [f"note: {product}" for product in products if _NO_HUB in product]

@@ -33,10 +33,7 @@ def test_the_unit_starts_a_daemon_at_the_board(units, capsys, words, service, co
     (line,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
     assert f" {command} $RIG_OPTIONS" in line
     assert "EnvironmentFile=-" in text
-    narration = capsys.readouterr().err
-    assert f"enable --now {service}\n" in narration
-    port = command.split()[-1]
-    assert (f"nothing is at {port} now" in narration) is not Path(port).exists()
+    assert f"enable --now {service}\n" in capsys.readouterr().err
     if IS_HERE:
         assert complaints_of(unit) == []
 
