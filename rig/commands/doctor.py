@@ -17,13 +17,15 @@ from rig.errors import DeviceError, RigError, SessionError
 from rig.link.port import open_port, port_clock
 from rig.reasons import make_reason
 from rig.selftest.findings import Finding, explain, make_check
-from rig.usb.listing import serial_ports
+from rig.usb.listing import note_early_boards, serial_ports
 
 
 def main(arguments: Namespace) -> int:
     """Say what is well, and of what is not, what to do."""
     if arguments.clear_cache:
         CacheFile().clear()
+    for note in note_early_boards(arguments.port):
+        say(note)
     findings = []
     for finding in _findings(arguments.port, arguments.session):
         findings.append(finding)
@@ -32,10 +34,9 @@ def main(arguments: Namespace) -> int:
     if arguments.json:
         print_json({"findings": [finding.json() for finding in findings]})
     troubles = sum(bool(finding.advice) for finding in findings)
-    if troubles:
-        say(f"{troubles} thing{'s' * (troubles > 1)} to do")
-    else:
-        say("nothing to do" + ("" if arguments.port else "; --port PORT asks the board too"))
+    things = f"{troubles} thing{'s' * (troubles > 1)}" if troubles else "nothing"
+    more = "" if troubles or arguments.port else "; --port PORT asks the board too"
+    say(f"{things} to do{more}")
     return DeviceError.exit_code if troubles else 0
 
 
@@ -51,7 +52,7 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
         yield from _board(url)
     elif url:
         yield Finding("board", "not asked: its port cannot be used now")
-    folder = Path(session).parent if session else Path()
+    folder = Path(session or "").parent
     yield make_check("packages called rig", computer.check_packages, "chainrig")
     yield make_check("kept results", computer.describe_cache, CacheFile())
     yield make_check("disk", computer.check_room, folder)
@@ -72,9 +73,8 @@ def _check_all(
 
 
 def _failure(name: str, error: RigError) -> Finding:
-    if error.reasons:
-        return explain(name, error.reasons[0])
-    return explain(name, make_reason("failed", text=error.message, hint=error.hint))
+    failed = make_reason("failed", text=error.message, hint=error.hint)
+    return explain(name, next(iter(error.reasons), failed))
 
 
 def _board(url: str) -> Iterator[Finding]:

@@ -13,6 +13,7 @@ from rig.reasons import remedies
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
+from rig.usb.listing import note_early_boards
 
 
 def main(arguments: Namespace) -> int:
@@ -25,19 +26,20 @@ def main(arguments: Namespace) -> int:
     options = SelftestOptions(arguments.loopback, arguments.drops, release, gates)
     if options.release:
         say("releases will be driven: keep clear of them")
+    for note in note_early_boards(arguments.port, arguments.judge):
+        say(note)
     findings = []
     judge_port = closing(open_port(arguments.judge)) if arguments.judge else nullcontext()
     with closing(open_port(arguments.port)) as port, judge_port as judge:
         for finding in selftest(port, port_clock(port), options, judge):
             findings.append(finding)
             if not arguments.json:
-                words = finding.name, finding.verdict, finding.what
-                print(": ".join(filter(None, words)), flush=True)
+                print(finding.line, flush=True)
     if arguments.json:
         print_json({"checks": [finding.json() for finding in findings]})
     failures = sum(finding.verdict is Verdict.FAILED for finding in findings)
     for advice in remedies(finding.reason for finding in findings if finding.reason):
         say(f"do: {advice}")
     if failures:
-        say(f"{failures} checks failed" if failures > 1 else "1 check failed")
+        say(f"{failures} check{'s' * (failures > 1)} failed")
     return DeviceError.exit_code if failures else 0

@@ -20,7 +20,7 @@ from rig.link.messages import HOST_SILENCE_MS, Arm, Identity, Phase, RefusalReas
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import Reason, make_reason
 from rig.selftest.board import LABEL
-from rig.selftest.findings import CheckFailedError
+from rig.selftest.findings import CheckFailedError, fail_if
 from rig.selftest.line_checks import judge_clock
 
 if TYPE_CHECKING:
@@ -119,8 +119,8 @@ def _firmware(board: BoardFacts) -> str:
     firmware = board.identity.firmware
     if not board.shipped:
         return f"{firmware}; none for a {board.identity.board} comes with rig"
-    if firmware != board.shipped:
-        raise CheckFailedError("firmware_differs", firmware=firmware, shipped=board.shipped)
+    differs = firmware != board.shipped
+    fail_if(differs, "firmware_differs", firmware=firmware, shipped=board.shipped)
     return f"{firmware}, as it comes with rig; {UNSEEN}"
 
 
@@ -133,11 +133,9 @@ def _held_drop(board: BoardFacts) -> str:
 
 def _round_trip(board: BoardFacts) -> str:
     """See that answers come fast enough to keep an armed board armed."""
-    if not board.pings:
-        raise CheckFailedError("no_ping")
+    fail_if(not board.pings, "no_ping")
     slowest = max(ping.host_recv_ns - ping.host_send_ns for ping in board.pings) * 1e-9
-    if slowest > HOST_SILENCE_MS / 2000:
-        raise CheckFailedError("slow_answers", slowest_s=slowest)
+    fail_if(slowest > HOST_SILENCE_MS / 2000, "slow_answers", slowest_s=slowest)
     return f"{slowest * 1e3:.1f} ms at most"
 
 
@@ -145,15 +143,14 @@ def _emergency_stop(board: BoardFacts) -> str:
     """See that the emergency stop lets the board arm."""
     if not isinstance(board.edges, Reason):
         return "closed"
-    if board.edges.code == "refused_stopped":
-        raise CheckFailedError("stop_open")
+    fail_if(board.edges.code == "refused_stopped", "stop_open")
     return "not tried"
 
 
 def _stuck_gates(board: BoardFacts) -> str:
     """See that no gate is blocked all the time."""
-    if board.states.stuck:
-        raise CheckFailedError("gates_blocked", gates_listed=name_gates(board.states.stuck))
+    stuck = board.states.stuck
+    fail_if(stuck, "gates_blocked", gates_listed=name_gates(stuck))
     return "none"
 
 
@@ -161,8 +158,8 @@ def _flickering_gates(board: BoardFacts) -> str:
     """See that no gate changes while nothing moves, and whether the mains do it if one does."""
     edges = board.edges
     if isinstance(edges, Reason) or not edges:
-        if seen := board.states.flickering:
-            raise CheckFailedError("gates_flicker", gates_listed=name_gates(seen))
+        flickering = board.states.flickering
+        fail_if(flickering, "gates_flicker", gates_listed=name_gates(flickering))
         if isinstance(edges, Reason):
             return f"none seen at a glance; not recorded: {edges}"
         return f"none within {_WATCH_S:g} s"

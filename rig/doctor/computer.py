@@ -12,7 +12,7 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.selftest.findings import CheckFailedError
+from rig.selftest.findings import CheckFailedError, fail_if
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,15 +39,14 @@ class PortPlace(NamedTuple):
 
 def check_permission(port: PortPlace) -> str:
     """See that this user may read and write the port."""
-    if not port.device.exists():
-        raise CheckFailedError("port_missing")
+    fail_if(not port.device.exists(), "port_missing")
     if os.access(port.device, os.R_OK | os.W_OK):
         return "given"
     group = ""
     with suppress(OSError, KeyError):  # gone, or a group without a name
         group = port.device.group()
-    if group == "root":  # who joins it to reach a board can do far more than that
-        raise CheckFailedError("port_of_root")
+    # Who joins the group root to reach a board can do far more than that.
+    fail_if(group == "root", "port_of_root")
     raise CheckFailedError("port_forbidden", group=group or "its group", join=group or "dialout")
 
 
@@ -82,8 +81,7 @@ PORT_CHECKS = {
 def check_packages(owner: str) -> str:
     """See that no package but the owner has modules of the name `rig`, and mixes them with ours."""
     names = sorted(set(packages_distributions().get("rig", ())) - {owner})
-    if names:
-        raise CheckFailedError("packages_mixed", packages=", ".join(names), names=" ".join(names))
+    fail_if(names, "packages_mixed", packages=", ".join(names), names=" ".join(names))
     return "only this one"
 
 
@@ -102,9 +100,8 @@ def check_room(folder: Path) -> str:
     while not place.exists():
         place = place.parent
     free = shutil.disk_usage(place).free
-    if free < ROOM:
-        values = {"free_mb": free / 1e6, "needed_mb": ROOM / 1e6}
-        raise CheckFailedError("disk_full", folder=str(place), **values)
+    values = {"free_mb": free / 1e6, "needed_mb": ROOM / 1e6}
+    fail_if(free < ROOM, "disk_full", folder=str(place), **values)
     return f"{free / 1e6:.0f} MB free in {place}"
 
 

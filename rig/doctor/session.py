@@ -9,7 +9,7 @@ from rig.link.messages import unpack_label
 from rig.link.transcript import Restart, causes
 from rig.records import Drop, Job
 from rig.recover.examine import ExaminedFile, examine
-from rig.selftest.findings import CheckFailedError, Finding, make_check
+from rig.selftest.findings import CheckFailedError, Finding, fail_if, make_check
 from rig.session.drop_check import ByteReplay
 from rig.session.store import Session
 
@@ -35,8 +35,7 @@ def check_session(path: str) -> Iterator[Finding]:
 
 def check_whole(examined: ExaminedFile, path: str) -> str:
     """See that a session file is whole."""
-    if examined.foreign:
-        raise CheckFailedError("no_session", text=examined.foreign)
+    fail_if(examined.foreign, "no_session", text=examined.foreign)
     for trouble in examined.troubles:
         raise CheckFailedError("session_damaged", text=trouble, path=path)
     writer = examined.snapshot.writer

@@ -16,7 +16,7 @@ from rig.reasons import make_error
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rig.flash.boards import AvrTarget
+    from rig.flash.boards import Target
 
 _LOOK_S = 0.2
 _CAUSES = {
@@ -53,7 +53,7 @@ def find_avrdude(path: str | None) -> str:
     raise make_error(InputError, "no_avrdude")
 
 
-def write_flash(avrdude: str, target: AvrTarget, port: str, image: Path) -> None:
+def write_flash(avrdude: str, target: Target, port: str, image: Path) -> None:
     """Write an image into a board's flash; avrdude reads it back and compares.
 
     Parameters
@@ -72,12 +72,11 @@ def write_flash(avrdude: str, target: AvrTarget, port: str, image: Path) -> None
     DeviceError
         Avrdude failed.
     """
-    command = [avrdude, "-p", target.part, "-c", target.programmer, "-b", str(target.baudrate)]
     # -D: a boot loader erases each page as it comes, and knows no erasing of the whole chip.
-    command += ["-D", "-P", port, "-U", f"flash:w:{image}:i"]
+    writing = ["-D", "-P", port, "-U", f"flash:w:{image}:i"]
     try:
         child = subprocess.Popen(
-            command,
+            [avrdude, *target.avrdude.split(), *writing],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

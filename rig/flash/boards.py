@@ -25,11 +25,15 @@ class Target:
         File name of the firmware that comes with this program.
     flash_limit
         How much of its flash a firmware may take.
+    avrdude
+        The chip, and the boot loader's protocol and rate, as avrdude wants them; empty for a board
+        that avrdude does not write.
     """
 
     board: Capabilities
     image: str
     flash_limit: int
+    avrdude: str = ""
 
     @property
     def shipped(self) -> Path:
@@ -37,25 +41,10 @@ class Target:
         return Path(__file__).with_name(self.image)
 
 
-@dataclass(frozen=True, slots=True)
-class AvrTarget(Target):
-    """A board that avrdude writes.
-
-    Attributes
-    ----------
-    part, programmer, baudrate
-        The chip and the boot loader's protocol and rate, as avrdude wants them.
-    """
-
-    part: str
-    programmer: str
-    baudrate: int
-
-
 TARGETS = {
-    "mega": AvrTarget(MEGA, "atmega2560.hex", 0x3E000, "m2560", "wiring", 115200),
-    "uno": AvrTarget(UNO, "atmega328p.hex", 0x7E00, "m328p", "arduino", 115200),
-    "nano-old": AvrTarget(UNO, "atmega328p.hex", 0x7800, "m328p", "arduino", 57600),
+    "mega": Target(MEGA, "atmega2560.hex", 0x3E000, "-p m2560 -c wiring -b 115200"),
+    "uno": Target(UNO, "atmega328p.hex", 0x7E00, "-p m328p -c arduino -b 115200"),
+    "nano-old": Target(UNO, "atmega328p.hex", 0x7800, "-p m328p -c arduino -b 57600"),
 }
 """By the word for ``--board``. All boot loaders' rates are those of the makers' own tools. A
 Nano is an Uno on a smaller board; those sold before 2018, and many since, have another loader."""

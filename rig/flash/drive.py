@@ -87,20 +87,18 @@ def copy_to(drive: Path, image: Path) -> None:
     DeviceError
         The drive could not be written.
     """
+    code = "drive_unwritable"
     try:
-        stream = (drive / "chainrig.uf2").open("wb")
-    except OSError as error:
-        raise make_error(DeviceError, "drive_unwritable", path=drive, text=error) from None
-    try:
-        with stream:
+        with (drive / "chainrig.uf2").open("wb") as stream:
+            code = "drive_failed"
             stream.write(image.read_bytes())
             stream.flush()
             os.fsync(stream.fileno())
     except OSError as error:
         # The board may be gone before the computer has noticed that everything was written: who it
         # is afterwards decides.
-        if _is_drive(drive):
-            raise make_error(DeviceError, "drive_failed", path=drive, text=error) from None
+        if code == "drive_unwritable" or _is_drive(drive):
+            raise make_error(DeviceError, code, path=drive, text=error) from None
 
 
 def new_port(before: set[str]) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import closing
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash import drive as drives
@@ -12,15 +12,10 @@ from rig.flash.boards import DRIVE, TARGETS, Target
 from rig.flash.image import read_image
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import RefusalReason
+from rig.link.messages import Identity, RefusalReason
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.link.messages import Identity
 
 _UDEV_S = 2.0
 """For which a port that has just appeared may be forbidden: udev gives permission after it."""

@@ -12,7 +12,14 @@ from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.gatewatch import GateStates, watch_gates
 from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
 from rig.link.transcript import Incoming
-from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+from rig.selftest.findings import (
+    CheckFailedError,
+    NotPossibleError,
+    fail_if,
+    insist,
+    need,
+    wrong_answer,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -136,8 +143,7 @@ class BoardUnderTest(Exchange):
         """
         if isinstance(request, wire.Arm) and request.release and not self.options.release:
             self._may_release = True
-        if isinstance(request, wire.Fire) and self._may_release:
-            raise CheckFailedError("fire_withheld")
+        fail_if(isinstance(request, wire.Fire) and self._may_release, "fire_withheld")
         seq = seq or self.next_seq()
         for _ in range(_TRIES):
             self.send(request, seq)
@@ -179,8 +185,8 @@ class BoardUnderTest(Exchange):
                 return None
             before, records = self.transcript.unreadable, self.receive()
             self._heard += [record for record in records if isinstance(record, Incoming)]
-            if self.transcript.unreadable > before:
-                raise CheckFailedError("invalid_message", text=self.transcript.misreading)
+            unreadable = self.transcript.unreadable > before
+            fail_if(unreadable, "invalid_message", text=self.transcript.misreading)
 
     def wait_unasked(self, seconds: float, *kinds: type[wire.DeviceMessage]) -> Incoming | None:
         """Give the next message of some kinds that came, or comes in time, of its own accord."""
@@ -336,10 +342,11 @@ class BoardUnderTest(Exchange):
         """
         states = self.gates
         restless = states.stuck | states.flickering
-        for gate in reversed(range(self.identity.gates)):
-            if not restless >> gate & 1 and gate != self.options.loopback:
-                return 1 << gate
-        raise NotPossibleError("check_needs", needed=_QUIET)
+        if self.options.loopback is not None:
+            restless |= 1 << self.options.loopback
+        quiet = ~restless & ((1 << self.identity.gates) - 1)
+        need(quiet, _QUIET)
+        return 1 << quiet.bit_length() - 1
 
     @property
     def identity(self) -> wire.Identity:

@@ -12,7 +12,7 @@ from rig.link import messages as wire
 from rig.link.assembly import ticks_since
 from rig.link.messages import TEST_RUN, Phase, RefusalReason
 from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US, BoardUnderTest
-from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+from rig.selftest.findings import fail_if, insist, need, wrong_answer
 
 _BUSY_MS = 400
 
@@ -87,8 +87,7 @@ def acknowledge_drop(board: BoardUnderTest) -> None:
 
 def arm_while_cooling(board: BoardUnderTest) -> str:
     """See that a release rests after its pulse. Drives release 0."""
-    if not board.options.release:
-        raise NotPossibleError("check_needs", needed="leave to drive release 0: --release")
+    need(board.options.release, "leave to drive release 0: --release")
     pulse = {"release": 1, "pulse_us": PULSE_US}
     board.fire(board.arm(**pulse))
     board.acknowledge(board.collect_drop())
@@ -107,17 +106,13 @@ def measure_sync_edges(board: BoardUnderTest) -> str:
 
     The output goes high with FIRE; its way back ends the recording and so is in no drop.
     """
-    gate = board.options.loopback
-    if gate is None:
-        wire_needed = "a wire from the sync output to a gate: --loopback GATE"
-        raise NotPossibleError("check_needs", needed=wire_needed)
-    identity = board.identity
-    if gate >= identity.gates:
-        gates = f"gate {gate}, and this board has gates 0 to {identity.gates - 1}"
-        raise NotPossibleError("check_needs", needed=gates)
-    states = board.gates
-    if (states.stuck | states.flickering) >> gate & 1:
-        raise CheckFailedError("sync_blocked", gate=gate)
+    loopback, identity = board.options.loopback, board.identity
+    need(loopback is not None, "a wire from the sync output to a gate: --loopback GATE")
+    gate = loopback or 0
+    last = identity.gates - 1
+    need(gate <= last, f"gate {gate}, and this board has gates 0 to {last}")
+    restless = board.gates.stuck | board.gates.flickering
+    fail_if(restless >> gate & 1, "sync_blocked", gate=gate)
     late = [_sync_edge(board, gate) for _ in range(board.options.drops)]
     us = [1e6 * ticks / identity.tick_hz for ticks in late]
     scatter = f"{stdev(us):.3f} µs" if len(us) > 1 else "unknown"
@@ -125,8 +120,8 @@ def measure_sync_edges(board: BoardUnderTest) -> str:
         f"{len(us)} drops, latency {fmean(us):+.3f} µs, scatter {scatter}, "
         f"{min(us):+.3f} to {max(us):+.3f} µs"
     )
-    if max(map(abs, late)) > identity.late_ticks:
-        raise CheckFailedError("sync_late", latency=latency, ticks=identity.late_ticks)
+    allowed = identity.late_ticks
+    fail_if(max(map(abs, late)) > allowed, "sync_late", latency=latency, ticks=allowed)
     return latency
 
 
@@ -136,6 +131,6 @@ def _sync_edge(board: BoardUnderTest, gate: int) -> int:
     recorded = board.drop(gates=mask)
     board.acknowledge(recorded)
     states = [event.state for event in recorded.events]
-    if states != [mask] or recorded.certificate.glitches:
-        raise CheckFailedError("sync_edges", gate=gate, events=len(states))
+    broken = states != [mask] or recorded.certificate.glitches
+    fail_if(broken, "sync_edges", gate=gate, events=len(states))
     return ticks_since(recorded.certificate.fire_tick, recorded.events[0].tick)

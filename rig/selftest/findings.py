@@ -34,6 +34,11 @@ class Finding:
         """What to do about it; empty where all is well."""
         return "; ".join(remedies([self.reason])) if self.reason else ""
 
+    @property
+    def line(self) -> str:
+        """Name, verdict and words in one line."""
+        return ": ".join(filter(None, (self.name, self.verdict, self.what)))
+
     def json(self) -> dict[str, object]:
         """Return it as JSON has it."""
         verdict, codes = self.verdict.name.lower(), [self.reason.json()] if self.reason else []
@@ -81,6 +86,18 @@ def wrong_answer(request: str, expected: object, answer: object) -> CheckFailedE
     """Return the failure of a board that gave another answer than expected."""
     expected, answer = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
     return CheckFailedError("wrong_answer", request=request, expected=expected, answer=answer)
+
+
+def fail_if(broken: object, code: str, **values: object) -> None:
+    """Let a check fail for a reason if that is so."""
+    if broken:
+        raise CheckFailedError(code, **values)
+
+
+def need(present: object, needed: str) -> None:
+    """Let a check be impossible, by saying what it needs, unless that is there."""
+    if not present:
+        raise NotPossibleError("check_needs", needed=needed)
 
 
 def insist(request: str, answer: object, expected: object) -> None:

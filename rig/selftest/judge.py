@@ -14,7 +14,7 @@ from rig.link.assembly import ticks_since
 from rig.link.gatewatch import name_gates
 from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
 from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
-from rig.selftest.findings import CheckFailedError, insist
+from rig.selftest.findings import fail_if, insist
 from rig.selftest.requests import identify
 
 RELEASE, SYNC, QUIET = 1, 2, 4
@@ -161,8 +161,8 @@ def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:
         if (event.state ^ state) & gate:
             changes.append(ticks_since(recorded.certificate.fire_tick, event.tick))
         state = event.state
-    if len(changes) != 2:
-        raise CheckFailedError("judged_edges", gates_listed=name_gates(gate), edges=len(changes))
+    edges = len(changes)
+    fail_if(edges != 2, "judged_edges", gates_listed=name_gates(gate), edges=edges)
     return changes[0], changes[1]
 
 
@@ -175,6 +175,5 @@ def _flanks(recorded: RecordedDrop, gates: int) -> tuple[int, int]:
 
 def _limit(what: str, values: list[float], limit: float, unit: str) -> None:
     worst = max(map(abs, values))
-    if worst > limit:
-        measured, allowed = (f"{value:.3g} {unit}" for value in (worst, limit))
-        raise CheckFailedError("judged_limit", text=what, measured=measured, limit=allowed)
+    measured, allowed = (f"{value:.3g} {unit}" for value in (worst, limit))
+    fail_if(worst > limit, "judged_limit", text=what, measured=measured, limit=allowed)

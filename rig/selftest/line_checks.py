@@ -13,7 +13,7 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
 from rig.records import ClockSample
-from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+from rig.selftest.findings import NotPossibleError, fail_if, insist, wrong_answer
 
 if TYPE_CHECKING:
     from rig.selftest.board import BoardUnderTest
@@ -39,8 +39,7 @@ def measure_round_trips(board: BoardUnderTest) -> str:
     board.slowest_s = trips[-1]
     limit_s = HOST_SILENCE_MS / 2000
     late = sum(trip > limit_s for trip in trips)
-    if late > _LATE:
-        raise CheckFailedError("slow_answers", slowest_s=trips[-1])
+    fail_if(late > _LATE, "slow_answers", slowest_s=trips[-1])
     clock = judge_clock(pings, board.identity.tick_hz)
     if late:
         raise NotPossibleError("computer_busy", interval_s=limit_s)
@@ -57,11 +56,9 @@ def judge_clock(pings: Sequence[ClockSample], nominal_hz: int) -> str:
         It is not, or that is not known.
     """
     rate = ping_rate(epochs(pings, nominal_hz))
-    if not rate.n:
-        raise CheckFailedError("clock_unknown", pings=len(pings))
+    fail_if(not rate.n, "clock_unknown", pings=len(pings))
     off, u = rate.hz / nominal_hz - 1, rate.u_hz / nominal_hz
-    if abs(off) > RESONATOR_TOLERANCE + 2 * u:
-        raise CheckFailedError("clock_off", ppm=off * 1e6, U95=2e6 * u)
+    fail_if(abs(off) > RESONATOR_TOLERANCE + 2 * u, "clock_off", ppm=off * 1e6, U95=2e6 * u)
     return f"{off * 1e6:+.0f} ± {2 * u * 1e6:.0f} ppm"
 
 

@@ -11,7 +11,7 @@ from rig.link.frames import DELIMITER
 from rig.link.gatewatch import name_gates
 from rig.link.messages import PROTOCOL_VERSION, Phase, RefusalReason
 from rig.selftest.board import LABEL, PULSE_US, BoardUnderTest, RawRequest
-from rig.selftest.findings import CheckFailedError, NotPossibleError, insist, wrong_answer
+from rig.selftest.findings import NotPossibleError, fail_if, insist, need, wrong_answer
 
 BAD_ORDERS: tuple[dict[str, int], ...] = (
     {"label": 0},
@@ -95,8 +95,7 @@ def look_at_gates(board: BoardUnderTest) -> str:
         "gates_blocked": states.stuck & (in_use or 0),
     }
     for code, mask in faults.items():
-        if mask:
-            raise CheckFailedError(code, gates_listed=name_gates(mask))
+        fail_if(mask, code, gates_listed=name_gates(mask))
     stuck = name_gates(states.stuck)
     if in_use is None and states.stuck:
         raise NotPossibleError("gates_unused", gates_listed=stuck)
@@ -107,8 +106,7 @@ def look_at_gates(board: BoardUnderTest) -> str:
 def arm_blocked_gate(board: BoardUnderTest) -> str:
     """See that a gate that is blocked forbids arming."""
     stuck = board.gates.stuck
-    if not stuck:
-        raise NotPossibleError("check_needs", needed="a gate that is blocked by hand")
+    need(stuck, "a gate that is blocked by hand")
     gate = stuck & -stuck
     order = board.order(gates=gate)
     if board.ask(order) == wire.Refused(RefusalReason.STOPPED, 0):

@@ -9,14 +9,7 @@ from rig.errors import DeviceError
 from rig.link.port import port_clock
 from rig.selftest import drops, line_checks, requests
 from rig.selftest.board import BoardUnderTest, Check, SelftestOptions
-from rig.selftest.findings import (
-    CheckEndedError,
-    Finding,
-    NotPossibleError,
-    Verdict,
-    explain,
-    make_check,
-)
+from rig.selftest.findings import CheckEndedError, Finding, Verdict, explain, make_check, need
 from rig.selftest.judge import JudgeBoard
 
 if TYPE_CHECKING:
@@ -25,13 +18,6 @@ if TYPE_CHECKING:
     from rig.clock.host import Clock
     from rig.link.port import Port
     from rig.reasons import Reason
-
-
-def _needs(needed: str) -> Check:
-    def refuse(_board: BoardUnderTest) -> str:
-        raise NotPossibleError("check_needs", needed=needed)
-
-    return refuse
 
 
 CHECKS: dict[str, Check] = {
@@ -61,9 +47,9 @@ CHECKS: dict[str, Check] = {
     "ACKNOWLEDGE and WRONG_CRC": drops.acknowledge_drop,
     "sync output to gate": drops.measure_sync_edges,
     "COOLING": drops.arm_while_cooling,
-    "GATE_UNSTEADY": _needs("a hand in a beam"),
-    "STOPPED": _needs("a hand at the emergency stop"),
-    "NOT_KEPT": _needs("more edges than the memory holds"),
+    "GATE_UNSTEADY": lambda _: need(False, "a hand in a beam"),
+    "STOPPED": lambda _: need(False, "a hand at the emergency stop"),
+    "NOT_KEPT": lambda _: need(False, "more edges than the memory holds"),
 }
 
 

@@ -39,6 +39,7 @@ class Known:
     product: str = ""
 
 
+_NO_HUB = "use no hub"  # as the firmware has it in the product text of an early Pico
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
 _MEGAS = "2341:0010 2341:0042 2341:0210 2341:0242 2a03:0010 2a03:0042"
@@ -113,16 +114,9 @@ def _describe(info: ListPortInfo) -> SerialPort:
         skipped = "a board with another program: name it with --port if it is one of this rig"
     else:
         skipped = ""
-    return SerialPort(
-        path=info.device,
-        vid=info.vid,
-        pid=info.pid,
-        serial_number=info.serial_number,
-        manufacturer=info.manufacturer,
-        product=info.product,
-        kinds=tuple(kind.name for kind in kinds),
-        skipped=skipped,
-    )
+    texts = info.serial_number, info.manufacturer, info.product
+    names = tuple(kind.name for kind in kinds)
+    return SerialPort(info.device, info.vid, info.pid, *texts, names, skipped)
 
 
 def sole_port() -> str:
@@ -184,8 +178,35 @@ def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> st
     str or None
         `None` when it has none (CH340 chips have none), and for URLs.
     """
+    port = port_at(path, ports)
+    return port.serial_number if port else None
+
+
+def port_at(path: str, ports: Iterable[SerialPort] | None = None) -> SerialPort | None:
+    """Return what USB says of a port.
+
+    Parameters
+    ----------
+    path
+        Device path, or a link to one as in ``/dev/serial/by-id``.
+    ports
+        Where to look; by default at everything that is there.
+
+    Returns
+    -------
+    SerialPort or None
+        `None` for URLs, and where nothing is plugged in.
+    """
     place = os.path.realpath(path)
-    for port in serial_ports() if ports is None else ports:
-        if os.path.realpath(port.path) == place:
-            return port.serial_number
-    return None
+    listed = serial_ports() if ports is None else ports
+    return next((port for port in listed if os.path.realpath(port.path) == place), None)
+
+
+def note_early_boards(*paths: str | None) -> list[str]:
+    """Return a note for each port with a board that wants no hub, by its text at USB.
+
+    An early Pico's chip has a fault in its USB part that shows behind a hub.
+    """
+    ports = [port_at(path) for path in paths if path]
+    products = [port.product for port in ports if port and port.product]
+    return [f"note: {product}" for product in products if _NO_HUB in product]

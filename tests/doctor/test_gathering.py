@@ -17,11 +17,11 @@ from rig.doctor.computer import PORT_CHECKS, PortPlace, check_packages, check_ro
 from rig.doctor.session import check_session
 from rig.errors import DeviceError
 from rig.link.client import Device
-from rig.link.messages import Arm, Phase, pack_label
+from rig.link.messages import Phase
 from rig.selftest.findings import make_check
 from rig.session.store import Session
 from tests.flash.pty_board import PtyBoard
-from tests.selftest.benches import LoopedBoard, Wire, port_of
+from tests.selftest.benches import LoopedBoard, Wire, fire_drop, hold_drop, port_of
 from tests.session.altering import unguarded
 
 MAINS = [(0.0005 + n * 0.01 + half * 0.004, 6, not half) for n in range(99) for half in (0, 1)]
@@ -150,15 +150,10 @@ def test_edges_of_a_flickering_gate_are_seen():
 
 def test_a_drop_of_a_session_is_not_touched():
     port = port_of(LoopedBoard(lab()))
-    device = Device(port, port.clock)
-    device.connect()
-    label = pack_label(3, 1)
-    order = {"gates": 8, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    device.fire(device.arm(Arm(label, **order)))
-    device.collect(label)
+    device, order, _ = hold_drop(port, 3)
     facts = look_at_board(port, port.clock)
-    assert facts.edges.values == {"run": 3, "attempt": 1}
-    assert device.status().label == label
+    assert facts.edges.values == {"run": 3, "attempt": 2}
+    assert device.status().label == order["label"]
 
 
 # -- the command
@@ -206,22 +201,18 @@ def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp
     path = tmp_path / "s.session"
     with Session.create(path, "x", "x.yaml", simulated=True, origin="x") as session:
         port = port_of(LoopedBoard(lab()))
-        device = Device(port, port.clock, session.log_bytes)
-        device.connect()
-        label = pack_label(3, 1)
-        order = {"gates": 8, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-        device.fire(device.arm(Arm(label, **order)))
+        device, order = fire_drop(port, 3, session.log_bytes)
         port.clock.sleep(0.004)
         port.board.brown_out(port.clock.now_ns())
         said = (
             r"the board restarted about [45] ms after FIRE: is its supply shared with the magnets\?"
         )
         with pytest.raises(DeviceError, match=said):
-            device.collect(label)
+            device.collect(order["label"])
     code, out, _ = doctor("--session", path)
     assert code == 4
     found = (
-        r"^restarts: run 3, attempt 1: about [45] ms after FIRE \(brown-out\)\n  do: is its supply"
+        r"^restarts: run 3, attempt 2: about [45] ms after FIRE \(brown-out\)\n  do: is its supply"
     )
     assert re.search(found, out, re.MULTILINE)
 

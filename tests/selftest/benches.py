@@ -1,5 +1,8 @@
 """Boards on a bench for ``rig selftest``, with a wire from the sync output to a gate."""
 
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.messages import pack_label
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
@@ -43,3 +46,19 @@ def outcomes(port, loopback=GATE, drops=5, release=True, gates=None):
 def port_of(board, **settings):
     """Plug a board in."""
     return SimulatedSerial("test", board=board, timeout=0.02, **settings)
+
+
+def fire_drop(port, run, *tap):
+    """Have a board begin a drop; give the client and the order of the drop."""
+    device = Device(port, port.clock, *tap)
+    device.connect()
+    order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
+    order["label"] = pack_label(run, 2)
+    device.fire(device.arm(wire.Arm(**order)))
+    return device, order
+
+
+def hold_drop(port, run):
+    """Have a board hold a drop; give the client, the order of the drop and the drop."""
+    device, order = fire_drop(port, run)
+    return device, order, device.collect(order["label"])

@@ -9,12 +9,12 @@ from rig.cli import main
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import Phase, pack_label
+from rig.link.messages import Phase
 from rig.selftest.findings import Verdict
 from rig.selftest.run import CHECKS
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
-from tests.selftest.benches import GATE, LoopedBoard, Wire, outcomes, port_of
+from tests.selftest.benches import LoopedBoard, Wire, hold_drop, outcomes, port_of
 
 HANDS = {"GATE_BLOCKED", "GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
 FENCE = "sim://?protocol=protocols/picket-fence.yaml"
@@ -190,16 +190,6 @@ def test_behind_a_terminal_in_real_time(rig):
     with PtyBoard() as there:
         code, lines, _ = rig("--port", there.path)
     assert code == 0, lines
-
-
-def hold_drop(port, run):
-    """Have a board hold a drop; give the client, the order of the drop and the drop."""
-    device = Device(port, port.clock)
-    device.connect()
-    order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    order["label"] = pack_label(run, 2)
-    device.fire(device.arm(wire.Arm(**order)))
-    return device, order, device.collect(order["label"])
 
 
 def test_a_drop_of_a_session_is_left_alone():

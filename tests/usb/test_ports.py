@@ -147,6 +147,16 @@ def test_a_pico_with_another_program_is_not_opened(plugged):
     assert pico_ports() == {"/dev/ttyACM2"}
 
 
+@pytest.mark.parametrize("command", ["doctor", "selftest"])
+@pytest.mark.parametrize("revision", [" B1 (use no hub)", ""])
+def test_an_early_pico_is_named_and_fails_nothing(plugged, capsys, command, revision):
+    port, product = "sim://?protocol=protocols/picket-fence.yaml", f"chainrig on a Pico{revision}"
+    plugged(info(port, 0x2E8A, 0x000A, "e66", product))
+    assert main([command, "--port", port, "--json"]) == 0
+    note = f"note: {product}\n" if revision else ""
+    assert capsys.readouterr().err.removesuffix("nothing to do\n") == note
+
+
 def test_copies_that_share_a_number_are_not_confused(plugged):
     plugged(info("/dev/ttyUSB0", serial_number="0001"), info("/dev/ttyUSB1", serial_number="0001"))
     with pytest.raises(DeviceError, match="/dev/ttyUSB0 and /dev/ttyUSB1 have the same"):
