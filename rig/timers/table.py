@@ -30,7 +30,8 @@ _NAME = re.compile(r"([^\W\d][\w ]*?)[\"']?\s?[=:]?\s?[\"']?$")
 REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)|FRAME-(?:BEGIN|END)')
 """A line that is marked as a remark, or parts what sigrok captured."""
 _QUANTITY = re.compile(
-    r"([+-]?[0-9][0-9.,]{0,30}(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))", re.IGNORECASE
+    r"([+-]?[0-9]{1,30}(?:[.,][0-9]{0,30})?(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))",
+    re.IGNORECASE,
 )
 _ASSIGNED = re.compile(r"\s?[=:]\s?")
 _COLUMN_ROLES = {"time", "state", "edge", "volts", "gate", "run", "duration", "index", "derived"}
@@ -178,7 +179,8 @@ class Table:
         """Whether a row below others is a mark, or a heading, of further ones."""
         is_again = row.texts in [above.texts for above in block.headings]
         is_heading = is_again or 0 < len(row.texts) <= 2 * count_known(row)
-        return _is_mark(row) or (is_heading and not any(map(is_number, row.texts)))
+        has_number = any(map(is_number, row.texts))
+        return (is_heading and not has_number) or (not row.raw[:1].isdigit() and _is_mark(row))
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
         texts = row.texts

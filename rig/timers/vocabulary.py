@@ -60,6 +60,8 @@ def _pattern(role: str, number: str = "") -> re.Pattern[str]:
 
 def without_accents(text: str) -> str:
     """Return a text in which accents are left out and compatible letters are the same."""
+    if text.isascii():
+        return text
     parts = unicodedata.normalize("NFKD", text)
     return "".join(part for part in parts if not unicodedata.combining(part))
 
@@ -112,10 +114,11 @@ def state_of(text: str) -> str:
     Returns
     -------
     str
-        ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, ``unknown``, or an empty text.
+        ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, ``unknown``, ``missing``, or
+        an empty text.
     """
     word = re.sub(r"(?<=[01])[.,]0{0,30}$", "", without_accents(text[:80]).casefold())
-    roles = ("one", "zero", "blocked", "clear", "high", "low", "unknown")
+    roles = ("one", "zero", "blocked", "clear", "high", "low", "unknown", "missing")
     return next((role for role in roles if word in words()[role]), "")
 
 
@@ -132,15 +135,14 @@ def kinds_of(text: str) -> frozenset[str]:
     -------
     frozenset of str
         ``number`` (with a decimal point) or ``comma``; ``clock``, a time of day, perhaps with its
-        date; ``timed``, a time with its unit; ``input``, a name with its number; ``missing``;
-        ``state``, with what `state_of` says.
+        date; ``timed``, a time with its unit; ``input``, a name with its number; ``state``, with
+        what `state_of` says.
     """
     kinds = {kind for kind, form in _FORMS.items() if form.fullmatch(text[: LONGEST + 1])}
     if len(text) > LONGEST or ("input" in kinds and "start" in roles_in(text)):
         return frozenset()
     state = state_of(text)
-    kinds |= {"state", state} if state else set()
-    return frozenset(kinds | ({"missing"} if text.casefold() in words()["missing"] else set()))
+    return frozenset(kinds | ({"state", state} if state else set()))
 
 
 def number_of(label: str) -> int | None:
