@@ -12,15 +12,14 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock, count_known, find_time_base
 from rig.timers.vocabulary import (
-    CLOCK,
     POWERS,
     SYMBOLS,
-    TIMED,
     find_label,
     is_number,
     normal,
@@ -105,23 +104,17 @@ class Signal(NamedTuple):
     label: str
 
 
-@cache
-def _rules() -> list[tuple[str, set[str], set[str]]]:
-    return [
-        (role, {f for f in facts.split() if f[0] != "-"}, set(re.findall(r"-(\S+)", facts)))
-        for role, facts in vocabulary.read_rows("columns.txt", ":")
-    ]
-
-
 def _find_role(facts: set[str]) -> str:
-    fitting = (role for role, needed, barred in _rules() if needed <= facts and not barred & facts)
-    return next(fitting, "other")
+    return next(
+        role
+        for role, rule in vocabulary.read_rows("columns.txt", ":")
+        if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
+    )
 
 
 def columns_of(
     block: RowBlock,
     rows: Sequence[Row],
-    remarks: Sequence[Row],
     unit: str | None,
     problems: ProblemList,
 ) -> tuple[list[TimerColumn], Row | None]:
@@ -131,8 +124,6 @@ def columns_of(
     ----------
     rows
         The first ones.
-    remarks
-        Above them, where names of inputs may stand.
     unit
         Of the times where the file does not say, a key of `POWERS`.
     """
@@ -146,7 +137,7 @@ def columns_of(
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     heading = _find_heading(block, facts, width)
     if all("levels" in fact for fact in facts.values()):
-        heading = _name_levels(len(facts), block, remarks) or heading
+        heading = _name_levels(len(facts), block) or heading
     if heading is None and _is_each_row_rising(rows, width):
         heading = Row(0, [f"moment {n}" for n in range(1, width + 1)])
     is_rising = any({"rises", "fractions"} <= fact - {"levels"} for fact in facts.values())
@@ -166,9 +157,9 @@ def columns_of(
     _name_traces(block, columns if heading is None else [])
     # Of columns that say the same times in other units, the finest is kept.
     times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
-    finest = {(c.gate, c.run, c.state): c for c in sorted(times, key=lambda c: c.power or 0)}
+    finest = {(c.gate, c.run, c.state): c.power for c in sorted(times, key=attrgetter("power"))}
     for column in times:
-        if (column.power or 0) < (finest[column.gate, column.run, column.state].power or 0):
+        if column.power != finest[column.gate, column.run, column.state]:
             column.role = "coarse"
     return columns, heading
 
@@ -180,12 +171,12 @@ def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
     return width >= _FEWEST_TIMES and is_list
 
 
-def _name_levels(width: int, block: RowBlock, remarks: Sequence[Row]) -> Row | None:
+def _name_levels(width: int, block: RowBlock) -> Row | None:
     """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
     labels = {text.casefold() for row in block.headings[-1:] for text in row.texts}
-    if labels - {"logic", "analog"} or not find_time_base([*remarks, *block.headings]):
+    if labels - {"logic", "analog"} or not find_time_base(block):
         return None
-    lists = [row.raw.partition(":")[2].split(",") for row in remarks]
+    lists = [row.raw.partition(":")[2].split(",") for row in block.remarks]
     names = next((n for n in lists if len(n) == width), [f"D{n}" for n in range(width)])
     texts = (text.strip() for text in names)
     return Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])
@@ -287,14 +278,14 @@ def _find_gate(text: str) -> str:
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
-    states = [vocabulary.state_of(text) or text.casefold() in {"x", "z"} for text in texts]
+    kinds = [vocabulary.kinds_of(text) for text in texts]
     numbers = [float(text) for text in texts if is_number(text)]
     is_whole = all(vocabulary.number_of(t) is not None and not set(t) & set(".,+-") for t in texts)
     steps, is_numeric = {b - a for a, b in pairwise(numbers)}, len(numbers) == len(texts)
     facts = {
-        "levels": all(states),
-        "suffixed": all(TIMED.fullmatch(text) or CLOCK.fullmatch(text) for text in texts),
-        "plain": not {"blocked", "clear"} & set(states),
+        "levels": all("state" in kind for kind in kinds),
+        "suffixed": all({"timed", "clock"} & kind for kind in kinds),
+        "plain": not any({"blocked", "clear"} & kind for kind in kinds),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
         "counts": is_numeric and is_whole and numbers[0] in {0, 1} and steps == {1.0},

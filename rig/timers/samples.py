@@ -132,9 +132,11 @@ class SampleReader:
         self, signal: Signal, times: Array, trace: Levels, lines: Array
     ) -> Iterator[Reason]:
         at = np.flatnonzero(np.isfinite(times) & np.isfinite(trace))
-        threshold = (0.5, 0.0) if self.is_digital else find_threshold(trace[at])
+        # Where nothing of it can be read, its lowest and its highest are no numbers.
+        volts = trace[at] if at.size else np.full(1, np.nan, np.float32)
+        threshold = (0.5, 0.0) if self.is_digital else find_threshold(volts)
         if threshold is None:
-            span = {"low": float(trace[at].min()), "high": float(trace[at].max())}
+            span = {"low": float(volts.min()), "high": float(volts.max())}
             yield make_reason("no_passage", input=signal.label, **span)
             return
         crossings = list(_crossings(times[at], trace[at], threshold))

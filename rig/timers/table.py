@@ -16,7 +16,7 @@ from functools import cache
 from typing import NamedTuple
 
 from rig.timers import vocabulary
-from rig.timers.vocabulary import CLOCK, LONGEST, POWERS, is_measured, is_number, is_value, words
+from rig.timers.vocabulary import CLOCK, LONGEST, MEASURED, POWERS, is_number, kinds_of, words
 
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
@@ -30,7 +30,8 @@ _NAME = re.compile(r"([^\W\d][\w ]*?)[\"']?\s?[=:]?\s?[\"']?$")
 REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)|FRAME-(?:BEGIN|END)')
 """A line that is marked as a remark, or parts what sigrok captured."""
 _QUANTITY = re.compile(
-    r"([+-]?[0-9][0-9.,]{0,30}(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))", re.IGNORECASE
+    r"([+-]?[0-9]{1,30}(?:[.,][0-9]{0,30})?(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))",
+    re.IGNORECASE,
 )
 _ASSIGNED = re.compile(r"\s?[=:]\s?")
 _COLUMN_ROLES = {"time", "state", "edge", "volts", "gate", "run", "duration", "index", "derived"}
@@ -71,11 +72,14 @@ class RowBlock:
         What stands above them, and above those of the block before.
     width
         How many cells the first one has.
+    remarks
+        Of the whole file, as far as read.
     """
 
     headings: list[Row] = field(default_factory=list)
     above: list[Row] = field(default_factory=list)
     width: int = 0
+    remarks: list[Row] = field(default_factory=list)
 
 
 class Table:
@@ -132,7 +136,7 @@ class Table:
 
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
-        block = RowBlock([Row(0, self._names)] if self._names else [])
+        block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
         remark = Row(0, [])
         for number, line in self._lines:
             if not line or line.isspace():
@@ -148,7 +152,7 @@ class Table:
                 self.remarks += [row] * (number <= _SAMPLE)
             row = self._without_settings(row, block) if self._beside else row
             if _is_mark(row) if mark else block.width > 0 and self._begins_block(row, block):
-                block = RowBlock([row], block.headings)
+                block = RowBlock([row], block.headings, remarks=self.remarks)
             elif not mark and self._is_row(row, block):
                 if not block.headings and len(list(filter(None, remark.texts))) == len(row.texts):
                     block.headings.append(remark)  # with a name for each cell
@@ -175,7 +179,8 @@ class Table:
         """Whether a row below others is a mark, or a heading, of further ones."""
         is_again = row.texts in [above.texts for above in block.headings]
         is_heading = is_again or 0 < len(row.texts) <= 2 * count_known(row)
-        return _is_mark(row) or (is_heading and not any(map(is_number, row.texts)))
+        has_number = any(map(is_number, row.texts))
+        return (is_heading and not has_number) or (not row.raw[:1].isdigit() and _is_mark(row))
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
         texts = row.texts
@@ -190,7 +195,7 @@ def split_cells(line: str, separator: str) -> list[str]:
     if separator == " ":
         # A heading has names of several words: two blanks or more part them.
         cells = line.split()
-        return cells if all(map(is_value, cells)) else re.split(r" {2,}|\t", line.strip())
+        return cells if all(map(kinds_of, cells)) else re.split(r" {2,}|\t", line.strip())
     if '"' in line:
         (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
         return [text.strip().strip('"').strip() for text in cells]
@@ -251,17 +256,18 @@ def find_separator(lines: Sequence[str]) -> str:
         return ";" if is_rising else ","
     # Blanks part values; a comma behind one parts them, too.
     parted = [row.split() for row in rows if ", " not in row and " " in row]
-    return " " if sum(all(map(is_value, row)) for row in parted) * 2 > len(rows) else ","
+    return " " if sum(all(map(kinds_of, row)) for row in parted) * 2 > len(rows) else ","
 
 
 def _is_data(texts: Sequence[str]) -> bool:
     """Whether cells hold values only, and at least one number or date."""
-    return all(is_value(text) for text in texts if text) and any(map(is_measured, texts))
+    kinds = [kinds_of(text) for text in texts if text]
+    return all(kinds) and any(MEASURED & kind for kind in kinds)
 
 
 def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
     """Return which cells are filled, and numbers; of most rows of data it is the same."""
-    return tuple((text != "", is_measured(text)) for text in texts)
+    return tuple((text != "", bool(MEASURED & kinds_of(text))) for text in texts)
 
 
 def count_known(row: Row) -> int:
@@ -281,13 +287,13 @@ def _is_mark(row: Row) -> bool:
     return "vernier format" in text or (is_named and is_whole)
 
 
-def find_time_base(rows: Sequence[Row]) -> tuple[float, float] | None:
+def find_time_base(block: RowBlock) -> tuple[float, float] | None:
     """Return the first sample's time and the step, s, that settings state; `None` without.
 
     A setting's value stands behind its name, after ``:`` or ``=`` or in the next cell, or below it.
     """
-    stated: dict[str, float] = {}
-    for above, below in itertools.zip_longest(rows, rows[1:], fillvalue=Row(0, [])):
+    rows, stated = [*block.remarks, *block.headings], dict[str, float]()
+    for above, below in itertools.pairwise([*rows, Row(0, [])]):
         for n, text in enumerate(above.texts):
             name, _, inside = _ASSIGNED.sub("\0", text[:60]).partition("\0")
             role = next(

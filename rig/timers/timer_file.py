@@ -72,8 +72,10 @@ class TimerFile:
         Whether it has samples: a level that changes may be of an input that is no gate.
     is_wide
         Whether a row has several times, so that it may be a run.
-    ways
-        How many there are to understand its columns.
+    unit
+        Of its times where it does not say: ``s``, ``ms``, ``us`` or ``ns``.
+    way, ways
+        In which way, from 0, its columns are understood, and how many there are.
     rows
         How many lines of data there are.
     unread
@@ -89,6 +91,8 @@ class TimerFile:
     has_unit: bool = True
     is_sampled: bool = False
     is_wide: bool = False
+    unit: str | None = None
+    way: int = 0
     ways: int = 1
     rows: int = 0
     unread: list[int] = field(default_factory=list)
@@ -118,9 +122,9 @@ def read_ways(path: str | Path, unit: str | None = None) -> list[TimerFile]:
     """
     files, faults, ways = list[TimerFile](), list[InputError](), 1
     while (way := len(files) + len(faults)) < ways:
-        file = TimerFile()
+        file = TimerFile(unit=unit, way=way)
         try:
-            _read(file, read_lines(path), unit, way, ProblemList(str(path), _HINT))
+            _read(file, read_lines(path), ProblemList(str(path), _HINT))
             files.append(file)
         except InputError as error:
             faults.append(error)
@@ -134,9 +138,7 @@ def read_ways(path: str | Path, unit: str | None = None) -> list[TimerFile]:
     return files
 
 
-def _read(
-    file: TimerFile, lines: Iterator[str], unit: str | None, way: int, problems: ProblemList
-) -> None:
+def _read(file: TimerFile, lines: Iterator[str], problems: ProblemList) -> None:
     head = list(itertools.islice(lines, 50))
     numbered = enumerate(itertools.chain(head, lines), 1)
     is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
@@ -145,7 +147,7 @@ def _read(
     name = recognise_format("\n".join(line[:LONGEST] for line in head))
     file.kind = f"a table, its cells {cells}" + (f"; it looks like {name}" if name else "")
     for block, rows in table.blocks():
-        _read_block(file, block, rows, table.remarks, unit, way, problems)
+        _read_block(file, block, rows, problems)
         problems.raise_if_any()
     file.rows += len(table.strays)
     file.unread += table.strays
@@ -155,22 +157,16 @@ def _read(
 
 
 def _read_block(
-    file: TimerFile,
-    block: RowBlock,
-    rows: Iterator[Row],
-    remarks: Sequence[Row],
-    unit: str | None,
-    way: int,
-    problems: ProblemList,
+    file: TimerFile, block: RowBlock, rows: Iterator[Row], problems: ProblemList
 ) -> None:
     """Add what a block says: samples, or passages."""
     sample = list(itertools.islice(rows, _SAMPLE))
     rows = itertools.chain(sample, rows)
-    columns, heading = columns_of(block, sample, remarks, unit, problems)
+    columns, heading = columns_of(block, sample, file.unit, problems)
     unclear = [column for column in columns if "|" in column.role]
     for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
         roles = column.role.split("|")
-        file.ways, column.role = max(file.ways, len(roles)), roles[way % len(roles)]
+        file.ways, column.role = max(file.ways, len(roles)), roles[file.way % len(roles)]
     check_columns(columns, heading, sample[0], problems)
     problems.raise_if_any()
     file.columns |= {column.name: column.meaning for column in columns}
@@ -178,7 +174,7 @@ def _read_block(
     known, signals, out = {c.role for c in columns}, find_signals(columns), EventList(problems)
     unused = ", ".join(column.name for column in columns if column.role in {"other", "duration"})
     if known & set(VALUES[0]):
-        base = find_time_base([*remarks, *block.headings])
+        base = find_time_base(block)
         if base is None and "time" not in known:
             problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
         reader = SampleReader(signals, base or (0.0, 1.0), out)

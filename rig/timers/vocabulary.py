@@ -20,13 +20,23 @@ CLOCK = re.compile(
 TIMED = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s?(s|ms|us|µs|μs|ns)")
 """A time with its unit."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,2})?")
-_NAME = re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}")
+_FORMS = {
+    "number": _NUMBER,
+    "comma": re.compile(_NUMBER.pattern.replace(r"\.", "[.,]")),
+    "clock": CLOCK,
+    "timed": TIMED,
+    "input": re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}"),
+}
+"""How a cell is written that is a value, by its kind."""
+MEASURED = frozenset({"number", "clock"})
+"""Kinds of a cell that no heading has."""
 _BRACKETED = re.compile(r"[\[({]\s*([^\W\d_]{1,20})\s*[\])}]")
 _LAST = re.compile(r"(?:^|[\W_])([^\W\d_]{1,20})\W*$")
 _ENDING = r"(?![^\W\d_])"
 _NUMBERED = r"[\s#:_-]{0,3}(?:nr\.?|no\.?)?\s?(?:[0-9]{1,4}|[a-d])(?![^\W_])"
 
 
+@cache
 def read_rows(name: str, mark: str) -> list[list[str]]:
     """Return the rows of a table beside this module, their cells parted by a mark."""
     text = Path(__file__).with_name(name).read_text("utf-8")
@@ -50,6 +60,8 @@ def _pattern(role: str, number: str = "") -> re.Pattern[str]:
 
 def without_accents(text: str) -> str:
     """Return a text in which accents are left out and compatible letters are the same."""
+    if text.isascii():
+        return text
     parts = unicodedata.normalize("NFKD", text)
     return "".join(part for part in parts if not unicodedata.combining(part))
 
@@ -102,10 +114,11 @@ def state_of(text: str) -> str:
     Returns
     -------
     str
-        ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, or an empty text.
+        ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, ``unknown``, ``missing``, or
+        an empty text.
     """
     word = re.sub(r"(?<=[01])[.,]0{0,30}$", "", without_accents(text[:80]).casefold())
-    roles = ("one", "zero", "blocked", "clear", "high", "low")
+    roles = ("one", "zero", "blocked", "clear", "high", "low", "unknown", "missing")
     return next((role for role in roles if word in words()[role]), "")
 
 
@@ -114,18 +127,22 @@ def is_number(text: str) -> bool:
     return len(text) <= LONGEST and _NUMBER.fullmatch(text) is not None
 
 
-def is_measured(text: str) -> bool:
-    """Whether a text is a number, or a time of day, perhaps with its date."""
-    return is_number(text) or (":" in text and CLOCK.fullmatch(text[:LONGEST]) is not None)
+@lru_cache(10_000)
+def kinds_of(text: str) -> frozenset[str]:
+    """Return everything that a cell may be; of words, such as a heading has, nothing.
 
-
-def is_value(text: str) -> bool:
-    """Whether a word is a number, a date, a state or the name of an input."""
-    if is_number(text.replace(",", ".", 1)) or state_of(text):
-        return True
-    forms = () if len(text) > LONGEST or "start" in roles_in(text) else (_NAME, CLOCK, TIMED)
-    is_unknown = text.casefold() in {"x", "z", *words()["missing"]}
-    return is_unknown or any(form.fullmatch(text) for form in forms)
+    Returns
+    -------
+    frozenset of str
+        ``number`` (with a decimal point) or ``comma``; ``clock``, a time of day, perhaps with its
+        date; ``timed``, a time with its unit; ``input``, a name with its number; ``state``, with
+        what `state_of` says.
+    """
+    kinds = {kind for kind, form in _FORMS.items() if form.fullmatch(text[: LONGEST + 1])}
+    if len(text) > LONGEST or ("input" in kinds and "start" in roles_in(text)):
+        return frozenset()
+    state = state_of(text)
+    return frozenset(kinds | ({"state", state} if state else set()))
 
 
 def number_of(label: str) -> int | None:

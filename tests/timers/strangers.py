@@ -144,4 +144,10 @@ NOT_READ = {
 REFUSED = {"empty": b"", "blank": b" \n\n", "binary": bytes(range(256)) * 40,
            "zip": b"PK\x03\x04" * 9,
            "picture": b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 9, "numbers": b"1\n2\n3\n",
-           "zeros": b"\0" * 5000, "a heading": b"gate,time (s),state\n"}  # fmt: skip
+           "zeros": b"\0" * 5000, "a heading": b"gate,time (s),state\n",
+           "a broken setting": b"gate,start (s),duration (s)\n0,0.40030590.020295\n1,0.553153,"
+           b"0.008245\n2,0.641801,0.006088a3,0.711323,0.005048\n",
+           "broken NaN": b"gate 0 (s),gate 1 (s),gate 2 (s),gate 5 (s.\n0.400305,NaN,NaN,NaN\n"
+           b"0.420600,NaN,NaN,NaN\nNaN,0.553153,NaN,NaN\nNaN,0.561398,NaN,NaN\n"
+           b"NaN,NaN,0.641801,NaN\nNaN,NaN,0.647889,NaN\nNaN,;aN,NaN,0.711323\nNaN,N\n"
+           b"N,NaN,0.716371\n"}  # fmt: skip
