@@ -134,7 +134,8 @@ def value_at(
 ) -> Any:
     """Follow a place such as ``run.incline_deg`` or ``0.edges()``; ``-`` is the record itself.
 
-    Nothing has nothing further along, and a mapping inside a record may lack a key.
+    Nothing has nothing further along. A mapping inside a record may lack a key, and where the place
+    ends with ``?``, as ``impact_chain?``, the record itself.
 
     Raises
     ------
@@ -144,13 +145,14 @@ def value_at(
     value = record
     for step in place.split("."):
         name, call, _ = step.partition("()")
-        if value is None:
+        if value is None or name == "-":
             break
         if call:
             value = derived[name](value)
         elif isinstance(value, Mapping):
-            value = value[name] if value is record else value.get(name)
-        elif name != "-":
+            key = name.removesuffix("?")
+            value = value[key] if value is record and key == name else value.get(key)
+        else:
             value = value[int(name)] if name.isdigit() else getattr(value, name)
     return value
 
