@@ -122,7 +122,8 @@ def _cell(
     derived: Mapping[str, Callable[[Any], Any]],
     record: Any,
 ) -> str:
-    row = row or value_at(record, "row") or MEASURANDS.get(value_at(record, "quantity"))
+    own = record.get if isinstance(record, Mapping) else partial(getattr, record)
+    row = row or own("row", None) or MEASURANDS.get(own("quantity", ""))
     value = value_at(record, place.format(row=row), derived)
     way, *numbers = way.split()
     return _WAYS[way](value, row, *map(float, numbers))
@@ -131,16 +132,29 @@ def _cell(
 def value_at(
     record: Any, place: str, derived: Mapping[str, Callable[[Any], Any]] = _NOTHING
 ) -> Any:
-    """Follow a place such as ``run.incline_deg`` or ``0.edges()``; ``-`` is the record itself."""
+    """Follow a place such as ``run.incline_deg`` or ``0.edges()``; ``-`` is the record itself.
+
+    Nothing has nothing further along. A mapping inside a record may lack a key, and where the place
+    ends with ``?``, as ``impact_chain?``, the record itself.
+
+    Raises
+    ------
+    AttributeError, KeyError
+        A record has no such attribute or key: a column would else be left out in silence.
+    """
+    value = record
     for step in place.split("."):
         name, call, _ = step.partition("()")
+        if value is None or name == "-":
+            break
         if call:
-            record = None if record is None else derived[name](record)
-        elif isinstance(record, Mapping):
-            record = record.get(name)
-        elif name != "-":
-            record = record[int(name)] if name.isdigit() else getattr(record, name, None)
-    return record
+            value = derived[name](value)
+        elif isinstance(value, Mapping):
+            key = name.removesuffix("?")
+            value = value[key] if value is record and key == name else value.get(key)
+        else:
+            value = value[int(name)] if name.isdigit() else getattr(value, name)
+    return value
 
 
 def _text(value: object, *_: object) -> str:
