@@ -6,6 +6,7 @@ import math
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from rig.analysis.plain_data import plain
 from rig.bench.figures import conditioning_figure
 from rig.bench.findings import Findings
 from rig.bench.stability import VERDICTS, stability
@@ -31,7 +32,7 @@ def main(arguments: Namespace) -> int:
 def _examine(arguments: Namespace) -> Iterator[Findings]:
     rows = stability(quick=arguments.quick, say=say)
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in VERDICTS}
-    records = [row._asdict() for row in rows]
+    records = plain([row._asdict() for row in rows])
     lines = [
         *_summary(rows), "", ", ".join(f"{n} {verdict}" for verdict, n in counts.items()), "",
         *_table(rows),
@@ -69,8 +70,7 @@ def _table(rows: Iterable[StabilityRow]) -> list[str]:
         alone = " + " not in case and _lost(row.naive_error or 1.0) > _lost(row.expected) + 4
         if alone or row.verdict == "FAILED":
             numbers = (f"{x or 0.0:.0e}" for x in (row.error, row.expected, row.backward))
-            name = _NAMES.get(row.quantity, "")
-            table.append([case, name, *numbers, row.naive, row.verdict])
+            table.append([case, _NAMES.get(row.quantity, ""), *numbers, row.naive, row.verdict])
     return text_table(table, left={0, 1, 6}, rule=True)
 
 

@@ -12,7 +12,7 @@ from rig.bench.stability import examine, of_fall
 
 def test_the_quick_study_finds_no_fault(tmp_path):
     assert cli.main(["bench", "stability", "--quick", "-o", str(tmp_path)]) == 0
-    study = json.loads((tmp_path / "stability.json").read_text("utf-8"))
+    study = json.loads((tmp_path / "stability.json").read_text("utf-8"), parse_constant=pytest.fail)
     assert study["counts"]["FAILED"] == 0
     for row in study["rows"]:  # whatever is not simply right says why
         assert (row["verdict"] == "exact") == (row["note"] == ""), row
