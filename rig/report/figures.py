@@ -161,8 +161,10 @@ def _stacked(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dic
     """Lay one bar, source after source, the largest first."""
     begin = 0.0
     for name in sorted(parts, key=lambda name: -parts[name]):
-        if parts[name] > _SMALL:
-            color, end = colors.setdefault(name, PARTS[len(colors)]), begin + parts[name]
+        # Sources beyond the colours are among the others.
+        color = colors.get(name) or dict(enumerate(PARTS)).get(len(colors))
+        if parts[name] > _SMALL and color is not None:
+            colors[name], end = color, begin + parts[name]
             yield _bar(name, color, begin, end)
             begin = end
     if begin < 99.5:

@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 from scipy.special import log_ndtr
 
+from bench.studies.coverage import COEFFICIENTS, draw_rigs
+from bench.studies.time_scales import time_scale
 from rig.analysis.annealing import MISSED, STRAYS
+from rig.analysis.drop import fit_drop
 from rig.analysis.identify import deciding_gate
 from rig.analysis.verdict import LEAD, pattern_faults
+from rig.bench.falls import falls
 from rig.errors import InputError
 from rig.protocol import reader
+from rig.protocol.plan import runs as planned
 from rig.protocol.protocol import Protocol
 from rig.records import Edge
 from sim.dials import Dials
-from tests.analysis.drops import CLOCK_U, STATED, Case, case, wrong_rods
+from tests.analysis.drops import CLOCK_U, PROTOCOLS, STATED, Case, case, wrong_rods
 
 FENCE = """
 protocol: 1
@@ -315,3 +320,16 @@ def test_any_layout_is_read(written, dials):
         assert wrong_rods(result, one.truth) == []
         if dials.missed == 0.0:
             assert result.verdict != "void", (protocol.title, result.reasons)
+
+
+def test_steps_that_an_edge_at_an_impact_stops_are_begun_once_more(tmp_path):
+    rig = next(rig for rig in draw_rigs(str(PROTOCOLS), COEFFICIENTS, 20, 1) if rig.number == 12)
+    protocol = reader.parse(rig.text)
+    runs = {run.number: run for run in planned(protocol)}
+    (fall,) = falls([rig.ask(tmp_path)._replace(runs=[[4]])])
+    result, fit = fit_drop(protocol, runs[4], fall.drop, time_scale(rig.seed))
+    assert fit.estimate.settled
+    assert result.verdict == "accepted"
+    for name in ("speed_m_s", "separation_raw_m"):
+        measured = result.quantities[name]
+        assert abs(measured.value - fall.truth[name]) < 1.5 * measured.expanded, name

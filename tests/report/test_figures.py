@@ -17,9 +17,15 @@ from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
 from rig.report.canvas import KINDS, canvas, figure_file, write_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
-from rig.report.figures import budget_figure, result_figure, runs_figure, variance_shares
+from rig.report.figures import (
+    _stacked,
+    budget_figure,
+    result_figure,
+    runs_figure,
+    variance_shares,
+)
 from rig.report.film import film_figure
-from rig.report.looks import COLORS, SECOND
+from rig.report.looks import COLORS, PARTS, SECOND
 from rig.report.plot import page_svg, plot
 from tests.report import fake_analysis
 
@@ -171,3 +177,14 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
     with pytest.raises(KeyboardInterrupt):
         drawing.file(kind)
     assert len(drawings) > 1
+
+
+def test_sources_beyond_the_colours_are_among_the_others():
+    colors: dict[str, int] = {}
+    for names in ("abcdefgh", "abc", "hgfedcba"):
+        bars = [*_stacked(dict.fromkeys(names, 100.0 / len(names)), colors)]
+        assert sum(end - begin for bar in bars for end, _, begin in bar["points"]) == pytest.approx(
+            100.0
+        )
+        assert len({bar["color"] for bar in bars}) == len(bars)
+    assert len(colors) == len(PARTS)
