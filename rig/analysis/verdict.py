@@ -251,7 +251,7 @@ def _doubts(
     if estimate.scatter > RESTLESS:
         yield make_reason("scatter", factor=estimate.scatter)
     if not estimate.settled:
-        yield make_reason("not_converged")
+        yield make_reason("not_converged", words)
     device, edges = drop.certificate, max(1, len(drop.edges))
     if device is not None and device.late > LATE * edges:
         yield make_reason("late_stamps", edges=device.late)
