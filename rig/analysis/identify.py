@@ -263,11 +263,10 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
         sides = dict(zip(readings, pair, strict=True))
         begun = model.begun({role: side.guess for role, side in sides.items()})
         matches = {role: model.pairings[role].numbered(side.edges) for role, side in sides.items()}
-        fit = settle(begun, matches)
-        tried.append(weighed(fit))
-        if not fit.estimate.settled:  # once more, from where it has the chains
-            begun = model.begun({role: adjusted(fit, role) for role in sides})
-            tried[-1] = max(tried[-1], weighed(settle(begun)), key=lambda one: one.evidence)
+        fits = [settle(begun, matches)]
+        if not fits[0].estimate.settled:  # once more, from where it has the chains
+            fits.append(settle(model.begun({role: adjusted(fits[0], role) for role in sides})))
+        tried.append(max(map(weighed, fits), key=lambda reading: reading.evidence))
     best, *rest = _ranked(tried)
     shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:

@@ -174,12 +174,11 @@ class Adjusted:
         # A chain that turned is lower at its top, the more the further it fell.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
         level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
-        record, highest = self.model.records[role], np.full(levels.value.shape, chain.rods - 1)
-        for name, behind in (("air lag", lags), ("slack", slack)):
-            parts = behind(record, protocol.drop.value, highest, levels.value)
-            level += self.linear(f"{role} {name}", parts)
+        highest = np.full(levels.value.shape, chain.rods - 1)
+        fall = self.model.records[role], protocol.drop.value, highest, levels.value
+        level += self.linear(f"{role} air lag", lags(*fall))
         if role == "free":
-            return level
+            return level + self.linear("free slack", slack(*fall))
         last: Array = levels.value < self._path(role).height[chain.rods - 1]  # of all that fall
         return level + self.linear("top") * last - self.stretched(levels.value)[0]
 

@@ -160,9 +160,8 @@ def predicted(protocol: Protocol, run: Run, components: Components) -> tuple[Dro
         chain = protocol.chains[run.impact].chain
         impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
         alphas = np.array([impact.alpha for impact in impacts])
-    guess = Guess(
-        RELEASE_S, protocol.drop.value, float(alphas.mean())
-    )  # a free chain leaves α alone
+    # A free chain leaves α alone.
+    guess = Guess(RELEASE_S, protocol.drop.value, float(alphas.mean()))
     guesses: dict[str, Guess] = {record.role: guess for record in records}
     model = DropModel(protocol, records, guesses, CLOCK_U, components)
     x = np.zeros(len(model.unknowns))

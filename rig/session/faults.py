@@ -29,9 +29,9 @@ def not_a_session(path: Path, why: str) -> SessionError:
 
 def as_session_error(path: Path, error: Exception) -> SessionError:
     """Translate an error of SQLite or of a row that Python refuses; its own words are kept."""
-    other = "sqlite_corrupt" if isinstance(error, UNREADABLE) else "sqlite_constraint"
-    plain = "" if isinstance(error, sqlite3.Error) else other
-    name = getattr(error, "sqlite_errorname", plain)  # absent on errors of the Python wrapper
+    name = getattr(error, "sqlite_errorname", "")  # absent on errors of the Python wrapper
+    if not isinstance(error, sqlite3.Error):
+        name = "sqlite_corrupt" if isinstance(error, UNREADABLE) else "sqlite_constraint"
     primary = "_".join(name.lower().split("_")[:2])  # of SQLITE_IOERR_WRITE
     code = _SAME.get(primary, primary if primary in WORDINGS else "sqlite_failed")
     return make_error(SessionError, code, path=path, text=error)

@@ -168,10 +168,8 @@ def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> st
 
     Parameters
     ----------
-    path
-        Device path, or a link to one as in ``/dev/serial/by-id``.
-    ports
-        Where to look; by default at everything that is there.
+    path, ports
+        As for `port_at`.
 
     Returns
     -------

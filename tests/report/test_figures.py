@@ -183,8 +183,7 @@ def test_sources_beyond_the_colours_are_among_the_others():
     colors: dict[str, int] = {}
     for names in ("abcdefgh", "abc", "hgfedcba"):
         bars = [*_stacked(dict.fromkeys(names, 100.0 / len(names)), colors)]
-        assert sum(end - begin for bar in bars for end, _, begin in bar["points"]) == pytest.approx(
-            100.0
-        )
+        shares = [end - begin for bar in bars for end, _, begin in bar["points"]]
+        assert sum(shares) == pytest.approx(100.0)
         assert len({bar["color"] for bar in bars}) == len(bars)
     assert len(colors) == len(PARTS)
