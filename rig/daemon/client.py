@@ -272,20 +272,14 @@ class Client:
 
     def arm(self, run: int, attempt: int) -> int:
         """Arm; give the token."""
-        self._armed = True
-        try:
-            token: int = self.call("arm", run=run, attempt=attempt)["token"]
-        except BaseException:
-            self._armed = False
-            raise
+        token: int = self.call("arm", run=run, attempt=attempt)["token"]
+        self._armed = True  # not before: an answer may take longer than a lease
         return token
 
     def fire(self, token: int) -> None:
         """Let go."""
-        try:
-            self.call("fire", token=token)
-        finally:
-            self._armed = False
+        self._armed = False
+        self.call("fire", token=token)
 
     def collect(self, run: int, attempt: int) -> Drop:
         """Wait until a drop is stored, and read it from the file."""

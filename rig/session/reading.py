@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import deque
 from contextlib import contextmanager
+from datetime import datetime
 from itertools import chain
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
@@ -95,6 +96,10 @@ class Reader:
             raise self._damage(f"it does not say {missing[0]}")
         if self.meta["simulated"] not in {"true", "false"}:
             raise self._damage("it does not say whether it is simulated")
+        try:
+            datetime.fromisoformat(self.meta["created"])
+        except ValueError:
+            raise self._damage("it does not say when it was made") from None
 
     @contextmanager
     def snapshot(self) -> Iterator[None]:

@@ -2,13 +2,14 @@
 
 import re
 import signal
+import threading
 from functools import partial
 
 import pytest
 
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
-from rig.daemon.lease import ControlError
+from rig.daemon.lease import LEASE_S, ControlError
 from rig.errors import InputError
 from rig.link.client import Device
 from rig.link.frames import Decoder
@@ -163,8 +164,20 @@ def test_a_stop_ends_a_wait(processes, client):
     one, two = client("one"), client("two")
     one.take_control()
     one.open_session(str(processes.protocol), str(processes.session))
-    one.line.ask("wait", seconds=600)
-    two.stop("no need")
+    waiting = one.line.ask("wait", seconds=600)
+    while not waiting.done():  # a stop may overtake even the request for the wait
+        two.stop("no need")
+    with pytest.raises(StoppedError, match="no need"):
+        waiting.result()
+    assert one.arm(1, 1)
+
+
+def test_a_board_that_answers_late_does_not_cost_control(processes, client):
+    one = client("one")
+    one.take_control()
+    one.open_session(str(processes.protocol), str(processes.session))
+    processes.board.send_signal(signal.SIGSTOP)
+    threading.Timer(1.2 * LEASE_S, processes.board.send_signal, [signal.SIGCONT]).start()
     assert one.arm(1, 1)
 
 

@@ -17,6 +17,7 @@ from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.recover.examine import examine
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 from rig.session.store import Session
+from tests.session.altering import unguarded
 
 TEXT = "protocol: 1\ntitle: Übung\n"
 DEVICE_DROP = Drop(
@@ -382,10 +383,13 @@ def database(path, *sql):
         connection.commit()
 
 
-def newer(path):
-    make(path).close()
-    with closing(sqlite3.connect(path)) as connection:
-        connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION + 1}")
+def altered(sql):
+    def alter(path):
+        make(path).close()
+        with unguarded(path) as connection:
+            connection.execute(sql)
+
+    return alter
 
 
 def hollow(path):
@@ -407,11 +411,23 @@ def cut(path):
         (lambda path: path.write_text("run,channel,time_s,state\n" * 400), "not a session"),
         (lambda path: path.write_bytes(b"x"), "not a session"),
         (database, "another program's"),
-        (newer, "newer rig"),
+        (altered(f"PRAGMA user_version = {SCHEMA_VERSION + 1}"), "newer rig"),
+        (altered("UPDATE meta SET value = 'once' WHERE key = 'created'"), "when it was made"),
         (hollow, "not a session|cannot be used|damaged"),
         (cut, "damaged"),
     ],
-    ids=["missing", "folder", "empty", "text", "byte", "foreign", "newer", "hollow", "cut"],
+    ids=[
+        "missing",
+        "folder",
+        "empty",
+        "text",
+        "byte",
+        "foreign",
+        "newer",
+        "undated",
+        "hollow",
+        "cut",
+    ],
 )
 def test_what_is_no_session(path, prepare, words: str, readonly: bool):
     prepare(path)
