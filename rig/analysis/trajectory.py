@@ -214,8 +214,10 @@ class Trajectory:
             return np.maximum(np.searchsorted(begins, moments, side="right") - 1, 0)
         count, size = begins.shape
         moments_of = np.broadcast_to(moments, (count, moments.shape[-1]))
-        leg = [np.searchsorted(*row, side="right") for row in zip(begins, moments_of, strict=True)]
-        legs: Index = np.maximum(np.array(leg) - 1, 0) + size * np.arange(count)[:, None]
+        legs = np.zeros(moments_of.shape, dtype=np.intp)
+        for row, (begin, moment) in enumerate(zip(begins, moments_of, strict=True)):
+            last = np.searchsorted(begin, moment, side="right") - 1
+            legs[row] = size * row + np.maximum(last, 0)
         return legs
 
     @property

@@ -52,6 +52,13 @@ def test_derivatives_are_those_of_the_heights(scene):
             )
 
 
+def test_no_falls_come_by_at_no_times():
+    """As where all that a suspected fault leaves possible is outside of α's domain."""
+    for fall in falls_of(RECORD):
+        times = fall.path(np.zeros((0, UNKNOWNS))).times(fall.levels)
+        assert times.shape == (0, fall.levels.size)
+
+
 @pytest.mark.parametrize("late", [1.0, 1800.0])
 def test_a_record_may_begin_long_before_the_fall_and_end_long_after_it(late):
     """Also of half an hour, with edges at either end of it."""
