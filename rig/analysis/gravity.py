@@ -23,6 +23,7 @@ from rig.analysis.plain_data import attributes
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY
+from rig.reasons import make_reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from rig.analysis.fit import Fit
     from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol
+    from rig.reasons import Reason
     from rig.units import Quantity
 
 _FEWEST = 8  # edges
@@ -63,6 +65,17 @@ class GravityCheck:
     def agrees(self) -> bool:
         """Whether they do."""
         return abs(self.normalized_error) <= 1.0
+
+    @property
+    def doubts(self) -> tuple[Reason, ...]:
+        """Where they do not, that something is not as stated."""
+        values = {
+            "g": self.measured.value,
+            "U": self.measured.expanded,
+            "E_n": self.normalized_error,
+        }
+        doubt = make_reason("gravity_unlike", stated=self.stated.value, **values)
+        return () if self.agrees else (doubt,)
 
     def json(self) -> dict[str, Any]:
         """A member of ``calibration``."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import stated
 from rig.analysis.drop import fit_drop
+from rig.analysis.gravity import check_gravity
 from rig.analysis.identify import log_evidence, most_votes
 from rig.clock.calibration import TimeScale
 from rig.clock.epochs import RESONATOR_TOLERANCE
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Sequence
 
+    from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
 
@@ -87,7 +89,8 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     # Of gates that the file does not have nothing is due.
     protocol = with_gates(protocol, {edge.channel for drop in drops for edge in drop.edges})
     shares, near, expected = [1.0], 0, 0
-    evidence, gravity = 0.0, list[float]()
+    evidence = 0.0
+    results: list[DropResult] = []
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
     for drop in [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]:
         run = planned[drop.run]
@@ -96,14 +99,16 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         due = sum(record.expected for record in records)
         shares.append(votes / max(1, len(drop.edges), due))
         near, expected = near + min(votes, due), expected + due
-        if exact and len(gravity) < _COMPARED:
+        if exact and len(results) < _COMPARED:
             result, fit = fit_drop(protocol, run, drop, rate, explain=False)
             evidence += log_evidence(fit) if fit else 0.0
-            gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
+            results.append(result)
     text = make_reason("falls_fit", runs=len(drops), near=near, due=expected).text
-    if gravity:
-        text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
-    return FallMatch(min(shares), evidence, text)
+    check = check_gravity(protocol, results)
+    if check is None:
+        return FallMatch(min(shares), evidence, text)
+    text += f"; g {check.measured.value:.2f} m/s²"
+    return FallMatch(min(shares), evidence, text, check.doubts)
 
 
 def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:

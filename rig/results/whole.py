@@ -93,7 +93,7 @@ class SessionResults:
         fields, check = self.clock.said, self.gravity
         if check is None:
             return fields
-        doubts = [] if check.agrees else [_gravity_doubt(check)]
+        doubts = (doubt.text for doubt in check.doubts)
         return fields | {"gravity": check.json(), "notes": [*fields["notes"], *doubts]}
 
     @property
@@ -119,14 +119,6 @@ class SessionResults:
         head |= {"blind": True} if self.blind else {}
         better = [improvement.json() for improvement in improvements(self.analysis.summary)]
         return head | {"calibration": self.calibration} | fields | {"measure_next": better}
-
-
-def _gravity_doubt(check: GravityCheck) -> str:
-    return (
-        f"free fall gives g = {check.measured.value:.4f} ± {check.measured.expanded:.4f} "
-        f"m/s², the protocol says {check.stated.value:.4f} (Eₙ {check.normalized_error:.1f}): "
-        "the clock, the beams' heights, the air or the protocol's gravity is not as stated"
-    )
 
 
 def protocol_of(session: Reader) -> Protocol:

@@ -62,11 +62,14 @@ class FallMatch(NamedTuple):
         Logarithm of the marginal likelihood; 0 if not asked for.
     text
         What a user can check.
+    doubts
+        What falls of the protocol do not do.
     """
 
     share: float
     evidence: float = 0.0
     text: str = ""
+    doubts: Sequence[Reason] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +152,7 @@ def import_drops(
     is_open = len([other for other in readings if other.layout.dark != "inverted"]) > 1
     if is_open or (match.share < _GOOD and not options.as_read):
         notes.append(make_reason("reading_chosen", option=str(layout), fit=match.text))
-    notes += _assumptions(file, reading, gates)
+    notes += [*match.doubts, *_assumptions(file, reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{layout.text}\n", "utf-8")
     lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]

@@ -34,6 +34,14 @@ def test_every_row_is_counted(look):
     assert done.code == 0, done.err
     assert "1 run, 8 rows: 8 edges" in done.err
     assert "8 of 8 edges where a fall puts them; g 9.8" in done.out
+    assert "the protocol says" not in done.err
+
+
+def test_a_fall_that_is_not_the_protocols_is_doubted(look):
+    done = look(HEAD + rows((1.1 * t, channel, dark) for t, channel, dark in RUNS[0]))
+    assert done.code == 0, done.err
+    assert "free fall gives g = 8." in done.err
+    assert "the protocol says 9.8" in done.err
 
 
 def test_rows_that_are_not_used_are_an_error_unless_they_are_allowed(look):
