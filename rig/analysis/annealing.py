@@ -17,11 +17,13 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
+from rig.analysis.air import prior_air
 from rig.analysis.chain_records import WIDER
 from rig.analysis.components import above
 from rig.analysis.discrepancy import LOWEST_START
 from rig.analysis.free_flight import FAINT
-from rig.analysis.trajectory import COMMON, GRAVITY, free_trajectory, struck_trajectory
+from rig.analysis.trajectory import COMMON, GRAVITY, ONE, free_trajectory, struck_trajectory
+from rig.analysis.unknowns import ANY_GRAVITY
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -29,9 +31,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rig.analysis.chain_records import ChainRecord, EdgeTrain
-    from rig.analysis.drop_model import DropModel
+    from rig.analysis.components import Components
     from rig.analysis.trajectory import Trajectory
     from rig.arrays import Array, Index
+    from rig.protocol.protocol import Protocol
 
 
 Item = TypeVar("Item", bound=np.generic)
@@ -94,6 +97,12 @@ class Guess:
     kappa: float = 0.0
     clock: float = 0.0
     pull: float = 0.0
+
+    @classmethod
+    def stated(cls, protocol: Protocol, record: ChainRecord) -> Guess:
+        """Let a chain begin as stated."""
+        kappa, _ = prior_air(protocol)
+        return cls(0.0, protocol.drop.value, record.alpha, kappa)
 
 
 def split(line: NDArray[Item], ends: Index) -> list[NDArray[Item]]:
@@ -359,7 +368,7 @@ class SideFall:
         Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 for what is known, and
         1 s for the release, of which nothing is.
     sigma
-        By how much every expected edge may be off by itself, m.
+        By how much every expected edge may be off by itself, m; falls are counted without.
     """
 
     record: ChainRecord
@@ -370,23 +379,26 @@ class SideFall:
     sigma: Array
 
     @classmethod
-    def of(cls, model: DropModel, role: str) -> SideFall:
+    def of(
+        cls,
+        protocol: Protocol,
+        record: ChainRecord,
+        clock_u: float,
+        components: Components,
+        sigma: Array = ONE,
+    ) -> SideFall:
         """Take a side of a drop that begins as stated."""
-        protocol, components, record = model.protocol, model.components, model.records[role]
-        prior_sd, strings = model.unknowns.sd, protocol.priors.strings
         sd = np.zeros(UNKNOWNS)
         sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, components.hang)
-        sd[CLOCK], sd[DRAG] = model.clock_u, model.kappa_u
-        sd[PULL] = prior_sd[model.unknowns["gravity"]][0]
-        # What else moves where an edge is expected is no unknown here, but scatters.
-        variance = components.floor**2 + (model.slopes[role].levels ** 2) @ prior_sd**2
+        sd[CLOCK], (_, sd[DRAG]) = clock_u, prior_air(protocol)
+        sd[PULL] = ANY_GRAVITY if protocol.surface is None else protocol.gravity.u
         if record.ratios is not None:
-            variance += components.departure**2
             # All α are alike that energy allows.
             sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
-            sd[GROWTH] = strings * abs(record.alpha)
-        stated, gravity = model.guesses[role], protocol.gravity.value
-        return cls(record, model.pairings[role], stated, gravity, sd, np.sqrt(variance))
+            sd[GROWTH] = protocol.priors.strings * abs(record.alpha)
+        stated, gravity = Guess.stated(protocol, record), protocol.gravity.value
+        pairing = Pairing.of(record.trains, record.crossed)
+        return cls(record, pairing, stated, gravity, sd, sigma)
 
     @cached_property
     def levels(self) -> Array:

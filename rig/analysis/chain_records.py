@@ -189,6 +189,12 @@ class ChainRecord:
         return places - self.higher if self.higher else places
 
     @property
+    def crossed(self) -> Sequence[float]:
+        """Widths of rods where others may be thrown back in their way; else nothing."""
+        thrown = self.ratios is not None and self.chain.chain.rods > 1
+        return self.chain.widths if thrown else ()
+
+    @property
     def expected(self) -> int:
         """Number of edges that a perfect rig would report."""
         return sum(train.rods.size for train in self.trains)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from rig.analysis.air import prior_air
-from rig.analysis.annealing import Guess, Pairing
+from rig.analysis.annealing import Guess, Pairing, SideFall
 from rig.analysis.components import Components, stated
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
@@ -115,7 +115,7 @@ class DropModel:
         return _model_of(_Condition(protocol, content, tuple(records))).changed(
             records={record.role: record for record in records},
             pairings=_pairings(records),
-            guesses=_stated_guesses(protocol, records) if guesses is None else guesses,
+            guesses=_begin(protocol, records) if guesses is None else guesses,
             clock_u=clock_u,
             components=components or stated(protocol),
         )
@@ -143,6 +143,13 @@ class DropModel:
             guesses["impact"] = replace(struck, alpha=struck.alpha + float(x[at][0]))
             x[at] = 0.0
         return self.changed(components=components, clock_u=clock_u, guesses=guesses)
+
+    def begin(self, role: str) -> SideFall:
+        """Take a side by itself, with what else moves its edges as their scatter."""
+        record, scales = self.records[role], self.components
+        sd = np.hypot(scales.floor, scales.departure if record.ratios is not None else 0.0)
+        variance = sd**2 + (self.slopes[role].levels ** 2) @ self.unknowns.sd**2
+        return SideFall.of(self.protocol, record, self.clock_u, scales, np.sqrt(variance))
 
     def begun(self, guesses: Mapping[str, Guess]) -> DropModel:
         """Return the same drop with other first guesses."""
@@ -376,7 +383,7 @@ class _Condition:
 @lru_cache(maxsize=64)
 def _model_of(condition: _Condition) -> DropModel:
     protocol, records = condition.protocol, condition.records
-    return DropModel(protocol, records, _stated_guesses(protocol, records), 0.0)
+    return DropModel(protocol, records, _begin(protocol, records), 0.0)
 
 
 def _expectations(record: ChainRecord) -> tuple[object, ...]:
@@ -394,20 +401,12 @@ def _expectations(record: ChainRecord) -> tuple[object, ...]:
     )
 
 
-def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
-    """Let chains begin as stated."""
-    kappa, _ = prior_air(protocol)
-    return {record.role: Guess(0.0, protocol.drop.value, record.alpha, kappa) for record in records}
+def _begin(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
+    return {record.role: Guess.stated(protocol, record) for record in records}
 
 
 def _pairings(records: Sequence[ChainRecord]) -> dict[str, Pairing]:
-    return {record.role: Pairing.of(record.trains, _widths(record)) for record in records}
-
-
-def _widths(record: ChainRecord) -> Sequence[float]:
-    """Return how wide rods are where others may be thrown back in their way; else nothing."""
-    thrown = record.ratios is not None and record.chain.chain.rods > 1
-    return record.chain.widths if thrown else ()
+    return {record.role: Pairing.of(record.trains, record.crossed) for record in records}
 
 
 def _loose(path: Trajectory, times: Array, seen: Seen) -> Array:

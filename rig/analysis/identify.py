@@ -119,7 +119,7 @@ def identify(
         How many batches of starts are tried at most, the likeliest first.
     """
     model = DropModel.of(protocol, records, None, clock_u, components)
-    readings = {role: _read(SideFall.of(model, role), window, batches) for role in model.records}
+    readings = {role: _read(model.begin(role), window, batches) for role in model.records}
     # Likelier than that all edges are strays and every rod was missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
@@ -142,8 +142,7 @@ def most_votes(
     protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
 ) -> int:
     """Count the expected edges of a side that agree on one fall near the stated one, at most."""
-    model = DropModel.of(protocol, [record], None, clock_u, components)
-    return SideFall.of(model, record.role).most_votes()
+    return SideFall.of(protocol, record, clock_u, components).most_votes()
 
 
 def well_read(reading: Reading) -> bool:
