@@ -226,7 +226,9 @@ class Explainer:
         least = self._net(self.setting)[1]
         candidates = []
         for fault in faults:
-            sized = [(*self._net(fault.premise(self.setting, size)), size) for size in fault.sizes]
+            sized = [
+                (*self._net(fault.premise(self.setting, size), least), size) for size in fault.sizes
+            ]
             share, net, size = max(sized, key=lambda row: row[1])
             if share >= _VOTED and net >= least:
                 candidates.append((net, fault, size))
@@ -241,18 +243,24 @@ class Explainer:
                     enough = max(enough, net - 2 * _MARGIN)
                 yield explanation
 
-    def _net(self, setting: Premise) -> tuple[float, int]:
-        """Share of the expected edges that vote for one fall, and votes less edges without."""
-        votes = 0
+    def _net(self, setting: Premise, least: float = -math.inf) -> tuple[float, int]:
+        """Share of the expected edges that vote for one fall, and votes less edges without.
+
+        Both are only bounds from above where these cannot be as many as the least.
+        """
         records = self._records(setting)
         expected = sum(side.expected for side in records)
-        for record in records:
+        most = [possible(record) for record in records]
+        votes = sum(most)
+        for n, record in enumerate(records):
+            if 2 * votes - expected < least:
+                break
             key = expected, *_key(setting, record)
             if key not in self._votes:
                 self._votes[key] = most_votes(
                     setting.protocol, record, self.clock_u, self.components
                 )
-            votes += self._votes[key]
+            votes += self._votes[key] - most[n]
         return votes / max(1, expected), 2 * votes - expected
 
     def _afresh(self, fault: Fault, size: float, stated: float) -> Explanation | None:
