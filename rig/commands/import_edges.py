@@ -98,7 +98,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         votes = sum(most_votes(protocol, record, rate.u, stated(protocol)) for record in records)
         due = sum(record.expected for record in records)
         shares.append(votes / max(1, len(drop.edges), due))
-        near, expected = near + min(votes, due), expected + due
+        near, expected = near + votes, expected + due
         if exact and len(results) < _COMPARED:
             result, fit = fit_drop(protocol, run, drop, rate, explain=False)
             evidence += log_evidence(fit) if fit else 0.0
