@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.reasons import make_reason
@@ -11,7 +13,7 @@ from rig.session.rows import drop_of, named_values
 
 if TYPE_CHECKING:
     from rig.records import Drop
-    from rig.recover.rows import Row, Rows
+    from rig.recover.rows import Rows
 
 
 class RecoveredDrop(NamedTuple):
@@ -32,14 +34,12 @@ def recover_drops(rows: Rows) -> list[RecoveredDrop]:
     replay = ByteReplay()
     replay.feed(row[1:] for row in rows.in_order("bytes"))
     replayed = replay.drops()
-    edges: dict[int, list[Row]] = {}
-    for edge in rows.in_order("edge"):
-        edges.setdefault(edge[0], []).append(edge)
+    edges = {drop: [*own] for drop, own in groupby(rows.in_order("edge"), itemgetter(0))}
     drops: list[RecoveredDrop] = []
     for row in rows.in_order("drop"):
-        values, own = named_values(row), edges.get(row[0], [])
-        stored = drop_of(row, own)
-        fate = check_drop(stored, replayed, torn=any(edge[1] != n for n, edge in enumerate(own)))
+        values = named_values(row)
+        stored = drop_of(row, edges.get(row[0], []))
+        fate = check_drop(stored, replayed)
         best = _best(stored, replayed.get(stored.job), fate)
         drops.append(RecoveredDrop(best, fate, values["host_ns"], values["provenance"]))
     stored_jobs = {each.drop.job for each in drops}

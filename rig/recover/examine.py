@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.printable import printable
 from rig.reasons import sentences
 from rig.recover.drops import RecoveredDrop, recover_drops
-from rig.recover.pages import MAGIC, read_pages
+from rig.recover.pages import Pages
 from rig.recover.rows import Rows, find_rows
 from rig.recover.snapshot import SessionCopy, take_snapshot
 from rig.session.drop_check import Fate
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Mapping, Sequence
-
 _NUMBERED = {name: table.meaning for name, table in TABLES.items() if table.numbered}
 FAULTS = ("damaged: ", "lost: ")
 """How lines begin that say what is wrong with a file."""
 _GOOD = (Fate.CONFIRMED, Fate.IMPORTED)
+_FORMAT, _APPLICATION = 60, 68
+"""Where SQLite's header has ``user_version`` and ``application_id``."""
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
 
@@ -62,7 +61,7 @@ class ExaminedFile:
         return list(dict.fromkeys([*self.damage, *self.lost, *doubtful]))
 
 
-def examine(path: str | os.PathLike[str]) -> ExaminedFile:
+def examine(path: str | Path) -> ExaminedFile:
     """Look at a session file, which stays as it is.
 
     Raises
@@ -71,33 +70,29 @@ def examine(path: str | os.PathLike[str]) -> ExaminedFile:
         It cannot be read at all.
     """
     snapshot = take_snapshot(path)
-    pages = read_pages(snapshot.data)
+    pages = Pages(snapshot.data)
     rows = find_rows(pages)
     drops = recover_drops(rows)
-    if foreign := _foreign(snapshot.data, pages.pages.get(1, b""), rows):
+    if foreign := _foreign(snapshot.data, pages, rows):
         return ExaminedFile(snapshot, rows, drops, foreign)
-    orphans = len({drop for drop, _ in rows.tables["edge"]} - rows.tables["drop"].keys())
-    torn = f"{pages.missing} of {pages.expected} pages are not there: the file is torn"
+    chained = pages.header(_FORMAT) >= TABLES["hash"].since
+    orphans = len({row[:1] for row in rows.tables["edge"]} - rows.tables["drop"].keys())
     damage = {
-        torn: pages.missing,
+        f"{pages.missing} of {pages.expected} pages are not there: the file is torn": pages.missing,
         snapshot.trouble: snapshot.trouble,
         f"{rows.bad} records cannot be read": rows.bad,
-        "table hash: all its rows are missing": (
-            int.from_bytes(pages.pages.get(1, b"")[60:64], "big") >= TABLES["hash"].since
-            and not rows.tables["hash"]
-        ),
+        "table hash: all its rows are missing": chained and not rows.tables["hash"],
         f"nothing says what drops {orphans} groups of edges belong to": orphans,
     }
-    facts = "whether it is simulated, when and by what it was made"
     lost = {
-        facts: "simulated" not in rows.meta,
+        "whether it is simulated, when and by what it was made": "simulated" not in rows.meta,
         "the protocol file": rows.protocol is None,
         "the protocol's text has changed since the session was made": rows.protocol_altered,
         **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
         **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
     }
-    damaged = _true(damage) + rows.chain_faults()
-    return ExaminedFile(snapshot, rows, drops, "", damaged, _true(lost))
+    damaged = [*filter(damage.get, damage), *rows.chain_faults()]
+    return ExaminedFile(snapshot, rows, drops, "", damaged, [*filter(lost.get, lost)])
 
 
 def describe(session: ExaminedFile) -> list[str]:
@@ -117,10 +112,9 @@ def _lines(session: ExaminedFile) -> list[str]:
     if snapshot.logged:
         lines.append(f"{snapshot.logged} pages are in the log beside it (-wal) only: keep both")
     world = {"true": "simulated", "false": "real"}.get(meta.get("simulated", ""), "unknown if real")
-    lines.append(
-        f"a session made {meta.get('created', 'at an unknown time')} by rig "
-        f"{meta.get('rig_version', 'of unknown version')}, {world}"
-    )
+    program = meta.get("rig_version", "of unknown version")
+    made = meta.get("created", "at an unknown time")
+    lines.append(f"a session made {made} by rig {program}, {world}")
     for table, name in _NUMBERED.items():
         if count := len(rows.tables[table]):
             missing = rows.gaps(table)
@@ -132,9 +126,8 @@ def _lines(session: ExaminedFile) -> list[str]:
         lines.append("its chain of hashes began later than the session")
     for recovered in session.drops:
         drop = recovered.drop
-        name = f"{drop.job}: {len(drop.edges)} edges: {recovered.fate}"
         faults = f" (recorded with faults: {sentences(drop.faults)})" if drop.faults else ""
-        lines.append(name + faults)
+        lines.append(f"{drop.job}: {len(drop.edges)} edges: {recovered.fate}{faults}")
     lines += [FAULTS[text in session.lost] + text for text in session.troubles]
     if session.whole:
         lines.append("everything is whole")
@@ -147,20 +140,17 @@ def _lines(session: ExaminedFile) -> list[str]:
     return lines
 
 
-def _foreign(data: bytes, first: bytes, rows: Rows) -> str:
+def _foreign(data: bytes, pages: Pages, rows: Rows) -> str:
     if not data:
         return "it is empty"
-    if first.startswith(MAGIC):
-        application, version = (int.from_bytes(first[at : at + 4], "big") for at in (68, 60))
-        if application != APPLICATION_ID and not rows.any():
-            return "it is another program's SQLite database"
-        if application == APPLICATION_ID and version > SCHEMA_VERSION:
-            return "it was written by a newer rig: update rig"
-    return "" if rows.any() else "there is nothing of a session in it"
-
-
-def _true(sentences: Mapping[str, object]) -> list[str]:
-    return [sentence for sentence, holds in sentences.items() if holds]
+    own = pages.header(_APPLICATION) == APPLICATION_ID
+    if pages.known and own and pages.header(_FORMAT) > SCHEMA_VERSION:
+        return "it was written by a newer rig: update rig"
+    if any(rows.tables[name] for name in ("meta", "protocol", "bytes", "drop", "run_state")):
+        return ""
+    if pages.known and not own:
+        return "it is another program's SQLite database"
+    return "there is nothing of a session in it"
 
 
 def _describe_fate(recovered: RecoveredDrop) -> str:

@@ -9,70 +9,59 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 Value: TypeAlias = int | float | str | bytes | None
+Cell: TypeAlias = tuple[int | None, tuple[Value, ...]]
+"""A record and its number, `None` in an index, and in a table that is kept as one."""
 
 MAGIC = b"SQLite format 3\0"
 _HEADER = 100  # bytes before the first page's b-tree, section 1.3
 _USUAL_PAGE = 4096  # what SQLite makes, unless told otherwise
 TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR = 0x0D, 0x0A, 0x02
-_INTEGERS = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8}  # serial type → bytes, section 2.1
+_SIZES = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 7: 8}  # serial type → bytes, section 2.1
+_CONSTANTS = {0: None, 8: 0, 9: 1}  # serial type → value, same section
 
 
-@dataclass(frozen=True)
 class Pages:
-    """The pages of a database.
+    """The pages of a database file.
 
     Attributes
     ----------
+    known
+        Whether the first of them says that it is SQLite's.
+    pages
+        Those that are there, by number from 1.
     usable
         Bytes of a page that SQLite uses.
     expected
         How many pages there should be, 0 when nobody says.
-    pages
-        Those that are there, by number from 1.
+    missing
+        How many of these are not there.
     """
 
-    usable: int
-    expected: int
-    pages: dict[int, bytes]
+    def __init__(self, data: bytes) -> None:
+        size = int.from_bytes(data[16:18], "big")
+        size = 65536 if size == 1 else size
+        if not data.startswith(MAGIC) or not 512 <= size <= 65536 or size & (size - 1):
+            size = _USUAL_PAGE
+        count = len(data) // size
+        self.pages = {n + 1: data[n * size : (n + 1) * size] for n in range(count)}
+        self.usable, self.expected = size, 0
+        self.known = count > 0 and data.startswith(MAGIC)
+        if self.known:
+            # A log that is not there may have held the rest; a wild number says nothing.
+            expected = self.header(28)
+            self.expected = expected if expected < 4 * count + 1000 else 0
+            self.usable -= data[20] if data[20] < size // 2 else 0
+        self.missing = sum(n not in self.pages for n in range(1, self.expected + 1))
 
-    @property
-    def missing(self) -> int:
-        """How many pages there should be and are not."""
-        return sum(number not in self.pages for number in range(1, self.expected + 1))
-
-
-def read_pages(data: bytes) -> Pages:
-    """Cut a database file into pages."""
-    size = int.from_bytes(data[16:18], "big")
-    size = 65536 if size == 1 else size
-    if not data.startswith(MAGIC) or not 512 <= size <= 65536 or size & (size - 1):
-        size = _USUAL_PAGE
-    pages = {
-        number + 1: data[number * size : (number + 1) * size] for number in range(len(data) // size)
-    }
-    first = pages.get(1, b"")
-    if not first.startswith(MAGIC):
-        return Pages(size, 0, pages)
-    expected = int.from_bytes(first[28:32], "big")
-    # A log that is not there may have held the rest; a wild number says nothing.
-    if not 0 < expected < 4 * len(pages) + 1000:
-        expected = 0
-    reserved = first[20] if first[20] < size // 2 else 0
-    return Pages(size - reserved, expected, pages)
+    def header(self, at: int) -> int:
+        """Return the number at a place of the file's header, section 1.3."""
+        return int.from_bytes(self.pages.get(1, b"")[at : at + 4], "big")
 
 
-class PageCell(NamedTuple):
-    """One record; `rowid` is `None` in an index, and in a table that is kept as one."""
-
-    rowid: int | None
-    values: tuple[Value, ...]
-
-
-def read_cells(pages: Pages, number: int) -> Iterator[PageCell | None]:
+def read_cells(pages: Pages, number: int) -> Iterator[Cell | None]:
     """Read all records of a page, `None` for each that is none; a page without records has none.
 
     Parameters
@@ -99,7 +88,7 @@ def read_cells(pages: Pages, number: int) -> Iterator[PageCell | None]:
             yield None
 
 
-def _cell(pages: Pages, page: bytes, kind: int, at: int) -> PageCell:
+def _cell(pages: Pages, page: bytes, kind: int, at: int) -> Cell:
     """Read a cell, sections 1.6 and 2.1."""
     if kind == INDEX_INTERIOR:
         at += 4  # the page to its left
@@ -107,7 +96,7 @@ def _cell(pages: Pages, page: bytes, kind: int, at: int) -> PageCell:
     rowid = None
     if kind == TABLE_LEAF:
         rowid, at = _varint(page, at)
-    return PageCell(rowid, tuple(_record(_payload(pages, page, kind, at, size))))
+    return rowid, tuple(_record(_payload(pages, page, kind, at, size)))
 
 
 def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:
@@ -116,28 +105,23 @@ def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:
     limit = usable - 35 if kind == TABLE_LEAF else (usable - 12) * 64 // 255 - 23
     if size > len(pages.pages) * usable:
         raise ValueError("longer than the file")
-    if size <= limit:
-        return _cut(page, at, size, usable)
-    least = (usable - 12) * 32 // 255 - 23
-    local = least + (size - least) % (usable - 4)
-    local = local if local <= limit else least
-    parts = [_cut(page, at, local, usable)]
-    follow = int.from_bytes(_cut(page, at + local, 4, usable), "big")
-    remaining = size - local
-    while remaining > 0:
-        if follow not in pages.pages:
-            raise ValueError("its end is missing")
-        over = pages.pages[follow]
-        parts.append(over[4 : min(4 + remaining, usable)])
-        remaining -= len(parts[-1])
-        follow = int.from_bytes(over[:4], "big")
-    return b"".join(parts)
-
-
-def _cut(page: bytes, at: int, size: int, usable: int) -> bytes:
-    if at < 8 or at + size > usable:
+    local, pointer = size, 0
+    if size > limit:
+        least = (usable - 12) * 32 // 255 - 23
+        local, pointer = least + (size - least) % (usable - 4), 4
+        local = local if local <= limit else least
+    end = at + local
+    if at < 8 or end + pointer > usable:
         raise ValueError("outside of its page")
-    return page[at : at + size]
+    payload = bytearray(page[at:end])
+    follow = page[end : end + pointer]
+    while len(payload) < size:
+        over = pages.pages.get(int.from_bytes(follow, "big"))
+        if over is None:
+            raise ValueError("its end is missing")
+        payload += over[4 : min(4 + size - len(payload), usable)]
+        follow = over[:4]
+    return bytes(payload)
 
 
 def _record(payload: bytes) -> Iterator[Value]:
@@ -147,7 +131,7 @@ def _record(payload: bytes) -> Iterator[Value]:
         kind, at = _varint(payload, at)
         if kind in {10, 11}:
             raise ValueError("no such type")
-        size = _INTEGERS.get(kind, 8 if kind == 7 else max(0, kind - 12) // 2)
+        size = _SIZES.get(kind, max(0, kind - 12) // 2)
         data = payload[body : body + size]
         if len(data) != size:
             raise ValueError("cut short")
@@ -158,17 +142,13 @@ def _record(payload: bytes) -> Iterator[Value]:
 
 
 def _value(kind: int, data: bytes) -> Value:
-    if kind == 0:
-        return None
-    if kind in {8, 9}:
-        return kind - 8
+    if kind in _CONSTANTS:
+        return _CONSTANTS[kind]
     if kind == 7:
         return float(struct.unpack(">d", data)[0])
     if kind < 7:
         return int.from_bytes(data, "big", signed=True)
-    if kind % 2 == 0:
-        return data
-    return data.decode("utf-8")
+    return data.decode("utf-8") if kind % 2 else data
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:

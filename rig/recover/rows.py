@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
 
-from rig.recover.pages import read_cells
+from rig.recover.pages import Pages, read_cells
 from rig.session.hashes import check_chain
 from rig.session.rows import RowError, check_row
-from rig.session.schema import SCHEMA_VERSION, TABLES
+from rig.session.schema import TABLES, Row
 
-if TYPE_CHECKING:
-    from rig.recover.pages import PageCell, Pages
-
-Row: TypeAlias = "tuple[Any, ...]"
-
-_LENGTHS = {
-    name: {len(table.names(version)) for version in range(table.since, SCHEMA_VERSION + 1)}
-    for name, table in TABLES.items()
-}
 _TRIP_NS = 60 * 10**9  # no answer takes longer
 
 
@@ -30,8 +21,22 @@ class Rows:
     The key is the row's number, and of an edge the drop's number and its own.
     """
 
-    tables: dict[str, dict[Any, Row]] = field(default_factory=lambda: {name: {} for name in TABLES})
+    tables: dict[str, dict[Row, Row]] = field(default_factory=lambda: {name: {} for name in TABLES})
     bad: int = 0
+
+    def add(self, rowid: int | None, row: Row) -> None:
+        """Put a record where it belongs by its shape; what is no row of a session is left out."""
+        if row[:1] == (None,):  # SQLite leaves the number out of the record
+            row = (rowid, *row[1:])
+        for name, table in TABLES.items():
+            if (rowid is None) == (table.key > 1) and len(row) in table.lengths:
+                with suppress(RowError):
+                    check_row(name, row)
+                    # Breaks of the host have the same columns as clock samples.
+                    if name != "ping" or 0 <= row[2] - row[1] <= _TRIP_NS:
+                        key = row[: table.key] if rowid is None else (rowid,)
+                        self.tables[name].setdefault(key, row)
+                        return
 
     def in_order(self, table: str) -> list[Row]:
         """List the rows of a table by key."""
@@ -55,23 +60,15 @@ class Rows:
         digest = hashlib.sha256(self.protocol[1].encode()).hexdigest()
         return self.meta.get("protocol_sha256", digest) != digest
 
-    def any(self) -> bool:
-        """Whether anything of a session was found."""
-        return any(self.tables[name] for name in ("meta", "protocol", "bytes", "drop", "run_state"))
-
     def gaps(self, table: str) -> int:
         """Count the rows that are missing: a session numbers its rows from 1 without gaps."""
         numbers = self.tables[table]
-        hashed = (last for _, covered, last, _ in self.in_order("hash") if covered == table)
-        return int(max([0, *hashed, *numbers])) - len(numbers)
+        hashed = (last for _, covered, last, _ in self.tables["hash"].values() if covered == table)
+        return int(max([0, *hashed, *(number for (number,) in numbers)])) - len(numbers)
 
     def chain_faults(self) -> list[str]:
         """List what the chain of hashes says was altered; nothing where there is no chain."""
-        rows = {
-            name: [(key[0] if name == "edge" else key, row) for key, row in sorted(table.items())]
-            for name, table in self.tables.items()
-        }
-        return check_chain(self.in_order("hash"), rows)
+        return check_chain(self.tables)
 
 
 def find_rows(pages: Pages) -> Rows:
@@ -81,33 +78,8 @@ def find_rows(pages: Pages) -> Rows:
     never altered, so both say the same, and the first counts. Results are left out: they are
     computed again.
     """
-    rows = Rows()
-    for number in sorted(pages.pages):
-        for cell in read_cells(pages, number):
-            if cell is None:
-                rows.bad += 1
-            else:
-                _sort(rows, cell)
+    cells = [cell for number in pages.pages for cell in read_cells(pages, number)]
+    rows = Rows(bad=cells.count(None))
+    for cell in filter(None, cells):
+        rows.add(*cell)
     return rows
-
-
-def _sort(rows: Rows, cell: PageCell) -> None:
-    """Put a record where it belongs by its shape; one that is no row of a session is left out."""
-    for name in TABLES:
-        row: Row = cell.values
-        if row[:1] == (None,):  # SQLite leaves the number out of the record
-            row = (cell.rowid, *row[1:])
-        if (cell.rowid is None) == (name == "edge") and _fits(name, row):
-            rows.tables[name].setdefault(row[:2] if name == "edge" else cell.rowid, row)
-            return
-
-
-def _fits(table: str, row: Row) -> bool:
-    if len(row) not in _LENGTHS[table]:
-        return False
-    try:
-        check_row(table, row)
-    except RowError:
-        return False
-    # Breaks of the host have the same columns.
-    return table != "ping" or 0 <= row[2] - row[1] <= _TRIP_NS

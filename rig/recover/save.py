@@ -13,15 +13,10 @@ from rig.session.schema import OLDER, RunState
 from rig.session.store import Session
 
 if TYPE_CHECKING:
-    import os
-
     from rig.recover.examine import ExaminedFile
-    from rig.recover.rows import Rows
 
 
-def save(
-    examined: ExaminedFile, target: str | os.PathLike[str], protocol: str | None = None
-) -> list[str]:
+def save(examined: ExaminedFile, target: str | Path, protocol: str | None = None) -> list[str]:
     """Write a new session with everything that could be read.
 
     Parameters
@@ -47,15 +42,9 @@ def save(
         raise SessionError(f"{examined.snapshot.path} is not a session file: {examined.foreign}")
     rows = examined.rows
     source, text = _protocol(examined, protocol)
-    simulated, notes = _find_world(rows)
-    session = Session.create(
-        target,
-        text,
-        source,
-        simulated=simulated,
-        origin=rows.meta.get("origin", f"recovered from {examined.snapshot.path.name}"),
-    )
-    with session:
+    simulated, notes = _find_world(examined)
+    origin = rows.meta.get("origin", f"recovered from {examined.snapshot.path.name}")
+    with Session.create(target, text, source, simulated=simulated, origin=origin) as session:
         for table in ("identity", "ping", "reference", "host_break", "bytes", "attachment"):
             session.add_rows(table, [row[1:] for row in rows.in_order(table)])
         notes += _drops(session, examined)
@@ -73,17 +62,16 @@ def _protocol(examined: ExaminedFile, file: str | None) -> tuple[str, str]:
             raise SessionError(f"cannot read {file}: {error}") from error
     rows = examined.rows
     if rows.protocol is None or rows.protocol_altered:
-        raise SessionError(
-            f"{examined.snapshot.path} has lost its protocol file", "give it: --protocol FILE"
-        )
+        path = examined.snapshot.path
+        raise SessionError(f"{path} has lost its protocol file", "give it: --protocol FILE")
     return rows.protocol
 
 
-def _find_world(rows: Rows) -> tuple[bool, list[str]]:
+def _find_world(examined: ExaminedFile) -> tuple[bool, list[str]]:
     """Say whether the data are simulated; where nobody knows they are stamped so."""
-    if "simulated" in rows.meta:
-        return rows.meta["simulated"] == "true", []
-    for identity in rows.in_order("identity"):
+    if world := examined.rows.meta.get("simulated", ""):
+        return world == "true", []
+    for identity in examined.rows.in_order("identity"):
         port = json.loads(identity[2]).get("port")
         if isinstance(port, str):
             return is_simulated(port), []
@@ -92,16 +80,14 @@ def _find_world(rows: Rows) -> tuple[bool, list[str]]:
 
 def _drops(session: Session, examined: ExaminedFile) -> list[str]:
     """Add drops and the log of states; a drop that no state tells of gets one."""
-    seen = set()
+    jobs = set()
     for drop, _, host_ns, provenance in examined.drops:
-        if drop.job not in seen:
+        if drop.job not in jobs:
             session.add_drop(drop, host_ns=host_ns, provenance=provenance)
-        seen.add(drop.job)
+        jobs.add(drop.job)
     states = examined.rows.in_order("run_state")
     session.add_rows("run_state", [row[1:] for row in states])
-    last_ns = states[-1][-1] if states else 0
-    notes = []
-    for run, attempt in sorted(seen - {row[1:3] for row in states}):
-        session.add_state(run, attempt, RunState.RECORDED, last_ns)
-        notes.append(f"run {run}, attempt {attempt}: its verdict; rig run judges it anew")
-    return notes
+    untold = sorted(jobs - {row[1:3] for row in states})
+    for job in untold:
+        session.add_state(*job, RunState.RECORDED, states[-1][-1] if states else 0)
+    return [f"{job}: its verdict; rig run judges it anew" for job in untold]

@@ -5,20 +5,19 @@ from __future__ import annotations
 import os
 import sqlite3
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 from rig.errors import SessionError
 from rig.files import require_file
-from rig.session.database import copy_session
-from rig.session.faults import UNREADABLE
+from rig.session.database import copy_session, open_database
+from rig.session.faults import UNREADABLE, translate_errors
 from rig.session.lock import writer_of
 from rig.session.store import Session
 
 
-@dataclass(frozen=True, slots=True)
-class SessionCopy:
+class SessionCopy(NamedTuple):
     """A session file.
 
     Attributes
@@ -45,7 +44,7 @@ class SessionCopy:
     trouble: str
 
 
-def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
+def take_snapshot(path: str | Path) -> SessionCopy:
     """Read a session file and ask SQLite about a copy of it.
 
     Raises
@@ -55,36 +54,24 @@ def take_snapshot(path: str | os.PathLike[str]) -> SessionCopy:
     """
     place = Path(os.path.realpath(path))
     writer, logged = writer_of(place), None
-    try:
+    with translate_errors(Path(path)), TemporaryDirectory(prefix="rig-recover-") as folder:
         require_file(place)
-        with TemporaryDirectory(prefix="rig-recover-") as folder:
-            copy = Path(folder) / "copy"
-            if writer:
-                _copy_beside_writer(place, copy)
-            else:
-                copy_session(place, Path(folder))
-                if copy.with_name("copy-wal").exists():
-                    logged = _fold_in(copy)
-            data = copy.read_bytes()
-            trouble = _trouble(copy, place.name)
-    except SessionError:
-        raise
-    except OSError as error:
-        raise SessionError(
-            f"cannot read {path}: {error.strerror or error}",
-            "check its name and permissions, and that there is room for a copy in TMPDIR",
-        ) from error
+        copy = Path(folder) / "copy"
+        if writer:
+            _copy_beside_writer(place, copy)
+        else:
+            copy_session(place, Path(folder))
+            if copy.with_name("copy-wal").exists():
+                logged = _fold_in(copy)
+        data, trouble = copy.read_bytes(), _trouble(copy, place.name)
     return SessionCopy(place, data, logged, writer, os.access(place, os.W_OK), trouble)
 
 
 def _copy_beside_writer(place: Path, copy: Path) -> None:
     """Let SQLite copy it: bytes that change meanwhile would not fit together."""
     try:
-        with (
-            closing(sqlite3.connect(f"{place.as_uri()}?mode=ro", uri=True)) as source,
-            closing(sqlite3.connect(copy)) as target,
-        ):
-            source.backup(target)
+        with closing(open_database(place, "ro")) as source, closing(sqlite3.connect(copy)) as new:
+            source.backup(new)
     except UNREADABLE:
         copy.write_bytes(place.read_bytes())
 

@@ -5,36 +5,36 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rig.errors import InputError, SessionError
 from rig.files import replacing, require_file
 from rig.reasons import make_error
-from rig.session.faults import not_a_session, translate_errors
-from rig.session.foreign import check_schema, guard
+from rig.session.faults import translate_errors
+from rig.session.foreign import check_schema
 from rig.session.hashes import extend_chain
 from rig.session.lock import writer_of
-from rig.session.schema import (
-    SCHEMA_VERSION,
-    create_script,
-    insert_statement,
-    upgrade_script,
-)
+from rig.session.schema import SCHEMA_VERSION, TABLES, Record, create_script, upgrade_script
 
+_GUARDS = "PRAGMA foreign_keys = ON; PRAGMA recursive_triggers = ON;"
+_READING = f"{_GUARDS} PRAGMA query_only = ON;"
+# macOS: fsync alone leaves data in the drive's cache.
+_DURABLE = "PRAGMA synchronous = FULL; PRAGMA fullfsync = ON; PRAGMA checkpoint_fullfsync = ON;"
+_WRITING = f"{_GUARDS} PRAGMA journal_mode = WAL; {_DURABLE}"
 _BUSY_S = 2.0  # only a program other than this one can hold the database for longer
 
 
-def build(path: Path, meta: dict[str, str], protocol_source: str, protocol_text: str) -> None:
+def build(path: Path, first: Record) -> None:
     """Make a new session file, whole or not at all.
 
     Parameters
     ----------
     path
         Where nothing is yet; the caller holds its lock.
-    meta, protocol_source, protocol_text
-        The first rows.
+    first
+        The first rows, by table.
 
     Raises
     ------
@@ -45,8 +45,8 @@ def build(path: Path, meta: dict[str, str], protocol_source: str, protocol_text:
         raise make_error(SessionError, "session_there", path=path)
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
         memory.executescript(f"BEGIN;\n{create_script()}COMMIT;")
-        memory.executemany(insert_statement("meta"), meta.items())
-        memory.execute(insert_statement("protocol"), (1, protocol_source, protocol_text))
+        for table, rows in first.items():
+            memory.executemany(TABLES[table].insert, rows)
         extend_chain(memory)
         content = memory.serialize()
     try:
@@ -71,7 +71,7 @@ def check_place(path: Path) -> None:
     except OSError as error:
         raise make_error(SessionError, "session_absent", path=path, text=error) from error
     if size == 0:  # SQLite would take it for an empty database
-        raise not_a_session(path, "it is empty")
+        raise make_error(SessionError, "not_a_session", path=path, text="it is empty")
 
 
 def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
@@ -84,30 +84,19 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
     """
     # Never read the header by hand: closing a second handle on the file would drop the POSIX
     # locks of a writer in this very process.
-    with translate_errors(path):
-        connection = _reading(path) if readonly else _connect(path, "rw")
-        try:
-            guard(connection)
-            version = check_schema(path, connection)
-            connection.execute("PRAGMA foreign_keys = ON")
-            connection.execute("PRAGMA recursive_triggers = ON")
-            if readonly:
-                connection.execute("PRAGMA query_only = ON")
-            else:
-                connection.execute("PRAGMA journal_mode = WAL")
-                connection.execute("PRAGMA synchronous = FULL")
-                # macOS: fsync alone leaves data in the drive's cache.
-                connection.execute("PRAGMA fullfsync = ON")
-                connection.execute("PRAGMA checkpoint_fullfsync = ON")
-                for newer in range(version + 1, SCHEMA_VERSION + 1):
-                    connection.executescript(upgrade_script(newer))
-        except BaseException:
-            connection.close()
-            raise
+    with translate_errors(path), ExitStack() as undo:
+        connection = _reading(path) if readonly else open_database(path, "rw")
+        undo.callback(connection.close)
+        version = check_schema(path, connection)
+        connection.executescript(_READING if readonly else _WRITING)
+        for newer in range(SCHEMA_VERSION if readonly else version, SCHEMA_VERSION):
+            connection.executescript(upgrade_script(newer + 1))
+        undo.pop_all()
     return connection
 
 
-def _connect(path: Path, mode: str) -> sqlite3.Connection:
+def open_database(path: Path, mode: str) -> sqlite3.Connection:
+    """Open a file as SQLite's, whatever is in it."""
     uri = f"{path.as_uri()}?mode={mode}"
     return sqlite3.connect(uri, uri=True, timeout=_BUSY_S, isolation_level=None)
 
@@ -117,17 +106,14 @@ def copy_session(path: Path, folder: Path) -> Path:
 
     Raises
     ------
-    SessionError
+    OSError
         It cannot be read, or there is no room for it.
     """
     copy = folder / "copy"
     log = path.with_name(path.name + "-wal")
-    try:
-        shutil.copyfile(path, copy)
-        if log.is_file() and log.stat().st_size:
-            shutil.copyfile(log, folder / "copy-wal")
-    except OSError as error:
-        raise make_error(SessionError, "session_unreadable", path=path, text=error) from error
+    shutil.copyfile(path, copy)
+    if log.is_file() and log.stat().st_size:
+        shutil.copyfile(log, folder / "copy-wal")
     return copy
 
 
@@ -136,27 +122,19 @@ def _reading(path: Path) -> sqlite3.Connection:
     # A log whose writer is gone would be brought into the file by whoever closes it last.
     leftover = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
     if leftover and not writer_of(path):
-        connection = _read_copy(path)
-        if not writer_of(path):  # else it may have been copied in the middle of a write
-            return connection
-        connection.close()
-    return _connect(path, _reading_mode(path))
-
-
-def _read_copy(path: Path) -> sqlite3.Connection:
-    with TemporaryDirectory(prefix="rig-session-") as folder:
-        copy = copy_session(path, Path(folder))
         memory = sqlite3.connect(":memory:", isolation_level=None)
-        with closing(_connect(copy, "rw")) as source:
-            source.backup(memory)
-    return memory
-
-
-def _reading_mode(path: Path) -> str:
+        with TemporaryDirectory(prefix="rig-session-") as folder:
+            copy = copy_session(path, Path(folder))
+            with closing(open_database(copy, "rw")) as source:
+                source.backup(memory)
+        if not writer_of(path):  # else it may have been copied in the middle of a write
+            return memory
+        memory.close()
     # WAL keeps a log and shared memory beside the database. A read-only handle would make them
     # and could not take them away again, so where writing is allowed the guard is query_only.
     if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK):
-        return "rw"
+        return open_database(path, "rw")
     # Without a log nobody is writing: on a CD or a write-protected share the file may be read
     # as it stands.
-    return "ro" if path.with_name(path.name + "-wal").exists() else "ro&immutable=1"
+    logged = path.with_name(path.name + "-wal").exists()
+    return open_database(path, "ro" if logged else "ro&immutable=1")

@@ -6,18 +6,15 @@ Everyone who reads drops, for results or to save what is left of a file, asks he
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from enum import StrEnum
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from rig.link.messages import TEST_RUN, pack_events
 from rig.link.transcript import Incoming, Record, Restart, Transcript
 from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
 
 _U32 = (1 << 32) - 1
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
@@ -64,8 +61,7 @@ class ByteReplay:
 
     def acknowledged_drops(self) -> list[Drop]:
         """List the drops that the host has read enough of, without those of no plan."""
-        drops = (record for record in self.records if isinstance(record, Drop))
-        return [drop for drop in drops if drop.run != TEST_RUN]
+        return [told for told in self.records if isinstance(told, Drop) and told.run != TEST_RUN]
 
     def unfinished_drops(self) -> list[Drop]:
         """List the drops that were never acknowledged, as far as they are there."""
@@ -77,7 +73,7 @@ class ByteReplay:
         return {drop.job: drop for drop in drops}
 
 
-def check_drop(stored: Drop, replayed: Mapping[Job, Drop], *, torn: bool = False) -> Fate:
+def check_drop(stored: Drop, replayed: Mapping[Job, Drop]) -> Fate:
     """Compare a stored drop with what the bytes say, and where they are damaged, with itself.
 
     Parameters
@@ -86,28 +82,21 @@ def check_drop(stored: Drop, replayed: Mapping[Job, Drop], *, torn: bool = False
         As its rows give it.
     replayed
         From `ByteReplay.drops`.
-    torn
-        Whether rows of it are missing, or cannot be.
     """
     again = replayed.get(stored.job)
     if again is None:
-        whole = not torn and _sound(stored) and not _under_another_name(stored, replayed)
-        good = Fate.IMPORTED if stored.certificate is None else Fate.UNCONFIRMED
-        return good if whole else Fate.PARTIAL
-    if not torn and as_old_as(stored, again) == stored:
+        told = [(drop.certificate, drop.fire_tick) for drop in replayed.values()]
+        moved = stored.certificate and (stored.certificate, stored.fire_tick) in told
+        if moved or not _sound(stored):
+            return Fate.PARTIAL  # at best the bytes have it under another name
+        return Fate.IMPORTED if stored.certificate is None else Fate.UNCONFIRMED
+    if as_old_as(stored, again) == stored:
         return Fate.CONFIRMED
     if again.certificate is not None and again.tick_hz:
         holds = _account_holds(again, again.certificate)
         if holds or (holds is None and not again.faults):
             return Fate.RESTORED
-    return Fate.PARTIAL if torn or not _sound(stored) else Fate.UNCONFIRMED
-
-
-def _under_another_name(stored: Drop, replayed: Mapping[Job, Drop]) -> bool:
-    own = stored.certificate, stored.fire_tick
-    return stored.certificate is not None and any(
-        own == (drop.certificate, drop.fire_tick) for drop in replayed.values()
-    )
+    return Fate.UNCONFIRMED if _sound(stored) else Fate.PARTIAL
 
 
 def as_old_as(stored: Drop, drop: Drop) -> Drop:
@@ -124,8 +113,8 @@ def as_old_as(stored: Drop, drop: Drop) -> Drop:
 
 def _sound(drop: Drop) -> bool:
     """Whether nothing in a stored record contradicts it; one with faults is void by itself."""
-    if drop.faults:
-        return True
+    if drop.damage or drop.faults:
+        return not drop.damage
     seen = drop.certificate
     return bool(drop.edges) if seen is None else _account_holds(drop, seen) is not False
 

@@ -1,4 +1,4 @@
-"""SQLite's errors in the user's words, each with what to do next."""
+"""What is wrong with a session file in the user's words, each with what to do next."""
 
 from __future__ import annotations
 
@@ -20,27 +20,30 @@ _SAME = {
     "sqlite_perm": "sqlite_cantopen",
 }
 """Errors of SQLite about which there is no more to say than another code does."""
-
-
-def not_a_session(path: Path, why: str) -> SessionError:
-    """Error for a file that is something else."""
-    return make_error(SessionError, "not_a_session", path=path, text=why)
+_OTHERS = {
+    sqlite3.Error: "sqlite_failed",
+    UnicodeDecodeError: "sqlite_corrupt",
+    OSError: "session_unreadable",
+    Exception: "sqlite_constraint",  # what Python does not put into a row
+}
+"""What else there is, the narrower first."""
 
 
 def as_session_error(path: Path, error: Exception) -> SessionError:
-    """Translate an error of SQLite or of a row that Python refuses; its own words are kept."""
+    """Translate an error of SQLite, of the disk or of a row; its own words are kept."""
     name = getattr(error, "sqlite_errorname", "")  # absent on errors of the Python wrapper
-    if not isinstance(error, sqlite3.Error):
-        name = "sqlite_corrupt" if isinstance(error, UNREADABLE) else "sqlite_constraint"
     primary = "_".join(name.lower().split("_")[:2])  # of SQLITE_IOERR_WRITE
-    code = _SAME.get(primary, primary if primary in WORDINGS else "sqlite_failed")
+    other = next(code for kind, code in _OTHERS.items() if isinstance(error, kind))
+    code = _SAME.get(primary, primary if primary in WORDINGS else other)
     return make_error(SessionError, code, path=path, text=error)
 
 
 @contextmanager
 def translate_errors(path: Path) -> Iterator[None]:
-    """Raise SQLite's errors inside the block as `SessionError`."""
+    """Raise what makes a session unreadable inside the block as `SessionError`."""
     try:
         yield
-    except UNREADABLE as error:
+    except SessionError:
+        raise
+    except (*UNREADABLE, OSError) as error:
         raise as_session_error(path, error) from error

@@ -10,17 +10,12 @@ from __future__ import annotations
 import sqlite3
 from contextlib import closing
 from functools import cache
-from typing import TYPE_CHECKING, TypeAlias
+from itertools import repeat
+from pathlib import Path
 
 from rig.errors import SessionError
 from rig.reasons import make_error
-from rig.session.faults import not_a_session
-from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, create_script
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    Shape: TypeAlias = tuple[object, ...]
+from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, Row, create_script
 
 LONGEST_VALUE = 1 << 26
 """Bytes of one value; the longest that is ever written is a protocol or a burst of edges."""
@@ -30,28 +25,16 @@ _MOST_STEPS = 1 << 31
 _OF_ANALYZE = {"sqlite_stat1", "sqlite_stat4"}  # left behind by somebody's ANALYZE
 
 
-def guard(connection: sqlite3.Connection) -> None:
-    """Bound what one value may cost, whatever the file says of its length."""
-    # Not `trusted_schema = OFF`: SQLite then refuses the json_valid of our own tables, and once
-    # `check_schema` has been through there is nothing else in the file that could run.
-    connection.execute("PRAGMA cell_size_check = ON")
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
-
-
 def limit_steps(connection: sqlite3.Connection) -> None:
     """Have statements end that take far more steps, from now on, than any session needs."""
-    budget = _MOST_STEPS
-
-    def step() -> bool:
-        nonlocal budget
-        budget -= _STEPS
-        return budget < 0
-
-    connection.set_progress_handler(step, _STEPS)
+    looks = repeat(False, _MOST_STEPS // _STEPS)
+    connection.set_progress_handler(lambda: next(looks, True), _STEPS)
 
 
 def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     """Compare a file's tables, indices and triggers with those that this program makes.
+
+    From now on it is bounded too what one value may cost, whatever the file says of its length.
 
     Returns
     -------
@@ -63,42 +46,43 @@ def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     SessionError
         It is no session, a newer one, or its tables are others or built in another way.
     """
+    # Not `trusted_schema = OFF`: SQLite then refuses the json_valid of our own tables, and once
+    # all has been compared there is nothing else in the file that could run.
+    connection.execute("PRAGMA cell_size_check = ON")
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application != APPLICATION_ID:
-        raise not_a_session(path, "it is another program's SQLite database")
+        text = "it is another program's SQLite database"
+        raise make_error(SessionError, "not_a_session", path=path, text=text)
     if version < 1:
-        raise not_a_session(path, "it was never finished")
+        raise make_error(SessionError, "not_a_session", path=path, text="it was never finished")
     if version > SCHEMA_VERSION:
         formats = {"format": version, "known": SCHEMA_VERSION}
         raise make_error(SessionError, "session_newer", path=path, **formats)
     shapes = _schema(connection)
-    for name, shape in _schema_of(version).items():
-        if shapes.pop(name, None) != shape:
-            raise _alteration(path, f"{name} is missing or not as rig makes it")
-    if strange := sorted(shapes.keys() - _OF_ANALYZE):
-        raise _alteration(path, f"it has {strange[0]}, which rig does not make")
+    own = _schema_of(version)
+    changed = [name for name in own if shapes.get(name) != own[name]]
+    altered = [f"{name} is missing or not as rig makes it" for name in changed]
+    strange = sorted(shapes.keys() - own.keys() - _OF_ANALYZE)
+    for text in [*altered, *(f"it has {name}, which rig does not make" for name in strange)]:
+        raise make_error(SessionError, "session_altered", path=path, text=text)
     return int(version)
 
 
-def _alteration(path: Path, text: str) -> SessionError:
-    return make_error(SessionError, "session_altered", path=path, text=text)
-
-
 @cache
-def _schema_of(version: int) -> dict[str, Shape]:
+def _schema_of(version: int) -> dict[str, Row]:
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(create_script(version))
         return _schema(connection)
 
 
-def _schema(connection: sqlite3.Connection) -> dict[str, Shape]:
+def _schema(connection: sqlite3.Connection) -> dict[str, Row]:
     """Give by name what there is: tables with their columns, all else as it is written."""
     kinds = {name: tuple(how) for _, name, *how in connection.execute("PRAGMA table_list")}
-    shapes: dict[str, Shape] = {}
-    for kind, name, of, sql in connection.execute(
-        "SELECT type, name, tbl_name, sql FROM main.sqlite_master"
-    ):
+    shapes: dict[str, Row] = {}
+    rows = connection.execute("SELECT type, name, tbl_name, sql FROM main.sqlite_master")
+    for kind, name, of, sql in rows:
         if kind == "table":
             columns = connection.execute("SELECT * FROM pragma_table_xinfo(?)", (name,))
             table_kind, _, *how = kinds.get(name, ("", 0))

@@ -10,16 +10,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.records import Job
-from rig.session.schema import OLDER, TABLES, insert_statement
+from rig.session.schema import OLDER, TABLES, Row
 
 if TYPE_CHECKING:
     import sqlite3
-    from collections.abc import Iterable, Mapping, Sequence
-
-    KeyedRow = tuple[int, Sequence[Any]]
 
 HASHED = [name for name in TABLES if name != "hash"]
 
@@ -31,51 +29,44 @@ class ChainEnd(NamedTuple):
     digest: bytes
 
 
-def read_end(connection: sqlite3.Connection) -> ChainEnd:
-    """Read where the chain of a session ends, which takes time with its length."""
-    last = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
-    tip = connection.execute("SELECT digest FROM hash ORDER BY id DESC LIMIT 1").fetchone()
-    return ChainEnd(dict(last), tip[0] if tip else b"")
-
-
 def extend_chain(connection: sqlite3.Connection, end: ChainEnd | None = None) -> ChainEnd:
     """Hash all rows that no hash covers, in the open transaction.
 
     Parameters
     ----------
     end
-        Where the committed chain ends, if that is known.
+        Where the committed chain ends, if that is known; to read it takes time with its length.
 
     Returns
     -------
     ChainEnd
         Where it ends once the transaction is committed.
     """
-    covered, digest = end or read_end(connection)
-    last = {**covered}
+    if end is None:
+        covered = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
+        tip = connection.execute("SELECT digest FROM hash ORDER BY id DESC LIMIT 1").fetchone()
+        end = ChainEnd(dict(covered), tip[0] if tip else b"")
+    last, digest = {**end.last}, end.digest
     for table in HASHED:
-        # A table that is kept as an index has no number of its own; edges go by their drop's.
-        key, then = ('"drop"', ", idx") if table == "edge" else ("rowid", "")
-        sql = f'SELECT {key}, * FROM "{table}" WHERE {key} > ? ORDER BY {key}{then}'  # noqa: S608
+        # A row that has no number of its own goes by that of another: an edge by its drop's.
+        order = TABLES[table].order
+        number = order.partition(",")[0]
+        sql = f'SELECT {number}, * FROM "{table}" WHERE {number} > ? ORDER BY {order}'  # noqa: S608
         rows = connection.execute(sql, (last.get(table, 0),)).fetchall()
         if rows:
             last[table] = rows[-1][0]
             digest = _digest(digest, table, (row[1:] for row in rows))
-            connection.execute(insert_statement("hash"), (None, table, last[table], digest))
+            connection.execute(TABLES["hash"].insert, (None, table, last[table], digest))
     return ChainEnd(last, digest)
 
 
-def check_chain(
-    links: Iterable[Sequence[Any]], rows: Mapping[str, Iterable[KeyedRow]]
-) -> list[str]:
-    """Compare a chain with the rows that it covers.
+def check_chain(tables: Mapping[str, Mapping[Row, Row]]) -> list[str]:
+    """Compare the chain of a session with the rows that it covers.
 
     Parameters
     ----------
-    links
-        The rows of table ``hash`` in order.
-    rows
-        Those of the other tables in order, each with its number; of an edge the drop's.
+    tables
+        The rows of each by their keys, which begin with the number that the chain goes by.
 
     Returns
     -------
@@ -83,28 +74,24 @@ def check_chain(
         What was altered, a line each; empty where everything agrees, or where there is no chain.
     """
     faults: list[str] = []
-    ahead = {table: deque(rows[table]) for table in HASHED}
-    drops = {number: str(Job(*row[1:3])) for number, row in ahead["drop"]}
+    ahead = {table: deque(sorted(tables[table].items())) for table in HASHED}
+    jobs = {number: str(Job(*row[1:3])) for (number,), row in ahead["drop"]}
     before, due, since = b"", 1, dict.fromkeys(HASHED, 0)
-    for number, table, last, digest in links:
+    for _, (number, table, last, digest) in sorted(tables["hash"].items()):
         if number != due:
             faults.append(f"table hash: rows {due} to {number - 1} are missing")
-        batch = []
-        while ahead.get(table) and ahead[table][0][0] <= last:
-            batch.append(ahead[table].popleft()[1])
+        rows, batch = ahead.get(table), []
+        while rows and rows[0][0] < (last + 1,):
+            batch.append(rows.popleft()[1])
         if number == due and table != OLDER and digest != _digest(before, table, batch):
             span = range(since.get(table, 0) + 1, last + 1)
-            known = drops if table in {"drop", "edge"} else {}
-            own = [name for n, name in known.items() if n in span]
+            own = [jobs[n] for n in jobs if n in span and table in {"drop", "edge"}]
             names = "; ".join(own) or f"rows {span.start} to {last}"
             faults.append(f"table {table:.20}: not as recorded: {names}")
         since[table], before, due = last, digest, number + 1
     if due > 1:
-        faults += [
-            f"table {table}: rows after {since[table]} are in no hash"
-            for table, left in ahead.items()
-            if left
-        ]
+        left = [table for table in HASHED if ahead[table]]
+        faults += [f"table {table}: rows after {since[table]} are in no hash" for table in left]
     return faults
 
 
@@ -114,7 +101,7 @@ def protocol_first(links: Sequence[Sequence[Any]]) -> bool | None:
     Parameters
     ----------
     links
-        As for `check_chain`, which must find no fault in them.
+        The rows of table ``hash`` in order, in which `check_chain` finds no fault.
     """
     tables = [table for _, table, *_ in links]
     if not tables or OLDER in tables:

@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import NamedTuple
 
 from rig.session.faults import as_session_error
 from rig.session.hashes import ChainEnd, extend_chain
-
-
-class Statement(NamedTuple):
-    """One SQL statement and the rows it is run with."""
-
-    sql: str
-    rows: Sequence[Sequence[object]]
-
+from rig.session.schema import TABLES, Record
 
 _BAD_ROW = (
     sqlite3.IntegrityError,
@@ -44,54 +36,53 @@ class Journal:
         In manual transaction mode (``isolation_level=None``).
     path
         For messages.
+
+    Attributes
+    ----------
+    pending
+        Records not yet on the disk.
+    begun_s
+        When the disk began with the write under way, by the monotonic clock; `None` for none.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self._connection = connection
         self._path = path
-        self._pending: list[tuple[Statement, ...]] = []
+        self.pending: list[Record] = []
         self._applied = 0  # how many of the pending the open transaction holds
-        self._failed = False
-        self._begun_s: float | None = None
+        self.begun_s: float | None = None
         self._chain_end: ChainEnd | None = None  # as committed, once that is known
-
-    def __len__(self) -> int:
-        """Count the records not yet on the disk."""
-        return len(self._pending)
-
-    @property
-    def write_s(self) -> float:
-        """How long the disk has been at the write under way; 0 for none. For other threads too."""
-        begun = self._begun_s
-        return 0.0 if begun is None else monotonic() - begun
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
         """Time a write; when the disk fails all that is pending is applied anew by the next."""
-        self._begun_s = monotonic()
+        self.begun_s = monotonic()
         try:
             yield
         except sqlite3.Error as error:
-            self._give_up()
+            self._connection.rollback()
             raise as_session_error(self._path, error) from error
         finally:
-            self._begun_s = None
+            self.begun_s = None
 
-    def add(self, *statements: Statement) -> None:
-        """Put statements into the open transaction, all or none of them.
+    def add(self, record: Record) -> None:
+        """Put rows into the open transaction, all or none of them.
 
         Raises
         ------
         SessionError
             If the rows are refused (they are forgotten) or the disk fails (they are kept).
         """
-        self._pending.append(statements)
-        # After a failure wait for commit(): trying the whole backlog at every row would be
-        # quadratic, and the caller already knows.
-        if not self._failed:
+        # What waits is in the open transaction. Without one the disk has failed, then wait for
+        # commit(): trying the whole backlog at every row would be quadratic, and the caller
+        # already knows.
+        failed = bool(self.pending) and not self._connection.in_transaction
+        self.pending.append(record)
+        if not failed:
             with self._writing():
                 refusal = self._run()
-            self._report(refusal)
+            if refusal is not None:
+                raise as_session_error(self._path, refusal) from refusal
 
     def commit(self) -> None:
         """Make everything added so far durable.
@@ -101,7 +92,7 @@ class Journal:
         SessionError
             If the disk fails; nothing is forgotten and a later call tries again.
         """
-        if self._pending:
+        if self.pending:
             with self._writing():
                 self._commit()
 
@@ -123,17 +114,16 @@ class Journal:
         sqlite3.Error, OSError
             It cannot be read, or not be written there.
         """
-        self._give_up()
+        self._connection.rollback()
         with closing(sqlite3.connect(place, isolation_level=None)) as target:
             self._connection.backup(target)
             target.execute("PRAGMA synchronous = FULL")
             rescue = Journal(target, place)
-            rescue._pending = self._pending
-            refused = len(self._pending)
+            rescue.pending = self.pending
+            refused = len(self.pending)
             rescue._run()
-            refused -= len(self._pending)
+            refused -= len(self.pending)
             rescue._commit()
-        self._failed = False
         return refused
 
     def _commit(self) -> None:
@@ -142,9 +132,9 @@ class Journal:
             end = extend_chain(self._connection, self._chain_end)
             self._connection.execute("COMMIT")
             self._chain_end = end
-        self._pending.clear()
-        self._applied = 0
-        self._report(refusal)
+        self.pending.clear()
+        if refusal is not None:
+            raise as_session_error(self._path, refusal) from refusal
 
     def _run(self) -> Exception | None:
         """Apply what is pending; records that are refused are left out, the last one returned."""
@@ -152,27 +142,22 @@ class Journal:
         if not self._connection.in_transaction:
             self._applied = 0
             self._connection.execute("BEGIN IMMEDIATE")
-        while self._applied < len(self._pending):
+        while self._applied < len(self.pending):
             try:
-                self._apply(self._pending[self._applied])
+                self._apply(self.pending[self._applied])
             except _BAD_ROW as error:
-                del self._pending[self._applied]
+                del self.pending[self._applied]
                 refusal = error
             else:
                 self._applied += 1
-        self._failed = False
         return refusal
 
-    def _report(self, refusal: Exception | None) -> None:
-        if refusal is not None:
-            raise as_session_error(self._path, refusal) from refusal
-
-    def _apply(self, statements: tuple[Statement, ...]) -> None:
+    def _apply(self, record: Record) -> None:
         # Even one executemany can fail half-way through its rows.
         self._connection.execute("SAVEPOINT record")
         try:
-            for statement in statements:
-                self._connection.executemany(statement.sql, statement.rows)
+            for table, rows in record.items():
+                self._connection.executemany(TABLES[table].insert, rows)
         except _BAD_ROW:
             self._connection.execute("ROLLBACK TO record")
             raise
@@ -180,9 +165,3 @@ class Journal:
             # When the disk failed SQLite has already rolled everything back, savepoint included.
             if self._connection.in_transaction:
                 self._connection.execute("RELEASE record")
-
-    def _give_up(self) -> None:
-        self._failed = True
-        self._applied = 0
-        if self._connection.in_transaction:
-            self._connection.rollback()

@@ -37,7 +37,10 @@ class WriterLock:
             self.path, _LOOK_S, thread_local=False, poll_interval=_POLL_S, fallback_to_soft=False
         )
         try:
-            _refuse_second_name(session)
+            with suppress(FileNotFoundError):
+                # A hard link has a lock and a log of its own: two writers would destroy the file.
+                if session.stat().st_nlink > 1:
+                    raise make_error(SessionError, "session_two_names", path=session)
             session.parent.stat()  # filelock would make it
             self._lock.acquire()
             if has_fcntl:  # elsewhere the lock's file cannot be written, or says who has it
@@ -88,10 +91,3 @@ def writer_of(session: Path) -> str:
             time.sleep(pause_s)
         return _holder(lock)
     return ""
-
-
-def _refuse_second_name(session: Path) -> None:
-    """A hard link has a lock and a log of its own: two writers would destroy the file."""
-    with suppress(FileNotFoundError):
-        if session.stat().st_nlink > 1:
-            raise make_error(SessionError, "session_two_names", path=session)

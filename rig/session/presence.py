@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from pathlib import Path
-
-from rig.files import identity_of
 
 
 class Presence:
@@ -21,38 +20,36 @@ class Presence:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self._files = {
-            file: identity_of(file) for file in (path, path.with_name(path.name + "-wal"))
-        }
-        self._size = path.stat().st_size
+        self._path, self._log = path, path.with_name(path.name + "-wal")
+        self._known = {file: _stat(file) for file in (path, self._log)}
 
     def remove_log(self) -> None:
         """Take away the log of a file that is elsewhere, once it is empty.
 
         SQLite leaves it, and would apply it to any other file that comes to this place.
         """
-        log = self._path.with_name(self._path.name + "-wal")
-        with suppress(OSError):
-            if identity_of(log) == self._files[log] and log.stat().st_size == 0:
-                log.unlink()
+        known, now = self._known[self._log], _stat(self._log)
+        if known and now and os.path.samestat(known, now) and now.st_size == 0:
+            with suppress(OSError):
+                self._log.unlink()
                 self._path.with_name(self._path.name + "-shm").unlink()
 
     def trouble(self) -> str:
         """Say in words what has become of it; empty while it is there."""
-        for path, before in self._files.items():
-            identity = identity_of(path)
-            if before is None:
-                self._files[path] = identity
-            elif identity is None:
-                return f"{path} was deleted or moved"
-            elif identity != before:
-                return f"{path} was replaced by another file"
-        try:
-            size = self._path.stat().st_size
-        except OSError:  # in this very moment
-            return f"{self._path} was deleted or moved"
-        if size < self._size:
-            return f"{self._path} was cut from {self._size} to {size} bytes"
-        self._size = size
+        for path, before in self._known.items():
+            now = _stat(path)
+            if before is not None:
+                if now is None:
+                    return f"{path} was deleted or moved"
+                if not os.path.samestat(now, before):
+                    return f"{path} was replaced by another file"
+                if path == self._path and now.st_size < before.st_size:
+                    return f"{path} was cut from {before.st_size} to {now.st_size} bytes"
+            self._known[path] = now
         return ""
+
+
+def _stat(path: Path) -> os.stat_result | None:
+    with suppress(OSError):
+        return path.stat()
+    return None

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
 from itertools import chain
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
@@ -18,13 +20,10 @@ from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
 from rig.session.rows import RowError, check_row, drop_of, named_values
-from rig.session.schema import TABLES, RunState, read_identity, read_reasons
+from rig.session.schema import TABLES, Row, RunState, read_identity, read_reasons
 
 if TYPE_CHECKING:
     import sqlite3
-    from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
-
 
 T = TypeVar("T")
 Direction = Literal["rx", "tx"]
@@ -37,6 +36,8 @@ MOST_EDGES = 1 << 22
 """Of a drop that no certificate bounds: no timer that works gives more in an hour."""
 _AT_ONCE = 256
 """Rows that are fetched in one go."""
+_AFTER = "WHERE id > ? ORDER BY id"
+"""All but the first so many rows: nothing is ever deleted, so their numbers have no gaps."""
 _ALWAYS = {"created", "rig_version", "simulated", "origin", "protocol_sha256"}
 
 
@@ -89,9 +90,7 @@ class Reader:
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
         self._connection: sqlite3.Connection | None = connection
-        self.meta: Mapping[str, str] = MappingProxyType(
-            {str(key): str(value) for key, value in self._rows("meta")}
-        )
+        self.meta: Mapping[str, str] = MappingProxyType(dict(self._rows("meta")))
         if missing := sorted(_ALWAYS - self.meta.keys()):
             raise self._damage(f"it does not say {missing[0]}")
         if self.meta["simulated"] not in {"true", "false"}:
@@ -104,15 +103,13 @@ class Reader:
     @contextmanager
     def snapshot(self) -> Iterator[None]:
         """See the records as they stand at the first question, whatever another adds meanwhile."""
-        connection = self.connection
-        if not self.readonly or connection.in_transaction:  # it alone writes, or has one
-            yield
-            return
-        connection.execute("BEGIN")
+        begins = self.readonly and not self.connection.in_transaction  # else it alone writes
+        if begins:
+            self.connection.execute("BEGIN")
         try:
             yield
         finally:
-            if self._connection is not None:
+            if begins and self._connection is not None:
                 self._connection.rollback()
 
     @property
@@ -160,24 +157,23 @@ class Reader:
 
         They are read as they are asked for.
         """
-        return self._records(ByteChunk, "bytes", after)
+        return self._records(ByteChunk, "bytes", _AFTER, after)
 
     def pings(self, after: int = 0) -> list[ClockSample]:
         """Clock samples in order, all but the first so many."""
-        # Nothing is ever deleted, so rows are numbered from 1 without gaps.
-        return [*self._records(ClockSample, "ping", after)]
+        return [*self._records(ClockSample, "ping", _AFTER, after)]
 
     def pulses(self) -> list[Pulse]:
         """All pulses of the 1 Hz reference that were asked for, in order."""
-        return [*self._records(Pulse, "reference")]
+        return [*self._records(Pulse, "reference", _AFTER, 0)]
 
     def host_breaks(self) -> list[HostBreak]:
         """When the host slept or its clock was set, in order."""
-        return [*self._records(HostBreak, "host_break")]
+        return [*self._records(HostBreak, "host_break", _AFTER, 0)]
 
     def attached_files(self) -> list[AttachedFile]:
         """All files that were attached, in order."""
-        return [*self._records(AttachedFile, "attachment")]
+        return [*self._records(AttachedFile, "attachment", _AFTER, 0)]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Every attempt at every run, in the order of recording, compared with its bytes.
@@ -201,26 +197,23 @@ class Reader:
 
     def latest_drops(self, run: int | None = None) -> list[Drop]:
         """Return the last attempt at each run, by run, or at one run, compared with its bytes."""
-        last: dict[int, Drop] = {}
-        for drop in self.drops():
-            if run in {None, drop.run} and drop.attempt >= last.get(drop.run, drop).attempt:
-                last[drop.run] = drop
-        return [last[number] for number in sorted(last)]
+        drops = sorted(self.drops(), key=lambda drop: drop.job)
+        return [*{drop.run: drop for drop in drops if run in {None, drop.run}}.values()]
 
     def states(self, run: int | None = None) -> list[StateEntry]:
         """Return the log of run states, in order: the whole of it, or of one run."""
-        rows = self._rows("run_state", "WHERE ?1 IS NULL OR run = ?1 ORDER BY id", run)
-        return [_state(row) for row in rows]
+        which = "WHERE ?1 IS NULL OR run = ?1 ORDER BY id"
+        return [*self._records(_state, "run_state", which, run)]
 
     def fired_ns(self) -> dict[tuple[int, int], int]:
         """Return by run and attempt when the host's log says that it was fired."""
-        fired = (entry for entry in self.states() if entry.state is RunState.FIRED)
-        return {(entry.run, entry.attempt): entry.host_ns for entry in fired}
+        states = self.states()
+        return {entry[:2]: entry.host_ns for entry in states if entry.state is RunState.FIRED}
 
     def latest_state(self, run: int) -> StateEntry | None:
         """Where a run stands; `None` when the log does not name it."""
-        rows = self._rows("run_state", "WHERE run = ? ORDER BY id DESC LIMIT 1", run)
-        return next(map(_state, rows), None)
+        which = "WHERE run = ? ORDER BY id DESC LIMIT 1"
+        return next(self._records(_state, "run_state", which, run), None)
 
     def check(self) -> None:
         """Read everything there is once.
@@ -238,10 +231,10 @@ class Reader:
                 raise self._damage(f"{drop.job}: {drop.damage}")
         _ = self.protocol_text
 
-    def _raw(self, table: str, which: str, *values: object) -> Iterator[tuple[Any, ...]]:
+    def _raw(self, table: str, which: str, *values: object) -> Iterator[Row]:
         """Read rows as they are; `table` and `which` are of this module only."""
 
-        def fetch() -> list[tuple[Any, ...]]:
+        def fetch() -> list[Row]:
             with translate_errors(self.path):
                 return cursor.fetchmany(_AT_ONCE)
 
@@ -253,7 +246,7 @@ class Reader:
         # that comes meanwhile is shown and lost.
         return chain.from_iterable(iter(fetch, []))
 
-    def _rows(self, table: str, which: str = "", *values: object) -> Iterator[tuple[Any, ...]]:
+    def _rows(self, table: str, which: str = "", *values: object) -> Iterator[Row]:
         """Read rows, each of them checked.
 
         Raises
@@ -268,43 +261,40 @@ class Reader:
             self._check(table, row)
             yield row
 
-    def _records(self, kind: Callable[..., T], table: str, after: int = 0) -> Iterator[T]:
-        rows = self._rows(table, "WHERE id > ? ORDER BY id", after)
-        return (kind(*row[1:]) for row in rows)
+    def _records(
+        self, kind: Callable[..., T], table: str, which: str, *args: object
+    ) -> Iterator[T]:
+        return (kind(*row[1:]) for row in self._rows(table, which, *args))
 
-    def _check(self, table: str, row: tuple[Any, ...]) -> None:
+    def _check(self, table: str, row: Row) -> None:
         try:
             check_row(table, row)
         except RowError as error:
             raise self._damage(str(error)) from error
 
-    def _protocol(self) -> tuple[Any, ...]:
+    def _protocol(self) -> Row:
         row = next(self._rows("protocol"), None)
         if row is None:
             raise self._damage("it has lost its protocol")
         return row
 
-    def _drop(self, row: tuple[Any, ...], replayed: Mapping[Job, Drop]) -> Drop:
+    def _drop(self, row: Row, replayed: Mapping[Job, Drop]) -> Drop:
         self._check("drop", row[:3])  # else nobody knows which drop it is
         try:
             check_row("drop", row)
-            edges = self._edges(row)
-            stored = drop_of(row, edges)
-            torn = any(edge[1] != n for n, edge in enumerate(edges))
-            if check_drop(stored, replayed, torn=torn).whole:
+            stored = drop_of(row, self._edges(row))
+            if check_drop(stored, replayed).whole:
                 return stored
-            agree = "its edges do not agree with its bytes or its certificate"
-            why = "edges of it are missing" if torn else agree
+            why = stored.damage or "its edges do not agree with its bytes or its certificate"
         except RowError as error:
             why = str(error)
         # Of its numbers none can be trusted.
-        run, attempt = row[1:3]
-        return Drop(run, attempt, tick_hz=1, edges=(), damage=why)
+        return Drop(row[1], row[2], tick_hz=1, edges=(), damage=why)
 
     def _damage(self, text: str) -> SessionError:
         return make_error(SessionError, "session_wrong", path=self.path, text=text)
 
-    def _edges(self, row: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+    def _edges(self, row: Row) -> list[Row]:
         number, events = row[0], named_values(row)["events"]
         # An event is a change of one gate or more.
         most = MOST_EDGES if events is None else min(MOST_EDGES, GATES * events)
@@ -316,5 +306,5 @@ class Reader:
         return edges
 
 
-def _state(row: tuple[Any, ...]) -> StateEntry:
-    return StateEntry(row[1], row[2], RunState(row[3]), row[5], read_reasons(row[4]))
+def _state(run: int, attempt: int, state: str, reasons: str, host_ns: int) -> StateEntry:
+    return StateEntry(run, attempt, RunState(state), host_ns, read_reasons(reasons))

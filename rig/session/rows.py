@@ -8,12 +8,14 @@ from typing import Any
 
 from rig.printable import encodable
 from rig.records import Certificate, Drop, Edge
-from rig.session.schema import TABLES, read_reasons, write_reasons
+from rig.session.schema import TABLES, Record, read_reasons, write_reasons
 
 _DROP = TABLES["drop"].names()
 _ACCOUNT = [field.name for field in fields(Certificate)]
 _CERTIFIED = [field.name for field in fields(Certificate) if field.default is not None]
 """What every certificate has, whatever the format of the file."""
+_PLAIN = [field.name for field in fields(Drop) if field.name in {*_DROP} - {"faults"}]
+"""What a drop has as its row has it."""
 
 
 class RowError(ValueError):
@@ -37,11 +39,9 @@ def check_row(table: str, row: Sequence[object]) -> None:
     """
     for column, value in zip(TABLES[table].columns, row, strict=False):
         if not column.accepts(value):
-            at = row[:2] if table == "edge" else row[0]
-            raise RowError(
-                f"table {table}, row {at!r:.40}: {column.name} {value!r:.40} is not "
-                f"{column.accepted}"
-            )
+            at = row[0] if TABLES[table].key == 1 else row[: TABLES[table].key]
+            fault = f"{column.name} {value!r:.40} is not {column.accepted}"
+            raise RowError(f"table {table}, row {at!r:.40}: {fault}")
     if table == "drop":
         values = named_values(row)
         if len({values[name] is None for name in _CERTIFIED if name in values}) > 1:
@@ -54,24 +54,22 @@ def named_values(row: Sequence[Any]) -> dict[str, Any]:
 
 
 def drop_of(row: Sequence[Any], edges: Iterable[Sequence[Any]]) -> Drop:
-    """Make a drop of its row and the rows of its edges, all checked."""
-    values = named_values(row)
+    """Make a drop of its row and the rows of its edges, all checked; it is damaged without some."""
+    values, edges = named_values(row), [*edges]
+    torn = any(edge[1] != number for number, edge in enumerate(edges))
     # What an older format has not, its certificate has not either.
     account: dict[str, Any] = {name: values.get(name) for name in _ACCOUNT}
     return Drop(
-        run=values["run"],
-        attempt=values["attempt"],
-        tick_hz=values["tick_hz"],
+        **{name: values[name] for name in _PLAIN},
         edges=tuple(Edge(tick, channel, bool(blocked)) for _, _, tick, channel, blocked in edges),
-        fire_tick=values["fire_tick"],
-        initial_state=values["initial_state"],
         certificate=None if values["events"] is None else Certificate(**account),
         faults=read_reasons(values["faults"]),
+        damage="edges of it are missing" if torn else "",
     )
 
 
-def row_of(drop: Drop, number: int, host_ns: int | None, provenance: str) -> list[object]:
-    """Return the row of a drop; without a certificate its columns are empty."""
+def rows_of(drop: Drop, number: int, host_ns: int | None, provenance: str) -> Record:
+    """Return the rows of a drop by table; without a certificate its columns are empty."""
     values = {
         "id": number,
         "faults": write_reasons(drop.faults),
@@ -79,9 +77,6 @@ def row_of(drop: Drop, number: int, host_ns: int | None, provenance: str) -> lis
         "provenance": encodable(provenance),
         **{name: getattr(drop.certificate, name, None) for name in _ACCOUNT},
     }
-    return [values[name] if name in values else getattr(drop, name) for name in _DROP]
-
-
-def edge_rows(drop: Drop, number: int) -> list[tuple[int, ...]]:
-    """Return the rows of a drop's edges."""
-    return [(number, index, *map(int, edge)) for index, edge in enumerate(drop.edges)]
+    row = [values[name] if name in values else getattr(drop, name) for name in _DROP]
+    edges = [[number, index, *map(int, edge)] for index, edge in enumerate(drop.edges)]
+    return {"drop": [row], "edge": edges}

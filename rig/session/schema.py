@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from rig.boards import GATES
 from rig.printable import encodable
-from rig.reasons import Reason, make_reason, plain_reason, read_record
-from rig.wordings import NOTE
+from rig.reasons import Reason, plain_reason, read_record
+from rig.wordings import NOTE, SENTENCE
+
+Row: TypeAlias = tuple[Any, ...]
+Record: TypeAlias = Mapping[str, Sequence[Sequence[object]]]
+"""Rows that belong together, by table."""
 
 APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
@@ -43,22 +47,23 @@ class RunState(StrEnum):
 
 
 class _Kind(NamedTuple):
-    """A kind of value: its SQL with a place for the column's name, and what it accepts."""
+    """A kind of value: its type and check in SQL, with {} for the column, and what it accepts."""
 
-    sql: str
+    type_name: str
+    check: str
     accepted: str
     accepts: Callable[[Any], bool]
 
 
 def _whole(low: int, high: int, check: str = "") -> _Kind:
     words = f"a whole number from {low} to {high}"
-    return _Kind(f"INTEGER{check}", words, lambda v: type(v) is int and low <= v <= high)
+    return _Kind("INTEGER", check, words, lambda v: type(v) is int and low <= v <= high)
 
 
 def _words(*words: str) -> _Kind:
     quoted = ", ".join(f"'{word}'" for word in words)
     accepted = f"one of {', '.join(words)}"
-    return _Kind(f"TEXT CHECK ({{}} IN ({quoted}))", accepted, lambda value: value in words)
+    return _Kind("TEXT", f" CHECK ({{}} IN ({quoted}))", accepted, lambda value: value in words)
 
 
 def _json(accepted: str, read: Callable[[str], object]) -> _Kind:
@@ -73,7 +78,7 @@ def _json(accepted: str, read: Callable[[str], object]) -> _Kind:
             return False
         return True
 
-    return _Kind("TEXT CHECK (json_valid({}))", accepted, accepts)
+    return _Kind("TEXT", " CHECK (json_valid({}))", accepted, accepts)
 
 
 def read_identity(record: str) -> dict[str, Any]:
@@ -109,13 +114,14 @@ def read_reasons(text: str) -> tuple[Reason, ...]:
     rows = json.loads(text)
     if not isinstance(rows, list):
         raise TypeError(f"{text:.40} is no list of reasons")
-    return tuple(_read_sentence(row) if isinstance(row, str) else read_record(row) for row in rows)
+    return tuple(map(_read_reason, rows))
 
 
-def _read_sentence(text: str) -> Reason:
-    if text.startswith(_OLD_NOTE):
-        return make_reason(NOTE, text=text.removeprefix(_OLD_NOTE))
-    return plain_reason(text)
+def _read_reason(row: object) -> Reason:
+    if not isinstance(row, str):
+        return read_record(row)
+    code = NOTE if row.startswith(_OLD_NOTE) else SENTENCE
+    return plain_reason(row.removeprefix(_OLD_NOTE), code)
 
 
 _U32, _INT64 = (1 << 32) - 1, (1 << 63) - 1
@@ -135,8 +141,8 @@ _KINDS = {
     "hz": _whole(1, _MOST_HZ, " CHECK ({} > 0)"),
     "channel": _whole(0, GATES - 1, " CHECK ({} >= 0)"),
     "bit": _whole(0, 1, " CHECK ({} IN (0, 1))"),
-    "text": _Kind("TEXT", "text", lambda value: type(value) is str),
-    "bytes": _Kind("BLOB", "bytes", lambda value: type(value) is bytes),
+    "text": _Kind("TEXT", "", "text", lambda value: type(value) is str),
+    "bytes": _Kind("BLOB", "", "bytes", lambda value: type(value) is bytes),
     "direction": _words("rx", "tx"),
     "state": _words(*RunState),
     "device": _json("a JSON object of a device", read_identity),
@@ -161,10 +167,10 @@ class TableColumn:
         self._kind, self._optional = _KINDS[word], "empty" in options
         self.accepted = self._kind.accepted
         self.since = next((int(word) for word in options if word.isdecimal()), table_since)
-        key, needed = " PRIMARY KEY", "" if self._optional else " NOT NULL"
-        type_name, _, check = self._kind.sql.partition(" ")
-        rest = f" {check.format(self.name)}" if check else ""
-        self.sql = f'"{self.name}" {type_name}{key if "key" in options else needed}{rest}'
+        demand = "" if self._optional else " NOT NULL"
+        demand = " PRIMARY KEY" if "key" in options else demand
+        check = self._kind.check.format(self.name)
+        self.sql = f'"{self.name}" {self._kind.type_name}{demand}{check}'
 
     def accepts(self, value: object) -> bool:
         """Whether a value may stand here."""
@@ -184,31 +190,51 @@ class SessionTable:
         What its rows are.
     numbered
         Whether its rows are numbered from 1.
+    lengths
+        How many columns it has, in any format.
+    order
+        By which its rows are in order, for SQL: their number, or the columns of a longer key.
+    key
+        How many columns the key has: more than one where SQLite gives a row no number.
+    insert
+        Statement that adds a row of all columns; an empty id is numbered.
     """
 
-    def __init__(self, since: int, meaning: str, rows: list[str]) -> None:
-        self.since, self.meaning = since, meaning
-        more = rows.pop(0).removeprefix("  =") if rows[0].startswith("  =") else "||id = NEW.id"
-        self._constraint, self._option, self._collides = map(str.strip, more.split("|"))
+    def __init__(self, name: str, since: int, meaning: str, rows: list[str]) -> None:
+        self._name, self.since, self.meaning = name, since, meaning
+        unique = rows.pop(0).removeprefix("  = ") if rows[0].startswith("  = ") else "id"
+        self._key, *self._also = unique.split(" | ")
+        self.key = len(self._key.split(", "))
+        self.order = self._key if self.key > 1 else "rowid"
         self.columns = [TableColumn(row, since) for row in rows]
         self.numbered = rows[0].split()[2] == "row"
+        self.lengths = {len(self.names(n)) for n in range(since, SCHEMA_VERSION + 1)}
+        values = ", ".join("?" * len(rows))
+        self.insert = f'INSERT INTO "{name}" VALUES ({values})'  # noqa: S608 - of tables.txt
 
     def names(self, version: int = SCHEMA_VERSION) -> list[str]:
         """List the columns that a format has."""
         return [column.name for column in self.columns if column.since <= version]
 
-    def script(self, name: str, version: int) -> str:
+    def script(self, version: int) -> str:
         """Return the script that makes it, as a format has it."""
-        columns = ", ".join(column.sql for column in self.columns if column.since <= version)
+        name, parts = self._name, [c.sql for c in self.columns if c.since <= version]
+        parts += [f"UNIQUE ({columns})" for columns in self._also]
+        parts += [f"PRIMARY KEY ({self._key})"] if self.key > 1 else []
+        taken = " OR ".join([_same(self._key), *(f"({_same(columns)})" for columns in self._also)])
         # "INSERT OR REPLACE" deletes without asking the delete trigger, so it has one of its own.
         refuse = f"SELECT RAISE(ABORT, '{name}: raw records are never altered');"
         return f"""
-CREATE TABLE "{name}" ({columns}{self._constraint}) STRICT{self._option};
+CREATE TABLE "{name}" ({", ".join(parts)}) STRICT{", WITHOUT ROWID" if self.key > 1 else ""};
 CREATE TRIGGER {name}_no_update BEFORE UPDATE ON "{name}" BEGIN {refuse} END;
 CREATE TRIGGER {name}_no_delete BEFORE DELETE ON "{name}" BEGIN {refuse} END;
 CREATE TRIGGER {name}_no_replace BEFORE INSERT ON "{name}"
-WHEN EXISTS (SELECT 1 FROM "{name}" WHERE {self._collides}) BEGIN {refuse} END;
+WHEN EXISTS (SELECT 1 FROM "{name}" WHERE {taken}) BEGIN {refuse} END;
 """  # noqa: S608 - all names are constants of tables.txt
+
+
+def _same(columns: str) -> str:
+    return " AND ".join(f"{name} = NEW.{name}" for name in columns.split(", "))
 
 
 def _read_tables(page: str) -> dict[str, SessionTable]:
@@ -217,7 +243,7 @@ def _read_tables(page: str) -> dict[str, SessionTable]:
         head, *rows = paragraph.splitlines()
         words, meaning = head.split(": ", 1)
         name, *since = words.split()
-        tables[name] = SessionTable(int(*since or "1"), meaning, rows)
+        tables[name] = SessionTable(name, int(*since or "1"), meaning, rows)
     return tables
 
 
@@ -235,8 +261,7 @@ CREATE TABLE result (run INTEGER NOT NULL, attempt INTEGER NOT NULL, analysis_ve
 
 def create_script(version: int = SCHEMA_VERSION) -> str:
     """Return the script that makes an empty session of a format inside a transaction."""
-    known = {name: table for name, table in TABLES.items() if table.since <= version}
-    tables = "".join(table.script(name, version) for name, table in known.items())
+    tables = "".join(table.script(version) for table in TABLES.values() if table.since <= version)
     numbers = f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {version};\n"
     return tables + _BESIDES + numbers
 
@@ -246,16 +271,10 @@ def upgrade_script(version: int) -> str:
     script = ""
     for name, table in TABLES.items():
         if table.since == version:
-            script += table.script(name, version)
+            script += table.script(version)
             if name == "hash":
                 script += f"INSERT INTO hash VALUES (1, '{OLDER}', 0, x'');"  # noqa: S608
         else:
             added = (column.sql for column in table.columns if column.since == version)
             script += "".join(f'ALTER TABLE "{name}" ADD COLUMN {sql};\n' for sql in added)
     return f"BEGIN; {script} PRAGMA user_version = {version}; COMMIT;"
-
-
-def insert_statement(name: str) -> str:
-    """Return the statement that adds a row of all columns to a table; an empty id is numbered."""
-    values = ", ".join("?" * len(TABLES[name].columns))
-    return f'INSERT INTO "{name}" VALUES ({values})'  # noqa: S608 - a constant of tables.txt

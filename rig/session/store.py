@@ -8,33 +8,29 @@ import logging
 import os
 import platform
 import sqlite3
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, closing, suppress
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
+from time import monotonic
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from rig import __version__
 from rig.errors import InputError, SessionError
 from rig.files import make_folder, state_folder
 from rig.printable import encodable
 from rig.reasons import Reason, make_error
-from rig.records import ClockSample, HostBreak, Pulse
+from rig.records import ClockSample, Drop, HostBreak, Pulse
 from rig.session.database import build, check_place, connect
 from rig.session.faults import translate_errors
-from rig.session.journal import Journal, Statement
+from rig.session.journal import Journal
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
 from rig.session.reading import UNBLINDED, Direction, Reader
-from rig.session.rows import edge_rows, row_of
-from rig.session.schema import TABLES, RunState, insert_statement, write_reasons
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from rig.records import Drop
-
+from rig.session.rows import rows_of
+from rig.session.schema import TABLES, Record, RunState, write_reasons
 
 log = logging.getLogger(__name__)
 _TIMINGS = {ClockSample: "ping", Pulse: "reference", HostBreak: "host_break"}
@@ -95,13 +91,9 @@ class Session(Reader):
             "origin": encodable(origin),
         }
         place = Path(os.path.realpath(path))
-        lock = WriterLock(place)
-        try:
-            build(place, meta, encodable(protocol_source), protocol_text)
-        except BaseException:
-            lock.release()
-            raise
-        return cls._connect(place, lock)
+        protocol = encodable(protocol_source), protocol_text
+        rows: Record = {"meta": [*meta.items()], "protocol": [(1, *protocol)]}
+        return cls._connect(place, WriterLock(place), rows)
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Session:
@@ -125,10 +117,12 @@ class Session(Reader):
         return cls._connect(place, None if readonly else WriterLock(place))
 
     @classmethod
-    def _connect(cls, place: Path, lock: WriterLock | None) -> Self:
+    def _connect(cls, place: Path, lock: WriterLock | None, first: Record | None = None) -> Self:
         with ExitStack() as undo:
             if lock is not None:
                 undo.callback(lock.release)
+            if first is not None:
+                build(place, first)
             connection = undo.enter_context(closing(connect(place, readonly=lock is None)))
             session = cls(place, connection, lock)
             undo.pop_all()
@@ -139,12 +133,13 @@ class Session(Reader):
     @property
     def pending(self) -> int:
         """Number of records that no `commit` has made durable yet."""
-        return len(self._journal)
+        return len(self._journal.pending)
 
     @property
     def write_s(self) -> float:
         """How long the disk has been at the write under way; 0 for none. For other threads too."""
-        return self._journal.write_s
+        begun_s = self._journal.begun_s
+        return 0.0 if begun_s is None else monotonic() - begun_s
 
     def commit(self) -> None:
         """Return when everything added so far is on the disk.
@@ -246,7 +241,7 @@ class Session(Reader):
     def add_rows(self, table: str, rows: Iterable[Sequence[object]]) -> None:
         """Add rows to a table, all or none; those with a number get the next ones."""
         values = [(None, *row) if TABLES[table].numbered else row for row in rows]
-        self._writable().add(Statement(insert_statement(table), values))
+        self._writable().add({table: values})
 
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
         """Add bytes exchanged with the device, as they came or went."""
@@ -274,11 +269,7 @@ class Session(Reader):
         """
         journal = self._writable()
         self._last_drop += 1
-        row = row_of(drop, self._last_drop, host_ns, provenance)
-        journal.add(
-            Statement(insert_statement("drop"), [row]),
-            Statement(insert_statement("edge"), edge_rows(drop, self._last_drop)),
-        )
+        journal.add(rows_of(drop, self._last_drop, host_ns, provenance))
 
     def add_state(
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()

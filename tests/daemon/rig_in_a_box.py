@@ -167,7 +167,7 @@ class Box:
         self.worker.stop("a second client")
 
     def filled(self, journal):
-        journal._give_up()
+        journal._connection.rollback()
         raise SessionError("the disk is full", "make room")
 
     # ------------------------------------------------------------------ what may be done
