@@ -123,7 +123,7 @@ class Key(NamedTuple):
     example
         As written in a file.
     scene
-        What a scene needs for this key to matter: empty, or one of `rig.protocol.describe.SCENES`.
+        What a scene needs for this key to matter: as ``describe.txt`` writes it.
     source
         Where the default comes from.
     """
