@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from contextlib import suppress
+from typing import Any
 
 from rig.model.chain import XI, Chain
-from rig.protocol.fields import FieldFaults, Section, did_you_mean, join, read_value, unique_entries
+from rig.protocol.fields import (
+    FieldFaults,
+    Section,
+    UnsoundError,
+    did_you_mean,
+    join,
+    read_value,
+    unique_entries,
+)
 from rig.protocol.keys import Plain
 from rig.protocol.masses import place_masses
 from rig.protocol.protocol import RodChain
-from rig.protocol.rods import are_apart, list_rods, place_rods
-from rig.protocol.yamltree import Mapping, Node, ScalarNode, Sequence
+from rig.protocol.rods import check_apart, count_rods, list_rods, place_rods
+from rig.protocol.yamltree import Mapping, Node, Sequence
 from rig.units import quoted
 
 _LONGEST_NAME = 32
@@ -56,11 +66,8 @@ def read_chains(
         name: unique_entries(own, join("chains", name), faults)[1]
         for name, own in described.items()
     }
-    bases = {
-        name: like
-        for name, own in keys.items()
-        if isinstance(like := own.get("like"), ScalarNode) and like.kind == "text"
-    }
+    likes: list[tuple[str, Any]] = [(name, own.get("like")) for name, own in keys.items()]
+    bases = {name: like for name, like in likes if getattr(like, "kind", "") == "text"}
     chains: dict[str, RodChain | None] = dict.fromkeys(nodes.keys() - described.keys())
     for name in sorted(described, key=lambda name: name in bases):
         path, own, lenient = join("chains", name), described[name], False
@@ -73,7 +80,9 @@ def read_chains(
                 own = _inherit(own, described[base], keys[name], keys[base])
             lenient = chains.get(base) is None
         section = Section(own, path, "chains.*", faults, lenient=lenient)
-        chains[name] = _build_chain(name, section, seen_by_gates=seen_by_gates, struck=struck)
+        chains[name] = None
+        with suppress(UnsoundError):
+            chains[name] = _build_chain(name, section, seen_by_gates=seen_by_gates, struck=struck)
     return {name: chains[name] for name in nodes}
 
 
@@ -100,50 +109,38 @@ def _inherit(
     return Mapping(own.place, [*own.entries, *entries])
 
 
-def _build_chain(
-    name: str, section: Section, *, seen_by_gates: bool, struck: bool
-) -> RodChain | None:
-    """Build a chain from its keys, or note what does not fit together."""
-    rods = list_rods(section, seen_by_gates=seen_by_gates, struck=struck)
-    is_object = rods is not None and len(rods.diameters) == 1
+def _build_chain(name: str, section: Section, *, seen_by_gates: bool, struck: bool) -> RodChain:
+    """Build a chain from its keys.
+
+    Raises
+    ------
+    UnsoundError
+        If a key is faulty or does not fit to others, which is noted.
+    """
+    is_object = section.is_sound("rods") and count_rods(section) == 1 and not struck
     if is_object:
         section.refuse("one object has no {}; leave it out", "length", "spacing")
     elif not isinstance(section.nodes.get("spacing"), Sequence):
         section.need("length")
     else:
         section.refuse("follows from the listed spacing; leave it out", "length")
-    if rods is None:
-        return None
+    rods = list_rods(section, seen_by_gates=seen_by_gates, struck=struck)
     if rods.weighed:
         section.refuse("mass is also given; keep one of them", "masses")
-    heights = place_rods(section, rods.diameters) if section.is_sound("length", "spacing") else None
-    if heights is None or not section.is_sound("tilt", "rod_length"):
-        return None
-    tilt = math.radians(section["tilt"])
-    widths = tuple(diameter / math.cos(tilt) for diameter in rods.diameters)
-    rod_length = section["rod_length"] or 0.0
-    if not are_apart(section, heights, widths, rod_length * math.sin(tilt)):
-        return None
-    masses: tuple[float, ...] | None = rods.masses
-    if "masses" in section:
-        masses = place_masses(section, heights)
-    if masses is None or not section.is_sound():
-        return None
-    chain = Chain(
-        masses, heights, XI * section["inertia"], alpha=section["alpha"], gamma=section["gamma"]
-    )
-    position_u = section["position_uncertainty"]
+    section.require_sound("length", "spacing")
+    heights = place_rods(section, rods.diameters)
+    section.require_sound("tilt", "rod_length")
+    tilt, rod_length = section["tilt"], section["rod_length"] or 0.0
+    widths = tuple(diameter / math.cos(math.radians(tilt)) for diameter in rods.diameters)
+    check_apart(section, heights, widths, rod_length * math.sin(math.radians(tilt)))
+    masses = place_masses(section, heights) if "masses" in section else rods.masses
+    section.require_sound()
+    inertia, alpha, gamma = XI * section["inertia"], section["alpha"], section["gamma"]
+    chain = Chain(masses, heights, inertia, alpha=alpha, gamma=gamma)
+    position_u, width_u = section["position_uncertainty"], section["width_uncertainty"]
     if is_object and "position_uncertainty" not in section:
         position_u = 0.0  # it is where its drop says
-    width_u, weighed = section["width_uncertainty"], rods.weighed or "masses" in section
+    weighed = rods.weighed or "masses" in section
     return RodChain(
-        name,
-        chain,
-        widths,
-        section["tilt"],
-        position_u,
-        width_u,
-        rods.diameters,
-        rod_length,
-        weighed,
+        name, chain, widths, tilt, position_u, width_u, rods.diameters, rod_length, weighed
     )

@@ -62,7 +62,7 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
         if rods and "drop" in top and top.is_sound("drop"):
             inclines = top["plan"]["incline"] if top["plan"] else DEFAULTS["plan.incline"]
             inclines = [angle for angle in inclines or () if on_board and angle is not None]
-            check_clear(top["gates"], rods, top["drop"], surface=struck, inclines=inclines)
+            check_clear(top, rods, inclines)
 
 
 def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:

@@ -136,9 +136,7 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
         for low, high in pairwise(rods.chain.heights)
         if high - low > 2.0 * (half + max(_CLEAR, drop.u))
     ]
-    for share in _HIGH:
-        if len(heights) == number or not gaps:
-            break
+    for share in _HIGH[: min(number - len(heights), len(gaps))]:
         target = drop.value + share * rods.chain.length
         _, gap = min((abs(gap - target), gap) for gap in gaps)
         gaps.remove(gap)

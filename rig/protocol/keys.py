@@ -19,8 +19,14 @@ ANY = "*"
 """Stands in a path for names that the file chooses: of chains."""
 EACH = "[]"
 """Stands in a path for each item of a list."""
-BOOLEANS = dict.fromkeys(("true", "True", "TRUE"), True)
-BOOLEANS |= dict.fromkeys(("false", "False", "FALSE"), False)
+BOOLEANS = {
+    "true": True,
+    "True": True,
+    "TRUE": True,
+    "false": False,
+    "False": False,
+    "FALSE": False,
+}
 """As YAML 1.2 writes them (core schema, section 10.3.2)."""
 
 

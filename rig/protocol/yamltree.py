@@ -22,6 +22,8 @@ MAX_DEPTH = 32
 MAX_NODES = 10_000
 _BREAK = re.compile(r"\r\n|[\n\r\x85\u2028\u2029]")
 """Ends of lines in YAML 1.1, section 5.4: PyYAML counts lines by them."""
+_TAB = re.compile(r"^[^\t#\n]*\t", re.MULTILINE)
+"""A tab outside comments: YAML takes it in some places and not in others."""
 _EXCERPT = 72  # columns of a terminal of 80, less an indent
 
 # Scalars of the YAML 1.2 core schema (section 10.3.2); what matches nothing here is text, so
@@ -95,11 +97,8 @@ def place_of(root: Node, *path: str | int) -> Place:
     """Find where the value at a path of keys and list indices stands, or as much as is there."""
     node = root
     for step in path:
-        inner: list[Node] = []
-        if isinstance(node, Mapping):
-            inner = [value for key, value in node.entries if getattr(key, "text", None) == step]
-        elif isinstance(node, Sequence) and isinstance(step, int):
-            inner = node.items[step : step + 1]
+        parts = node.entries if isinstance(node, Mapping) else enumerate(getattr(node, "items", ()))
+        inner = [value for key, value in parts if getattr(key, "text", key) == step]
         if not inner:
             break
         node = inner[0]
@@ -129,7 +128,6 @@ def load(text: str, source: str) -> Node:
     """
     body = "\n".join(_BREAK.split(text.removeprefix("\ufeff")))
     try:
-        _refuse_tabs(body)
         return _Builder(body).build()
     except _RefusalError as refusal:
         place, message = refusal.place, refusal.message
@@ -172,18 +170,12 @@ def _excerpt(text: str, place: Place) -> str:
     return f"\n    {one_line(line, _EXCERPT).rstrip()}\n    {'^':>{place.column - begin}}"
 
 
-def _refuse_tabs(text: str) -> None:
-    """Refuse tabs outside comments: YAML takes them in some places and not in others."""
-    for number, line in enumerate(text.split("\n"), start=1):
-        column = line.partition("#")[0].find("\t")
-        if column >= 0:
-            raise _RefusalError(Place(number, column + 1), "a tab; use blanks")
-
-
 class _Builder:
     """Builds the tree from parser events, no deeper than `MAX_DEPTH` levels."""
 
     def __init__(self, text: str) -> None:
+        if tab := _TAB.search(text):
+            raise _RefusalError(place_at(text, tab.end() - 1), "a tab; use blanks")
         self.events: Iterator[Any] = yaml.parse(text, Loader=yaml.SafeLoader)
         self.anchors: dict[str, tuple[Node, int]] = {}
         self.nodes = 0
