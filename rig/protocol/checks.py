@@ -102,7 +102,7 @@ def _is_on_board(contact: Section | None, chains: Iterable[RodChain]) -> bool:
     """Whether heights are measured from a board; note what chains then lack."""
     if contact is None or contact["datum"] != "board":
         return False
-    lacking = {rods.name: keys for rods in chains if (keys := lacking_geometry(rods))}
-    for name, keys in lacking.items():
-        contact.fault("datum", f"datum: board needs chains.{name}.{keys[0]}; state it")
+    lacking = [f"chains.{rods.name}.{key}" for rods in chains for key in lacking_geometry(rods)[:1]]
+    for key in lacking:
+        contact.fault("datum", f"datum: board needs {key}; state it")
     return not lacking

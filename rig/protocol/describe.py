@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from pathlib import Path
 from string import Formatter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.boards import BOARDS
 from rig.model.chain import XI
@@ -22,16 +22,10 @@ from rig.protocol.plan import PATTERNS, runs
 from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY, Protocol, RodChain
 from rig.units import UNITS, Quantity, format_quantity
 
-if TYPE_CHECKING:
-    from rig.errors import Problem
-
 _EVEN = 1e-9  # metres by which rounding may change an even spacing
 _BLOCKS = Path(__file__).with_suffix(".txt").read_text("utf-8").strip().split("\n\n")[1:]
 _SECTIONS = {heading: rows for heading, *rows in (block.split("\n") for block in _BLOCKS)}
-_STATED = (
-    *Protocol.__slots__,
-    *("vocabulary", "two_chains", "one_object", "unlike_chains", "drop_from"),
-)
+_STATED = [name for name in vars(Protocol) if not name.startswith("_")]
 Facts = Mapping[str, Any]
 
 
@@ -104,7 +98,6 @@ def _list_facts(protocol: Protocol) -> dict[str, Any]:
         "level": max(plan.inclines) == 0,
         "tilted": any(rods.tilt_deg for rods in chains),
         "standard": protocol.gravity == standard,
-        "dropped": surface or gates,
         "thrown": protocol.initial_speed != AT_REST,
         "runs": len(planned),
         "several": len(planned) > 1,
@@ -139,7 +132,6 @@ def _chain_facts(rods: RodChain) -> Facts:
     least, most = min(chain.masses), max(chain.masses)
     return {
         "chain": rods,
-        "single": chain.rods == 1,
         "thin": thin * 1e3,
         "thick": thick * 1e3,
         "unlike": thin != thick,
@@ -179,7 +171,7 @@ def _touch_facts(protocol: Protocol) -> Iterator[Facts]:
         yield {"incline": incline, "name": name, "low": low, "high": high, "unlike": low != high}
 
 
-def _lack_facts(wants: Mapping[str, Sequence[Problem]]) -> Iterator[Facts]:
+def _lack_facts(wants: Mapping[str, Sequence[Any]]) -> Iterator[Facts]:
     """List what boards lack; of gates, which are many alike, the first will do."""
     for board, problems in wants.items():
         gates = [problem for problem in problems if problem.key.startswith("gates.")]

@@ -18,7 +18,7 @@ from rig.units import UnitError, parse, quoted
 
 
 @dataclass(slots=True)
-class FieldFaults:
+class Faults:
     """The problems noted so far in one file."""
 
     source: str
@@ -57,7 +57,7 @@ class Section:
     """
 
     def __init__(
-        self, node: Mapping, path: str, table: str, faults: FieldFaults, *, lenient: bool = False
+        self, node: Mapping, path: str, table: str, faults: Faults, *, lenient: bool = False
     ) -> None:
         self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
         self.keys, self.nodes = unique_entries(node, path, faults)
@@ -164,7 +164,7 @@ def did_you_mean(word: str, accepted: Iterable[str]) -> str:
 
 
 def unique_entries(
-    node: Mapping, path: str, faults: FieldFaults
+    node: Mapping, path: str, faults: Faults
 ) -> tuple[dict[str, Place], dict[str, Node]]:
     """Return the places and values of a mapping's keys, noting repeated keys and odd ones."""
     places: dict[str, Place] = {}
@@ -182,9 +182,7 @@ def unique_entries(
     return places, values
 
 
-def read_value(
-    accepted: keys.Accepted, node: Node, path: str, table_path: str, faults: FieldFaults
-) -> Any:
+def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, faults: Faults) -> Any:
     """Return a value of the file in base units, or note a fault and return ``None``.
 
     A mapping becomes a `Section` (or stays a node, where the file chooses its names), and a list a
@@ -195,16 +193,14 @@ def read_value(
             shape = isinstance(node, Sequence), isinstance(node, Mapping)
             for kind in kinds:
                 if (isinstance(kind, keys.ListOf), kind is keys.Plain.MAPPED) == shape:
-                    value = read_value(kind, node, path, table_path, faults)
+                    value = read_value(kind, node, path, table, faults)
                     return accepted.as_list(kind, value)
         case keys.Plain.MAPPED, Mapping():
-            return Section(node, path, table_path, faults) if table_path in keys.SECTIONS else node
+            return Section(node, path, table, faults) if table in keys.SECTIONS else node
         case keys.ListOf(each), Sequence(items=[_, *_] as items):
-            kind, table_path = each or keys.Plain.MAPPED, f"{table_path}.{keys.EACH}"
-            return tuple(
-                read_value(kind, item, f"{path}[{n}]", table_path, faults)
-                for n, item in enumerate(items)
-            )
+            kind, table = each or keys.Plain.MAPPED, f"{table}.{keys.EACH}"
+            paths = ((f"{path}[{n}]", item) for n, item in enumerate(items))
+            return tuple(read_value(kind, item, at, table, faults) for at, item in paths)
     message = f"found {node}; accepted: {_form(accepted)}"
     if isinstance(node, ScalarNode):
         try:
@@ -269,7 +265,7 @@ def _read_default(key: keys.Key) -> Any:
     if not key.default or key.in_words:
         return None
     node = ScalarNode(key.default, plain=True, place=Place(1, 1))
-    return read_value(key.accepted, node, key.path, key.path, FieldFaults("keys.txt"))
+    return read_value(key.accepted, node, key.path, key.path, Faults("keys.txt"))
 
 
 DEFAULTS: dict[str, Any] = {path: _read_default(key) for path, key in keys.KEYS.items()}

@@ -180,15 +180,10 @@ def read_key(row: str) -> Key:
     row
         Columns parted by ``|``, as the head of that file explains; the last two may be left out.
     """
-    path, accepted, default, *texts = map(str.strip, row.split("|"))
-    return Key(
-        path.removesuffix("!"),
-        _read_accepted(accepted),
-        default.strip("()"),
-        path.endswith("!"),
-        default.startswith("("),
-        *texts,
-    )
+    name, form, default, *texts = map(str.strip, row.split("|"))
+    path, accepted = name.removesuffix("!"), _read_accepted(form)
+    required, in_words = name.endswith("!"), default.startswith("(")
+    return Key(path, accepted, default.strip("()"), required, in_words, *texts)
 
 
 _LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
@@ -206,9 +201,8 @@ for _key in KEYS.values():
 def range_of(path: str) -> Range:
     """Return the accepted values of a key that is a quantity, or of each in its list."""
     accepted = KEYS[path].accepted
-    accepted = accepted.kinds[0] if isinstance(accepted, Either) else accepted
-    assert isinstance(accepted, Range)
-    return accepted
+    kinds = accepted.kinds if isinstance(accepted, Either) else (accepted,)
+    return next(kind for kind in kinds if isinstance(kind, Range))
 
 
 _BRACKETS = (("", "{", "}"), (f".{EACH}", "[{", "}]"), (f".{ANY}", "{A: {", ", …}}"))

@@ -14,7 +14,7 @@ from rig.files import read_input
 from rig.protocol import protocol as scene
 from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
-from rig.protocol.fields import FieldFaults, Section, read_value
+from rig.protocol.fields import Faults, Section, read_value
 from rig.protocol.keys import Plain
 from rig.protocol.protocol import Protocol
 from rig.protocol.site import gravity_at
@@ -93,12 +93,11 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
     """
     if len(text) > MAX_BYTES:
         raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
-    faults = FieldFaults(source)
+    faults = Faults(source)
     top: Section | None = read_value(Plain.MAPPED, load(text, source), "", "", faults)
     if top is None:
         raise InputError(problems=faults.problems.values())
-    struck, measured = "surface" in top, "gates" in top
-    chains = read_chains(top["chains"], faults, seen_by_gates=measured, struck=struck)
+    chains = read_chains(top)
     check_scene(top, chains, kept=kept)
     if faults.problems:
         raise InputError(problems=faults.problems.values())
@@ -140,12 +139,9 @@ def _surface(section: Section) -> Surface:
     """Return the surface; without a restitution, which no chain then needs, its is 0."""
     from rig.model.surface import Pile, Surface  # noqa: PLC0415 - only where something is struck
 
-    pile = section["pile"]
-    return Surface(
-        section["restitution"] or Quantity(0.0),
-        section["friction"],
-        pile and Pile(pile["below"], pile["restitution"]),
-    )
+    restitution, pile = section["restitution"] or Quantity(0.0), section["pile"]
+    softer = pile and Pile(pile["below"], pile["restitution"])
+    return Surface(restitution, section["friction"], softer)
 
 
 def _gates(section: Section) -> scene.Gates:

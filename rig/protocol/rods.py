@@ -30,8 +30,8 @@ def count_rods(section: Section) -> int:
     return rods if isinstance(rods, int) else sum(group["count"] for group in rods)
 
 
-def list_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods:
-    """Return the rods of a chain by its ``rods``, ``diameter`` and ``mass``.
+def list_rods(section: Section, top: Section) -> Rods:
+    """Return the rods of a chain of a file by its ``rods``, ``diameter`` and ``mass``.
 
     Masses are those given, else proportional to the cross-section (like material) with the
     bottom rod's as 1, else all 1. One rod alone is any object, which may fall and never strikes.
@@ -40,7 +40,7 @@ def list_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods:
     total = count_rods(section)
     if total > MOST_RODS:
         section.reject("rods", f"found {total} rods; at most {MOST_RODS} are accepted")
-    if total == 1 and struck:
+    if total == 1 and "surface" in top:
         message = "found 1 rod; a chain that strikes a surface has at least 2"
         section.reject("rods", f"{message}; for one object leave surface out")
     diameters, masses = (_list_values(section, key, total) for key in ("diameter", "mass"))
@@ -48,7 +48,7 @@ def list_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods:
     if not weighed and any(masses):
         section.reject("rods", "mass is given for some groups only; state it for all or none")
     if None in diameters:
-        if seen_by_gates or any(diameters):
+        if "gates" in top or any(diameters):
             section.need("diameter")
             section.require_sound("diameter")
         diameters = [0.0] * total
@@ -117,9 +117,8 @@ def check_apart(
         Of one end of a tilted rod over the other, m; 0 where unknown.
     """
     key = "length" if "length" in section else "spacing"
-    for rod, ((low, high), (lower, upper)) in enumerate(
-        zip(pairwise(heights), pairwise(widths), strict=True), start=1
-    ):
+    neighbours = zip(pairwise(heights), pairwise(widths), strict=True)
+    for rod, ((low, high), (lower, upper)) in enumerate(neighbours, start=1):
         pitch, needed = high - low, (lower + upper) / 2
         if not pitch > needed:
             apart, thick = (format_quantity(Quantity(x), "mm") for x in (pitch, needed))

@@ -138,13 +138,9 @@ def _list_mends(text: str, at: int, spans: dict[str, list[Span]]) -> Iterator[Me
                 anchor = begin if span.anchor is None else span.anchor
                 pointed = match.start("at") if "at" in groups else anchor
                 word = match["word"] if "word" in groups else _word(text, pointed)
-                message = sentence.format(
-                    close=span.close,
-                    opened=text[anchor],
-                    old=quoted(old),
-                    word=quoted(word),
-                    character=quoted(text[pointed : pointed + 1]),
-                )
+                character = quoted(text[pointed : pointed + 1])
+                words = {"old": quoted(old), "word": quoted(word), "character": character}
+                message = sentence.format(**words, close=span.close, opened=text[anchor])
                 added = _NEW | {"close": span.close, "quoted": json.dumps(old, ensure_ascii=False)}
                 yield pointed, message, text[:begin] + added.get(new, new) + text[end:]
 

@@ -86,6 +86,11 @@ class Mapping:
     place: Place
     entries: list[tuple[Node, Node]]
 
+    def get(self, name: str | int) -> Node | None:
+        """Return the first value of a key."""
+        values = (value for key, value in self.entries if getattr(key, "text", None) == name)
+        return next(values, None)
+
     def __str__(self) -> str:
         return "a mapping"
 
@@ -97,11 +102,11 @@ def place_of(root: Node, *path: str | int) -> Place:
     """Find where the value at a path of keys and list indices stands, or as much as is there."""
     node = root
     for step in path:
-        parts = node.entries if isinstance(node, Mapping) else enumerate(getattr(node, "items", ()))
-        inner = [value for key, value in parts if getattr(key, "text", key) == step]
-        if not inner:
+        items: dict[Any, Node] = dict(enumerate(getattr(node, "items", ())))
+        inner = node.get(step) if isinstance(node, Mapping) else items.get(step)
+        if inner is None:
             break
-        node = inner[0]
+        node = inner
     return node.place
 
 
