@@ -44,14 +44,13 @@ def read_chains(top: Section) -> dict[str, RodChain | None]:
         if not name.isidentifier() or len(name) > _LONGEST_NAME:
             message = "this name needs to be one word of letters and digits, such as A"
             faults.add(place, join("chains", name), message)
-    described: dict[str, Mapping] = {
-        name: own
-        for name, node in nodes.items()
-        if (own := fields.read_value(Plain.MAPPED, node, join("chains", name), "chains", faults))
-    }
+    described = {name: own for name, own in nodes.items() if isinstance(own, Mapping)}
     likes: dict[str, Any] = {name: own.get("like") for name, own in described.items()}
     bases = {name: like for name, like in likes.items() if getattr(like, "kind", "") == "text"}
-    chains: dict[str, RodChain | None] = dict.fromkeys(nodes.keys() - described.keys())
+    chains: dict[str, RodChain | None] = {}
+    for name in nodes.keys() - described.keys():
+        path = join("chains", name)
+        chains[name] = fields.read_value(Plain.MAPPED, nodes[name], path, "chains", faults)
     for name in sorted(described, key=lambda name: name in bases):
         path, own, lenient = join("chains", name), described[name], False
         if name in bases:
@@ -105,23 +104,21 @@ def _build_chain(name: str, section: Section, top: Section) -> RodChain:
         section.need("length")
     else:
         section.refuse("follows from the listed spacing; leave it out", "length")
-    rods = list_rods(section, top)
-    if rods.weighed:
+    diameters, masses, weighed = list_rods(section, top)
+    if weighed:
         section.refuse("mass is also given; keep one of them", "masses")
     section.require_sound("length", "spacing")
-    heights = place_rods(section, rods.diameters)
+    heights = place_rods(section, diameters)
     section.require_sound("tilt", "rod_length")
     tilt, rod_length = section["tilt"], section["rod_length"] or 0.0
-    widths = tuple(diameter / math.cos(math.radians(tilt)) for diameter in rods.diameters)
+    widths = tuple(diameter / math.cos(math.radians(tilt)) for diameter in diameters)
     check_apart(section, heights, widths, rod_length * math.sin(math.radians(tilt)))
-    masses = place_masses(section, heights) if "masses" in section else rods.masses
+    if "masses" in section:
+        masses, weighed = place_masses(section, heights), True
     section.require_sound()
     inertia, alpha, gamma = XI * section["inertia"], section["alpha"], section["gamma"]
     chain = Chain(masses, heights, inertia, alpha=alpha, gamma=gamma)
     position_u, width_u = section["position_uncertainty"], section["width_uncertainty"]
     if is_object and "position_uncertainty" not in section:
         position_u = 0.0  # it is where its drop says
-    weighed = rods.weighed or "masses" in section
-    return RodChain(
-        name, chain, widths, tilt, position_u, width_u, rods.diameters, rod_length, weighed
-    )
+    return RodChain(name, chain, widths, tilt, position_u, width_u, diameters, rod_length, weighed)

@@ -194,7 +194,9 @@ def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, fault
             for kind in kinds:
                 if (isinstance(kind, keys.ListOf), kind is keys.Plain.MAPPED) == shape:
                     value = read_value(kind, node, path, table, faults)
-                    return accepted.as_list(kind, value)
+                    # What may be a list, too, is alone a list of one.
+                    is_item = keys.ListOf(kind) in kinds and value is not None
+                    return (value,) if is_item else value
         case keys.Plain.MAPPED, Mapping():
             return Section(node, path, table, faults) if table in keys.SECTIONS else node
         case keys.ListOf(each), Sequence(items=[_, *_] as items):
@@ -262,10 +264,9 @@ def _form(accepted: keys.Accepted) -> str:
 
 def _read_default(key: keys.Key) -> Any:
     """Return the default of a key as if it stood in a file; `None` where there is none."""
-    if not key.default or key.in_words:
-        return None
     node = ScalarNode(key.default, plain=True, place=Place(1, 1))
-    return read_value(key.accepted, node, key.path, key.path, Faults("keys.txt"))
+    stated = key.default and not key.in_words
+    return read_value(key.accepted, node, key.path, key.path, Faults("")) if stated else None
 
 
 DEFAULTS: dict[str, Any] = {path: _read_default(key) for path, key in keys.KEYS.items()}

@@ -128,11 +128,9 @@ def _clear_heights(
     below = {math.floor(rod.low * 1e4) - step for rod in rods for step in (0, 1)}
     above = {math.ceil(rod.high * 1e4) + step for rod in rods for step in (0, 1)}
     tenths = [z for z in below | above if blocking_rod(rods, z / 1e4) is None]
-    nearest = (
-        max((z for z in tenths if z / 1e4 < height), default=0),
-        min((z for z in tenths if z / 1e4 > height), default=0),
-    )
-    return [z / 1e4 for z in nearest if max(lowest, 1e-4) <= z / 1e4 <= top]
+    lower = max((z for z in tenths if z / 1e4 < height), default=0)
+    upper = min((z for z in tenths if z / 1e4 > height), default=0)
+    return [z / 1e4 for z in (lower, upper) if max(lowest, 1e-4) <= z / 1e4 <= top]
 
 
 def _mm(height: float) -> str:

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rig.units import Dimension, Quantity, format_quantity
 
@@ -32,7 +32,6 @@ BOOLEANS = {
 
 MOST_RODS = 1000
 """Of a chain, in all its groups."""
-_NO_U = "no uncertainty is accepted here"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +45,8 @@ class Range:
     low: float
     high: float
     unit: str
-    open_low: bool = False
-    exact: str = _NO_U
+    open_low: bool
+    exact: str
 
     def __contains__(self, value: float) -> bool:
         return self.low <= value <= self.high and not (self.open_low and value == self.low)
@@ -84,10 +83,6 @@ class Either(NamedTuple):
 
     def __str__(self) -> str:
         return "; or ".join(map(str, self.kinds))
-
-    def as_list(self, kind: Accepted, value: Any) -> Any:
-        """Return a value of one of these kinds; alone where a list may stand, it is one of one."""
-        return (value,) if ListOf(kind) in self.kinds and value is not None else value
 
 
 class ListOf(NamedTuple):
@@ -152,7 +147,7 @@ def _read_range(text: str) -> Range:
     parts = _RANGE.fullmatch(text)
     assert parts is not None, text
     name, opening, low, high, unit, with_u, why = parts.groups()
-    exact = "" if with_u else why or _NO_U
+    exact = "" if with_u else why or "no uncertainty is accepted here"
     return Range(Dimension[name.upper()], float(low), float(high), unit, opening == "(", exact)
 
 
@@ -201,8 +196,7 @@ for _key in KEYS.values():
 def range_of(path: str) -> Range:
     """Return the accepted values of a key that is a quantity, or of each in its list."""
     accepted = KEYS[path].accepted
-    kinds = accepted.kinds if isinstance(accepted, Either) else (accepted,)
-    return next(kind for kind in kinds if isinstance(kind, Range))
+    return next(kind for kind in getattr(accepted, "kinds", (accepted,)) if isinstance(kind, Range))
 
 
 _BRACKETS = (("", "{", "}"), (f".{EACH}", "[{", "}]"), (f".{ANY}", "{A: {", ", …}}"))

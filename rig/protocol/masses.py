@@ -9,11 +9,10 @@ from rig.protocol.fields import UnsoundError
 
 if TYPE_CHECKING:
     from rig.protocol.fields import Section
+    from rig.protocol.rods import RodValues
 
-Masses = tuple[float, ...]
 
-
-def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses:
+def place_masses(chain: Section, heights: RodValues) -> RodValues:
     """Return the mass of each rod, kg, bottom up.
 
     They are listed with one mass a rod; or follow ``{exponential: {bottom: …, top: …}}``, an even
@@ -45,7 +44,7 @@ def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses:
     return (bottom, *(bottom * share for share in between), top)
 
 
-def _interpolate(masses: Section, heights: tuple[float, ...]) -> Masses:
+def _interpolate(masses: Section, heights: RodValues) -> RodValues:
     """Return masses that run straight between the points of a table."""
     points = [(point["height"], point["mass"]) for point in masses["table"]]
     for n, ((low, _), (high, _)) in enumerate(pairwise(points), start=1):

@@ -16,7 +16,6 @@ from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
 from rig.protocol.fields import Faults, Section, read_value
 from rig.protocol.keys import Plain
-from rig.protocol.protocol import Protocol
 from rig.protocol.site import gravity_at
 from rig.protocol.yamltree import load, place_at
 from rig.units import Quantity
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 MAX_BYTES = 1_000_000
 
 
-def read(path: str | os.PathLike[str]) -> Protocol:
+def read(path: str | os.PathLike[str]) -> scene.Protocol:
     """Read a protocol file.
 
     Parameters
@@ -68,7 +67,7 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     return parse(text, source)
 
 
-def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protocol:
+def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.Protocol:
     """Read a protocol from its text.
 
     Parameters
@@ -104,7 +103,7 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
     track = top["track"] and scene.InclinedTrack(**_arguments(top["track"], incline="incline_deg"))
     site, contact = top["site"], top["contact"]
     gravity = gravity_at(site["latitude"], site["height"]) if site else top["gravity"]
-    return Protocol(
+    return scene.Protocol(
         title=top["title"] if "title" in top else Path(source).stem,
         chains={name: chain for name, chain in chains.items() if chain is not None},
         gravity=gravity if track is None else track.along(gravity),

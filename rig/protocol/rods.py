@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from rig.protocol.keys import MOST_RODS
 from rig.units import Quantity, format_quantity
@@ -13,15 +13,8 @@ if TYPE_CHECKING:
     from rig.protocol.fields import Section
 
 
-class Rods(NamedTuple):
-    """Diameter (m; 0 where unknown) and mass of each rod, bottom up.
-
-    `weighed` says that masses are in kg; else only their ratios mean something.
-    """
-
-    diameters: tuple[float, ...]
-    masses: tuple[float, ...]
-    weighed: bool
+RodValues = tuple[float, ...]
+"""One of each rod, bottom up."""
 
 
 def count_rods(section: Section) -> int:
@@ -30,11 +23,17 @@ def count_rods(section: Section) -> int:
     return rods if isinstance(rods, int) else sum(group["count"] for group in rods)
 
 
-def list_rods(section: Section, top: Section) -> Rods:
-    """Return the rods of a chain of a file by its ``rods``, ``diameter`` and ``mass``.
+def list_rods(section: Section, top: Section) -> tuple[RodValues, RodValues, bool]:
+    """Return the rods of a chain of a file by its ``rods``, ``diameter`` and ``mass``, bottom up.
 
     Masses are those given, else proportional to the cross-section (like material) with the
     bottom rod's as 1, else all 1. One rod alone is any object, which may fall and never strikes.
+
+    Returns
+    -------
+    tuple
+        Diameters, m, 0 where unknown; masses; and whether these are in kg: else only their ratios
+        mean something.
     """
     section.require_sound("rods", "diameter", "mass")
     total = count_rods(section)
@@ -54,7 +53,7 @@ def list_rods(section: Section, top: Section) -> Rods:
         diameters = [0.0] * total
     if not weighed:
         masses = [(d / diameters[0]) ** 2 if diameters[0] else 1.0 for d in diameters]
-    return Rods(tuple(diameters), tuple(masses), weighed)
+    return tuple(diameters), tuple(masses), weighed
 
 
 def _list_values(section: Section, key: str, total: int) -> list[Any]:
@@ -68,7 +67,7 @@ def _list_values(section: Section, key: str, total: int) -> list[Any]:
     ]
 
 
-def place_rods(section: Section, diameters: tuple[float, ...]) -> tuple[float, ...]:
+def place_rods(section: Section, diameters: RodValues) -> RodValues:
     """Return the heights of the rods' middles above the bottom rod's, m.
 
     Equal gaps: neighbours i, i+1 are ``gap + (d_i + d_{i+1})/2`` apart, the gap being whatever
@@ -102,9 +101,7 @@ def place_rods(section: Section, diameters: tuple[float, ...]) -> tuple[float, .
     return (*accumulate((gap + half for half in halves[:-1]), initial=0.0), length)
 
 
-def check_apart(
-    section: Section, heights: tuple[float, ...], widths: tuple[float, ...], rise: float
-) -> None:
+def check_apart(section: Section, heights: RodValues, widths: RodValues, rise: float) -> None:
     """Check that no two neighbours overlap as seen from the side, nor touch with their ends.
 
     Parameters

@@ -108,11 +108,11 @@ def _list_spans(text: str, stop: int, at: int, begin: int) -> dict[str, list[Spa
             opened.pop()
     if text[begin : begin + 1] in _CLOSING and begin not in opened:
         opened.insert(0, begin)
-    open_brackets = [(bracket, _CLOSING[text[bracket]]) for bracket in opened[-1:]]
 
     def behind(opening: int, close: str) -> Span:
         return Span(opening + 1, _line_end(text, opening), opening, close)
 
+    brackets = [behind(bracket, _CLOSING[text[bracket]]) for bracket in opened[-1:]]
     return {
         "stop": [Span(at, at + 1)],
         "rest": [Span(at, end)],
@@ -121,8 +121,8 @@ def _list_spans(text: str, stop: int, at: int, begin: int) -> dict[str, list[Spa
         "lines": [Span(line, _line_end(text, line)) for line in dict.fromkeys(lines)],
         "around": [Span(before, end)],
         "quote": [behind(quote.start(), quote["open"]) for quote in quotes if quote["open"]],
-        "bracket": [Span(opening, at + 1, opening, close) for opening, close in open_brackets],
-        "behind": [behind(opening, close) for opening, close in open_brackets],
+        "bracket": [bracket._replace(end=at + 1) for bracket in brackets],
+        "behind": brackets,
     }
 
 
