@@ -31,7 +31,7 @@ Mend = tuple[int, str, str]
 """A place in a text, what is wrong there, and the text as it should be."""
 
 
-class Span(NamedTuple):
+class _Span(NamedTuple):
     """Where to look for a mistake: the place that its sentence points to, and what closes there."""
 
     begin: int
@@ -57,7 +57,7 @@ def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
     """
     stop = min(_stop(error), len(text))
     begin = error.context_mark.index if error.context_mark else stop
-    at = stop if text[stop:].strip() else max(len(text.rstrip()) - 1, 0)
+    at = _visible(text, stop)
     farther = None
     mends = _list_mends(text, at, _list_spans(text, stop, at, begin))
     for place, message, mended in islice(mends, MOST_PARSED // (len(text) + 1)):
@@ -86,7 +86,7 @@ def _stop(error: yaml.MarkedYAMLError) -> int:
     return mark.index if mark else 0
 
 
-def _list_spans(text: str, stop: int, at: int, begin: int) -> dict[str, list[Span]]:
+def _list_spans(text: str, stop: int, at: int, begin: int) -> dict[str, list[_Span]]:
     """Return the places of the table: around where the parser stopped, and what it began there.
 
     Parameters
@@ -109,24 +109,24 @@ def _list_spans(text: str, stop: int, at: int, begin: int) -> dict[str, list[Spa
     if text[begin : begin + 1] in _CLOSING and begin not in opened:
         opened.insert(0, begin)
 
-    def behind(opening: int, close: str) -> Span:
-        return Span(opening + 1, _line_end(text, opening), opening, close)
+    def behind(opening: int, close: str) -> _Span:
+        return _Span(opening + 1, _line_end(text, opening), opening, close)
 
     brackets = [behind(bracket, _CLOSING[text[bracket]]) for bracket in opened[-1:]]
     return {
-        "stop": [Span(at, at + 1)],
-        "rest": [Span(at, end)],
-        "before": [Span(start, at + 1)],
-        "line": [Span(start, end, at)],
-        "lines": [Span(line, _line_end(text, line)) for line in dict.fromkeys(lines)],
-        "around": [Span(before, end)],
+        "stop": [_Span(at, at + 1)],
+        "rest": [_Span(at, end)],
+        "before": [_Span(start, at + 1)],
+        "line": [_Span(start, end, at)],
+        "lines": [_Span(line, _line_end(text, line)) for line in dict.fromkeys(lines)],
+        "around": [_Span(before, end)],
         "quote": [behind(quote.start(), quote["open"]) for quote in quotes if quote["open"]],
         "bracket": [bracket._replace(end=at + 1) for bracket in brackets],
         "behind": brackets,
     }
 
 
-def _list_mends(text: str, at: int, spans: dict[str, list[Span]]) -> Iterator[Mend]:
+def _list_mends(text: str, at: int, spans: dict[str, list[_Span]]) -> Iterator[Mend]:
     """List changes that could let the parser go on, the likeliest first."""
     for where, rows in groupby(_MISTAKES, key=lambda row: row[0].split()[0]):
         if where == "indents":
@@ -145,7 +145,7 @@ def _list_mends(text: str, at: int, spans: dict[str, list[Span]]) -> Iterator[Me
                 yield pointed, message, text[:begin] + added.get(new, new) + text[end:]
 
 
-def _find(pattern: str, text: str, span: Span, order: str, at: int) -> list[re.Match[str]]:
+def _find(pattern: str, text: str, span: _Span, order: str, at: int) -> list[re.Match[str]]:
     """Return where a mistake may be: only ``here``, the one ``near`` the stop first, or all."""
     matches = [*re.compile(pattern, re.MULTILINE).finditer(text, span.begin, span.end)]
     if order == "near":
