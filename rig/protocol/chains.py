@@ -4,64 +4,53 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from contextlib import suppress
+from typing import Any
 
 from rig.model.chain import XI, Chain
-from rig.protocol.fields import FieldFaults, Section, did_you_mean, join, read_value, unique_entries
+from rig.protocol import fields
+from rig.protocol.fields import Section, join
 from rig.protocol.keys import Plain
 from rig.protocol.masses import place_masses
 from rig.protocol.protocol import RodChain
-from rig.protocol.rods import are_apart, list_rods, place_rods
-from rig.protocol.yamltree import Mapping, Node, ScalarNode, Sequence
+from rig.protocol.rods import check_apart, count_rods, list_rods, place_rods
+from rig.protocol.yamltree import Mapping, Sequence
 from rig.units import quoted
 
 _LONGEST_NAME = 32
 
 
-def read_chains(
-    node: Mapping | None, faults: FieldFaults, *, seen_by_gates: bool, struck: bool
-) -> dict[str, RodChain | None]:
+def read_chains(top: Section) -> dict[str, RodChain | None]:
     """Read the ``chains`` mapping.
 
     Parameters
     ----------
-    node
-        The value of ``chains``; `None` where it is faulty or missing, which has been noted.
-    faults
-        Where problems go.
-    seen_by_gates
-        Whether light beams measure the rods, so that their diameters are needed.
-    struck
-        Whether there is a surface, which one rod alone does not strike.
+    top
+        The root of the file: light beams need the rods' diameters, and one rod alone strikes no
+        surface.
 
     Returns
     -------
     dict of str to RodChain or None
         In file order; ``None`` for a faulty chain.
     """
+    node, faults = top["chains"], top.faults
     if node is None:
         return {}
-    places, nodes = unique_entries(node, "chains", faults)
+    places, nodes = fields.unique_entries(node, "chains", faults)
     if not 1 <= len(nodes) <= 2:
         faults.add(node.place, "chains", f"found {len(nodes)} chains; one or two are accepted")
     for name, place in places.items():
         if not name.isidentifier() or len(name) > _LONGEST_NAME:
             message = "this name needs to be one word of letters and digits, such as A"
             faults.add(place, join("chains", name), message)
-    described: dict[str, Mapping] = {
-        name: own
-        for name, node in nodes.items()
-        if (own := read_value(Plain.MAPPED, node, join("chains", name), "chains", faults))
-    }
-    keys = {
-        name: unique_entries(own, join("chains", name), faults)[1]
-        for name, own in described.items()
-    }
-    bases = {
-        name: like
-        for name, own in keys.items()
-        if isinstance(like := own.get("like"), ScalarNode) and like.kind == "text"
-    }
-    chains: dict[str, RodChain | None] = dict.fromkeys(nodes.keys() - described.keys())
+    described = {name: own for name, own in nodes.items() if isinstance(own, Mapping)}
+    likes: dict[str, Any] = {name: own.get("like") for name, own in described.items()}
+    bases = {name: like for name, like in likes.items() if getattr(like, "kind", "") == "text"}
+    chains: dict[str, RodChain | None] = {}
+    for name in nodes.keys() - described.keys():
+        path = join("chains", name)
+        chains[name] = fields.read_value(Plain.MAPPED, nodes[name], path, "chains", faults)
     for name in sorted(described, key=lambda name: name in bases):
         path, own, lenient = join("chains", name), described[name], False
         if name in bases:
@@ -70,10 +59,12 @@ def read_chains(
             if message:
                 faults.add(bases[name].place, f"{path}.like", message)
             if base in described:
-                own = _inherit(own, described[base], keys[name], keys[base])
+                own = _inherit(own, described[base])
             lenient = chains.get(base) is None
         section = Section(own, path, "chains.*", faults, lenient=lenient)
-        chains[name] = _build_chain(name, section, seen_by_gates=seen_by_gates, struck=struck)
+        chains[name] = None
+        with suppress(fields.UnsoundError):
+            chains[name] = _build_chain(name, section, top)
     return {name: chains[name] for name in nodes}
 
 
@@ -81,69 +72,53 @@ def _base_problem(base: str, read: Collection[str], candidates: list[str]) -> st
     """Say why a chain cannot be like another one, or nothing if it can."""
     if base not in candidates:
         accepted = ", ".join(map(quoted, candidates)) or "no other chain is there"
-        return f"found {quoted(base)}; {did_you_mean(base, candidates)}accepted: {accepted}"
+        return f"found {quoted(base)}; {fields.did_you_mean(base, candidates)}accepted: {accepted}"
     return "" if base in read else "like refers back to itself; describe one chain in full"
 
 
-def _inherit(
-    own: Mapping, base: Mapping, own_keys: dict[str, Node], base_keys: dict[str, Node]
-) -> Mapping:
+def _inherit(own: Mapping, base: Mapping) -> Mapping:
     """Return a chain's own entries, then those of its base that it does not override."""
-    hidden = {*own_keys, "like"}
-    if "mass" in own_keys or "masses" in own_keys:
+    hidden = {"like", *(getattr(key, "text", None) for key, _ in own.entries)}
+    if hidden & {"mass", "masses"}:
         hidden |= {"mass", "masses"}
-    if isinstance(own_keys.get("spacing"), Sequence):
+    if isinstance(own.get("spacing"), Sequence):
         hidden.add("length")
-    if "length" in own_keys and isinstance(base_keys.get("spacing"), Sequence):
+    if "length" in hidden and isinstance(base.get("spacing"), Sequence):
         hidden.add("spacing")
     entries = [entry for entry in base.entries if getattr(entry[0], "text", None) not in hidden]
     return Mapping(own.place, [*own.entries, *entries])
 
 
-def _build_chain(
-    name: str, section: Section, *, seen_by_gates: bool, struck: bool
-) -> RodChain | None:
-    """Build a chain from its keys, or note what does not fit together."""
-    rods = list_rods(section, seen_by_gates=seen_by_gates, struck=struck)
-    is_object = rods is not None and len(rods.diameters) == 1
+def _build_chain(name: str, section: Section, top: Section) -> RodChain:
+    """Build a chain from its keys.
+
+    Raises
+    ------
+    UnsoundError
+        If a key is faulty or does not fit to others, which is noted.
+    """
+    is_object = section.is_sound("rods") and count_rods(section) == 1 and "surface" not in top
     if is_object:
         section.refuse("one object has no {}; leave it out", "length", "spacing")
     elif not isinstance(section.nodes.get("spacing"), Sequence):
         section.need("length")
     else:
         section.refuse("follows from the listed spacing; leave it out", "length")
-    if rods is None:
-        return None
-    if rods.weighed:
+    diameters, masses, weighed = list_rods(section, top)
+    if weighed:
         section.refuse("mass is also given; keep one of them", "masses")
-    heights = place_rods(section, rods.diameters) if section.is_sound("length", "spacing") else None
-    if heights is None or not section.is_sound("tilt", "rod_length"):
-        return None
-    tilt = math.radians(section["tilt"])
-    widths = tuple(diameter / math.cos(tilt) for diameter in rods.diameters)
-    rod_length = section["rod_length"] or 0.0
-    if not are_apart(section, heights, widths, rod_length * math.sin(tilt)):
-        return None
-    masses: tuple[float, ...] | None = rods.masses
+    section.require_sound("length", "spacing")
+    heights = place_rods(section, diameters)
+    section.require_sound("tilt", "rod_length")
+    tilt, rod_length = section["tilt"], section["rod_length"] or 0.0
+    widths = tuple(diameter / math.cos(math.radians(tilt)) for diameter in diameters)
+    check_apart(section, heights, widths, rod_length * math.sin(math.radians(tilt)))
     if "masses" in section:
-        masses = place_masses(section, heights)
-    if masses is None or not section.is_sound():
-        return None
-    chain = Chain(
-        masses, heights, XI * section["inertia"], alpha=section["alpha"], gamma=section["gamma"]
-    )
-    position_u = section["position_uncertainty"]
+        masses, weighed = place_masses(section, heights), True
+    section.require_sound()
+    inertia, alpha, gamma = XI * section["inertia"], section["alpha"], section["gamma"]
+    chain = Chain(masses, heights, inertia, alpha=alpha, gamma=gamma)
+    position_u, width_u = section["position_uncertainty"], section["width_uncertainty"]
     if is_object and "position_uncertainty" not in section:
         position_u = 0.0  # it is where its drop says
-    width_u, weighed = section["width_uncertainty"], rods.weighed or "masses" in section
-    return RodChain(
-        name,
-        chain,
-        widths,
-        section["tilt"],
-        position_u,
-        width_u,
-        rods.diameters,
-        rod_length,
-        weighed,
-    )
+    return RodChain(name, chain, widths, tilt, position_u, width_u, diameters, rod_length, weighed)

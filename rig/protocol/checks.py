@@ -35,8 +35,7 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
     """
     struck = "surface" in top
     count = len(chains)
-    rods = tuple(filter(None, chains.values()))
-    rods = rods if len(rods) == count else ()
+    rods = () if None in chains.values() else tuple(filter(None, chains.values()))
     if struck or {"gravity", "site"} <= top.keys.keys():  # without a surface it is measured
         top.need("gravity", "site")
     if struck or "gates" in top:
@@ -62,7 +61,7 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
         if rods and "drop" in top and top.is_sound("drop"):
             inclines = top["plan"]["incline"] if top["plan"] else DEFAULTS["plan.incline"]
             inclines = [angle for angle in inclines or () if on_board and angle is not None]
-            check_clear(top["gates"], rods, top["drop"], surface=struck, inclines=inclines)
+            check_clear(top, rods, inclines)
 
 
 def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
@@ -72,8 +71,7 @@ def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
         drag.refuse("not used with terminal_speed; leave {} out", "air_density")
     if stated == "coefficient":
         for rods in chains:
-            if rods.missing_keys:
-                missing = ", ".join(rods.missing_keys)
+            if missing := ", ".join(rods.missing_keys):
                 message = f"needs {missing} of {rods.name}; state it, or terminal_speed instead"
                 drag.fault("coefficient", message)
 
@@ -83,8 +81,7 @@ def _check_plan(plan: Section, *, struck: bool, turns: bool) -> None:
     if not struck:
         plan.refuse("the scene has no surface; leave {} out", "incline")
     if "order" in plan and plan["order"] in {"ABBA", "alternate"} and not turns:
-        message = f"found {plan['order']}, which needs two chains; leave order out"
-        plan.fault("order", message)
+        plan.fault("order", f"found {plan['order']}, which needs two chains; leave order out")
     inclines, node = plan["incline"] or (), plan.nodes.get("incline")
     lines: dict[float, int] = {}
     for n, item in enumerate(node.items if isinstance(node, Sequence) else ()):
@@ -102,7 +99,7 @@ def _is_on_board(contact: Section | None, chains: Iterable[RodChain]) -> bool:
     """Whether heights are measured from a board; note what chains then lack."""
     if contact is None or contact["datum"] != "board":
         return False
-    lacking = {rods.name: keys for rods in chains if (keys := lacking_geometry(rods))}
-    for name, keys in lacking.items():
-        contact.fault("datum", f"datum: board needs chains.{name}.{keys[0]}; state it")
+    lacking = [f"chains.{rods.name}.{key}" for rods in chains for key in lacking_geometry(rods)[:1]]
+    for key in lacking:
+        contact.fault("datum", f"datum: board needs {key}; state it")
     return not lacking

@@ -85,9 +85,8 @@ def contact_level(protocol: Protocol, incline_deg: float, struck: str) -> Quanti
     level = protocol.contact.level
     if not protocol.contact.from_board or protocol.stated is not None:
         return level
-    return Quantity(
-        touching_heights(protocol.chains[struck], incline_deg)[-1] + level.value, level.u
-    )
+    top_rod = touching_heights(protocol.chains[struck], incline_deg)[-1]
+    return Quantity(top_rod + level.value, level.u)
 
 
 def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Protocol:
@@ -116,10 +115,6 @@ def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Pr
             for gate in gates.gates
         )
         gates = replace(gates, gates=tuple(lower))
-    return replace(
-        protocol,
-        drop=Quantity(protocol.drop.value - level.value, protocol.drop.u),
-        gates=gates,
-        contact=replace(protocol.contact, level=Quantity(0.0, level.u)),
-        stated=protocol,
-    )
+    drop = Quantity(protocol.drop.value - level.value, protocol.drop.u)
+    contact = replace(protocol.contact, level=Quantity(0.0, level.u))
+    return replace(protocol, drop=drop, gates=gates, contact=contact, stated=protocol)

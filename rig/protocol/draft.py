@@ -116,9 +116,8 @@ def _share_gates(draft: Draft) -> dict[Side, int]:
     if draft.scene != "two-chains":
         return {"free": draft.gates}
     if draft.gates < 2:
-        raise InputError(
-            "two chains need two gates, one on each side", "for one gate use --scene one-chain"
-        )
+        hint = "for one gate use --scene one-chain"
+        raise InputError("two chains need two gates, one on each side", hint)
     impact = 1 if draft.gates < 5 else draft.gates // 2
     return {"impact": impact, "free": draft.gates - impact}
 
@@ -127,27 +126,22 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
     """Low gates for the end, and some between hanging rods for the beginning."""
     (rods, *_), drop = protocol.chains.values(), protocol.drop
     half = max(rods.widths) / 2.0
-    lowest, below = half + _CLEAR, drop.value - half - max(_CLEAR, drop.u)
-    heights = [
-        max(lowest, min(meant, lowest + share * (below - lowest))) for meant, share in _LOW[side]
-    ][:number]
+    low = half + _CLEAR
+    way = drop.value - half - max(_CLEAR, drop.u) - low
+    heights = [max(low, min(meant, low + share * way)) for meant, share in _LOW[side][:number]]
     gaps = [
         drop.value + (low + high) / 2.0
         for low, high in pairwise(rods.chain.heights)
         if high - low > 2.0 * (half + max(_CLEAR, drop.u))
     ]
-    for share in _HIGH:
-        if len(heights) == number or not gaps:
-            break
+    for share in _HIGH[: min(number - len(heights), len(gaps))]:
         target = drop.value + share * rods.chain.length
         _, gap = min((abs(gap - target), gap) for gap in gaps)
         gaps.remove(gap)
         heights.append(gap)
     if len(heights) < number:
-        raise InputError(
-            f"there is no space for {number} gates on one side",
-            f"use {len(heights)} a side, a longer drop or thinner rods",
-        )
+        hint = f"use {len(heights)} a side, a longer drop or thinner rods"
+        raise InputError(f"there is no space for {number} gates on one side", hint)
     return heights
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NoReturn
 
 from rig.errors import Problem
 from rig.protocol import keys
@@ -18,7 +18,7 @@ from rig.units import UnitError, parse, quoted
 
 
 @dataclass(slots=True)
-class FieldFaults:
+class Faults:
     """The problems noted so far in one file."""
 
     source: str
@@ -30,6 +30,10 @@ class FieldFaults:
         self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, message))
 
 
+class UnsoundError(Exception):
+    """What is described cannot be built; why is noted."""
+
+
 class Section:
     """One mapping of the file, read by the keys that the table has for it.
 
@@ -39,7 +43,7 @@ class Section:
         The mapping.
     path
         Its key path in the file, empty for the root.
-    table_path
+    table
         The same in the table, see `rig.protocol.keys.ANY`.
     faults
         Where problems go.
@@ -53,23 +57,16 @@ class Section:
     """
 
     def __init__(
-        self,
-        node: Mapping,
-        path: str,
-        table_path: str,
-        faults: FieldFaults,
-        *,
-        lenient: bool = False,
+        self, node: Mapping, path: str, table: str, faults: Faults, *, lenient: bool = False
     ) -> None:
         self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
         self.keys, self.nodes = unique_entries(node, path, faults)
-        table = keys.SECTIONS[table_path]
-        self._table = table
+        self._accepted = keys.SECTIONS[table]
         self._faulty: set[str] = set()
-        self._unknown = self.keys.keys() - table.keys()
+        self._unknown = self.keys.keys() - self._accepted.keys()
         for name in self._unknown:
-            self.fault(name, _unknown_key(name, table), at_key=True)
-        self.values = {name: self._read(name, key) for name, key in table.items()}
+            self.fault(name, _unknown_key(name, self._accepted), at_key=True)
+        self.values = {name: self._read(name, key) for name, key in self._accepted.items()}
 
     def __contains__(self, name: str) -> bool:
         return name in self.nodes
@@ -79,9 +76,8 @@ class Section:
 
     def _read(self, name: str, key: keys.Key) -> Any:
         if name in self.nodes:
-            value = read_value(
-                key.accepted, self.nodes[name], self.key(name), key.path, self.faults
-            )
+            node, path = self.nodes[name], self.key(name)
+            value = read_value(key.accepted, node, path, key.path, self.faults)
             if not _is_sound(value):
                 self._faulty.add(name)
             return value
@@ -104,7 +100,7 @@ class Section:
         self._faulty.update(names)
         # What seems to be missing may be a key that is spelt wrongly.
         if not self.lenient and not any(did_you_mean(name, names) for name in self._unknown):
-            examples = (f"{name}: {keys.example(self._table[name])}" for name in names)
+            examples = (f"{name}: {keys.example(self._accepted[name])}" for name in names)
             message = f"missing; write for example {', or '.join(examples)}"
             self.faults.add(self.node.place, self.key(names[0]), message)
         return None
@@ -126,6 +122,16 @@ class Section:
         """Note a problem with the value of a key (or with the key's being there)."""
         place = self.keys[name] if at_key else self.place(name)
         self.faults.add(place, self.key(name), message)
+
+    def reject(self, name: str, message: str, *, at_key: bool = False) -> NoReturn:
+        """Note a problem with which nothing can be built from this section."""
+        self.fault(name, message, at_key=at_key)
+        raise UnsoundError
+
+    def require_sound(self, *names: str) -> None:
+        """Build nothing where one of these keys, or of all, is faulty or missing."""
+        if not self.is_sound(*names):
+            raise UnsoundError
 
 
 def _is_sound(value: Any) -> bool:
@@ -158,7 +164,7 @@ def did_you_mean(word: str, accepted: Iterable[str]) -> str:
 
 
 def unique_entries(
-    node: Mapping, path: str, faults: FieldFaults
+    node: Mapping, path: str, faults: Faults
 ) -> tuple[dict[str, Place], dict[str, Node]]:
     """Return the places and values of a mapping's keys, noting repeated keys and odd ones."""
     places: dict[str, Place] = {}
@@ -176,9 +182,7 @@ def unique_entries(
     return places, values
 
 
-def read_value(
-    accepted: keys.Accepted, node: Node, path: str, table_path: str, faults: FieldFaults
-) -> Any:
+def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, faults: Faults) -> Any:
     """Return a value of the file in base units, or note a fault and return ``None``.
 
     A mapping becomes a `Section` (or stays a node, where the file chooses its names), and a list a
@@ -189,16 +193,16 @@ def read_value(
             shape = isinstance(node, Sequence), isinstance(node, Mapping)
             for kind in kinds:
                 if (isinstance(kind, keys.ListOf), kind is keys.Plain.MAPPED) == shape:
-                    value = read_value(kind, node, path, table_path, faults)
-                    return accepted.as_list(kind, value)
+                    value = read_value(kind, node, path, table, faults)
+                    # What may be a list, too, is alone a list of one.
+                    is_item = keys.ListOf(kind) in kinds and value is not None
+                    return (value,) if is_item else value
         case keys.Plain.MAPPED, Mapping():
-            return Section(node, path, table_path, faults) if table_path in keys.SECTIONS else node
+            return Section(node, path, table, faults) if table in keys.SECTIONS else node
         case keys.ListOf(each), Sequence(items=[_, *_] as items):
-            kind, table_path = each or keys.Plain.MAPPED, f"{table_path}.{keys.EACH}"
-            return tuple(
-                read_value(kind, item, f"{path}[{n}]", table_path, faults)
-                for n, item in enumerate(items)
-            )
+            kind, table = each or keys.Plain.MAPPED, f"{table}.{keys.EACH}"
+            paths = ((f"{path}[{n}]", item) for n, item in enumerate(items))
+            return tuple(read_value(kind, item, at, table, faults) for at, item in paths)
     message = f"found {node}; accepted: {_form(accepted)}"
     if isinstance(node, ScalarNode):
         try:
@@ -217,19 +221,17 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
     UnitError
         If it is not accepted: says what was found and what is accepted.
     """
-    refusal, close, form = f"found {node}", "", _form(accepted)
+    refusal, close = f"found {node}", ""
     match accepted:
         case keys.Range() if node.kind not in {"nothing", "a boolean"}:
             quantity = parse(node.text, accepted.dimension)
             if quantity.value not in accepted:
-                refusal, form = f"found {node.text}", str(accepted)
-            elif accepted.exact and quantity.u > 0:
+                raise UnitError(f"found {node.text}; accepted: {accepted}")
+            if accepted.exact and quantity.u > 0:
                 raise UnitError(f"{refusal}; {accepted.exact}")
-            else:
-                return quantity.value if accepted.exact else quantity
+            return quantity.value if accepted.exact else quantity
         case keys.Whole(low, high) if node.kind == "a whole number" and len(node.text) <= 30:
-            sign, digits = (-1, node.text[1:]) if node.text[0] == "-" else (1, node.text)
-            number = sign * int(digits, {"0o": 8, "0x": 16}.get(digits[:2], 10))
+            number = int(node.text, {"0o": 8, "0x": 16}.get(node.text[:2], 10))
             if low <= number <= high:
                 return number
         case keys.OneOf(words):
@@ -243,7 +245,7 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
             raise UnitError(f"{refusal} with control characters; accepted: plain text")
         case keys.Plain.TEXT if node.kind != "nothing":
             raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
-    raise UnitError(f"{refusal}; {close}accepted: {form}")
+    raise UnitError(f"{refusal}; {close}accepted: {_form(accepted)}")
 
 
 def _form(accepted: keys.Accepted) -> str:
@@ -262,10 +264,9 @@ def _form(accepted: keys.Accepted) -> str:
 
 def _read_default(key: keys.Key) -> Any:
     """Return the default of a key as if it stood in a file; `None` where there is none."""
-    if not key.default or key.in_words:
-        return None
     node = ScalarNode(key.default, plain=True, place=Place(1, 1))
-    return read_value(key.accepted, node, key.path, key.path, FieldFaults("keys.txt"))
+    stated = key.default and not key.in_words
+    return read_value(key.accepted, node, key.path, key.path, Faults("")) if stated else None
 
 
 DEFAULTS: dict[str, Any] = {path: _read_default(key) for path, key in keys.KEYS.items()}

@@ -10,7 +10,7 @@ from rig.protocol.fields import Section
 from rig.protocol.protocol import SIDES, RodChain, vocabulary_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator
 
     from rig.units import Quantity
 
@@ -77,53 +77,47 @@ def blocking_rod(rods: Iterable[HangingRod], height: float) -> HangingRod | None
     return next((rod for rod in rods if rod.low < height < rod.high), None)
 
 
-def check_clear(
-    section: Section,
-    chains: Collection[RodChain],
-    drop: Quantity,
-    *,
-    surface: bool,
-    inclines: Sequence[float] = (),
-) -> None:
+def check_clear(top: Section, chains: Collection[RodChain], inclines: Iterable[float]) -> None:
     """Note gates that are blocked before the release, that nothing passes, or that are too low.
 
     The chains swap sides, so every gate is checked against every chain.
 
     Parameters
     ----------
-    section
-        The ``gates`` mapping.
+    top
+        The root of the file, with its ``gates`` and a sound ``drop``.
     inclines
         Of the board, where heights are measured from it.
     """
+    drop, struck = top["drop"], "surface" in top
     rods = hanging_rods(chains, drop)
-    lowest = max(width for chain in chains for width in chain.widths) / 2 if surface else 0.0
-    lowest += max(
-        (max(touching_heights(chain, incline)) for chain in chains for incline in inclines),
-        default=0.0,
-    )
-    top = min(drop.value + chain.chain.length for chain in chains)
-    part = vocabulary_of(chains, struck=surface).part
+    touching = [max(touching_heights(chain, angle)) for angle in inclines for chain in chains]
+    thickest = max(width for chain in chains for width in chain.widths)
+    lowest = thickest / 2 + max(touching, default=0.0) if struck else 0.0
+    top_rod = min(drop.value + chain.chain.length for chain in chains)
+    part = vocabulary_of(chains, struck=struck).part
     only = next(iter(chains)).name if all(chain.chain.rods == 1 for chain in chains) else None
-    for gate in filter(Section.is_sound, _sections(section)):
+    for gate in filter(Section.is_sound, _sections(top["gates"])):
         height = gate["height"]
-        message = f"found {_mm(height)}"
         rod = blocking_rod(rods, height)
         if height < lowest:
-            message += "; a rod at rest on the surface would block the beam: at least "
-            message += f"{_mm(math.ceil(lowest * 1e4) / 1e4)} is needed"
+            needed = _mm(math.ceil(lowest * 1e4) / 1e4)
+            why = (
+                f"; a rod at rest on the surface would block the beam: at least {needed} is needed"
+            )
         elif rod is not None:
-            clear = " or ".join(_mm(z) for z in _clear_heights(height, rods, lowest, top))
-            name = f"{part} {rod.number} of {rod.chain}" if only is None else only
-            message += f", which {name} blocks before the release"
-            message += f"; the nearest clear heights are {clear}" if clear else ""
-        elif height > top:
-            passes = f"no {part} passes" if only is None else f"{only} does not pass"
-            start = f"the top {part} starts" if only is None else "it starts"
-            message += f"; {passes} above {_mm(top)}, where {start}"
+            clear = " or ".join(_mm(z) for z in _clear_heights(height, rods, lowest, top_rod))
+            why = (
+                f", which {only or f'{part} {rod.number} of {rod.chain}'} blocks before the release"
+            )
+            why += f"; the nearest clear heights are {clear}" if clear else ""
+        elif height > top_rod:
+            passes = f"{only} does not pass" if only else f"no {part} passes"
+            start = "it starts" if only else f"the top {part} starts"
+            why = f"; {passes} above {_mm(top_rod)}, where {start}"
         else:
             continue
-        gate.fault("height", message)
+        gate.fault("height", f"found {_mm(height)}{why}")
 
 
 def _clear_heights(
@@ -134,11 +128,9 @@ def _clear_heights(
     below = {math.floor(rod.low * 1e4) - step for rod in rods for step in (0, 1)}
     above = {math.ceil(rod.high * 1e4) + step for rod in rods for step in (0, 1)}
     tenths = [z for z in below | above if blocking_rod(rods, z / 1e4) is None]
-    nearest = (
-        max((z for z in tenths if z / 1e4 < height), default=0),
-        min((z for z in tenths if z / 1e4 > height), default=0),
-    )
-    return [z / 1e4 for z in nearest if max(lowest, 1e-4) <= z / 1e4 <= top]
+    lower = max((z for z in tenths if z / 1e4 < height), default=0)
+    upper = min((z for z in tenths if z / 1e4 > height), default=0)
+    return [z / 1e4 for z in (lower, upper) if max(lowest, 1e-4) <= z / 1e4 <= top]
 
 
 def _mm(height: float) -> str:

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rig.units import Dimension, Quantity, format_quantity
 
@@ -19,14 +19,19 @@ ANY = "*"
 """Stands in a path for names that the file chooses: of chains."""
 EACH = "[]"
 """Stands in a path for each item of a list."""
-BOOLEANS = dict.fromkeys(("true", "True", "TRUE"), True)
-BOOLEANS |= dict.fromkeys(("false", "False", "FALSE"), False)
+BOOLEANS = {
+    "true": True,
+    "True": True,
+    "TRUE": True,
+    "false": False,
+    "False": False,
+    "FALSE": False,
+}
 """As YAML 1.2 writes them (core schema, section 10.3.2)."""
 
 
 MOST_RODS = 1000
 """Of a chain, in all its groups."""
-_NO_U = "no uncertainty is accepted here"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +45,8 @@ class Range:
     low: float
     high: float
     unit: str
-    open_low: bool = False
-    exact: str = _NO_U
+    open_low: bool
+    exact: str
 
     def __contains__(self, value: float) -> bool:
         return self.low <= value <= self.high and not (self.open_low and value == self.low)
@@ -78,10 +83,6 @@ class Either(NamedTuple):
 
     def __str__(self) -> str:
         return "; or ".join(map(str, self.kinds))
-
-    def as_list(self, kind: Accepted, value: Any) -> Any:
-        """Return a value of one of these kinds; alone where a list may stand, it is one of one."""
-        return (value,) if ListOf(kind) in self.kinds and value is not None else value
 
 
 class ListOf(NamedTuple):
@@ -123,7 +124,7 @@ class Key(NamedTuple):
     example
         As written in a file.
     scene
-        What a scene needs for this key to matter: empty, or one of `rig.protocol.describe.SCENES`.
+        What a scene needs for this key to matter: as ``describe.txt`` writes it.
     source
         Where the default comes from.
     """
@@ -146,7 +147,7 @@ def _read_range(text: str) -> Range:
     parts = _RANGE.fullmatch(text)
     assert parts is not None, text
     name, opening, low, high, unit, with_u, why = parts.groups()
-    exact = "" if with_u else why or _NO_U
+    exact = "" if with_u else why or "no uncertainty is accepted here"
     return Range(Dimension[name.upper()], float(low), float(high), unit, opening == "(", exact)
 
 
@@ -174,15 +175,10 @@ def read_key(row: str) -> Key:
     row
         Columns parted by ``|``, as the head of that file explains; the last two may be left out.
     """
-    path, accepted, default, *texts = map(str.strip, row.split("|"))
-    return Key(
-        path.removesuffix("!"),
-        _read_accepted(accepted),
-        default.strip("()"),
-        path.endswith("!"),
-        default.startswith("("),
-        *texts,
-    )
+    name, form, default, *texts = map(str.strip, row.split("|"))
+    path, accepted = name.removesuffix("!"), _read_accepted(form)
+    required, in_words = name.endswith("!"), default.startswith("(")
+    return Key(path, accepted, default.strip("()"), required, in_words, *texts)
 
 
 _LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
@@ -200,9 +196,7 @@ for _key in KEYS.values():
 def range_of(path: str) -> Range:
     """Return the accepted values of a key that is a quantity, or of each in its list."""
     accepted = KEYS[path].accepted
-    accepted = accepted.kinds[0] if isinstance(accepted, Either) else accepted
-    assert isinstance(accepted, Range)
-    return accepted
+    return next(kind for kind in getattr(accepted, "kinds", (accepted,)) if isinstance(kind, Range))
 
 
 _BRACKETS = (("", "{", "}"), (f".{EACH}", "[{", "}]"), (f".{ANY}", "{A: {", ", …}}"))

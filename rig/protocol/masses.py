@@ -5,14 +5,15 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from rig.protocol.fields import UnsoundError
+
 if TYPE_CHECKING:
     from rig.protocol.fields import Section
+    from rig.protocol.rods import RodValues
 
-Masses = tuple[float, ...]
 
-
-def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses | None:
-    """Return the mass of each rod, kg, bottom up; `None` (and faults) if they are not sound.
+def place_masses(chain: Section, heights: RodValues) -> RodValues:
+    """Return the mass of each rod, kg, bottom up.
 
     They are listed with one mass a rod; or follow ``{exponential: {bottom: …, top: …}}``, an even
     ratio from each rod to the next; or ``{table: [{height: …, mass: …}, …]}``, straight from point
@@ -27,37 +28,33 @@ def place_masses(chain: Section, heights: tuple[float, ...]) -> Masses | None:
     """
     masses, rods = chain["masses"], len(heights)
     if isinstance(masses, tuple):
-        if len(masses) == rods:
-            return masses
-        message = f"found {len(masses)} masses for {rods} rods; state one for each rod"
-        chain.fault("masses", message)
-        return None
+        if len(masses) != rods:
+            message = f"found {len(masses)} masses for {rods} rods; state one for each rod"
+            chain.reject("masses", message)
+        return masses
     profile = masses and masses.need("exponential", "table")
     if not profile or not masses.is_sound():
-        return None
+        raise UnsoundError
     if profile == "table":
         return _interpolate(masses, heights)
     if rods == 1:
-        masses.fault("exponential", "one object has one mass; state it as mass", at_key=True)
-        return None
+        masses.reject("exponential", "one object has one mass; state it as mass", at_key=True)
     bottom, top = masses["exponential"]["bottom"], masses["exponential"]["top"]
     between = ((top / bottom) ** (rod / (rods - 1)) for rod in range(1, rods - 1))
     return (bottom, *(bottom * share for share in between), top)
 
 
-def _interpolate(masses: Section, heights: tuple[float, ...]) -> Masses | None:
+def _interpolate(masses: Section, heights: RodValues) -> RodValues:
     """Return masses that run straight between the points of a table."""
     points = [(point["height"], point["mass"]) for point in masses["table"]]
     for n, ((low, _), (high, _)) in enumerate(pairwise(points), start=1):
         if low >= high:
-            masses["table"][n].fault("height", "heights must increase from point to point")
-            return None
+            masses["table"][n].reject("height", "heights must increase from point to point")
     lowest, highest = points[0][0], points[-1][0]
     # A height that sums up from rods is a rounding above what was written.
     if lowest > 0.0 or highest < heights[-1] * (1.0 - 1e-12):
         message = f"runs from {lowest:g} m to {highest:g} m; the rods are from 0 m"
-        masses.fault("table", f"{message} to {heights[-1]:g} m")
-        return None
+        masses.reject("table", f"{message} to {heights[-1]:g} m")
     return tuple(_mass_at(points, height) for height in heights)
 
 

@@ -44,12 +44,8 @@ def record_ms(protocol: Protocol) -> int:
     The chain may hang until the pulse ends, and the air makes the fall longer. More than
     `LONGEST_RECORD_MS` is too much for any board.
     """
-    wanted_s = (
-        _AIR * longest_fall(protocol)
-        + protocol.release.pulse
-        + protocol.accept.release_skew
-        + _MARGIN_S
-    )
+    fall_s, skew_s = _AIR * longest_fall(protocol), protocol.accept.release_skew
+    wanted_s = fall_s + protocol.release.pulse + skew_s + _MARGIN_S
     return max(LEAST_RECORD_MS, math.ceil(wanted_s * 1e3))
 
 
@@ -89,12 +85,9 @@ def check_measurable(protocol: Protocol) -> None:
     InputError
         With every reason.
     """
-    reasons = unmeasurable(protocol)
-    if reasons:
-        raise InputError(
-            f"{protocol.source}: prediction only, by {'; '.join(reasons)}",
-            "rig predict shows the prediction; leave these keys out to measure",
-        )
+    if reasons := "; ".join(unmeasurable(protocol)):
+        hint = "rig predict shows the prediction; leave these keys out to measure"
+        raise InputError(f"{protocol.source}: prediction only, by {reasons}", hint)
 
 
 def too_long(protocol: Protocol) -> Problem | None:
@@ -128,12 +121,10 @@ def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:
 
 def most_edges(protocol: Protocol) -> int:
     """Count the edges of a drop whose rods all pass, with the chain on each side that has more."""
-    edges = 0
-    for side in SIDES:
-        gates = protocol.gates.on(side) if protocol.gates else ()
-        passing = [passing_rods(protocol, gate) for gate in gates]
-        edges += 2 * max(sum(rods[name] for rods in passing) for name in protocol.chains)
-    return edges
+    sides = map(protocol.gates.on, SIDES) if protocol.gates else ()
+    passing = ([passing_rods(protocol, gate) for gate in gates] for gates in sides)
+    most = (max(sum(rods[name] for rods in side) for name in protocol.chains) for side in passing)
+    return 2 * sum(most)
 
 
 def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
@@ -141,12 +132,11 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     problems = []
 
     def want(kind: str, least: float, value: str, has: str, *path: str | int) -> None:
-        if getattr(board, kind) >= least:
-            return
-        able = [timer.one for timer in BOARDS.values() if getattr(timer, kind) >= least]
-        advice = f", or use {' or '.join(able)}" if able else ""
-        message = f"found {value}; the board ({board.name}) has {has}: change this{advice}"
-        problems.append(_locate(protocol, message, *path))
+        if getattr(board, kind) < least:
+            able = [timer.one for timer in BOARDS.values() if getattr(timer, kind) >= least]
+            advice = f", or use {' or '.join(able)}" if able else ""
+            message = f"found {value}; the board ({board.name}) has {has}: change this{advice}"
+            problems.append(_locate(protocol, message, *path))
 
     release = protocol.release
     has = f"releases 0 to {board.releases - 1}"

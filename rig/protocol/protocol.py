@@ -67,12 +67,9 @@ class RodChain:
     @property
     def missing_keys(self) -> tuple[str, ...]:
         """The keys of the rods that the file leaves open, though a scene may do without them."""
-        stated_keys = {
-            "mass": self.weighed,
-            "diameter": min(self.diameters, default=0.0) > 0.0,
-            "rod_length": self.rod_length > 0.0,
-        }
-        return tuple(key for key, stated in stated_keys.items() if not stated)
+        thinnest = min(self.diameters, default=0.0)
+        values = {"mass": self.weighed, "diameter": thinnest, "rod_length": self.rod_length}
+        return tuple(key for key, value in values.items() if not value)
 
 
 def vocabulary_of(chains: Collection[RodChain], *, struck: bool) -> Vocabulary:
@@ -371,15 +368,12 @@ class Protocol:
     @property
     def unlike_chains(self) -> bool:
         """Whether it changes a result which of the two chains strikes."""
-        if not self.two_chains:
-            return False
-        first, second = self.chains.values()
-        return first.chain != second.chain or (
-            self.drag is not None
-            and self.drag.coefficient is not None
-            and (first.diameters, first.rod_length, first.tilt_deg)
-            != (second.diameters, second.rod_length, second.tilt_deg)
-        )
+        in_air = self.drag is not None and self.drag.coefficient is not None
+        chains = {
+            (rods.chain, in_air and (rods.diameters, rods.rod_length, rods.tilt_deg))
+            for rods in self.chains.values()
+        }
+        return self.two_chains and len(chains) > 1
 
     @property
     def strikers(self) -> tuple[str, ...]:

@@ -11,23 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from rig.errors import InputError, Problem
 from rig.files import read_input
+from rig.protocol import protocol as scene
 from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene
-from rig.protocol.fields import FieldFaults, Section, read_value
+from rig.protocol.fields import Faults, Section, read_value
 from rig.protocol.keys import Plain
-from rig.protocol.protocol import (
-    SIDES,
-    Accept,
-    Contact,
-    Drag,
-    Gate,
-    Gates,
-    InclinedTrack,
-    Plan,
-    Priors,
-    Protocol,
-    ReleasePulse,
-)
 from rig.protocol.site import gravity_at
 from rig.protocol.yamltree import load, place_at
 from rig.units import Quantity
@@ -40,7 +28,7 @@ if TYPE_CHECKING:
 MAX_BYTES = 1_000_000
 
 
-def read(path: str | os.PathLike[str]) -> Protocol:
+def read(path: str | os.PathLike[str]) -> scene.Protocol:
     """Read a protocol file.
 
     Parameters
@@ -79,7 +67,7 @@ def read(path: str | os.PathLike[str]) -> Protocol:
     return parse(text, source)
 
 
-def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protocol:
+def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.Protocol:
     """Read a protocol from its text.
 
     Parameters
@@ -104,21 +92,18 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
     """
     if len(text) > MAX_BYTES:
         raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
-    faults = FieldFaults(source)
+    faults = Faults(source)
     top: Section | None = read_value(Plain.MAPPED, load(text, source), "", "", faults)
     if top is None:
         raise InputError(problems=faults.problems.values())
-    struck, measured = "surface" in top, "gates" in top
-    chains = read_chains(top["chains"], faults, seen_by_gates=measured, struck=struck)
+    chains = read_chains(top)
     check_scene(top, chains, kept=kept)
     if faults.problems:
         raise InputError(problems=faults.problems.values())
-    track = top["track"] and InclinedTrack(**_arguments(top["track"], incline="incline_deg"))
-    gravity, site = top["gravity"], top["site"]
-    if site is not None:
-        gravity = gravity_at(site["latitude"], site["height"])
-    contact = top["contact"]
-    return Protocol(
+    track = top["track"] and scene.InclinedTrack(**_arguments(top["track"], incline="incline_deg"))
+    site, contact = top["site"], top["contact"]
+    gravity = gravity_at(site["latitude"], site["height"]) if site else top["gravity"]
+    return scene.Protocol(
         title=top["title"] if "title" in top else Path(source).stem,
         chains={name: chain for name, chain in chains.items() if chain is not None},
         gravity=gravity if track is None else track.along(gravity),
@@ -126,16 +111,16 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> Protoco
         surface=top["surface"] and _surface(top["surface"]),
         track=track,
         gates=top["gates"] and _gates(top["gates"]),
-        release=ReleasePulse(**_arguments(top["release"])),
-        plan=Plan(**_arguments(top["plan"], incline="inclines")),
-        accept=Accept(**_arguments(top["accept"])),
+        release=scene.ReleasePulse(**_arguments(top["release"])),
+        plan=scene.Plan(**_arguments(top["plan"], incline="inclines")),
+        accept=scene.Accept(**_arguments(top["accept"])),
         initial_speed=top["initial_speed"],
-        drag=top["drag"] and Drag(**_arguments(top["drag"])),
-        contact=Contact(contact["level"], contact["strike"], contact["datum"] == "board")
+        drag=top["drag"] and scene.Drag(**_arguments(top["drag"])),
+        contact=scene.Contact(contact["level"], contact["strike"], contact["datum"] == "board")
         if contact
-        else Contact(),
+        else scene.Contact(),
         reference_u=top["reference"],
-        priors=Priors(**_arguments(top["priors"])),
+        priors=scene.Priors(**_arguments(top["priors"])),
         blind=top["blind"],
         notes=top["notes"] or "",
         text=text,
@@ -153,19 +138,13 @@ def _surface(section: Section) -> Surface:
     """Return the surface; without a restitution, which no chain then needs, its is 0."""
     from rig.model.surface import Pile, Surface  # noqa: PLC0415 - only where something is struck
 
-    pile = section["pile"]
-    return Surface(
-        section["restitution"] or Quantity(0.0),
-        section["friction"],
-        pile and Pile(pile["below"], pile["restitution"]),
-    )
+    restitution, pile = section["restitution"] or Quantity(0.0), section["pile"]
+    softer = pile and Pile(pile["below"], pile["restitution"])
+    return Surface(restitution, section["friction"], softer)
 
 
-def _gates(section: Section) -> Gates:
+def _gates(section: Section) -> scene.Gates:
     """Return the gates, impact side first, in the order of the file."""
-    gates = (
-        Gate(gate["channel"], gate["height"], side)
-        for side in SIDES
-        for gate in section[side] or ()
-    )
-    return Gates(tuple(gates), section["height_uncertainty"], section["datum_uncertainty"])
+    sides = ((side, gate) for side in scene.SIDES for gate in section[side] or ())
+    gates = (scene.Gate(gate["channel"], gate["height"], side) for side, gate in sides)
+    return scene.Gates(tuple(gates), section["height_uncertainty"], section["datum_uncertainty"])

@@ -5,6 +5,8 @@ Tests read every example of the table with the reader itself.
 
 from __future__ import annotations
 
+from pathlib import Path
+from string import Template
 from typing import Any
 
 from rig.protocol import keys
@@ -13,33 +15,14 @@ from rig.units import Dimension
 
 def page() -> str:
     """Write the reference as Markdown."""
-    lines = [
-        "# The protocol file",
-        "",
-        "What may stand in a protocol? One YAML file describes one experiment. `rig check FILE`",
-        "reads it, `rig check --keys` prints this page, and `rig check --schema` a JSON Schema for",
-        "editors. Examples are in [protocols](../protocols).",
-        "",
-        "Quantities have a unit (`48.5 mm`) and may have a standard uncertainty (`180 mm ± 2 mm`,",
-        "`9.8124(2) m/s^2`); *±* marks where. `*` is the name of a chain, `[]` an item of a list.",
-        "**Bold** keys are required within their section.",
-        "",
-        "| key | accepted | without it | meaning | example |",
-        "|---|---|---|---|---|",
-    ]
+    rows = []
     for key in keys.KEYS.values():
         name = f"**`{key.path}`**" if key.required else f"`{key.path}`"
         example = f"`{key.example}`" if key.example else ""
-        lines.append(f"| {name} | {key.accepted} | {key.default} | {key.meaning} | {example} |")
-    lines += [
-        "",
-        "## Where the defaults of `priors` come from",
-        "",
-        "| key | source |",
-        "|---|---|",
-    ]
-    lines += [f"| `{name}` | {key.source} |" for name, key in keys.SECTIONS["priors"].items()]
-    return "\n".join(lines) + "\n"
+        rows.append(f"| {name} | {key.accepted} | {key.default} | {key.meaning} | {example} |")
+    sources = [f"| `{name}` | {key.source} |" for name, key in keys.SECTIONS["priors"].items()]
+    page = Template(Path(__file__).with_suffix(".txt").read_text("utf-8"))
+    return page.substitute(keys="\n".join(rows), sources="\n".join(sources))
 
 
 def schema() -> dict[str, Any]:
@@ -51,14 +34,13 @@ def schema() -> dict[str, Any]:
 def _object(path: str, description: str) -> dict[str, Any]:
     """Return the schema of the mapping at a path."""
     head: dict[str, Any] = {"type": "object"}
-    if description:
-        head["description"] = description
+    head |= {"description": description} if description else {}
     if path not in keys.SECTIONS:
         inner = _object(f"{path}.{keys.ANY}", "a chain")
         return head | {"additionalProperties": inner, "minProperties": 1, "maxProperties": 2}
     table = keys.SECTIONS[path]
-    head["properties"] = {name: _property(key) for name, key in table.items()}
-    head["additionalProperties"] = False
+    properties = {name: _property(key) for name, key in table.items()}
+    head |= {"properties": properties, "additionalProperties": False}
     required = [name for name, key in table.items() if key.required]
     # What a chain is like another one in, it need not say again.
     return head | ({"required": required} if required and not path.endswith(keys.ANY) else {})
@@ -66,13 +48,11 @@ def _object(path: str, description: str) -> dict[str, Any]:
 
 def _property(key: keys.Key) -> dict[str, Any]:
     """Return the schema of a key."""
-    words = [key.meaning]
-    if key.accepted is not keys.Plain.MAPPED:
-        words.append(str(key.accepted))
-    if key.default:
-        words.append(f"without it: {key.default}")
+    accepted = "" if key.accepted is keys.Plain.MAPPED else f"; {key.accepted}"
+    default = key.default and f"; without it: {key.default}"
     examples = {"examples": [key.example]} if key.example else {}
-    return {"description": "; ".join(words), **_values(key.path, key.accepted), **examples}
+    description = f"{key.meaning}{accepted}{default}"
+    return {"description": description, **_values(key.path, key.accepted), **examples}
 
 
 def _values(path: str, accepted: keys.Accepted) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from rig.protocol.keys import MOST_RODS
 from rig.units import Quantity, format_quantity
@@ -13,59 +13,61 @@ if TYPE_CHECKING:
     from rig.protocol.fields import Section
 
 
-class Rods(NamedTuple):
-    """Diameter (m; 0 where unknown) and mass of each rod, bottom up.
-
-    `weighed` says that masses are in kg; else only their ratios mean something.
-    """
-
-    diameters: tuple[float, ...]
-    masses: tuple[float, ...]
-    weighed: bool
+RodValues = tuple[float, ...]
+"""One of each rod, bottom up."""
 
 
-def list_rods(section: Section, *, seen_by_gates: bool, struck: bool) -> Rods | None:
-    """Return the rods of a chain by its ``rods``, ``diameter`` and ``mass``.
+def count_rods(section: Section) -> int:
+    """Count the rods of a chain whose ``rods`` are sound."""
+    rods = section["rods"]
+    return rods if isinstance(rods, int) else sum(group["count"] for group in rods)
+
+
+def list_rods(section: Section, top: Section) -> tuple[RodValues, RodValues, bool]:
+    """Return the rods of a chain of a file by its ``rods``, ``diameter`` and ``mass``, bottom up.
 
     Masses are those given, else proportional to the cross-section (like material) with the
     bottom rod's as 1, else all 1. One rod alone is any object, which may fall and never strikes.
+
+    Returns
+    -------
+    tuple
+        Diameters, m, 0 where unknown; masses; and whether these are in kg: else only their ratios
+        mean something.
     """
-    if not section.is_sound("rods", "diameter", "mass"):
-        return None
-    groups = section["rods"]
-    if isinstance(groups, int):
-        groups = [{"count": groups, "diameter": None, "mass": None}]
-    total = sum(group["count"] for group in groups)
+    section.require_sound("rods", "diameter", "mass")
+    total = count_rods(section)
     if total > MOST_RODS:
-        section.fault("rods", f"found {total} rods; at most {MOST_RODS} are accepted")
-        return None
-    if total == 1 and struck:
+        section.reject("rods", f"found {total} rods; at most {MOST_RODS} are accepted")
+    if total == 1 and "surface" in top:
         message = "found 1 rod; a chain that strikes a surface has at least 2"
-        section.fault("rods", f"{message}; for one object leave surface out")
-        return None
-    diameters, masses = (
-        [
-            section[key] if group[key] is None else group[key]
-            for group in groups
-            for _ in range(group["count"])
-        ]
-        for key in ("diameter", "mass")
-    )
+        section.reject("rods", f"{message}; for one object leave surface out")
+    diameters, masses = (_list_values(section, key, total) for key in ("diameter", "mass"))
     weighed = None not in masses
-    if not weighed and any(mass is not None for mass in masses):
-        section.fault("rods", "mass is given for some groups only; state it for all or none")
-        return None
+    if not weighed and any(masses):
+        section.reject("rods", "mass is given for some groups only; state it for all or none")
     if None in diameters:
-        if seen_by_gates or any(diameter is not None for diameter in diameters):
+        if "gates" in top or any(diameters):
             section.need("diameter")
-            return None
+            section.require_sound("diameter")
         diameters = [0.0] * total
     if not weighed:
         masses = [(d / diameters[0]) ** 2 if diameters[0] else 1.0 for d in diameters]
-    return Rods(tuple(diameters), tuple(masses), weighed)
+    return tuple(diameters), tuple(masses), weighed
 
 
-def place_rods(section: Section, diameters: tuple[float, ...]) -> tuple[float, ...] | None:
+def _list_values(section: Section, key: str, total: int) -> list[Any]:
+    """Return a group's or the chain's value for each rod, bottom up; `None` where there is none."""
+    groups = section["rods"]
+    if isinstance(groups, int):
+        return [section[key]] * total
+    values = ((group["count"], group[key]) for group in groups)
+    return [
+        section[key] if value is None else value for count, value in values for _ in range(count)
+    ]
+
+
+def place_rods(section: Section, diameters: RodValues) -> RodValues:
     """Return the heights of the rods' middles above the bottom rod's, m.
 
     Equal gaps: neighbours i, i+1 are ``gap + (d_i + d_{i+1})/2`` apart, the gap being whatever
@@ -80,8 +82,8 @@ def place_rods(section: Section, diameters: tuple[float, ...]) -> tuple[float, .
 
     Returns
     -------
-    tuple of float or None
-        Shape ``(rods,)``; `None` if a wrong number of distances is listed, which is noted.
+    tuple of float
+        Shape ``(rods,)``.
     """
     last, length, spacing = len(diameters) - 1, section["length"], section["spacing"]
     if last == 0:
@@ -89,8 +91,7 @@ def place_rods(section: Section, diameters: tuple[float, ...]) -> tuple[float, .
     if isinstance(spacing, tuple):
         if len(spacing) != last:
             message = f"found {len(spacing)} distances; {last} are between {last + 1} rods"
-            section.fault("spacing", message)
-            return None
+            section.reject("spacing", message)
         return tuple(accumulate(spacing, initial=0.0))
     if spacing == "equal-pitch":
         return tuple(length * rod / last for rod in range(last + 1))
@@ -100,9 +101,7 @@ def place_rods(section: Section, diameters: tuple[float, ...]) -> tuple[float, .
     return (*accumulate((gap + half for half in halves[:-1]), initial=0.0), length)
 
 
-def are_apart(
-    section: Section, heights: tuple[float, ...], widths: tuple[float, ...], rise: float
-) -> bool:
+def check_apart(section: Section, heights: RodValues, widths: RodValues, rise: float) -> None:
     """Check that no two neighbours overlap as seen from the side, nor touch with their ends.
 
     Parameters
@@ -115,18 +114,14 @@ def are_apart(
         Of one end of a tilted rod over the other, m; 0 where unknown.
     """
     key = "length" if "length" in section else "spacing"
-    for rod, ((low, high), (lower, upper)) in enumerate(
-        zip(pairwise(heights), pairwise(widths), strict=True), start=1
-    ):
+    neighbours = zip(pairwise(heights), pairwise(widths), strict=True)
+    for rod, ((low, high), (lower, upper)) in enumerate(neighbours, start=1):
         pitch, needed = high - low, (lower + upper) / 2
         if not pitch > needed:
             apart, thick = (format_quantity(Quantity(x), "mm") for x in (pitch, needed))
             message = f"rods {rod} and {rod + 1} overlap: {apart} apart but {thick} thick"
-            section.fault(key, message)
-            return False
+            section.reject(key, message)
         if rise >= pitch:
             height = format_quantity(Quantity(rise), "mm")
             message = f"tilted ends rise {height}, so rods {rod} and {rod + 1} would touch"
-            section.fault("rod_length", message)
-            return False
-    return True
+            section.reject("rod_length", message)

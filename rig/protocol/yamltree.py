@@ -22,6 +22,8 @@ MAX_DEPTH = 32
 MAX_NODES = 10_000
 _BREAK = re.compile(r"\r\n|[\n\r\x85\u2028\u2029]")
 """Ends of lines in YAML 1.1, section 5.4: PyYAML counts lines by them."""
+_TAB = re.compile(r"^[^\t#\n]*\t", re.MULTILINE)
+"""A tab outside comments: YAML takes it in some places and not in others."""
 _EXCERPT = 72  # columns of a terminal of 80, less an indent
 
 # Scalars of the YAML 1.2 core schema (section 10.3.2); what matches nothing here is text, so
@@ -54,11 +56,8 @@ class ScalarNode:
     @property
     def kind(self) -> str:
         """What the core schema takes it for, as a noun."""
-        if self.plain:
-            for kind, pattern in _CORE:
-                if pattern.fullmatch(self.text):
-                    return kind
-        return "text"
+        kinds = (kind for kind, pattern in _CORE if pattern.fullmatch(self.text))
+        return next(kinds, "text") if self.plain else "text"
 
     def __str__(self) -> str:
         if self.kind == "nothing":
@@ -84,6 +83,11 @@ class Mapping:
     place: Place
     entries: list[tuple[Node, Node]]
 
+    def get(self, name: str | int) -> Node | None:
+        """Return the first value of a key."""
+        values = (value for key, value in self.entries if getattr(key, "text", None) == name)
+        return next(values, None)
+
     def __str__(self) -> str:
         return "a mapping"
 
@@ -95,14 +99,11 @@ def place_of(root: Node, *path: str | int) -> Place:
     """Find where the value at a path of keys and list indices stands, or as much as is there."""
     node = root
     for step in path:
-        inner: list[Node] = []
-        if isinstance(node, Mapping):
-            inner = [value for key, value in node.entries if getattr(key, "text", None) == step]
-        elif isinstance(node, Sequence) and isinstance(step, int):
-            inner = node.items[step : step + 1]
-        if not inner:
+        items: dict[Any, Node] = dict(enumerate(getattr(node, "items", ())))
+        inner = node.get(step) if isinstance(node, Mapping) else items.get(step)
+        if inner is None:
             break
-        node = inner[0]
+        node = inner
     return node.place
 
 
@@ -129,32 +130,26 @@ def load(text: str, source: str) -> Node:
     """
     body = "\n".join(_BREAK.split(text.removeprefix("\ufeff")))
     try:
-        _refuse_tabs(body)
         return _Builder(body).build()
     except _RefusalError as refusal:
-        place, message = refusal.place, refusal.message
+        index, message = refusal.args
     except yaml.reader.ReaderError as error:
-        character = f"U+{ord(body[error.position]):04X}"
-        place = place_at(body, error.position)
-        message = f"control character {character}; write plain text only"
+        index = error.position
+        message = f"control character U+{ord(body[index]):04X}; write plain text only"
     except yaml.MarkedYAMLError as error:
         from rig.protocol.yamlmend import explain  # noqa: PLC0415 - only a mistake needs it
 
         index, message = explain(body, error)
-        place = place_at(body, index)
     except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
         # The parser lets a few int() and chr() errors of broken escapes and directives through.
-        place, message = Place(1, 1), "this file cannot be read; see its quotes and % lines"
+        index, message = 0, "this file cannot be read; see its quotes and % lines"
+    place = place_at(body, index)
     below = _excerpt(body, place)
     raise InputError(problems=[Problem(source, place.line, place.column, "", message, below)])
 
 
 class _RefusalError(Exception):
-    """What a protocol may not have although YAML does."""
-
-    def __init__(self, place: Place, message: str) -> None:
-        super().__init__(message)
-        self.place, self.message = place, message
+    """What a protocol may not have although YAML does: its index in the text, and a sentence."""
 
 
 def place_at(text: str, index: int) -> Place:
@@ -172,18 +167,12 @@ def _excerpt(text: str, place: Place) -> str:
     return f"\n    {one_line(line, _EXCERPT).rstrip()}\n    {'^':>{place.column - begin}}"
 
 
-def _refuse_tabs(text: str) -> None:
-    """Refuse tabs outside comments: YAML takes them in some places and not in others."""
-    for number, line in enumerate(text.split("\n"), start=1):
-        column = line.partition("#")[0].find("\t")
-        if column >= 0:
-            raise _RefusalError(Place(number, column + 1), "a tab; use blanks")
-
-
 class _Builder:
     """Builds the tree from parser events, no deeper than `MAX_DEPTH` levels."""
 
     def __init__(self, text: str) -> None:
+        if tab := _TAB.search(text):
+            raise _RefusalError(tab.end() - 1, "a tab; use blanks")
         self.events: Iterator[Any] = yaml.parse(text, Loader=yaml.SafeLoader)
         self.anchors: dict[str, tuple[Node, int]] = {}
         self.nodes = 0
@@ -191,39 +180,40 @@ class _Builder:
     def build(self) -> Node:
         documents = self._list(yaml.StreamEndEvent, -1)
         if not documents:
-            raise _RefusalError(Place(1, 1), "the file is empty; begin with protocol: 1")
+            raise _RefusalError(0, "the file is empty; begin with protocol: 1")
         return documents[0]
 
     def _list(self, end: type[Any], depth: int) -> list[Node]:
         """Return the nodes up to the event that closes them."""
         nodes: list[Node] = []
         for event in self.events:
-            place = Place(event.start_mark.line + 1, event.start_mark.column + 1)
+            at = event.start_mark.index
             if isinstance(event, end):
                 break
             if isinstance(event, yaml.DocumentStartEvent) and nodes:
-                raise _RefusalError(place, "a second document; a file has one protocol")
+                raise _RefusalError(at, "a second document; a file has one protocol")
             if isinstance(event, yaml.NodeEvent):
-                nodes.append(self._node(event, place, depth + 1))
+                nodes.append(self._node(event, depth + 1))
         return nodes
 
-    def _node(self, event: Any, place: Place, depth: int) -> Node:
+    def _node(self, event: Any, depth: int) -> Node:
         node: Node
-        before, size = self.nodes, 1
+        at, before, size = event.start_mark.index, self.nodes, 1
+        place = Place(event.start_mark.line + 1, event.start_mark.column + 1)
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
                 name = quoted(str(event.anchor))
-                raise _RefusalError(place, f"no anchor stands before the alias {name}")
+                raise _RefusalError(at, f"no anchor stands before the alias {name}")
             node, size = self.anchors[event.anchor]
         elif event.tag is not None:
-            raise _RefusalError(place, f"the tag {quoted(event.tag)} is not accepted; leave it out")
+            raise _RefusalError(at, f"the tag {quoted(event.tag)} is not accepted; leave it out")
         elif isinstance(event, yaml.ScalarEvent):
             # "\uD800" in double quotes makes half a character, which no file or database takes.
             if any("\ud800" <= character <= "\udfff" for character in event.value):
-                raise _RefusalError(place, "half of a surrogate pair; write the character itself")
+                raise _RefusalError(at, "half of a surrogate pair; write the character itself")
             node = ScalarNode(event.value, event.style is None, place)
         elif depth >= MAX_DEPTH:
-            raise _RefusalError(place, f"more than {MAX_DEPTH} levels of brackets or indents")
+            raise _RefusalError(at, f"more than {MAX_DEPTH} levels of brackets or indents")
         elif isinstance(event, yaml.SequenceStartEvent):
             node = Sequence(place, self._list(yaml.SequenceEndEvent, depth))
         else:
@@ -232,7 +222,7 @@ class _Builder:
         # The parts of a list were counted as they came, but for those of an alias.
         self.nodes += size
         if self.nodes > MAX_NODES:
-            raise _RefusalError(place, f"more than {MAX_NODES} values, aliases expanded")
+            raise _RefusalError(at, f"more than {MAX_NODES} values, aliases expanded")
         if event.anchor:
             self.anchors[event.anchor] = node, self.nodes - before
         return node

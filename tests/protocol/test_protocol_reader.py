@@ -141,6 +141,18 @@ def test_all_faults_come_at_once_and_an_inherited_one_comes_once():
                                                                "f:12:46"]  # fmt: skip
 
 
+@pytest.mark.parametrize("diameter", ["", ", diameter: 20 s"])
+def test_an_object_is_never_asked_for_a_length(diameter):
+    text = """\
+protocol: 1
+chains: {ball: {rods: 1%s}}
+drop: 1 m
+gates: {free: [{channel: 0, height: 500 mm}]}
+"""
+    (problem,) = problems(text % diameter)
+    assert " chains.ball.diameter: " in problem
+
+
 def test_circular_like():
     text = GOOD.replace("A: {rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg}",
                         "A: {like: B}")  # fmt: skip

@@ -86,7 +86,7 @@ def test_a_row_of_the_table_is_all_that_a_key_needs(monkeypatch):
     monkeypatch.setitem(fields.DEFAULTS, delay.path, 2.0)
 
     def release(written: str):
-        faults = fields.FieldFaults("f")
+        faults = fields.Faults("f")
         section = fields.Section(load(written, "f"), "release", "release", faults)
         return section["delay"], [str(problem) for problem in faults.problems.values()]
 
