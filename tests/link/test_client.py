@@ -114,8 +114,9 @@ def _with(message):
 def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
     port = Captive(clock, {})
     assert Device(port, clock).connect() == IDENTITY
-    with pytest.raises(DeviceTimeoutError, match="did not answer Identify"):
+    with pytest.raises(DeviceTimeoutError, match="did not answer Identify") as caught:
         device(clock, {}).connect()
+    assert "cable" in caught.value.hint
 
 
 def test_repeats_have_the_same_seq_and_back_off(clock):
