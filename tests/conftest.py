@@ -72,9 +72,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     workers = getattr(config, "workerinput", {}).get("workercount", 1)
     waiting: list[pytest.Item] = []
     computing: list[pytest.Item] = []
+    clocked = {
+        path: any(map(path.is_relative_to, _BY_THE_CLOCK)) for path in {i.path for i in items}
+    }
     for one in items:
-        clocked = any(one.path.is_relative_to(at) for at in _BY_THE_CLOCK)
-        (waiting if clocked else computing).append(one)
+        (waiting if clocked[one.path] else computing).append(one)
 
     def share(of: list[pytest.Item], number: int) -> list[pytest.Item]:
         return of[len(of) * number // workers : len(of) * (number + 1) // workers]

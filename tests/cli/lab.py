@@ -1,5 +1,6 @@
 """What the tests of the command line share: short protocols, and what a session must look like."""
 
+import io
 import json
 import subprocess
 import sys
@@ -52,6 +53,15 @@ release: {channel: 0, pulse: 80 ms}
 plan: {incline: INCLINES, repeats: REPEATS, settle: SETTLE}
 accept: {release_skew: 5 ms, missed_edges: 5 %}
 """
+
+
+class Terminal(io.StringIO):
+    """A stream at which somebody looks."""
+
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
 
 
 def short(inclines: str = "[40 deg, 60 deg]", repeats: int = 2, settle: str = "1 s") -> str:

@@ -5,7 +5,6 @@ import lzma
 import re
 import socket
 import subprocess
-import sys
 import time
 from contextlib import ExitStack, suppress
 from http.client import HTTPConnection
@@ -162,14 +161,3 @@ def test_a_session_that_cannot_be_read_is_said(tmp_path):
     page = BoardPage("http://localhost:8080/")
     page.look({"session": str(broken)})
     assert "The session cannot be read" in page.look({"session": str(broken)})
-
-
-def test_a_code_needs_its_package_only_where_others_look_on():
-    script = (
-        "import sys; from rig.board.page import BoardPage as P; P('http://localhost:1/').look({});"
-        "print({'segno', 'matplotlib', 'textual'} & set(sys.modules))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "set()"

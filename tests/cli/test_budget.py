@@ -4,8 +4,6 @@ import json
 
 import pytest
 
-from tests.cli.lab import rig
-
 
 @pytest.mark.usefixtures("analysed_once")
 def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
@@ -26,13 +24,14 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
     assert max(map(len, table.splitlines())) <= 80
 
 
-def test_a_mistyped_number_of_trials_is_told_both_ways():
-    done = rig("analyze", "any.session", "--budget", 1, "--trials", "adaptve")
-    assert done.returncode == 2
-    assert "found 'adaptve'; accepted: a whole number or adaptive" in done.stderr
-
-
-def test_a_run_that_is_not_there_is_bad_input(finished):
-    done = rig("analyze", finished.session, "--budget", 99)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "run 99" in done.stderr
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((1, "--trials", "adaptve"), "found 'adaptve'; accepted: a whole number or adaptive"),
+        ((99,), "run 99"),
+    ],
+)
+def test_what_is_no_run_or_no_number_of_trials_is_bad_input(call, finished, words, said):
+    done = call("analyze", finished.session, "--budget", *words)
+    assert (done.code, done.out) == (2, "")
+    assert said in done.err

@@ -1,7 +1,6 @@
 """Ctrl-C while a command loads and as it ends: 130, and no traceback."""
 
 import asyncio
-import io
 import os
 import re
 import shlex
@@ -19,6 +18,7 @@ from bench.mutants import CSV, make_session
 from rig import cli
 from rig.commands import demo, tui
 from rig.commands.growing import Growing
+from tests.cli.lab import Terminal
 
 STRUCK = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
 LOADING = f"""
@@ -111,13 +111,6 @@ def test_a_demo_draws_fig_3_as_it_grows_where_somebody_looks(call, tmp_path, mon
     call("demo", "-o", tmp_path / "picture")
     assert told[0] is None
     assert isinstance(told[1].__self__, Growing)
-
-
-class Terminal(io.StringIO):
-    encoding = "utf-8"
-
-    def isatty(self):
-        return True
 
 
 MOMENTS = 40

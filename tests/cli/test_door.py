@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 
@@ -86,14 +84,6 @@ def test_what_is_not_there_is_said(tmp_path):
         _ = rig.opne
     with pytest.raises(InputError):
         rig.read_protocol(tmp_path / "none.yaml")
-
-
-def test_coming_to_the_door_loads_nothing():
-    code = (
-        "import rig, sys; print(sorted({'numpy', 'scipy', 'yaml', 'textual'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
 
 
 def threads():

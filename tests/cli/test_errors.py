@@ -103,15 +103,24 @@ def test_a_simulation_that_cannot_be_is_bad_input(call, protocol, tmp_path, port
 
 
 @pytest.mark.parametrize(
-    "port", ["nonsense", "/dev/null", "/etc/passwd", "no://such", "hwgrep://nobody", "loop://"]
+    ("port", "said"),
+    [
+        ("/dev/nonexistent", "cannot open /dev/nonexistent: there is no such port\n  hint: "),
+        ("/dev/null", "cannot open /dev/null: "),
+        ("no://such", "'no' not known"),
+        ("hwgrep://nobody", "cannot open hwgrep://nobody: "),
+        ("loop://", "did not answer"),
+    ],
 )
 def test_a_port_that_cannot_be_opened_is_device_trouble(
-    call, protocol, tmp_path, port, monkeypatch
+    call, protocol, tmp_path, port, said, monkeypatch
 ):
     monkeypatch.setattr("rig.recorder.recorder.BOOT_WAIT_S", 0.0)
     monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.0)
     monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
-    assert_told(call("run", protocol, "--port", port, "--session", tmp_path / "s"), 4)
+    done = call("run", protocol, "--port", port, "--session", tmp_path / "s")
+    assert_told(done, 4)
+    assert said in done.err
     if port != "loop://":  # it was never opened
         assert not (tmp_path / "s").exists()
         return

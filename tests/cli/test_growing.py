@@ -11,12 +11,7 @@ from rig.commands.growing import Growing
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.reasons import plain_reason
-from tests.cli.lab import short
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
+from tests.cli.lab import Terminal, short
 
 
 @pytest.fixture

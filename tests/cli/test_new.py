@@ -1,6 +1,5 @@
 """``rig new``: answers become a protocol that is read, drawn and tried."""
 
-import io
 from pathlib import Path
 
 import pytest
@@ -8,6 +7,7 @@ import pytest
 from rig.protocol.draft import SCENES, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.protocol.reader import parse, read
+from tests.cli.lab import Terminal
 
 
 def drafted(scene, gates, **changes):
@@ -62,11 +62,6 @@ def test_a_protocol_with_drawings_and_four_drops(call, tmp_path, monkeypatch):
         assert (again.code, f"{here} already exists" in again.err) == (2, True)
         Path(here).unlink()
     assert not any(tmp_path.iterdir()), "none was drawn anew while another was there"
-
-
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
 
 
 def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):

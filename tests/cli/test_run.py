@@ -143,16 +143,6 @@ def test_a_finished_session_is_not_made_again(call, finished, tmp_path):
     assert [r["attempt"] for r in json.loads(second.out)["runs"]] == [1, 1, 1, 1]
 
 
-def test_no_such_port_is_device_trouble(run, tmp_path):
-    done = run(port="/dev/nonexistent")
-    assert done.code == 4
-    assert done.out == ""
-    message, hint = done.err.splitlines()
-    assert message == "cannot open /dev/nonexistent: there is no such port"
-    assert hint.startswith("  hint: ")
-    assert not (tmp_path / "s").exists()
-
-
 def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(
     run, call, tmp_path, fence
 ):

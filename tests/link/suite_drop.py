@@ -5,7 +5,7 @@ import zlib
 import pytest
 
 from rig.link import messages as wire
-from rig.link.messages import Phase, pack_label
+from rig.link.messages import Phase
 from tests.link.bench import GATES, LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm
@@ -56,15 +56,6 @@ class DropSuite(Suite):
         assert drop.edges == ()
         assert drop.faults == ()
         assert drop.certificate.crc32 == zlib.crc32(b"")
-
-    def test_two_drops(self, bench, device, identity):
-        for run in (1, 2):
-            drop = self.drop(device, pack_label(run, 1))
-            self.check(bench, drop, identity)
-            self.release(device, drop)
-
-    def test_a_drop_without_release_is_possible(self, bench, device, identity):
-        self.check(bench, self.drop(device, release=0, pulse_us=0), identity)
 
     def test_the_32_bit_time_may_wrap_within_a_drop(self, bench, device, identity):
         if not bench.can_preset_tick:

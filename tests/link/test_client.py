@@ -1,8 +1,6 @@
 """What the client does when a device or a port misbehaves; the rest is in the conformance suite."""
 
 import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
@@ -114,8 +112,9 @@ def _with(message):
 def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
     port = Captive(clock, {})
     assert Device(port, clock).connect() == IDENTITY
-    with pytest.raises(DeviceTimeoutError, match="did not answer Identify"):
+    with pytest.raises(DeviceTimeoutError, match="did not answer Identify") as caught:
         device(clock, {}).connect()
+    assert "cable" in caught.value.hint
 
 
 def test_repeats_have_the_same_seq_and_back_off(clock):
@@ -461,13 +460,6 @@ def test_a_port_belongs_to_one_program():
     finally:
         os.close(controller)
         os.close(line)
-
-
-def test_the_link_alone_loads_neither_numpy_nor_sim():
-    code = "import sys, rig.link.client, rig.link.port; print(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(run.stdout.split())
-    assert not loaded & {"numpy", "sim", "yaml", "rig.model"}
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import socket
 import pytest
 from serial import SerialException
 
-from rig.errors import DeviceError, DeviceTimeoutError
+from rig.errors import DeviceError
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
 from sim.board import VirtualBoard
@@ -108,11 +108,3 @@ def test_a_program_that_does_not_speak_rfc_2217(monkeypatch):
     with pytest.raises(DeviceError, match=f"cannot open rfc2217://lab:7: {said}") as caught:
         open_port("rfc2217://lab:7")
     assert "firewall" in caught.value.hint
-
-
-def test_an_echo_is_no_board(monkeypatch):
-    monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.1)
-    port = open_port("loop://")
-    with pytest.raises(DeviceTimeoutError, match="did not answer"):
-        Device(port, port_clock(port), tries=2).connect(boot_wait_s=0)
-    port.close()

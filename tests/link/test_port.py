@@ -14,8 +14,3 @@ def test_a_missing_emulator_says_how_to_get_it(monkeypatch):
         open_port("emu://?protocol=x.yaml")
     assert "./firmware/emulator" in caught.value.hint
     assert "libsimavr-dev" in caught.value.hint
-
-
-def test_a_scheme_that_nobody_knows():
-    with pytest.raises(DeviceError, match="'nonsense' not known"):
-        open_port("nonsense://")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import base64
 import re
-import subprocess
-import sys
 from collections import defaultdict
 from collections.abc import Callable
 from datetime import datetime
@@ -129,12 +127,3 @@ def test_page_and_citation_file_name_the_same():
     assert paper["title"] in PAPER
     assert paper["identifiers"][0]["value"] in PAPER
     assert method_page() == (ROOT / "docs" / METHOD).read_text("utf-8")
-
-
-def test_importing_loads_neither_matplotlib_nor_jinja2():
-    code = (
-        "import sys, rig.report.templates, rig.report.figures, rig.bundle.tables,"
-        "rig.session.store\n"
-        "assert not {'matplotlib', 'numpy', 'jinja2'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": str(ROOT)})

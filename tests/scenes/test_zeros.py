@@ -14,6 +14,7 @@ from tests.scenes.draw import Scene
 from tests.scenes.through import faults
 
 PRIORS = SECTIONS["priors"]
+SLOW = pytest.mark.slow
 pytestmark = pytest.mark.usefixtures("analysed_once")
 GATES = (
     "[{channel: %d, height: 25 mm}, {channel: %d, height: 80 mm}, {channel: %d, height: 130 mm}]"
@@ -69,8 +70,15 @@ def assert_sound(runs) -> None:
             assert 0.0 < measured.expanded < 1.0
 
 
-@pytest.mark.parametrize("zero", ALL)
-@pytest.mark.parametrize("kind", ["two", "fence"])
+@pytest.mark.parametrize(
+    ("kind", "zero"),
+    [
+        (kind, zero)
+        for kind in ("two", "fence")
+        for zero in ALL
+        if protocol(kind, (zero,)) != protocol(kind, ())  # it has such a thing
+    ],
+)
 def test_one_thing_known_exactly_leaves_a_drop_sound(kind, zero):
     scene = parse(protocol(kind, (zero,)))
     found = analysis([case(scene, Dials.quiet(), run=run) for run in (1, 2, 3, 4)])
@@ -78,7 +86,9 @@ def test_one_thing_known_exactly_leaves_a_drop_sound(kind, zero):
     assert_sound(found.runs)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", ["two", "glider", *(pytest.param(kind, marks=SLOW) for kind in ("air", "fence"))]
+)
 def test_all_known_exactly_goes_through_every_command(kind, tmp_path):
     text = protocol(kind, ALL)
     scene = Scene(1, text, "sim://?quiet=1", parse(text, "zeros.yaml"))

@@ -2,7 +2,6 @@
 
 import csv
 import hashlib
-import io
 import json
 import re
 from xml.etree import ElementTree
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 
 from rig import __version__
+from tests.cli.lab import Terminal
 from tests.sweep.conftest import SCENE, VARY
 
 ONE_INCLINE = "incline=40deg"
@@ -100,11 +100,6 @@ def test_an_interrupt_while_writing_leaves_the_old_file(sweep, tmp_path, monkeyp
     assert sweep("s.csv", "friction=0..1:3") == (130, "rig: interrupted; nothing was written\n")
     assert (tmp_path / "s.csv").read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 2
-
-
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
 
 
 def test_a_terminal_has_one_line_that_is_rewritten(sweep, monkeypatch):
