@@ -5,7 +5,7 @@ A board that is there says the same of itself (`rig.link.messages.Identity`), an
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 GATES = 16
 """Gate inputs that the wire has bits for."""
@@ -15,8 +15,7 @@ LONGEST_RECORD_MS = 0xFFFF
 """The longest recording that the wire can ask for."""
 
 
-@dataclass(frozen=True, slots=True)
-class Capabilities:
+class Capabilities(NamedTuple):
     """What one kind of board can do.
 
     Attributes

@@ -62,11 +62,11 @@ def _run(argv: Sequence[str] | None) -> int:
 
         argcomplete.autocomplete(_parser())
     try:
-        parser = _parser()
+        seen = sys.stdin.isatty() and sys.stdout.isatty()
+        words = (sys.argv[1:] if argv is None else argv) or ["tui"] * seen
+        parser = _parser(words)
         try:
-            words = sys.argv[1:] if argv is None else argv
-            seen = sys.stdin.isatty() and sys.stdout.isatty()
-            arguments = parser.parse(words or ["tui"] * seen)
+            arguments = parser.parse(words)
         finally:
             sys.stdout.flush()  # of --help, here, where a closed pipe is understood
         if "module" not in arguments:
@@ -108,8 +108,8 @@ def _run(argv: Sequence[str] | None) -> int:
     return code
 
 
-def _parser() -> Parser:
-    return build_parser(f"rig {__version__}", _KINDS, {"import": "import_edges"})
+def _parser(words: Sequence[str] | None = None) -> Parser:
+    return build_parser(f"rig {__version__}", _KINDS, {"import": "import_edges"}, words)
 
 
 def _accept(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 
 class RigError(Exception):
@@ -35,8 +34,7 @@ class RigError(Exception):
         return f"{self.message}\n  hint: {self.hint}" if self.hint else self.message
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Problem:
+class Problem(NamedTuple):
     """One fault of an input file, at its place (lines and columns count from 1).
 
     `excerpt` is what a message shows below: the line itself and a caret, or nothing. `reason` is
@@ -49,7 +47,7 @@ class Problem:
     key: str
     message: str
     excerpt: str = ""
-    reason: Any = field(default=None, compare=False)
+    reason: Any = None
 
     def __str__(self) -> str:
         key = f" {self.key}:" if self.key else ""
@@ -64,7 +62,7 @@ class InputError(RigError):
     reason: Any = None
 
     def __init__(self, message: str = "", hint: str = "", *, problems: Iterable[Problem] = ()):
-        self.problems = tuple(sorted(problems))
+        self.problems = tuple(sorted(problems, key=lambda problem: problem[:-1]))
         super().__init__(message or "\n".join(map(str, self.problems)), hint)
 
 

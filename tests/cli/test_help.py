@@ -29,6 +29,26 @@ def test_every_command_has_a_group_and_two_examples(call):
         assert COMMANDS[name].text in done.err
 
 
+def test_a_command_is_parsed_without_the_others():
+    whole = _parser()
+    for name in COMMANDS:
+        alone = _parser([*name.split(), "--help"])
+        assert {each.split()[0] for each in alone.commands} == {name.split()[0]}
+        assert alone.commands[name].format_help() == whole.commands[name].format_help()
+    assert _parser(["--help"]).format_help() == whole.format_help()
+    assert not _parser(["--help"]).commands
+
+
+@pytest.mark.parametrize("words", [["bogus", "run"], ["--foo", "run"], ["", "run"], ["--", "runs"]])
+def test_what_is_no_command_is_refused_by_all_that_there_are(words, capsys):
+    with pytest.raises(SystemExit):
+        _parser(words).parse(words)
+    with pytest.raises(SystemExit):
+        _parser().parse(words)
+    said = capsys.readouterr().err
+    assert said[: len(said) // 2] == said[len(said) // 2 :]
+
+
 def test_each_board_is_a_choice():
     def choices(command):
         return next(a.choices for a in commands()[command]._actions if a.dest == "board")
