@@ -95,20 +95,30 @@ def heading_of(name: str) -> str:
     return _TABLES[name].heading
 
 
+def records_in(name: str, whole: Any) -> list[Any]:
+    """Return a table's records where its heading says; of groups, each with each of its members."""
+    place, _, members = _TABLES[name].place.partition("*")
+    records = value_at(whole, place) or () if place else ()
+    if members:
+        return [(group, member) for group in records for member in getattr(group, members)]
+    return [*records]
+
+
 class _Table(NamedTuple):
     heading: str
     words: str
     rows: list[list[str]]
+    place: str = ""
 
 
 def read_tables(text: str) -> Iterator[tuple[str, _Table]]:
     """Yield names with what stands below them in a file such as ``columns.txt``."""
     for block in text.split("\n[")[1:]:
-        (name, heading), *rows = (
+        (name, heading, *place), *rows = (
             re.split(r"\] | {2,}", line) for line in block.strip().split("\n")
         )
         words = " ".join(row[0] for row in rows if len(row) == 1)
-        yield name, _Table(heading, words, [row for row in rows if len(row) > 1])
+        yield name, _Table(heading, words, [row for row in rows if len(row) > 1], *place)
 
 
 def _kinds(each: str) -> list[Measurand]:

@@ -135,7 +135,7 @@ def chart(name: str, *panels: Mapping[str, Any], **values: object) -> Chart:
     values
         What title and caption ask for.
     """
-    title, caption, rows = _FIGURES[name]
+    title, caption, rows, _ = _FIGURES[name]
     drawn = [panel for sources in panels for panel in _panels(rows, {**_LINES, **sources})]
     return Chart(title.format(**values), caption.format(**values), drawn)
 
@@ -189,9 +189,12 @@ def _traces(
         )
 
 
-def _points(cells: Sequence[str], sources: Mapping[str, Any]) -> list[list[Any]]:
-    """Find the coordinates of all records that have both."""
+def _points(cells: Sequence[str], sources: Mapping[str, Any]) -> list[Sequence[Any]]:
+    """Find the coordinates of all records that have both, or of columns of equal length."""
     name, *places = (_written(cell, sources) for cell in cells)
+    if name == "-":
+        columns = [value_at(sources, place) for place in places]
+        return [] if any(column is None for column in columns) else [*zip(*columns, strict=True)]
     rows = ([value_at(record, place) for place in places] for record in sources.get(name, ()))
     return [row for row in rows if None not in row[:2]]
 

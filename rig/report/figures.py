@@ -160,20 +160,16 @@ def unanswered(curves: Mapping[str, Any]) -> list[tuple[float, float]]:
 def _stacked(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dict[str, Any]]:
     """Lay one bar, source after source, the largest first."""
     begin = 0.0
-    for name in sorted(parts, key=lambda name: -parts[name]):
+    for name, share in sorted(parts.items(), key=lambda part: -part[1]):
         # Sources beyond the colours are among the others.
         color = colors.get(name) or dict(enumerate(PARTS)).get(len(colors))
-        if parts[name] > _SMALL and color is not None:
-            colors[name], end = color, begin + parts[name]
-            yield _bar(name, color, begin, end)
-            begin = end
+        if share > _SMALL and color is not None:
+            colors[name], points = color, [(begin + share, 0.0, begin)]
+            yield {"part": name, "share": share, "color": color, "points": points}
+            begin += share
     if begin < 99.5:
-        yield _bar("others", REST, begin, 100.0)
-
-
-def _bar(name: str, color: int, begin: float, end: float) -> dict[str, Any]:
-    label = f"{name} {fixed(end - begin, 0)} %"
-    return {"label": label, "color": color, "points": [(end, 0.0, begin)]}
+        points = [(100.0, 0.0, begin)]
+        yield {"part": "others", "share": 100.0 - begin, "color": REST, "points": points}
 
 
 def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Groups:

@@ -6,12 +6,12 @@ from collections import defaultdict
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rig.measurands import ACCELERATION, GRAVITY, acceleration_in, averaged, told
+from rig.measurands import ACCELERATION, GRAVITY, acceleration_in, averaged
 from rig.protocol.plan import runs as planned_runs
-from rig.reasons import remedies, sentences, summarize_reasons
-from rig.report.numbers import decimals_for, fixed, plus_minus
+from rig.reasons import remedies, summarize_reasons
+from rig.report.numbers import plus_minus
 from rig.report.parts import means_of, summary_incline
-from rig.report.templates import sentence
+from rig.report.templates import lines, sentence
 from rig.results.improvements import improvements
 from rig.session.schema import RunState
 
@@ -33,9 +33,6 @@ _REFERENCES = {
     ACCELERATION: "the acceleration without friction",
 }
 """What strikes nothing is compared with."""
-_CLOCK_COVERAGE = 2.0  # about 95 %
-_ALONE = "the joint fit of all good runs did not converge: each run is shown by itself"
-_SIGNIFICANT = 4.0  # standard uncertainties beyond which κ is worth a remark
 NONE = "No deviations: every planned run was recorded once, in the planned order."
 
 
@@ -115,8 +112,7 @@ def remarks(results: SessionResults) -> list[str]:
     """Return the remarks on a session's falls, clock and air."""
     rig = results.analysis.rig
     return [
-        *([_ALONE] if results.analysis.unsettled else []),
-        *([rig.likeness.sentence] if rig is not None and rig.likeness is not None else []),
+        *lines("fitted", results.analysis),
         *alone_lines(results.analysis),
         *common_lines(results.analysis.summary),
         *(each.sentence for each in improvements(results.analysis.summary)),
@@ -134,16 +130,12 @@ def common_lines(summary: Sequence[Incline]) -> list[str]:
             most = {name: max(part.get(name, 0.0) for part in budgets) for name in budgets[0]}
             largest = [name for name, u in most.items() if u > 0.5 * max(most.values())]
             causes |= dict.fromkeys(sorted(largest, key=lambda name: -most[name]))
-    return [sentence("shared", ", ".join(causes))] if causes else []
+    return lines("shared", causes)
 
 
 def alone_lines(analysis: Analysis) -> list[str]:
     """Set what the last good run says by itself beside what it says among all, and say why."""
-    runs = [run for run in analysis.runs if run.learned]
-    row = next((row for row in told() if runs and row.name in runs[-1].alone), None)
-    if row is None:
-        return []
-    return [sentence("alone", runs[-1], row, len(runs))]
+    return lines("alone", analysis)
 
 
 def void_lines(analysis: Analysis) -> list[str]:
@@ -158,7 +150,7 @@ def void_lines(analysis: Analysis) -> list[str]:
         for members in kinds.values()
     ]
     advice = remedies(reason for drop in voids for reason in drop.reasons)
-    return sentence("void", groups, advice).split("\n") if voids else []
+    return lines("void", groups, advice) if voids else []
 
 
 def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
@@ -169,15 +161,12 @@ def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
     calibration
         Member of ``rig analyze --json``.
     """
-    expanded = _CLOCK_COVERAGE * calibration["u_ppm"]
-    u = fixed(expanded, max(decimals_for(expanded) - 1, 0))
-    return [sentence("clock", calibration, u), *calibration["notes"]]
+    return [sentence("clock", calibration), *calibration["notes"]]
 
 
 def air_lines(drag: Measured | None) -> list[str]:
     """State the air drag that a fit finds, where it is significant: predictions ignore it."""
-    significant = drag is not None and abs(drag.value) > _SIGNIFICANT * drag.u
-    return [sentence("air", drag)] if significant else []
+    return lines("air", drag)
 
 
 def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEntry]) -> list[str]:
@@ -197,7 +186,4 @@ def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEnt
     missing = [run.number for run in planned_runs(protocol) if run.number not in recorded]
     first = dict.fromkeys(entry.run for entry in states if entry.state is RunState.RECORDED)
     late = [after for before, after in pairwise(first) if after < before]
-    interrupted = [
-        (entry, sentences(entry.reasons)) for entry in states if entry.state is RunState.INTERRUPTED
-    ]
-    return sentence("deviations", analysis, missing, interrupted, late).split("\n")[1:] or [NONE]
+    return lines("deviations", analysis, states, missing, late) or [NONE]

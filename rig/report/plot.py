@@ -9,14 +9,12 @@ from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from rig.ctrl_c import ctrl_c_waits
-from rig.report.canvas import STYLE, Canvas
+from rig.report.canvas import drawing_file, style
 from rig.report.looks import COLORS, INK, MODEL, PAPER, SECOND, SIZE
 
 if TYPE_CHECKING:
@@ -59,7 +57,7 @@ _LOOKS: dict[str, dict[str, Any]] = {
 }
 
 
-def plot(chart: Chart, width: float | None = None) -> Canvas:
+def plot(chart: Chart, width: float | None = None) -> Figure:
     """Draw a figure in a width, points; by default in its own."""
     width = width or chart.width
     letters = int(width / _TYPED)
@@ -78,7 +76,7 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
         + _LETTER * max([_DIGITS, *map(len, panel.y.names.values())])
         for panel in panels
     )
-    with ctrl_c_waits(), mpl.rc_context(fname=STYLE):
+    with style():
         figure = Figure(figsize=(width / 72.0, height / 72.0), dpi=72.0)
         stamp = "SIMULATED DATA" if chart.simulated else ""
         figure.text(0.995, 1.0, stamp, ha="right", va="top", color=COLORS[SECOND][0])
@@ -101,12 +99,12 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
                 axes.margins(x=10.0)  # of a single run
         for panel, axes in zip(panels, figure.axes, strict=True):
             _name_series(axes, panel)
-    return Canvas(figure, figure.axes, chart.facts or chart.title)
+    return figure
 
 
 def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
     """Return SVG for a page, of a class and with names of its own, in the page's colours."""
-    svg = plot(chart, width).svg
+    svg = drawing_file(plot(chart, width), "svg").decode()
     svg = svg[svg.index("<svg") :]
     for pattern, words in _PAGE:
         svg = re.sub(pattern, words, svg, flags=re.DOTALL)
@@ -116,9 +114,9 @@ def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
     # Two figures have the same marks, and one of them may be hidden.
     svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{mark}-", svg)
     rules = ""
-    for number, style in enumerate(sorted(set(re.findall(r' style="([^"]*)"', svg)))):
-        svg = svg.replace(f' style="{style}"', f' class="{mark}-{number}"')
-        rules += f".{mark}-{number}{{{style}}}"
+    for number, look in enumerate(sorted(set(re.findall(r' style="([^"]*)"', svg)))):
+        svg = svg.replace(f' style="{look}"', f' class="{mark}-{number}"')
+        rules += f".{mark}-{number}{{{look}}}"
     svg = svg.replace(">", f"><style>{rules}</style>", 1)
     for number, (light, _) in enumerate(COLORS):
         svg = svg.replace(light, f"var(--c{number})")

@@ -74,15 +74,12 @@ def _panel(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> dict
         axes = {"x": f"{row.axis} against {x}", "y": y, "x_axis": across, "y_axis": up}
         return {"height": 200, "scale": 1, "traces": traces, **axes}
     (places,) = (axis.values for axis in layout.grid.axes)
-    parts = []
-    for piled in (False, True):
-        # The step from the pile to the surface is no part of either curve.
-        part = np.where(((swept.notes & PILE) > 0) == piled, values, np.nan)
-        inside = np.where(swept.in_domain, part, np.nan)
-        rows = {"points": part, "inside": inside}
-        parts.append({name: np.column_stack((places, row)) for name, row in rows.items()})
+    # The step from the pile to the surface is no part of either curve.
+    piled = (swept.notes & PILE) > 0
+    curves = (np.where(piled == below, values, np.nan) for below in (False, True))
+    parts = [{"whole": part, "inside": np.where(swept.in_domain, part, np.nan)} for part in curves]
     axes = {"x": x, "y": row.axis, "x_axis": across}
-    return {"height": 150, "scale": row.scale, "parts": parts, **axes}
+    return {"height": 150, "scale": row.scale, "places": places, "parts": parts, **axes}
 
 
 def _map(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:

@@ -10,6 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rig import measurands
+from rig.reasons import sentences
 from rig.report import looks, numbers
 from rig.report.figure import COLUMN_PT, WIDE_PT
 
@@ -33,9 +35,9 @@ def environment() -> Environment:
 
     loader = FileSystemLoader(Path(__file__).parent)
     templates = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
-    writers = numbers.plus_minus, numbers.with_unit, numbers.signed
+    writers = numbers.plus_minus, numbers.with_unit, numbers.signed, numbers.fixed, sentences
     templates.filters |= {write.__name__: write for write in writers} | {"prose": _prose}
-    templates.globals |= {"ranges": numbers.ranges, "looks": looks}
+    templates.globals |= {"numbers": numbers, "looks": looks, "measurands": measurands}
     return templates
 
 
@@ -58,6 +60,11 @@ def sentence(name: str, *values: object) -> str:
 
     write = getattr(environment().get_template("words.txt").module, name)
     return Markup(write(*values)).unescape()  # noqa: S704 - for a terminal too
+
+
+def lines(name: str, *values: object) -> list[str]:
+    """Write sentences of ``words.txt``, a line each; none where there is nothing to say."""
+    return [line for line in sentence(name, *values).split("\n") if line]
 
 
 def parts_html(parts: Sequence[Part]) -> str:
