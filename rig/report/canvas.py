@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rig.ctrl_c import ctrl_c_waits
 from rig.errors import InputError
-from rig.files import make_folder, replacing
+from rig.files import make_folder, replacing, write_atomic
 from rig.report.figure import csv_table
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ _UNSAID: dict[Kind, tuple[str, ...]] = {
     "png": ("Software",),
     "pdf": ("Creator", "Producer", "CreationDate"),
 }
-_SAID = {"pdf": "Subject"}
 
 
 @contextmanager
@@ -48,7 +47,7 @@ def drawing_file(drawing: Figure, kind: Kind, description: str = "") -> bytes:
     """
     written = io.BytesIO()
     metadata: dict[str, Any] = dict.fromkeys(_UNSAID[kind])
-    metadata[_SAID.get(kind, "Description")] = description
+    metadata["Subject" if kind == "pdf" else "Description"] = description
     with style():
         drawing.savefig(written, format=kind, metadata=metadata)
     return written.getvalue()
@@ -96,7 +95,6 @@ def write_figures(folder: str | Path, figures: Sequence[Chart]) -> None:
     place = make_folder(folder)
     for number, figure in enumerate(figures, 1):
         path = place / f"figure-{number}.csv"
-        with replacing(path) as stream:
-            stream.write(csv_table(figure).encode())
+        write_atomic(path, csv_table(figure))
         for kind in KINDS:
             write_figure(path.with_suffix(f".{kind}"), figure)

@@ -171,10 +171,6 @@ def _text(value: object, *_: object) -> str:
     return "" if value is None else str(value)
 
 
-def _fixed(value: float | None, _: object, decimals: float, scale: float = 1.0) -> str:
-    return "" if value is None else fixed(scale * value, int(decimals))
-
-
 def _verdict(error: float | None, *_: object) -> str:
     """Say what a normalized error means; nothing where nothing was compared."""
     return "" if error is None else "agrees" if abs(error) <= 1.0 else "disagrees"
@@ -199,8 +195,8 @@ _WAYS: dict[str, Callable[..., str]] = {
     "degrees": lambda value, _: degrees(value),
     "times": lambda value, _: f"× {value:.2f}",
     "p": lambda value, _: "" if value is None else f"{value:.2g}",
-    "fixed": _fixed,
-    "fine": lambda value, row: _fixed(value, row, row.fine_decimals, row.fine_scale),
+    "fixed": lambda value, _, decimals, scale=1.0: fixed(value and value * scale, int(decimals)),
+    "fine": lambda value, row: fixed(value and value * row.fine_scale, row.fine_decimals),
     "predicted": _predicted,
     "plus_minus": lambda value, _, scale=1.0: plus_minus(value, scale),
     "usual": lambda value, row: plus_minus(value, row.scale, row.decimals),

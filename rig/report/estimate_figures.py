@@ -66,12 +66,11 @@ def _curves(found: SessionEstimate) -> Chart | None:
 
 def _posterior(found: SessionEstimate) -> Chart | None:
     """Draw the regions of β and μ that hold 68.3 % and 95 %; `None` where they have no spread."""
-    parameters = found.coefficients.parameters if found.coefficients else ()
-    best = {parameter.name: parameter.least_squares for parameter in parameters}
-    if found.coefficients is None or not {"restitution", "friction"} <= best.keys():
+    fit = found.coefficients
+    best = {parameter.name: parameter.least_squares for parameter in fit.parameters} if fit else {}
+    if not fit or not fit.posterior or not {"restitution", "friction"} <= best.keys():
         return None
-    assert found.coefficients.posterior is not None
-    regions = _regions(found.coefficients.posterior)
+    regions = _regions(fit.posterior)
     return None if regions is None else chart("posterior", {"best": [best], "traces": [regions]})
 
 

@@ -22,15 +22,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
     from rig.analysis.result import DropResult
+    from rig.arrays import Array
     from rig.model.motion import Motion
     from rig.protocol.protocol import Gates, Protocol, Side
     from rig.records import Drop
     from rig.report.figure import Chart
-
-    Array = NDArray[np.float64]
 
 _MOMENTS = 200
 
@@ -164,8 +161,7 @@ def _object(protocol: Protocol, gates: Gates, seen: Passages, result: DropResult
 def _errors(values: Array, expected: Array, u: Array | float) -> Array:
     """Return what is left over in units of U: nothing finite where nothing has a U."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        errors: Array = (values - expected) / u
-        return errors
+        return np.asarray((values - expected) / u)
 
 
 def _model(motion: Motion, times: Array) -> dict[str, Array]:

@@ -10,6 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup, escape
+
 from rig import measurands
 from rig.reasons import sentences
 from rig.report import looks, numbers
@@ -49,15 +51,11 @@ def render(name: str, **values: object) -> str:
     Markup
         Which other templates need not escape.
     """
-    from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
-
     return Markup(environment().get_template(name).render(values))  # noqa: S704 - just escaped
 
 
 def sentence(name: str, *values: object) -> str:
     """Write a sentence of ``words.txt``."""
-    from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
-
     write = getattr(environment().get_template("words.txt").module, name)
     return Markup(write(*values)).unescape()  # noqa: S704 - for a terminal too
 
@@ -94,8 +92,6 @@ def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
 
     def draw(kind: str) -> str:
         """Draw the latest figure."""
-        from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
-
         from rig.report.plot import page_svg  # noqa: PLC0415 - matplotlib, only for figures
 
         svg = page_svg(figures[-1], _WIDTHS[kind], kind, f"{kind[0]}{len(figures)}")
@@ -109,6 +105,4 @@ def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
 
 def _prose(sentence: str) -> str:
     """Escape a sentence, and set its keys and commands in code type."""
-    from markupsafe import Markup, escape  # noqa: PLC0415 - comes with Jinja2
-
     return Markup(_CODE.sub(r"<code>\1</code>", str(escape(sentence))))  # noqa: S704 - just escaped
