@@ -6,12 +6,13 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from rig.report.canvas import INK, MODEL, MUTED, PAPER, SECOND, canvas
+from rig.bench.figures import INK, MODEL, MUTED, PAPER, SECOND, canvas
+from rig.report.canvas import drawing_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rig.report.canvas import Canvas
+    from matplotlib.figure import Figure
 
 _ESTIMATOR_PANELS = (("separation_rms_m", 1e3, "rms error of Δz (mm)"),
            ("speed_rms_m_s", 1e3, "rms error of V (mm/s)"))  # fmt: skip
@@ -37,7 +38,7 @@ def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
     str
         SVG.
     """
-    with canvas((3.2, 3.0)) as drawing:
+    with canvas(3.2, 3.0) as drawing:
         for axes, (field, scale, label) in zip(drawing.axes, _ESTIMATOR_PANELS, strict=True):
             styles = iter(_STYLES)
             for name, group in groupby(found, key=itemgetter("name")):
@@ -78,7 +79,7 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
         ("void drops", "void_share", _VOID_DARKEST),
         ("good drops with a wrong rod", "wrong", 1.0),
     )
-    with canvas((_ROW_IN * len(rows) + 0.6,), 8.0, columns=2, sharex=False) as drawing:
+    with canvas(_ROW_IN * len(rows) + 0.6, width_in=8.0, columns=2, sharex=False) as drawing:
         for axes, (title, field, darkest) in zip(drawing.axes, panels, strict=True):
             values = [one[field] for one in found]
             table = [values[n : n + len(columns)] for n in range(0, len(values), len(columns))]
@@ -102,7 +103,7 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
     return _stamped(drawing)
 
 
-def _stamped(drawing: Canvas) -> str:
+def _stamped(drawing: Figure) -> str:
     """Say what it is in a strip of its own, where it hides nothing and nothing hides it; as SVG."""
-    drawing.figure.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)
-    return drawing.svg
+    drawing.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)
+    return drawing_file(drawing, "svg").decode()

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from rig.report.canvas import INK, MODEL, MUTED, SECOND, canvas
+from rig.report import looks
+from rig.report.canvas import drawing_file, style
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from matplotlib.figure import Figure
 
     from rig.bench.stability import StabilityRow
     from rig.bench.work import Point
 
+INK, MODEL, SECOND, MUTED, PAPER = (
+    looks.COLORS[number][0]
+    for number in (looks.INK, looks.MODEL, looks.SECOND, looks.MUTED, looks.PAPER)
+)
 FLOOR = 3e-17
 """Where an error of 0 is drawn: no float is nearer."""
 _CEILING = 1.0
@@ -21,6 +29,32 @@ _LOOKS = [
     for fill in (True, False)
     for marker, color in zip("Dos^vP", (MODEL, SECOND, INK, MUTED, MODEL, SECOND), strict=True)
 ]
+
+
+@contextmanager
+def canvas(
+    *heights: float, width_in: float = 7.0, columns: int = 1, sharex: bool = True
+) -> Iterator[Figure]:
+    """Set the style up, and hand out empty panels; for what `rig.report.figure` cannot describe.
+
+    Parameters
+    ----------
+    heights
+        Of the panels, inches.
+    width_in
+        Of the figure, inches.
+    columns
+        Panels side by side in each row.
+    sharex
+        Whether all panels have one horizontal axis.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415 - half a second, only for figures
+
+    with style():
+        drawing = Figure(figsize=(width_in, sum(heights)), layout="constrained")
+        drawing.subplots(len(heights), columns, sharex=sharex, height_ratios=heights)
+        yield drawing
+        drawing.align_ylabels()
 
 
 def work_figure(title: str, points: Sequence[Point]) -> str:
@@ -44,7 +78,7 @@ def choice_figure(lines: Mapping[str, Sequence[Point]]) -> str:
 
 
 def _picture(title: str, lines: Mapping[str, Sequence[Point]], columns: int) -> str:
-    with canvas((4.4,)) as drawing:
+    with canvas(4.4) as drawing:
         (panel,) = drawing.axes
         for (label, points), (marker, color, fill) in zip(lines.items(), _LOOKS, strict=False):
             times = [point.cpu_s for point in points]
@@ -61,15 +95,15 @@ def _picture(title: str, lines: Mapping[str, Sequence[Point]], columns: int) -> 
         panel.set(xscale="log", yscale="log", ylim=(FLOOR / 2.0, _CEILING))
         panel.set_xlabel("processor time of one solution (s): median, quartiles")
         panel.set_ylabel("relative error")
-        drawing.figure.legend(
+        drawing.legend(
             title=title, alignment="left", loc="outside upper center", ncols=columns, fontsize=7.5
         )
-    return drawing.svg
+    return drawing_file(drawing, "svg").decode()
 
 
 def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
     """Draw errors against what the inputs' own rounding explains; return SVG."""
-    with canvas((4.4,)) as drawing:
+    with canvas(4.4) as drawing:
         (panel,) = drawing.axes
         for label, field, color, marker in (
             ("the equations computed as printed", "naive_error", MUTED, "x"),
@@ -86,16 +120,16 @@ def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
         panel.set_xlabel("κ·ε: what rounding of the inputs alone may cost")
         panel.set_ylabel("relative error against 50 digits")
         panel.legend(loc="best")
-    return drawing.svg
+    return drawing_file(drawing, "svg").decode()
 
 
 def scenes_figure(names: Sequence[str], panels: Mapping[str, Sequence[float]]) -> str:
     """Draw what scenes cost beside the whole, a panel a kind of cost; return SVG."""
-    with canvas((1.25,) * (len(panels) - 1) + (1.75,)) as drawing:
+    with canvas(*[1.25] * (len(panels) - 1), 1.75) as drawing:
         for panel, (label, shares) in zip(drawing.axes, panels.items(), strict=True):
             bars = panel.bar(names, shares, color=MODEL)
             panel.bar_label(bars, fmt="{:.2g}", fontsize=6.5)
             panel.margins(y=0.2)
             panel.set_ylabel(label)
             panel.set_xticks(range(len(names)), names, rotation=40, ha="right")
-    return drawing.svg
+    return drawing_file(drawing, "svg").decode()

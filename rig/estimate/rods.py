@@ -49,6 +49,11 @@ class Gain:
     eq9_m_s: float
 
     @property
+    def middle(self) -> float:
+        """Between its rods, counted from 1."""
+        return 1 + (self.first + self.last) / 2
+
+    @property
     def normalized_error(self) -> float | None:
         """Of what was measured against Eq. 9."""
         return self.measured.less(Measured(self.eq9_m_s, 0.0)).normalized_error

@@ -39,18 +39,16 @@ def attachments(session: Reader, outcome: SessionResults) -> list[Attachment]:
     if len(packed) > _DATA:
         words = "results as CSV files, with the protocol; rig export also writes budgets and edges"
         packed = zipped({n: data for n, data in contents.items() if n not in _LARGE})
+    rows = [
+        ("data.zip", "application/zip", packed, words),
+        ("summary.csv", "text/csv", contents["summary.csv"], "means only"),
+        (METHOD, "text/markdown", method_page().encode(), "the whole method"),
+    ]
+    own = (file for file in session.attached_files() if len(file.data) <= _DATA)
+    rows += ((f.name, "application/octet-stream", f.data, f"attached {f.added}") for f in own)
     return [
         Attachment(name, kind, base64.b64encode(content).decode("ascii"), words)
-        for name, kind, content, words in (
-            ("data.zip", "application/zip", packed, words),
-            ("summary.csv", "text/csv", contents["summary.csv"], "means only"),
-            (METHOD, "text/markdown", method_page().encode(), "the whole method"),
-            *(
-                (file.name, "application/octet-stream", file.data, f"attached {file.added}")
-                for file in session.attached_files()
-                if len(file.data) <= _DATA
-            ),
-        )
+        for name, kind, content, words in rows
     ]
 
 

@@ -95,20 +95,30 @@ def heading_of(name: str) -> str:
     return _TABLES[name].heading
 
 
+def records_in(name: str, whole: Any) -> list[Any]:
+    """Return a table's records where its heading says; of groups, each with each of its members."""
+    place, _, members = _TABLES[name].place.partition("*")
+    records = value_at(whole, place) or () if place else ()
+    if members:
+        return [(group, member) for group in records for member in getattr(group, members)]
+    return [*records]
+
+
 class _Table(NamedTuple):
     heading: str
     words: str
     rows: list[list[str]]
+    place: str = ""
 
 
 def read_tables(text: str) -> Iterator[tuple[str, _Table]]:
     """Yield names with what stands below them in a file such as ``columns.txt``."""
     for block in text.split("\n[")[1:]:
-        (name, heading), *rows = (
+        (name, heading, *place), *rows = (
             re.split(r"\] | {2,}", line) for line in block.strip().split("\n")
         )
         words = " ".join(row[0] for row in rows if len(row) == 1)
-        yield name, _Table(heading, words, [row for row in rows if len(row) > 1])
+        yield name, _Table(heading, words, [row for row in rows if len(row) > 1], *place)
 
 
 def _kinds(each: str) -> list[Measurand]:
@@ -161,10 +171,6 @@ def _text(value: object, *_: object) -> str:
     return "" if value is None else str(value)
 
 
-def _fixed(value: float | None, _: object, decimals: float, scale: float = 1.0) -> str:
-    return "" if value is None else fixed(scale * value, int(decimals))
-
-
 def _verdict(error: float | None, *_: object) -> str:
     """Say what a normalized error means; nothing where nothing was compared."""
     return "" if error is None else "agrees" if abs(error) <= 1.0 else "disagrees"
@@ -189,8 +195,8 @@ _WAYS: dict[str, Callable[..., str]] = {
     "degrees": lambda value, _: degrees(value),
     "times": lambda value, _: f"× {value:.2f}",
     "p": lambda value, _: "" if value is None else f"{value:.2g}",
-    "fixed": _fixed,
-    "fine": lambda value, row: _fixed(value, row, row.fine_decimals, row.fine_scale),
+    "fixed": lambda value, _, decimals, scale=1.0: fixed(value and value * scale, int(decimals)),
+    "fine": lambda value, row: fixed(value and value * row.fine_scale, row.fine_decimals),
     "predicted": _predicted,
     "plus_minus": lambda value, _, scale=1.0: plus_minus(value, scale),
     "usual": lambda value, row: plus_minus(value, row.scale, row.decimals),

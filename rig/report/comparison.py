@@ -10,8 +10,8 @@ from rig.analysis.summary import Incline
 from rig.measurands import acceleration_in, averaged
 from rig.report.columns import table_parts
 from rig.report.figure import chart
-from rig.report.parts import summary_table
-from rig.report.templates import page_html, sentence
+from rig.report.parts import means_of, summary_table
+from rig.report.templates import lines, page_html, sentence
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,17 +26,14 @@ def shared_lines(results: TogetherResults) -> list[str]:
     """Say which errors the sessions have in common."""
     owners = defaultdict[str, list[str]](list)
     for owner, groups in results.fit.shared.items():
-        for group in groups:
-            owners[", ".join(group)] += [owner] * (len(group) > 1)
-    return [sentence("common", words, names) for names, words in owners.items() if words] or [
-        sentence("nothing_common")
-    ]
+        for group in (group for group in groups if len(group) > 1):
+            owners[", ".join(group)].append(owner)
+    return lines("common", owners)
 
 
 def pooled_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means over all sessions of each scene, as lines of text."""
-    if results.simulated:
-        yield "SIMULATED DATA"
+    yield from ["SIMULATED DATA"] * results.simulated
     for scene in results.fit.pooled:
         yield from [f"{', '.join(scene.sessions)}:", *summary_table(scene.summary).splitlines()]
     yield from shared_lines(results)
@@ -44,8 +41,7 @@ def pooled_lines(results: TogetherResults) -> Iterator[str]:
 
 def difference_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means of every session and their differences, as lines of text."""
-    if results.simulated:
-        yield "SIMULATED DATA"
+    yield from ["SIMULATED DATA"] * results.simulated
     for part in _tables(results):
         yield from ["", *part.table]
     yield from ["", *_claims(results)]
@@ -67,15 +63,12 @@ def draw_comparison(results: TogetherResults) -> Chart:
 
 def _panel(row: Measurand, differences: Sequence[MeanDifference]) -> dict[str, Any]:
     places = {-float(place): each for place, each in enumerate(differences)}
-    names = {
-        place: ", ".join(filter(None, [each.session, _runs(each)]))
-        for place, each in places.items()
-    }
+    names = {at: f"{each.session}, {_runs(each)}".rstrip(", ") for at, each in places.items()}
     limits = min(places) - 0.6, 0.6
     return {
         "row": row,
         "middle": [(0.0, limit) for limit in limits],
-        "differences": [(place, each.value) for place, each in places.items()],
+        "differences": places.items(),
         "height": 16.0 * (len(places) + 0.5),
         "y_axis": {"names": names, "limits": limits},
     }
@@ -96,10 +89,9 @@ def _tables(results: TogetherResults) -> Iterator[Part]:
     """Yield the tables of each measurand."""
     for row, differences in _differences(results):
         means = (
-            {"session": part.name, "line": line, "runs": _runs(line)}
+            {"session": part.name, "line": mean.line, "runs": _runs(mean.line)}
             for part in results.fit.parts
-            for line in part.analysis.summary
-            if row.name in line.means
+            for mean in means_of(part.analysis.summary, row)
         )
         yield from table_parts("sessions", means, row=row)
         yield from table_parts("differences", differences, (), {"runs": _runs}, row)

@@ -6,13 +6,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.estimate.rods import resolution
-from rig.report.columns import heading_of, table_parts
+from rig.report.columns import heading_of, records_in, table_parts
 from rig.report.numbers import MINUS, decimals_for, fixed, plus_minus
-from rig.report.templates import sentence
+from rig.report.templates import lines
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator
 
+    from rig.estimate.alphas import ConditionAlpha
     from rig.estimate.rods import Gain
     from rig.estimate.session import Coefficient, Coefficients, SessionEstimate
     from rig.report.columns import Part
@@ -27,11 +28,11 @@ _PAGE = (*_TEXT, "inclines", "rods")
 
 def estimate_text(found: SessionEstimate, sections: Sections, *, simulated: bool) -> str:
     """Write everything for a terminal; what cannot be written is noted in `sections`."""
-    lines = ["SIMULATED DATA"] if simulated else []
-    lines.append(f"{found.drops} good drop{'s' * (found.drops > 1)}, {found.edges} edges")
+    text = ["SIMULATED DATA"] if simulated else []
+    text.append(f"{found.drops} good drop{'s' * (found.drops > 1)}, {found.edges} edges")
     for part in page_parts(found, sections, _TEXT):
-        lines += part.lines
-    return "\n".join(lines)
+        text += part.lines
+    return "\n".join(text)
 
 
 def page_parts(
@@ -40,7 +41,9 @@ def page_parts(
     """Yield tables of ``columns.txt``, each made alone."""
 
     def make(name: str) -> list[Part]:
-        return [*table_parts(name, *_TABLES[name](found), _CELLS)]
+        words = lines("estimated", name, found, resolution, _correlation)
+        cells = _CELLS | {"contact": partial(_contact, found)}
+        return [*table_parts(name, records_in(name, found), words, cells)]
 
     for name in names:
         yield from sections.make(f'The section "{heading_of(name)}"', partial(make, name)) or ()
@@ -52,40 +55,21 @@ def symbol(name: str) -> str:
     return SYMBOLS[what] + (f" of {chain}" if chain else "")
 
 
-def _coefficients(found: SessionEstimate) -> tuple[Sequence[Any], list[str]]:
-    words, coefficients = [f"{left}." for left in found.left_out or ()], found.coefficients
-    if coefficients is None or not coefficients.parameters:
-        return (), words
-    return coefficients.parameters, [*words, *_coefficient_words(coefficients)]
-
-
-def _coefficient_words(coefficients: Coefficients) -> Iterator[str]:
+def _correlation(coefficients: Coefficients) -> list[str]:
     names = [symbol(parameter.name) for parameter in coefficients.parameters]
-    pairs = [
+    return [
         f"{name} and {other} {fixed(coefficients.correlation[i, j], 2)}"
         for i, name in enumerate(names)
         for j, other in enumerate(names[:i])
     ]
-    if pairs:
-        yield f"Correlation: {', '.join(pairs)}."
-    yield sentence("priors")
-    yield sentence("drag", coefficients.drag)
 
 
-def _alphas(found: SessionEstimate) -> tuple[Sequence[Any], list[str]]:
-    if found.alphas is None:
-        return (), []
-    tests = {"runs": found.alphas.runs_share_alpha, "model": found.alphas.by_model}
-    words = [sentence("alphas", name, test) for name, test in tests.items() if test is not None]
-    contacts = found.coefficients.contact if found.coefficients else ()
-    contact = {point.incline_deg: point for point in contacts}
-    inclines = found.alphas.inclines
-    return [(alpha, contact.get(alpha.condition.incline_deg)) for alpha in inclines], words
-
-
-def members(groups: Iterable[Any] | None, name: str) -> list[tuple[Any, Any]]:
-    """Pair each group with each of its members."""
-    return [(group, member) for group in groups or () for member in getattr(group, name)]
+def _contact(found: SessionEstimate, alpha: ConditionAlpha) -> str:
+    """Say where the rods touch at the incline of an α, mm."""
+    for point in found.coefficients.contact if found.coefficients else ():
+        if point.incline_deg == alpha.condition.incline_deg:
+            return plus_minus(point.height, 1e3) if point.identified else "not identified"
+    return ""
 
 
 def _posterior(coefficient: Coefficient) -> str:
@@ -98,8 +82,8 @@ def _stated(coefficient: Coefficient) -> str:
     return f"{coefficient.stated.value:g}".replace("-", MINUS) + u
 
 
-def _worst(lines: Iterable[Any]) -> float | None:
-    errors = [line.normalized_error for line in lines]
+def _worst(compared: Iterable[Any]) -> float | None:
+    errors = [line.normalized_error for line in compared]
     return max((abs(error) for error in errors if error is not None), default=None)
 
 
@@ -108,25 +92,11 @@ def _rod(gain: Gain) -> str:
     return "–".join(str(1 + rod) for rod in dict.fromkeys((gain.first, gain.last)))
 
 
-_TABLES: dict[str, Callable[[SessionEstimate], tuple[Sequence[Any], list[str]]]] = {
-    "coefficients": _coefficients,
-    "alphas": _alphas,
-    "end": lambda found: ((), [found.end_correction.sentence] if found.end_correction else []),
-    "impulses": lambda found: (
-        found.impulses or (),
-        [] if found.impulses is None else [resolution(found.impulses)],
-    ),
-    "comparison": lambda found: (found.comparison or (), []),
-    "failed": lambda found: ((), [f"{sentence}." for sentence in found.failed]),
-    "inclines": lambda found: (members(found.comparison, "differences"), []),
-    "rods": lambda found: (members(found.impulses, "gains"), []),
-}
 _CELLS: dict[str, Callable[[Any], Any]] = {
     "symbol": symbol,
     "posterior": _posterior,
     "stated": _stated,
     "source": lambda coefficient: "edges" if coefficient.identified else "held",
-    "contact": lambda at: plus_minus(at.height, 1e3) if at.identified else "not identified",
     "worst": _worst,
     "rod": _rod,
 }

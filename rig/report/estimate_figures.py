@@ -7,29 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.report.estimate import members
 from rig.report.figure import Trace, chart
 from rig.report.looks import MODEL
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.estimate.posterior import Posterior
-    from rig.estimate.rods import Gain
     from rig.estimate.session import SessionEstimate
     from rig.report.figure import Chart
     from rig.sections import Sections
 
 _STYLES = (("ring", "model"), ("square", "second"), ("mean", "ink"))
 _SHARES = (0.683, 0.95)
-_CURVES = {
-    True: {
-        "title": "Separation against time and squared speed against height",
-        "words": "Δz(t) at simultaneous release and V²(z)",
-    },
-    False: {"title": "Squared speed against height", "words": "V²(z)"},
-}
-"""Whether separations are known or not."""
 _FEWEST = 4  # points of the grid in the larger region
 
 
@@ -61,42 +51,26 @@ def _alpha(found: SessionEstimate) -> Chart | None:
 
 def _impulses(found: SessionEstimate) -> Chart | None:
     """ΔV of every rod beside Eq. 9, and the normalized errors of all inclines."""
-
-    def rods(lines: Iterable[Any]) -> list[tuple[float, Gain]]:
-        return [(1 + (gain.first + gain.last) / 2, gain) for _, gain in members(lines, "gains")]
-
-    inclines = [
-        {**style, "rods": rods([line]), "label": f"{line.condition.incline_deg:g}°"}
-        for line, style in _styled(found.impulses or ())
-    ]
-    sources = {"inclines": inclines, "rods": rods(found.impulses or ())}
-    return chart("impulses", sources) if inclines else None
+    lines = found.impulses or ()
+    inclines = [{**style, "line": line, "gains": line.gains} for line, style in _styled(lines)]
+    sources = {"inclines": inclines, "gains": [gain for line in lines for gain in line.gains]}
+    return chart("impulses", sources) if lines else None
 
 
 def _curves(found: SessionEstimate) -> Chart | None:
     """Δz(t) and V²(z) with bands (Fig. 4)."""
-    drops = []
-    for drop, style in _styled(found.curves or ()):
-        curves = (drop.time_s, drop.separation), (drop.height_m, drop.squared_speed)
-        columns = {
-            name: np.column_stack((at, curve.measured, curve.u95, curve.model))
-            for name, (at, curve) in zip(("separation", "speed"), curves, strict=True)
-            if curve is not None
-        }
-        label = f"{drop.run.incline_deg:g}°, run {drop.run.number}"
-        drops.append({**style, "label": label, **columns})
-    apart = any("separation" in drop for drop in drops)
-    return chart("curves", {"drops": drops}, **_CURVES[apart]) if drops else None
+    drops = [{**style, "drop": drop} for drop, style in _styled(found.curves or ())]
+    apart = any(drop["drop"].separation for drop in drops)
+    return chart("curves" if apart else "speeds", {"drops": drops}) if drops else None
 
 
 def _posterior(found: SessionEstimate) -> Chart | None:
     """Draw the regions of β and μ that hold 68.3 % and 95 %; `None` where they have no spread."""
-    parameters = found.coefficients.parameters if found.coefficients else ()
-    best = {parameter.name: parameter.least_squares for parameter in parameters}
-    if found.coefficients is None or not {"restitution", "friction"} <= best.keys():
+    fit = found.coefficients
+    best = {parameter.name: parameter.least_squares for parameter in fit.parameters} if fit else {}
+    if not fit or not fit.posterior or not {"restitution", "friction"} <= best.keys():
         return None
-    assert found.coefficients.posterior is not None
-    regions = _regions(found.coefficients.posterior)
+    regions = _regions(fit.posterior)
     return None if regions is None else chart("posterior", {"best": [best], "traces": [regions]})
 
 

@@ -22,15 +22,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
     from rig.analysis.result import DropResult
+    from rig.arrays import Array
     from rig.model.motion import Motion
-    from rig.protocol.protocol import Protocol, Side
+    from rig.protocol.protocol import Gates, Protocol, Side
     from rig.records import Drop
     from rig.report.figure import Chart
-
-    Array = NDArray[np.float64]
 
 _MOMENTS = 200
 
@@ -49,6 +46,11 @@ class Passages(NamedTuple):
     time: Array
     height: Array
     speed: Array
+
+    @property
+    def squared_speed(self) -> Array:
+        """Of the top rod or object, m²/s²."""
+        return self.speed**2
 
 
 def passages(
@@ -97,81 +99,77 @@ def fall_figures(
     head, values = f"Run {result.run.number}", result.quantities
     if result.run.impact is None:
         if free.time.size > 2:
-            yield chart("object", *_motions(protocol, free, result), run=head)
+            yield chart("object", _object(protocol, protocol.gates, free, result), run=head)
         return
     if struck.time.size < 3 or not {FALL_TIME.name, SPEED.name} <= values.keys():
         return
     head += f" at {result.run.incline_deg:g}°"
     end = values[FALL_TIME.name].value
     released = struck.time[-1] + struck.height[-1] / values[SPEED.name].value - end
-    struck = struck._replace(time=struck.time - released)
+    time = struck.time - released
     motion = motion_by_model(protocol, result.run)
-    at = np.linspace(0.0, motion.end_s, _MOMENTS)
+    curve = _model(motion, np.linspace(0.0, motion.end_s, _MOMENTS))
     u = 2.0 * np.hypot(protocol.gates.height_u, protocol.gates.datum_u)
     if free.time.size > 2 and RELEASE_SKEW.name in values:
         half, skew = 0.5 * protocol.gravity.value, values[RELEASE_SKEW.name]
         # The free chain's way, from all its passages, at the moments of the striking one's.
         since = free.time - released - skew.value
-        points = np.mean(free.height + half * since**2) - half * struck.time**2 - struck.height
+        points = np.mean(free.height + half * since**2) - half * time**2 - struck.height
         name, u = "separation", np.hypot(u, struck.speed * skew.expanded)
     else:
         name, points, u = "height", struck.height, np.hypot(u, 2.0 * protocol.drop.u)
-    curves, expected = _model(motion, at), _model(motion, struck.time)[name]
+    top = curve["height"][0]
     sources = {
-        "curve": np.column_stack((at, curves[name])),
-        "passages": _with_residuals(struck.time, points, expected, u),
+        "curve": curve,
+        "free_fall": [(0.0, top), (2.0 * motion.gravity * top, 0.0)],
+        "free": free,
+        "struck": struck,
+        "time": time,
+        "points": points,
+        "errors": _errors(points, _model(motion, time)[name], u),
         "end": [(end, values.get(SEPARATION.name))],
     }
     yield chart(name, sources, run=head)
-    top = curves["height"][0]
-    squares = {
-        "free_fall": [(0.0, top), (2.0 * motion.gravity * top, 0.0)],
-        "curve": np.column_stack((curves["speed"] ** 2, curves["height"])),
-        "free": np.column_stack((free.speed**2, free.height)),
-        "struck": np.column_stack((struck.speed**2, struck.height)),
-    }
-    yield chart("speed", squares, run=head)
+    yield chart("speed", sources, run=head)
 
 
-def _motions(protocol: Protocol, seen: Passages, result: DropResult) -> Iterator[dict[str, Any]]:
-    """Yield z(t) and v(t) of an object, with the acceleration as the slope, and what is left."""
+def _object(protocol: Protocol, gates: Gates, seen: Passages, result: DropResult) -> dict[str, Any]:
+    """Return z(t) and v(t) of an object, with the acceleration as the slope, and what is left."""
     row = acceleration_in(result.quantities)
     assert row is not None
-    assert protocol.gates is not None
     pull = result.quantities[row.name]
     (rods,) = protocol.chains.values()
     time = seen.time - seen.time[0]
     # Height and speed at the first beam are as they fit best; the acceleration is the result.
     start = np.polyfit(time, seen.height + 0.5 * pull.value * time**2, 1)
-    line = np.poly1d([-0.5 * pull.value, *start])
-    slope = f"slope {row.symbol} = {with_unit(pull, row)}"
-    where = "height z (m)" if protocol.track is None else "place on the track z (m)"
-    u_speed = 2.0 * seen.speed * rods.width_u / rods.widths[0]
+    height = np.poly1d([-0.5 * pull.value, *start])
+    speed, u_speed = -height.deriv(), 2.0 * seen.speed * rods.width_u / rods.widths[0]
     at = np.linspace(0.0, time[-1], _MOMENTS)
-    for name, words, points_name, motion, points, u in (
-        (where, "", "beams", line, seen.height, 2.0 * protocol.gates.height_u),
-        ("speed v (m/s)", slope, "width over shadow time", -line.deriv(), seen.speed, u_speed),
-    ):
-        yield {
-            "name": name,
-            "slope": words,
-            "points": points_name,
-            "curve": np.column_stack((at, motion(at))),
-            "passages": _with_residuals(time, points, motion(time), u),
-        }
+    return {
+        "height": "height" if protocol.track is None else "place on the track",
+        "slope": f"slope {row.symbol} = {with_unit(pull, row)}",
+        "curve": {"time": at, "height": height(at), "speed": speed(at)},
+        "seen": {
+            **seen._asdict(),
+            "time": time,
+            "height_error": _errors(seen.height, height(time), 2.0 * gates.height_u),
+            "speed_error": _errors(seen.speed, speed(time), u_speed),
+        },
+    }
 
 
-def _with_residuals(times: Array, values: Array, expected: Array, u: Array | float) -> Array:
-    """Return a row a passage, with what is left over: nothing finite where nothing has a U."""
+def _errors(values: Array, expected: Array, u: Array | float) -> Array:
+    """Return what is left over in units of U: nothing finite where nothing has a U."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.column_stack((times, values, (values - expected) / u))
+        return np.asarray((values - expected) / u)
 
 
 def _model(motion: Motion, times: Array) -> dict[str, Array]:
-    """Return where the model has the top rod, m, its speed, m/s, and Δz, m, at each time."""
+    """Return where the model has the top rod, m, its squared speed, and Δz, m, at each time."""
     instants = [motion.at(min(max(time, 0.0), motion.end_s)) for time in times.tolist()]
     return {
+        "time": times,
         "height": np.array([at.height_m for at in instants]) + motion.chain.length,
-        "speed": np.array([at.speed_m_s for at in instants]),
+        "squared_speed": np.array([at.speed_m_s for at in instants]) ** 2,
         "separation": np.array([at.separation_m for at in instants]),
     }

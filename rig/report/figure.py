@@ -135,13 +135,13 @@ def chart(name: str, *panels: Mapping[str, Any], **values: object) -> Chart:
     values
         What title and caption ask for.
     """
-    title, caption, rows = _FIGURES[name]
+    title, caption, rows, _ = _FIGURES[name]
     drawn = [panel for sources in panels for panel in _panels(rows, {**_LINES, **sources})]
     return Chart(title.format(**values), caption.format(**values), drawn)
 
 
 def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[Panel]:
-    """Draw panels from their rows; without those that stay empty, but for maps."""
+    """Draw panels from their rows; without those that only lines cross, but for maps."""
     panels: list[Panel] = []
     scale = 1.0
     for kind, *cells in rows:
@@ -150,14 +150,13 @@ def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[P
             x_axis, y_axis = (sources.get(axis, {}) for axis in ("x_axis", "y_axis"))
             scale = float(*factor or (1.0,))
             traces, true = [*sources.get("traces", ())], sources.get("true", False)
-            panels.append(
-                Panel(PlotAxis(x, **x_axis), PlotAxis(y, **y_axis), traces, float(height), true)
-            )
+            axes = PlotAxis(x, **x_axis), PlotAxis(y, **y_axis)
+            panels.append(Panel(*axes, traces, float(height), true))
         elif kind == "residuals":
             panels += residual_panels(panels[-1].x, _points(cells, sources))
         else:
             panels[-1].series.extend(_traces(kind, cells, sources, scale))
-    return [panel for panel in panels if panel.series or "traces" in sources]
+    return [each for each in panels if "traces" in sources or any(line.x for line in each.series)]
 
 
 def _traces(
@@ -189,9 +188,12 @@ def _traces(
         )
 
 
-def _points(cells: Sequence[str], sources: Mapping[str, Any]) -> list[list[Any]]:
-    """Find the coordinates of all records that have both."""
+def _points(cells: Sequence[str], sources: Mapping[str, Any]) -> list[Sequence[Any]]:
+    """Find the coordinates of all records that have both, or of columns of equal length."""
     name, *places = (_written(cell, sources) for cell in cells)
+    if name == "-":
+        columns = [value_at(sources, place) for place in places]
+        return [] if any(column is None for column in columns) else [*zip(*columns, strict=True)]
     rows = ([value_at(record, place) for place in places] for record in sources.get(name, ()))
     return [row for row in rows if None not in row[:2]]
 
@@ -221,8 +223,7 @@ def residual_panels(x: PlotAxis, ratios: Iterable[Sequence[float]]) -> list[Pane
     most = 1.1 * max([2.0, *(abs(ratio) for _, ratio in points)])
     sources = {"ratios": points, "y_axis": {"limits": (-most, most)}, "x": x.label}
     sources["role"] = "mean" if len(points) <= _FEW else "points"
-    (panel,) = chart("residuals", sources).panels
-    return [replace(panel, x=x)] if points else []
+    return [replace(panel, x=x) for panel in chart("residuals", sources).panels]
 
 
 def csv_table(figure: Chart) -> str:

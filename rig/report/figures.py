@@ -63,12 +63,12 @@ def result_figure(
     inclines = {run.run.incline_deg for run in analysis.runs}
     if len(inclines) < FEWEST_INCLINES or acceleration_in(measured):
         return chart("runs", *(_by_run(analysis, row, site_m_s2) for row in rows), title=title)
-    gaps = unanswered(curves)
+    gaps = _unanswered(curves)
     sources = (
         {
             "row": row,
-            "gaps": [{"ends": gap} for gap in gaps],
-            "model": _model_parts(curves, row),
+            "gaps": gaps,
+            "model": [*_model_parts(curves, row)],
             "free_fall": [curves.get("free_fall_speed_m_s")] * (row == SPEED),
             "runs": good,
             "means": means_of(analysis.summary, row),
@@ -100,17 +100,14 @@ def runs_figure(analysis: Analysis, skew_limit_s: float | None = None) -> Chart 
         for line in analysis.summary
         if (reference := (line.predicted if predicted else line.means).get(SEPARATION.name))
     }
-    separation = _runs_by_chain(analysis, SEPARATION, references)
-    skew = _runs_by_chain(analysis, RELEASE_SKEW)
     sources = {
         "reference": "model" if predicted else "mean",
-        "separation": separation,
-        "middle": [0.0] * bool(separation),
-        "skew": skew,
-        "limits": [skew_limit_s, -skew_limit_s] if skew_limit_s and skew else (),
+        "separation": _runs_by_chain(analysis, SEPARATION, references),
+        "skew": _runs_by_chain(analysis, RELEASE_SKEW),
+        "limits": [skew_limit_s, -skew_limit_s] if skew_limit_s else (),
     }
-    chains = _CHAINS if separation else ""
-    return chart("order", sources, chains=chains) if separation or skew else None
+    figure = chart("order", sources, chains=_CHAINS if sources["separation"] else "")
+    return figure if figure.panels else None
 
 
 def budget_figure(summary: Sequence[Incline]) -> Chart | None:
@@ -151,59 +148,46 @@ def variance_shares(summary: Sequence[Incline], row: Measurand) -> dict[str, flo
     return {name: 100.0 * square / total for name, square in squares.items() if total}
 
 
-def unanswered(curves: Mapping[str, Any]) -> list[tuple[float, float]]:
+def _unanswered(curves: Mapping[str, Any]) -> Groups:
     """Inclines between those of the model's curves for which it has no answer, degrees."""
     inclines = sorted(set(curves.get("incline_deg", ())))
-    return [(low, high) for low, high in pairwise(inclines) if high - low > _GAP_DEG]
+    return [{"ends": ends} for ends in pairwise(inclines) if ends[1] - ends[0] > _GAP_DEG]
 
 
 def _stacked(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dict[str, Any]]:
     """Lay one bar, source after source, the largest first."""
     begin = 0.0
-    for name in sorted(parts, key=lambda name: -parts[name]):
+    for name, share in sorted(parts.items(), key=lambda part: -part[1]):
         # Sources beyond the colours are among the others.
         color = colors.get(name) or dict(enumerate(PARTS)).get(len(colors))
-        if parts[name] > _SMALL and color is not None:
-            colors[name], end = color, begin + parts[name]
-            yield _bar(name, color, begin, end)
-            begin = end
+        if share > _SMALL and color is not None:
+            colors[name], points = color, [(begin + share, 0.0, begin)]
+            yield {"part": name, "share": share, "color": color, "points": points}
+            begin += share
     if begin < 99.5:
-        yield _bar("others", REST, begin, 100.0)
+        points = [(100.0, 0.0, begin)]
+        yield {"part": "others", "share": 100.0 - begin, "color": REST, "points": points}
 
 
-def _bar(name: str, color: int, begin: float, end: float) -> dict[str, Any]:
-    label = f"{name} {fixed(end - begin, 0)} %"
-    return {"label": label, "color": color, "points": [(end, 0.0, begin)]}
-
-
-def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Groups:
+def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Iterator[dict[str, Any]]:
     """Part the model's curve: on the surface, on the pile, and of unlike chains."""
     if row.name not in curves:
-        return []
+        return
     names = curves.get("segments") or ["surface"] * len(curves["incline_deg"])
     columns = (curves[name] for name in ("incline_deg", row.name, row.key("U95")))
     first = names[0].partition(", ")[2]
-    parts = []
     for name, points in groupby(zip(names, *columns, strict=True), key=itemgetter(0)):
         where, _, chain = name.partition(", ")  # unlike chains have curves of their own
         role, words = _SEGMENTS[where]
-        parts.append(
-            {
-                "role": role,
-                "color": "model" if chain == first else "second",
-                "label": f"{words}, {chain}" if chain else words,
-                "points": [*points],
-            }
-        )
-    return parts
+        color, label = "model" if chain == first else "second", f"{words}, {chain}".rstrip(", ")
+        yield {"role": role, "color": color, "label": label, "points": [*points]}
 
 
 def _by_run(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> dict[str, Any]:
     """Say what a measurand is in each run, its mean with U as a strip, and what is expected."""
-    lines = [mean.line for mean in means_of(analysis.summary, row)]
-    means = [line.means[row.name] for line in lines]
+    means = means_of(analysis.summary, row)
     expected = [site_m_s2] if acceleration_in([row.name]) else []
-    expected += [value_of(line.predicted.get(row.name)) for line in lines]
+    expected += [value_of(mean.line.predicted.get(row.name)) for mean in means]
     stated = [value for value in expected if value is not None][:1]
     return {
         "row": row,
@@ -213,7 +197,7 @@ def _by_run(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> dict
                 "middle": [mean.value],
                 "ends": [mean.value - mean.expanded, mean.value + mean.expanded],
             }
-            for mean in means
+            for mean in (each.mean for each in means)
         ],
         "expectations": stated,
         "expected": "".join(fixed(value * row.scale, row.decimals) for value in stated),

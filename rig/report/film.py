@@ -13,14 +13,13 @@ if TYPE_CHECKING:
     from rig.films import Film, Point
     from rig.report.figure import Chart
 
-PICTURES = 6
 _APART_M = 0.26
 _BOARD_M = (-0.08, 0.12)
 _LIMITS_M = (-0.25, 0.55)
 _GAP = (math.nan,) * 3
 
 
-def film_figure(film: Film, pictures: int = PICTURES) -> Chart:
+def film_figure(film: Film, pictures: int = 6) -> Chart:
     """Draw moments of a fall side by side, from the front and, below, along the rods.
 
     Parameters
@@ -38,21 +37,17 @@ def film_figure(film: Film, pictures: int = PICTURES) -> Chart:
     middles = [
         (place + y, z) for place, moment in places.items() for _, y, z in film.middles(moment)
     ]
-    boards = [
-        {"color": "model", "points": [(place + y, film.board_m - y * slope) for y in _BOARD_M]}
-        for place in places
-    ]
-    axes = {
+    boards = [[(place + y, film.board_m - y * slope) for y in _BOARD_M] for place in places]
+    sources = {
+        "front": [
+            lines for place, moment in places.items() for lines in _front(film, moment, place)
+        ],
+        "boards": [{"points": points} for points in boards],
+        "rods": middles,
         "x_axis": {"names": names, "limits": (-0.1, [*places][-1] + 0.14)},
         "y_axis": {"limits": _LIMITS_M},
     }
-    front = [lines for place, moment in places.items() for lines in _front(film, moment, place)]
-    return chart(
-        "film",
-        {"name": "height (m)", "lines": front, **axes},
-        {"name": "height (m), along the rods", "lines": boards, "rods": middles, **axes},
-        incline=f"{film.incline_deg:g}",
-    )
+    return chart("film", sources, incline=f"{film.incline_deg:g}")
 
 
 def _front(film: Film, moment: int, place: float) -> Iterator[dict[str, Any]]:

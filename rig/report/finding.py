@@ -6,36 +6,28 @@ from collections import defaultdict
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rig.measurands import ACCELERATION, GRAVITY, acceleration_in, averaged, told
+from rig.measurands import ACCELERATION, GRAVITY, averaged
 from rig.protocol.plan import runs as planned_runs
-from rig.reasons import remedies, sentences, summarize_reasons
-from rig.report.numbers import decimals_for, fixed, plus_minus
+from rig.reasons import remedies, summarize_reasons
+from rig.report.numbers import plus_minus
 from rig.report.parts import means_of, summary_incline
-from rig.report.templates import sentence
+from rig.report.templates import lines, sentence
 from rig.results.improvements import improvements
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis
     from rig.analysis.summary import Incline
     from rig.measurands import Measurand
     from rig.protocol.protocol import Protocol
-    from rig.reasons import Reason
     from rig.results import SessionResults
     from rig.session.reading import StateEntry
 
 MOST_NUMBERS = 3
-_REFERENCES = {
-    GRAVITY: "the protocol's gravity",
-    ACCELERATION: "the acceleration without friction",
-}
+_REFERENCES = {GRAVITY: "the protocol's gravity", ACCELERATION: "the acceleration without friction"}
 """What strikes nothing is compared with."""
-_CLOCK_COVERAGE = 2.0  # about 95 %
-_ALONE = "the joint fit of all good runs did not converge: each run is shown by itself"
-_SIGNIFICANT = 4.0  # standard uncertainties beyond which κ is worth a remark
 NONE = "No deviations: every planned run was recorded once, in the planned order."
 
 
@@ -74,21 +66,14 @@ def headline(summary: Sequence[Incline]) -> list[Number]:
         for line, _ in means[:1] if numbers or len(means) < 2 else (means[0], means[-1]):
             value = plus_minus(line.means[row.name], row.scale, row.decimals)
             quantity = row.symbol if row in _REFERENCES else f"{row.title} {row.symbol}"
-            numbers.append(
-                Number(quantity, value, row.unit, _place(line) if len(means) > 1 else "")
-            )
+            place = _place(line) if len(means) > 1 else ""
+            numbers.append(Number(quantity, value, row.unit, place))
     for row in averaged():
         if len(summary) == 1 and row.name in summary[0].differences:
             difference = summary[0].differences[row.name]
             value = plus_minus(difference, row.fine_scale, row.fine_decimals)
             numbers.append(Number(f"{row.symbol} − {_expected(row)}", value, row.fine))
     return numbers[:MOST_NUMBERS]
-
-
-def claims(summary: Sequence[Incline]) -> list[str]:
-    """Say the numbers in a sentence."""
-    free = acceleration_in({name for line in summary for name in line.means})
-    return [sentence("claim", summary, headline(summary), free)] if summary else []
 
 
 def verdict(summary: Sequence[Incline]) -> ModelCheck:
@@ -113,15 +98,13 @@ def _place(line: Incline) -> str:
 
 def remarks(results: SessionResults) -> list[str]:
     """Return the remarks on a session's falls, clock and air."""
-    rig = results.analysis.rig
     return [
-        *([_ALONE] if results.analysis.unsettled else []),
-        *([rig.likeness.sentence] if rig is not None and rig.likeness is not None else []),
-        *alone_lines(results.analysis),
+        *lines("fitted", results.analysis),
+        *lines("alone", results.analysis),
         *common_lines(results.analysis.summary),
         *(each.sentence for each in improvements(results.analysis.summary)),
         *clock_lines(results.calibration),
-        *air_lines(None if rig is None else rig.drag),
+        *lines("air", results.analysis),
     ]
 
 
@@ -130,35 +113,24 @@ def common_lines(summary: Sequence[Incline]) -> list[str]:
     causes: dict[str, None] = {}
     for row in averaged():
         budgets = [line.causes[row.name] for line in summary if line.causes.get(row.name)]
-        if budgets:
-            most = {name: max(part.get(name, 0.0) for part in budgets) for name in budgets[0]}
-            largest = [name for name, u in most.items() if u > 0.5 * max(most.values())]
-            causes |= dict.fromkeys(sorted(largest, key=lambda name: -most[name]))
-    return [sentence("shared", ", ".join(causes))] if causes else []
-
-
-def alone_lines(analysis: Analysis) -> list[str]:
-    """Set what the last good run says by itself beside what it says among all, and say why."""
-    runs = [run for run in analysis.runs if run.learned]
-    row = next((row for row in told() if runs and row.name in runs[-1].alone), None)
-    if row is None:
-        return []
-    return [sentence("alone", runs[-1], row, len(runs))]
+        first = [name for part in budgets[:1] for name in part]
+        most = {name: max(part.get(name, 0.0) for part in budgets) for name in first}
+        largest = [name for name, u in most.items() if u > 0.5 * max(most.values())]
+        causes |= dict.fromkeys(sorted(largest, key=lambda name: -most[name]))
+    return lines("shared", causes)
 
 
 def void_lines(analysis: Analysis) -> list[str]:
     """Return why drops are void, a line for each kind of reason, and what to do about them."""
     voids = [drop for drop in analysis.drops if drop.verdict == "void"]
-    kinds: dict[tuple[object, ...], list[tuple[DropResult, Reason]]] = defaultdict(list)
+    kinds = defaultdict[Any, list[Any]](list)
     for drop in voids:
         for reason in drop.reasons:
             kinds[reason.kind].append((drop, reason))
-    groups = [
-        ([drop for drop, _ in members], summarize_reasons([reason for _, reason in members]))
-        for members in kinds.values()
-    ]
+    members = (zip(*group, strict=True) for group in kinds.values())
+    groups = [(drops, summarize_reasons(reasons)) for drops, reasons in members]
     advice = remedies(reason for drop in voids for reason in drop.reasons)
-    return sentence("void", groups, advice).split("\n") if voids else []
+    return lines("void", groups, advice) if voids else []
 
 
 def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
@@ -169,15 +141,7 @@ def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
     calibration
         Member of ``rig analyze --json``.
     """
-    expanded = _CLOCK_COVERAGE * calibration["u_ppm"]
-    u = fixed(expanded, max(decimals_for(expanded) - 1, 0))
-    return [sentence("clock", calibration, u), *calibration["notes"]]
-
-
-def air_lines(drag: Measured | None) -> list[str]:
-    """State the air drag that a fit finds, where it is significant: predictions ignore it."""
-    significant = drag is not None and abs(drag.value) > _SIGNIFICANT * drag.u
-    return [sentence("air", drag)] if significant else []
+    return [sentence("clock", calibration), *calibration["notes"]]
 
 
 def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEntry]) -> list[str]:
@@ -193,11 +157,6 @@ def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEnt
     list of str
         Sentences; `NONE` alone where there is no deviation.
     """
-    recorded = {drop.run.number for drop in analysis.runs}
-    missing = [run.number for run in planned_runs(protocol) if run.number not in recorded]
     first = dict.fromkeys(entry.run for entry in states if entry.state is RunState.RECORDED)
     late = [after for before, after in pairwise(first) if after < before]
-    interrupted = [
-        (entry, sentences(entry.reasons)) for entry in states if entry.state is RunState.INTERRUPTED
-    ]
-    return sentence("deviations", analysis, missing, interrupted, late).split("\n")[1:] or [NONE]
+    return lines("deviations", analysis, states, planned_runs(protocol), late) or [NONE]

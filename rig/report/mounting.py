@@ -14,16 +14,13 @@ from rig.report.figure import chart
 from rig.report.templates import render
 
 if TYPE_CHECKING:
-    from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol, Side
+    from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol
     from rig.report.figure import Chart
 
     Point = tuple[float, float]
 
-_SIDES: dict[Side, tuple[int, str, str]] = {
-    "impact": (-1, "line", "second"),
-    "free": (1, "dash", "model"),
-}
-_WIDTH_PT, _HEIGHT_PT = 530.0, 330.0
+_SIDES = {"impact": (-1, "line", "second"), "free": (1, "dash", "model")}
+_WIDTH_PT = 530.0
 _NEAR_M = 0.16  # what is drawn larger once more
 _POST_M = 0.12  # from the chains to the posts, as drawn
 _LOW_M = -0.02  # shown below the zero
@@ -42,23 +39,20 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
     """
     inclines = _inclines(protocol)
     if protocol.track is not None:
-        views = [_track(protocol, protocol.track, gates)]
+        figure = chart("track", _track(protocol, protocol.track, gates), title=protocol.title)
     else:
         highest = max(gate.height for gate in gates.gates)
         hanging = protocol.drop.value + max(c.chain.length for c in protocol.chains.values())
         near = max(_NEAR_M, 1.5 * min(gate.height for gate in gates.gates))
         lowest = f"close to the {protocol.zero}" if inclines else "lowest gates"
         whole = "posts and beams, from the side"
-        views = [
-            # What lies below is named in the other view, where there is room.
-            _side_view(protocol, gates, 1.04 * max(highest, hanging), near, whole),
-            _side_view(protocol, gates, near, 0.0, lowest),
-        ]
-    words = render(
-        "mounting.txt", protocol=protocol, gates=gates, inclines=inclines, ends=beam_ends
-    )
-    figure = chart("mounting", *views, title=protocol.title)
-    return replace(figure, caption=figure.title, foot=str(words).split("\n"), width=_WIDTH_PT)
+        # What lies below is named in the other view, where there is room.
+        above = _side_view(protocol, gates, 1.04 * max(highest, hanging), near, whole)
+        below = _side_view(protocol, gates, near, 0.0, lowest)
+        figure = chart("mounting", above, below, title=protocol.title)
+    known = {"protocol": protocol, "gates": gates, "inclines": inclines, "ends": beam_ends}
+    foot = str(render("mounting.txt", **known)).split("\n")
+    return replace(figure, caption=figure.title, foot=foot, width=_WIDTH_PT)
 
 
 def face_below(protocol: Protocol, incline_deg: float) -> float:
@@ -101,22 +95,19 @@ def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, 
     slope, start = math.radians(track.incline_deg.value), protocol.drop.value
 
     def at(along: float, above: float = 0.0) -> Point:
-        return (
-            (start - along) * math.cos(slope) + above * math.sin(slope),
-            along * math.sin(slope) + above * math.cos(slope),
-        )
+        level = (start - along) * math.cos(slope) + above * math.sin(slope)
+        return level, along * math.sin(slope) + above * math.cos(slope)
 
+    tips = [at(gate.height, _POST_M) for gate in gates.gates]
     return {
-        "x": f"the track at {track.incline_deg.value:g}°, from the side (mm)",
-        "y": "mm",
-        "height": 0.6 * _HEIGHT_PT,
+        "incline": track.incline_deg.value,
         "true": True,
-        "posts": [{"ends": [at(1.05 * start), at(0.0)]}],
+        "post": [at(1.05 * start), at(0.0)],
         "rods": [at(start)],
         "mark": [at(0.0)],
         "beams": [
-            _beam("line", "model", [at(gate.height), at(gate.height, _POST_M)], _name(gate))
-            for gate in gates.gates
+            {"label": _name(gate), "ends": [at(gate.height), tip], "tip": [tip]}
+            for gate, tip in zip(gates.gates, tips, strict=True)
         ],
     }
 
@@ -134,19 +125,20 @@ def _side_view(
         slope, face = math.radians(incline), face_below(protocol, incline)
         at = away * math.cos(slope), away * math.sin(slope) - face
         ends = [(y, y * math.tan(slope) - face) for y in (-0.5 * post, 1.2 * post)]
-        boards.append(_beam("line", "muted", ends, "" if named_above else f"{incline:g}°", at))
+        name = "" if named_above else f"{incline:g}°"
+        boards.append({"ends": ends, "label": name, "place": [at]})
     for gate in gates.gates:
         side, role, color = _SIDES[gate.side]
         if gate.height <= top:
-            ends = [(-side * post, gate.height), (side * post, gate.height)]
-            name, at = _name(gate), (1.05 * side * post, gate.height)
-            beams.append(_beam(role, color, ends, name if gate.height >= named_above else "", at))
+            ends = [(end * post, gate.height) for end in (-side, side, 1.05 * side)]
+            name = _name(gate) if gate.height >= named_above else ""
+            look = {"role": role, "color": color, "label": name}
+            beams.append({**look, "ends": ends[:2], "place": ends[2:]})
     return {
         "x": f"{title} ({'mm, uphill to the right' if inclines else 'mm'})",
         "y": f"mm {protocol.drop_from}" if inclines else "mm",
         "x_axis": {"limits": (-2.4 * _MM * post, 2.4 * _MM * post)},
         "y_axis": {"limits": (_MM * _LOW_M, _MM * top)},
-        "height": _HEIGHT_PT,
         "true": True,
         "ground": [0.0],
         "boards": boards,
@@ -155,14 +147,6 @@ def _side_view(
         "mark": [(0.0, 0.0)],
         "beams": beams,
     }
-
-
-def _beam(
-    role: str, color: str, ends: list[Point], name: str, place: Point | None = None
-) -> dict[str, Any]:
-    """Draw what is straight, with its name at a place, or at its second end."""
-    places = [place or ends[1]] if name else []
-    return {"role": role, "color": color, "ends": ends, "label": name, "place": places}
 
 
 def _name(gate: Gate) -> str:

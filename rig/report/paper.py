@@ -10,12 +10,11 @@ from rig.model import paper
 from rig.report.figure import chart
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from rig.report.figure import Chart
 
     Columns = Mapping[str, list[float]]
-    Rows = Sequence[Mapping[str, float]]
 
 _NO_LINE = "No line from just above 0° to arctan μ = 11.3°: the rods would not slide there."
 
@@ -39,25 +38,21 @@ def paper_figure(
         The figure, with what the text says of it and the equations do not below it; and its
         numbers.
     """
-    compute, draw = _KINDS[number]
-    columns = compute()
-    model, falls = (
-        [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=False)]
-        for table in (columns, resolved or {})
-    )
+    columns = getattr(paper, f"figure_{number}")()
     claims = [claim for claim in paper.claims() if claim.figure == number]
     foot = [
         *([_NO_LINE] if number == 3 else []),
         "Where the paper's text and its equations differ:",
         *(f"· {claim.text}; equations: {claim.equations}" for claim in claims),
     ]
-    figure = chart(f"paper {number}", *draw(model, falls))
+    figure = chart(f"paper {number}", *_SOURCES[number](columns, resolved or {}))
     return replace(figure, caption=figure.title, foot=foot), columns
 
 
-def _figure_3(model: Rows, resolved: Rows) -> Iterator[dict[str, Any]]:
+def _figure_3(model: Columns, resolved: Columns) -> Iterator[dict[str, Any]]:
     """Δz above, V below; of resolved falls the means with their standard deviations."""
-    surface = [row for row in model if not row["pile"]]
+    rows = [dict(zip(model, row, strict=True)) for row in zip(*model.values(), strict=True)]
+    surface = [row for row in rows if not row["pile"]]
     # The rods do not slide between level and arctan μ: no line across.
     start = surface[0]["incline_deg"] == 0.0
     for row in (SEPARATION, SPEED):
@@ -65,9 +60,9 @@ def _figure_3(model: Rows, resolved: Rows) -> Iterator[dict[str, Any]]:
             "row": row,
             "level": surface[:start],
             "surface": surface[start:],
-            "pile": [row for row in model if row["pile"]],
+            "pile": [row for row in rows if row["pile"]],
             "resolved": resolved,
-            "falls": resolved[0]["falls"] if resolved else 0,
+            "falls": max(resolved.get("falls", ()), default=0),
             "sd": row.key("sd"),
             "in_text": paper.TEXT_FREE_FALL_SPEED,
             "texts": [paper.TEXT_FREE_FALL_SPEED] * (row == SPEED),
@@ -75,20 +70,16 @@ def _figure_3(model: Rows, resolved: Rows) -> Iterator[dict[str, Any]]:
         }
 
 
-def _figure_4(model: Rows, resolved: Rows) -> Iterator[dict[str, Any]]:
+def _figure_4(model: Columns, resolved: Columns) -> Iterator[dict[str, Any]]:
     """Height against V², with the separation at the end; the paper's own point is hollow."""
-    measured = [(model[-1]["free_speed2"], paper.MEASURED_GRADED_SEPARATION)]
+    measured = [(model["free_speed2"][-1], paper.MEASURED_GRADED_SEPARATION)]
     yield {"model": model, "measured": measured, "resolved": resolved}
 
 
-def _figure_6(model: Rows, _: Rows) -> Iterator[dict[str, Any]]:
+def _figure_6(model: Columns, _: Columns) -> Iterator[dict[str, Any]]:
     """Against ξ, with the closed forms beside the discrete model."""
     for row, number in ((SEPARATION, 15), (SPEED, 14)):
         yield {"row": row, "number": number, "model": model}
 
 
-_KINDS: dict[int, Any] = {
-    3: (paper.figure_3, _figure_3),
-    4: (paper.figure_4, _figure_4),
-    6: (paper.figure_6, _figure_6),
-}
+_SOURCES: dict[int, Any] = {3: _figure_3, 4: _figure_4, 6: _figure_6}

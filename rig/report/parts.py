@@ -92,11 +92,6 @@ def tables(
     return table_parts(name, records, words, _CELLS, row)
 
 
-def budget_parts(summary: Sequence[Incline]) -> Iterator[Part]:
-    """Yield the table of what makes the uncertainty of the means, where anything is known of it."""
-    return tables("budget", (mean for mean in means_of(summary) if mean.mean.budget))
-
-
 def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the table of scatter."""
     return tables("scatter", (mean for line in summary for mean in means_of([line])))

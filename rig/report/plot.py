@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import re
 import textwrap
+import tomllib
 from functools import partial
 from html import escape
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from rig.ctrl_c import ctrl_c_waits
-from rig.report.canvas import STYLE, Canvas
+from rig.report.canvas import drawing_file, style
 from rig.report.looks import COLORS, INK, MODEL, PAPER, SECOND, SIZE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
+    from rig.arrays import Array
     from rig.report.figure import Chart, Panel, Trace
-
-    Points = NDArray[np.float64]
 
 _LETTER, _TYPED = 0.57 * SIZE, 0.61 * SIZE
 """Mean width of the digits and letters of the fonts in question, and those of a typewriter."""
@@ -46,20 +44,10 @@ _PAGE = (
 """What a page has no use for: it has a style sheet of its own."""
 _AREAS = ("bar", "band", "map", "levels")
 _LINES = ("line", "dash", "level", "limit")
-_LOOKS: dict[str, dict[str, Any]] = {
-    "line": {"linewidth": 1.4},
-    "dash": {"linewidth": 1.2, "dashes": (3.5, 2.0)},
-    "thick": {"linewidth": 3.0},
-    "level": {"linewidth": 0.9},
-    "limit": {"linewidth": 0.9, "dashes": (4.5, 3.0)},
-    "points": {"marker": "o", "markersize": 2.2, "alpha": 0.55},
-    "mean": {"marker": "o", "markersize": 4.0},
-    "ring": {"marker": "o", "markersize": 4.0, "markerfacecolor": COLORS[PAPER][0]},
-    "square": {"marker": "s", "markersize": 4.0},
-}
+_LOOKS = tomllib.loads(Path(__file__).with_name("roles.toml").read_text("utf-8"))
 
 
-def plot(chart: Chart, width: float | None = None) -> Canvas:
+def plot(chart: Chart, width: float | None = None) -> Figure:
     """Draw a figure in a width, points; by default in its own."""
     width = width or chart.width
     letters = int(width / _TYPED)
@@ -78,7 +66,7 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
         + _LETTER * max([_DIGITS, *map(len, panel.y.names.values())])
         for panel in panels
     )
-    with ctrl_c_waits(), mpl.rc_context(fname=STYLE):
+    with style():
         figure = Figure(figsize=(width / 72.0, height / 72.0), dpi=72.0)
         stamp = "SIMULATED DATA" if chart.simulated else ""
         figure.text(0.995, 1.0, stamp, ha="right", va="top", color=COLORS[SECOND][0])
@@ -89,10 +77,9 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
             box = left, top, width - left - _RIGHT_PT, panel.height
             axes = figure.add_axes(tuple(np.array(box) / (width, height, width, height)))
             top -= gap
-            for other, before in zip(figure.axes, panels, strict=False):
-                if before.x == panel.x and other is not axes:
-                    axes.sharex(other)
-                    break
+            before = zip(figure.axes[:-1], panels, strict=False)
+            for other in [other for other, earlier in before if earlier.x == panel.x][:1]:
+                axes.sharex(other)
             _set_up(axes, panel, numbered=not joined)
             for trace in panel.series:
                 _draw(axes, trace)
@@ -101,12 +88,12 @@ def plot(chart: Chart, width: float | None = None) -> Canvas:
                 axes.margins(x=10.0)  # of a single run
         for panel, axes in zip(panels, figure.axes, strict=True):
             _name_series(axes, panel)
-    return Canvas(figure, figure.axes, chart.facts or chart.title)
+    return figure
 
 
 def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
     """Return SVG for a page, of a class and with names of its own, in the page's colours."""
-    svg = plot(chart, width).svg
+    svg = drawing_file(plot(chart, width), "svg").decode()
     svg = svg[svg.index("<svg") :]
     for pattern, words in _PAGE:
         svg = re.sub(pattern, words, svg, flags=re.DOTALL)
@@ -116,9 +103,9 @@ def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
     # Two figures have the same marks, and one of them may be hidden.
     svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{mark}-", svg)
     rules = ""
-    for number, style in enumerate(sorted(set(re.findall(r' style="([^"]*)"', svg)))):
-        svg = svg.replace(f' style="{style}"', f' class="{mark}-{number}"')
-        rules += f".{mark}-{number}{{{style}}}"
+    for number, look in enumerate(sorted(set(re.findall(r' style="([^"]*)"', svg)))):
+        svg = svg.replace(f' style="{look}"', f' class="{mark}-{number}"')
+        rules += f".{mark}-{number}{{{look}}}"
     svg = svg.replace(">", f"><style>{rules}</style>", 1)
     for number, (light, _) in enumerate(COLORS):
         svg = svg.replace(light, f"var(--c{number})")
@@ -221,12 +208,12 @@ def _name_series(axes: Axes, panel: Panel) -> None:
         axes.annotate(trace.label, tuple(place), color=color, annotation_clip=False)
 
 
-def _meet(low: Points, high: Points, starts: Points, ends: Points) -> Any:
+def _meet(low: Array, high: Array, starts: Array, ends: Array) -> Any:
     """Count for each box how many others it meets."""
     return ((low[:, None] < ends) & (starts < high[:, None])).all(axis=2).sum(axis=1)
 
 
-def _shown(axes: Axes, trace: Trace) -> Points:
+def _shown(axes: Axes, trace: Trace) -> Array:
     """Return points on the drawing along what a series shows, none far from the next."""
     x, y, u = (np.array(values, float) for values in (trace.x, trace.y, trace.u))
     if trace.role == "bar":
@@ -237,7 +224,7 @@ def _shown(axes: Axes, trace: Trace) -> Points:
         ends = np.linspace(-1.0, 1.0, 9)[:, None] * u
         x, y = np.ravel(x + ends * trace.across), np.ravel(y + ends * (not trace.across))
     low, high = axes.get_ylim()
-    points: Points = axes.transData.transform(np.column_stack([x, y]))
+    points: Array = axes.transData.transform(np.column_stack([x, y]))
     points = points[(low <= y) & (y <= high) & np.isfinite(x)]
     if trace.role not in _LINES or len(points) < 2:
         return points

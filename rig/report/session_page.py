@@ -11,14 +11,16 @@ from functools import partial
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from rig import __version__, measurands
+from rig import __version__
 from rig.analysis import curves
-from rig.analysis.result import GOOD, Measured
+from rig.analysis.result import GOOD
 from rig.films import read_films
+from rig.measurands import SEPARATION
 from rig.protocol import plan
 from rig.report import attachments, estimate, figures, finding, parts, timeline
 from rig.report.falls import fall_figures
 from rig.report.film import film_figure
+from rig.report.numbers import value_of
 from rig.results import improvements, protocol_of
 from rig.results.whole import notes
 
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
 
     from rig.analysis.result import DropResult
     from rig.estimate.session import SessionEstimate
-    from rig.films import Film
     from rig.protocol.protocol import Protocol
     from rig.records import Drop
     from rig.report.figure import Chart
@@ -35,15 +36,6 @@ if TYPE_CHECKING:
     from rig.results import SessionResults
     from rig.sections import Sections
     from rig.session.reading import Reader
-
-PAPER = (
-    "J. Pantaleone, Understanding and enhancing the impact-induced tension of a falling chain, "
-    "arXiv:2207.02692 (2022)"
-)
-SOFTWARE = (
-    f"the chainrig authors, chainrig {__version__}: lab-rig controller for falling-chain and "
-    "photogate experiments (2026), MIT licence"
-)
 
 
 def session_page(
@@ -66,13 +58,9 @@ def session_page(
     sections
         Where a section that cannot be made is noted.
     """
-    protocol, drops = protocol_of(session), outcome.analysis.drops
+    protocol = protocol_of(session)
     records = {(drop.run, drop.attempt): drop for drop in session.drops()}
-    timed = [
-        (record, outcome.clock.scale(record).hz, drop)
-        for drop in drops
-        if (record := records[drop.run.number, drop.attempt])
-    ]
+    drops = [(records[drop.run.number, drop.attempt], drop) for drop in outcome.analysis.drops]
     return {
         "template": "session.html",
         "title": protocol.title,
@@ -80,20 +68,16 @@ def session_page(
         "session": session,
         "outcome": outcome,
         "protocol": protocol,
-        "drops": drops,
-        "timed": timed,
+        "timed": [(record, outcome.clock.scale(record).hz, drop) for record, drop in drops],
         "bars": bars,
         "estimated": estimated,
         "sections": sections,
         "make": partial(_make, sections),
         "good": GOOD,
         "created": datetime.fromisoformat(session.meta["created"]),
-        "free": measurands.acceleration_in({name for drop in drops for name in drop.quantities}),
         "notes": notes(session),
         "fall": _best_fall,
         "fallen": _films,
-        "paper": PAPER,
-        "software": SOFTWARE,
         "versions": {"rig": __version__} | {name: version(name) for name in ("numpy", "scipy")},
         **{module.__name__.rpartition(".")[2]: module for module in _MODULES},
     }
@@ -114,26 +98,18 @@ def _best_fall(
     protocol: Protocol, timed: Iterable[tuple[Drop, Any, DropResult]]
 ) -> Iterator[Chart]:
     """Draw the good run that shows most: where the separation is largest, else the first."""
-    none = Measured(0.0, 0.0)
-    best = max(
-        (drop for drop in timed if drop[-1].verdict in GOOD),
-        key=lambda drop: drop[-1].quantities.get(measurands.SEPARATION.name, none).value,
-        default=None,
-    )
-    return fall_figures(protocol, *best) if best else iter(())
+    good = [drop for drop in timed if drop[-1].verdict in GOOD]
+    good.sort(key=lambda drop: -(value_of(drop[-1].quantities.get(SEPARATION.name)) or 0.0))
+    return fall_figures(protocol, *good[0]) if good else iter(())
 
 
 def _films(session: Reader, runs: Iterable[DropResult]) -> Iterator[Chart]:
     """Draw how simulated chains fell: the first that counts, and the first that does not."""
     films = read_films(session.path) if session.simulated else {}
-    shown: dict[bool, Film] = {}
-    for drop in runs:
-        if (film := films.get((drop.run.number, drop.attempt))) is not None:
-            shown.setdefault(drop.verdict not in GOOD, film)
-    return (film_figure(film) for _, film in sorted(shown.items()))
+    drops = [(films.get((drop.run.number, drop.attempt)), drop.verdict in GOOD) for drop in runs]
+    for counts in (True, False):
+        shown = [film for film, good in drops if film is not None and good is counts]
+        yield from map(film_figure, shown[:1])
 
 
-_MODULES = (
-    *(attachments, curves, estimate, figures, finding, improvements),
-    *(measurands, parts, plan, timeline),
-)
+_MODULES = attachments, curves, estimate, figures, finding, improvements, parts, plan, timeline

@@ -45,44 +45,30 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Char
         Where the model has no answer the picture is empty; where the point lies beyond its domain,
         lines are dashed. Levels span what is found inside the domain.
     """
-    shown = [(SEPARATION, swept.separation_m)] if layout.two_chains else []
-    panels = (
-        _panel(row, layout, values, swept) for row, values in [*shown, (SPEED, swept.speed_m_s)]
-    )
+    rows = (SEPARATION, SPEED) if layout.two_chains else (SPEED,)
+    panels = (_panel(row, layout, swept) for row in rows)
     labels = {variable.column: variable.label for variable in VARIABLES.values()}
-    held = "; ".join(_with_unit(labels[name], value) for name, value in facts["fixed"].items())
-    foot = str(render("sweep.txt", facts=facts, held=held)).split("\n")
-    figure = chart("sweep", *panels, title=facts["title"])
+    foot = str(render("sweep.txt", facts=facts, labels=labels)).split("\n")
+    kind = "map" if len(layout.grid.axes) > 1 else "sweep"
+    figure = chart(kind, *panels, title=facts["title"])
     record = json.dumps(facts, ensure_ascii=False)
     return replace(figure, caption=foot[-1], foot=foot, width=WIDE_PT, facts=record)
 
 
-def _with_unit(label: str, value: float) -> str:
-    """Write a parameter as its axis would name it: ``drop = 0.18 m``."""
-    name, _, unit = label.partition(" (")
-    return f"{name} = {value:g} {unit.removesuffix(')')}".rstrip().replace(" °", "°")
-
-
-def _panel(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> dict[str, Any]:
+def _panel(row: Measurand, layout: Layout, swept: Swept) -> dict[str, Any]:
     """Draw one quantity: along an axis, or as a map, whose own axis says what its levels are."""
-    (x, across), *second = (
-        (VARIABLES[axis.name].label, {"limits": (axis.values[0], axis.values[-1])})
-        for axis in layout.grid.axes
-    )
-    for y, up in second:
-        traces = _map(row, layout, values, swept)
-        axes = {"x": f"{row.axis} against {x}", "y": y, "x_axis": across, "y_axis": up}
-        return {"height": 200, "scale": 1, "traces": traces, **axes}
-    (places,) = (axis.values for axis in layout.grid.axes)
-    parts = []
-    for piled in (False, True):
-        # The step from the pile to the surface is no part of either curve.
-        part = np.where(((swept.notes & PILE) > 0) == piled, values, np.nan)
-        inside = np.where(swept.in_domain, part, np.nan)
-        rows = {"points": part, "inside": inside}
-        parts.append({name: np.column_stack((places, row)) for name, row in rows.items()})
-    axes = {"x": x, "y": row.axis, "x_axis": across}
-    return {"height": 150, "scale": row.scale, "parts": parts, **axes}
+    values: Floats = getattr(swept, row.name)
+    axes: dict[str, Any] = {"row": row}
+    for name, axis in zip("xy", layout.grid.axes, strict=False):
+        axes[name] = VARIABLES[axis.name].label
+        axes[f"{name}_axis"] = {"limits": (axis.values[0], axis.values[-1])}
+    if "y" in axes:
+        return {**axes, "traces": _map(row, layout, values, swept)}
+    # The step from the pile to the surface is no part of either curve.
+    piled = (swept.notes & PILE) > 0
+    curves = (np.where(piled == below, values, np.nan) for below in (False, True))
+    parts = [{"whole": part, "inside": np.where(swept.in_domain, part, np.nan)} for part in curves]
+    return {**axes, "places": layout.grid.axes[0].values, "parts": parts}
 
 
 def _map(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:

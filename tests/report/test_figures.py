@@ -15,7 +15,7 @@ from rig.analysis.result import Audit, DropResult, Measured
 from rig.films import Film
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
-from rig.report.canvas import KINDS, canvas, figure_file, write_figures
+from rig.report.canvas import KINDS, drawing_file, figure_file, style, write_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
 from rig.report.figures import (
     _stacked,
@@ -80,7 +80,7 @@ def test_names_of_series_hide_no_other_and_stay_inside(figure):
             assert not box.padded(-1.0).overlaps(beside.padded(-1.0)), (text, other)
         for text, box in boxes:
             assert box.x0 >= 0.0, text
-            assert box.x1 <= drawing.figure.bbox.x1 + 1.0, text
+            assert box.x1 <= drawing.bbox.x1 + 1.0, text
 
 
 def test_every_number_of_a_figure_is_in_its_table(tmp_path):
@@ -159,23 +159,23 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
     drawings = []
 
     def drawn() -> None:
-        with canvas((1.0,)) as drawing:
+        with style():
             signal.raise_signal(signal.SIGINT)
-            drawings.append(drawing)
+            drawings.append(plot(film_figure(FILM)))
 
     with pytest.raises(KeyboardInterrupt):
         drawn()
     (drawing,) = drawings
-    write = drawing.figure.draw
+    write = drawing.draw
 
     def struck(renderer) -> None:
         signal.raise_signal(signal.SIGINT)
         write(renderer)
         drawings.append(drawing)
 
-    monkeypatch.setattr(drawing.figure, "draw", struck)
+    monkeypatch.setattr(drawing, "draw", struck)
     with pytest.raises(KeyboardInterrupt):
-        drawing.file(kind)
+        drawing_file(drawing, kind)
     assert len(drawings) > 1
 
 

@@ -24,8 +24,7 @@ from rig.report.attachments import METHOD, Attachment, method_page
 from rig.report.columns import Part
 from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.finding import ModelCheck, Number
-from rig.report.session_page import PAPER, SOFTWARE
-from rig.report.templates import page_html
+from rig.report.templates import page_html, sentence
 from rig.report.timeline import Lanes, Timeline
 
 ROOT = Path(__file__).parents[2]
@@ -75,26 +74,26 @@ def page_with(text: str) -> dict[str, Any]:
     )  # fmt: skip
     analysis = Simple(
         runs=(result,), drops=[result], superseded=(), damage=[text],
-        summary=(Simple(incline_deg=1.0, gates=()),),
+        summary=(Simple(incline_deg=1.0, gates=(), means={}),),
         rig=Simple(likeness=Simple(sentence=text), drag=None),
     )  # fmt: skip
     outcome = Mock(blind=False, analysis=analysis, clock=Simple(details={text: text}))
     return {
         "template": "session.html", "title": text, "simulated": True, "session": session,
         "outcome": outcome, "timed": (), "good": GOOD, "created": datetime(2026, 6, 3),
-        "protocol": Mock(notes=text, track=None), "free": None, "notes": {Job(1, 1): text},
-        "make": lambda _, make, *arguments: make(*arguments), "drops": [result], "bars": "U95",
+        "protocol": Mock(notes=text, track=None), "notes": {Job(1, 1): text},
+        "make": lambda _, make, *arguments: make(*arguments), "bars": "U95",
         "estimated": True, "sections": Simple(failed={"a": text}),
-        "paper": text, "software": text, "versions": {"rig": text},
+        "versions": {"rig": text},
         "curves": defaultdict(lambda: always([{}])), "fall": charts, "fallen": charts,
         "figures": defaultdict(lambda: charts, FEWEST_INCLINES=3), "plan": {"runs": always([])},
-        "parts": defaultdict(lambda: tables), "estimate": {"page_parts": tables},
+        "parts": defaultdict(lambda: tables, means_of=always([])),
+        "estimate": {"page_parts": tables},
         "timeline": {"timelines": always((Lanes((), 1.0), [Timeline(result, "", "M0 0")]))},
         "attachments": {"attachments": always([Attachment(text, text, "1", text)])},
         "finding": defaultdict(lambda: words, verdict=always(ModelCheck(text, False)),
                                headline=always([Number(text, text, text)])),
         "improvements": {"improvements": always([{"sentence": text}])},
-        "measurands": {"averaged": always([])},
     }  # fmt: skip
 
 
@@ -121,9 +120,9 @@ def test_text_is_escaped():
 def test_page_and_citation_file_name_the_same():
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
     assert cited["version"] == __version__
-    assert __version__ in SOFTWARE
-    assert cited["title"].partition(":")[2].strip() in SOFTWARE
+    assert __version__ in sentence("software", __version__)
+    assert cited["title"].partition(":")[2].strip() in sentence("software", __version__)
     (paper,) = cited["references"]
-    assert paper["title"] in PAPER
-    assert paper["identifiers"][0]["value"] in PAPER
+    assert paper["title"] in sentence("paper")
+    assert paper["identifiers"][0]["value"] in sentence("paper")
     assert method_page() == (ROOT / "docs" / METHOD).read_text("utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from html import unescape
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +12,8 @@ from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason, remedies
-from rig.report.finding import air_lines, void_lines
+from rig.report.finding import void_lines
+from rig.report.templates import lines
 from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
 from tests.cli.lab import rig, short
 
@@ -67,11 +69,11 @@ def test_a_session_without_a_good_run_says_why(tmp_path):
 
 def test_air_that_may_be_none_is_not_mentioned():
     for nothing in (None, Measured(3e-6, 1e-6), Measured(-3e-6, 1e-6)):
-        assert air_lines(nothing) == []
+        assert lines("air", SimpleNamespace(rig=nothing and SimpleNamespace(drag=nothing))) == []
 
 
 def test_air_is_said_with_its_uncertainty():
-    (line,) = air_lines(Measured(0.0312345, 1e-5))
+    (line,) = lines("air", SimpleNamespace(rig=SimpleNamespace(drag=Measured(0.0312345, 1e-5))))
     assert "κ = 0.031234 ± 0.000020 per m" in line
 
 

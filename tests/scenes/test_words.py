@@ -10,12 +10,13 @@ import pytest
 
 from bench import pictures
 from bench.pictures import FakeClient, screenshots, seen
+from rig import __version__
 from rig.campaign.machine import Flow, Stage
 from rig.cli import main
 from rig.ready import ready_protocol
 from rig.recorder.controller import Controller
 from rig.records import Job
-from rig.report.session_page import SOFTWARE
+from rig.report.templates import sentence
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.tui.app import RigApp
@@ -77,7 +78,7 @@ def recorded(request, tmp_path_factory):
 
 def assert_own_words(scene: str, where: str, text: str) -> None:
     """See that no text speaks of what its scene does not have."""
-    text = re.sub(r"\s+", " ", text).replace(SOFTWARE, "")
+    text = re.sub(r"\s+", " ", text).replace(sentence("software", __version__), "")
     for pattern in FOREIGN[scene]:
         met = re.search(pattern, text, re.IGNORECASE)
         assert met is None, f"{scene}, {where}: {text[max(0, met.start() - 80) : met.end() + 40]}"

@@ -11,9 +11,10 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rig import __version__
 from rig.analysis.result import GOOD
 from rig.cli import main
-from rig.report.session_page import SOFTWARE
+from rig.report.templates import sentence
 from tests.scenes.draw import Scene
 
 LONGEST_S = 60.0
@@ -198,7 +199,9 @@ class _Journey:
 
     def read(self, command: str, text: str) -> None:
         """Look for what the scene does not have in what a command says."""
-        text = text.replace(self.scene.protocol.title, "").replace(SOFTWARE, "")
+        text = text.replace(self.scene.protocol.title, "").replace(
+            sentence("software", __version__), ""
+        )
         text = re.sub(r"(?m)^  hang  ", "", text)  # the prior's name, as protocols have it
         plan = command in {"check", "predict", "design"} and self.scene.protocol.surface
         for word in (*self.lacking, *(["the object"] if plan else [])):

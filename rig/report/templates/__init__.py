@@ -10,6 +10,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup, escape
+
+from rig import measurands
+from rig.reasons import sentences
 from rig.report import looks, numbers
 from rig.report.figure import COLUMN_PT, WIDE_PT
 
@@ -33,9 +37,9 @@ def environment() -> Environment:
 
     loader = FileSystemLoader(Path(__file__).parent)
     templates = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
-    writers = numbers.plus_minus, numbers.with_unit, numbers.signed
+    writers = numbers.plus_minus, numbers.with_unit, numbers.signed, numbers.fixed, sentences
     templates.filters |= {write.__name__: write for write in writers} | {"prose": _prose}
-    templates.globals |= {"ranges": numbers.ranges, "looks": looks}
+    templates.globals |= {"numbers": numbers, "looks": looks, "measurands": measurands}
     return templates
 
 
@@ -47,17 +51,18 @@ def render(name: str, **values: object) -> str:
     Markup
         Which other templates need not escape.
     """
-    from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
-
     return Markup(environment().get_template(name).render(values))  # noqa: S704 - just escaped
 
 
 def sentence(name: str, *values: object) -> str:
     """Write a sentence of ``words.txt``."""
-    from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
-
     write = getattr(environment().get_template("words.txt").module, name)
     return Markup(write(*values)).unescape()  # noqa: S704 - for a terminal too
+
+
+def lines(name: str, *values: object) -> list[str]:
+    """Write sentences of ``words.txt``, a line each; none where there is nothing to say."""
+    return [line for line in sentence(name, *values).split("\n") if line]
 
 
 def parts_html(parts: Sequence[Part]) -> str:
@@ -87,8 +92,6 @@ def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
 
     def draw(kind: str) -> str:
         """Draw the latest figure."""
-        from markupsafe import Markup  # noqa: PLC0415 - comes with Jinja2
-
         from rig.report.plot import page_svg  # noqa: PLC0415 - matplotlib, only for figures
 
         svg = page_svg(figures[-1], _WIDTHS[kind], kind, f"{kind[0]}{len(figures)}")
@@ -102,6 +105,4 @@ def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
 
 def _prose(sentence: str) -> str:
     """Escape a sentence, and set its keys and commands in code type."""
-    from markupsafe import Markup, escape  # noqa: PLC0415 - comes with Jinja2
-
     return Markup(_CODE.sub(r"<code>\1</code>", str(escape(sentence))))  # noqa: S704 - just escaped
