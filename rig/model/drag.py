@@ -167,13 +167,8 @@ def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tup
     rate = sqrt(kappa * gravity)
     if rate * slow < 0.5:
         return arrival, slow * _per(atanh, rate * slow)
-    terminal = terminal_speed(gravity, kappa)
+    terminal = sqrt(gravity / kappa)  # where drag balances gravity
     return arrival, (kappa * distance + log((arrival + terminal) / (speed + terminal))) / rate
-
-
-def terminal_speed(gravity: float, kappa: float) -> float:
-    """√(g/κ), m/s: where drag balances gravity; infinite without drag."""
-    return sqrt(gravity / kappa) if kappa else inf
 
 
 def fallen(time: float, gravity: float, kappa: float, initial_speed: float = 0.0) -> float:

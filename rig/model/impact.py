@@ -34,17 +34,12 @@ class Impact:
 
 
 def alpha_level(restitution: float, inertia: float = UNIFORM_ROD_INERTIA) -> float:
-    """α of a long chain on a level surface, Eq. 8."""
-    return (1.0 + restitution) / 4.0 * (1.0 - inertia)
+    """α of a long chain on a level surface, Eq. 8; and of lift-off, N = αλV², Eq. S20.
 
-
-def alpha_liftoff(restitution: float = 0.0, inertia: float = UNIFORM_ROD_INERTIA) -> float:
-    """α of the surface's push on a rod that is pulled up by one end, N = αλV², Eq. S20.
-
-    The same as Eq. 8 for a rod that is laid down, but `restitution` is β' between rod and chain
-    through the string: 0 where the string damps all bouncing.
+    There the surface pushes on a rod that is pulled up by one end, and `restitution` is β' between
+    rod and chain through the string: 0 where the string damps all bouncing.
     """
-    return alpha_level(restitution, inertia)
+    return (1.0 + restitution) / 4.0 * (1.0 - inertia)
 
 
 def alpha_inclined(

@@ -45,11 +45,10 @@ def paper_figure(
         [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=False)]
         for table in (columns, resolved or {})
     )
-    claims = [claim for claim in paper.claims() if claim.figure == number]
     foot = [
         *([_NO_LINE] if number == 3 else []),
         "Where the paper's text and its equations differ:",
-        *(f"· {claim.text}; equations: {claim.equations}" for claim in claims),
+        *(f"· {text}; equations: {value}" for text, value in paper.claims()[number].items()),
     ]
     figure = chart(f"paper {number}", *draw(model, falls))
     return replace(figure, caption=figure.title, foot=foot), columns
