@@ -54,7 +54,7 @@ def problems(*, quick: bool = False) -> Iterator[WorkProblem]:
     yield fall_time()
 
 
-def _end(fall: Fall | continuum.ContinuumEnd, evaluations: int) -> Answer:
+def _end(fall: Fall, evaluations: int) -> Answer:
     values = {"separation": fall.separation_m, "speed": fall.speed_m_s, "time": fall.time_s}
     return Answer(values, evaluations)
 

@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from rig.model.chain import UNIFORM_ROD_INERTIA
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.model.surface import Pile
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -127,7 +129,9 @@ def falls(
     drop, gravity, initial_speed
         As in `rig.model.fall.hits`: m, m/s² and m/s; these and the impacts broadcast.
     """
-    profile = _floats(masses), _floats(heights)
+    mass = _floats(masses)
+    above = np.cumsum(mass[:0:-1])[::-1]  # from the top, as in rig.model.chain.Chain.legs
+    legs = [*zip(np.diff(_floats(heights)).tolist(), (above / mass[:-1]).tolist(), strict=True)]
     inputs = impacts.alpha, impacts.gamma, *map(_floats, (drop, gravity, initial_speed))
     shape = np.broadcast_shapes(*(array.shape for array in inputs))
     flat = [np.broadcast_to(array, shape).reshape(-1) for array in inputs]
@@ -135,29 +139,21 @@ def falls(
     with np.errstate(all="ignore"):
         for start in range(0, flat[0].size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            ends[:, block] = _block_ends(*profile, *(array[block] for array in flat))
+            ends[:, block] = _block_ends(legs, *(array[block] for array in flat))
     return FallBatch(*(row.reshape(shape) for row in ends))
 
 
-def _block_ends(
-    mass: Floats,
-    height: Floats,
-    alpha: Floats,
-    gamma: Floats,
-    drop: Floats,
-    gravity: Floats,
-    initial_speed: Floats,
-) -> tuple[Floats, Floats, Floats]:
-    """Δz, V and t of falls rod by rod; masses, heights of ``(rods,)``, all else ``(falls,)``."""
+def _block_ends(legs: Sequence[tuple[float, float]], *inputs: Floats) -> tuple[Floats, ...]:
+    """Δz, V and t of falls rod by rod; the inputs of `falls`, each of shape ``(falls,)``."""
+    alpha, gamma, drop, gravity, initial_speed = inputs
     twice_g = gravity * 2.0
     arrival = np.sqrt(initial_speed * initial_speed + twice_g * drop)
     # A rod released on the contact point strikes at once, though its leg's time was 0/0.
     arrival = np.where(drop == 0.0, initial_speed, arrival)
     time = np.where(drop == 0.0, 0.0, 2.0 * drop / (initial_speed + arrival))
     gained, separation, speed, step = np.zeros((4, drop.size))
-    above = np.cumsum(mass[:0:-1])[::-1]  # from the top, as in rig.model.chain.Chain.legs
     # In place: a fresh array for each result takes longer than its arithmetic.
-    for gap, ratio in zip(np.diff(height).tolist(), (above / mass[:-1]).tolist(), strict=True):
+    for gap, ratio in legs:
         np.add(gamma, ratio, out=step)
         np.divide(alpha, step, out=step)
         step *= arrival  # Eq. 9

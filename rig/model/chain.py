@@ -8,6 +8,8 @@ from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.units import Quantity
 
 XI = 4.0
@@ -62,6 +64,10 @@ class Chain:
         M is the mass above the rod that struck and m its own. M is summed from the top, so that a
         light end on a heavy chain keeps its digits.
         """
-        above = [*accumulate(self.masses[:0:-1])][::-1]
-        pairs = zip(pairwise(self.heights), above, self.masses, strict=False)
+        pairs = zip(pairwise(self.heights), sums_above(self.masses), self.masses, strict=False)
         return tuple((high - low, rest / mass) for (low, high), rest, mass in pairs)
+
+
+def sums_above(values: Sequence[float]) -> list[float]:
+    """Sum, for each rod but the top one, the values of all rods above it."""
+    return [*accumulate(values[:0:-1])][::-1]

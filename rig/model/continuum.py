@@ -36,6 +36,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.errors import DomainError
+from rig.model.fall import Fall, never_falls
 from rig.model.quadrature import gauss
 
 if TYPE_CHECKING:
@@ -86,10 +87,7 @@ class UniformChain:
         if self.length_m == 0.0:
             raise DomainError("length_m = 0: there is no chain")
         if self.gravity == 0.0 and self.initial_speed == 0.0:
-            raise DomainError(
-                "the chain never falls: no gravity and no initial speed",
-                "give a gravity above zero",
-            )
+            raise never_falls()
 
     @property
     def reach_m(self) -> float:
@@ -110,26 +108,19 @@ class UniformChain:
 
 
 @dataclass(frozen=True, slots=True)
-class ContinuumEnd:
+class ContinuumEnd(Fall):
     """The end of a fall, at the instant the chain's top end reaches the surface.
 
     Attributes
     ----------
-    separation_m
-        Δz: how far the freely falling twin is above it.
     speed_m_s
         V at z = 0; infinite where γs = 0 and α > 0.
-    time_s
-        Time since release.
     lay_down_s
         Time since the first strike, t of S15.
     evaluations
         How often the speed was evaluated.
     """
 
-    separation_m: float
-    speed_m_s: float
-    time_s: float
     lay_down_s: float
     evaluations: int
 
@@ -181,7 +172,9 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     panels
         Panels of equal width in p; `None` takes what full precision needs at 16 nodes.
     """
-    span = _span(chain)
+    span = _FARTHEST  # X, as far as it matters for Δz and t
+    if chain.reach_m > 0.0:
+        span = min(math.log1p(chain.length_m / chain.reach_m), span)
     square, line = _substitution(chain, span)
     if panels is None:
         panels = 1 + math.ceil(math.sqrt(span) + 0.2 * chain.alpha * span)
@@ -246,13 +239,6 @@ def separation_leading_order(alpha: float, length_m: float, reach_m: float) -> f
     if ratio > 0.0:
         braces += c * ratio / (c + 1.0) * math.log(ratio / (c * (c + 1.0)))
     return 2.0 * alpha * length_m * braces
-
-
-def _span(chain: UniformChain) -> float:
-    """X, as far as it matters for Δz and t."""
-    if chain.reach_m == 0.0:
-        return _FARTHEST
-    return min(math.log1p(chain.length_m / chain.reach_m), _FARTHEST)
 
 
 def _speeds(chain: UniformChain, x: NDArray[np.float64]) -> NDArray[np.float64]:

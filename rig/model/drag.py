@@ -24,7 +24,7 @@ from operator import mul
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, Hit, checked_fall, impacts
+from rig.model.fall import Fall, Hit, checked_fall, hits
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -99,10 +99,10 @@ def drag_hits(
     drop, gravity, initial_speed
         As in `rig.model.fall.hits`; none negative.
     """
-    return impacts(
-        chain, gains, drop, initial_speed,
-        lambda rod, distance, speed: drag_leg(distance, speed, gravity, kappas[rod]),
-    )  # fmt: skip
+    return hits(
+        *(chain, gains, drop, gravity, initial_speed),
+        lambda distance, speed, g, rod: drag_leg(distance, speed, g, kappas[rod]),
+    )
 
 
 def drag_fall(
@@ -167,13 +167,8 @@ def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tup
     rate = sqrt(kappa * gravity)
     if rate * slow < 0.5:
         return arrival, slow * _per(atanh, rate * slow)
-    terminal = terminal_speed(gravity, kappa)
+    terminal = sqrt(gravity / kappa)  # where drag balances gravity
     return arrival, (kappa * distance + log((arrival + terminal) / (speed + terminal))) / rate
-
-
-def terminal_speed(gravity: float, kappa: float) -> float:
-    """√(g/κ), m/s: where drag balances gravity; infinite without drag."""
-    return sqrt(gravity / kappa) if kappa else inf
 
 
 def fallen(time: float, gravity: float, kappa: float, initial_speed: float = 0.0) -> float:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from rig.model.chain import Chain
 
+    Leg = Callable[[float, float, float, int], tuple[float, float]]
 
 SMALL, LARGE = 1e-100, 1e100
 """Beyond these a square may leave the floats."""
@@ -79,7 +80,12 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float])
 
 
 def hits(
-    chain: Chain, gains: Sequence[float], drop: float, gravity: float, initial_speed: float = 0.0
+    chain: Chain,
+    gains: Sequence[float],
+    drop: float,
+    gravity: float,
+    initial_speed: float = 0.0,
+    leg: Leg | None = None,
 ) -> list[Hit]:
     """Every impact of a fall, bottom rod first.
 
@@ -93,31 +99,15 @@ def hits(
         m/s².
     initial_speed
         Downward speed at release, m/s.
-    """
-    return impacts(
-        chain, gains, drop, initial_speed, lambda _, distance, speed: _leg(distance, speed, gravity)
-    )
-
-
-def impacts(
-    chain: Chain,
-    gains: Sequence[float],
-    drop: float,
-    initial_speed: float,
-    leg: Callable[[int, float, float], tuple[float, float]],
-) -> list[Hit]:
-    """Every impact of any fall; arguments as in `hits`.
-
-    Parameters
-    ----------
     leg
-        Speed at the end and duration of the leg before a rod's impact, from the rod's number, the
-        distance and the speed before.
+        Speed at the end and duration of the leg before a rod's impact, from the distance, the
+        speed before, gravity and the rod's number; free fall if not given.
     """
+    leg = leg or free_leg
     events: list[Hit] = []
     time, speed, before = 0.0, initial_speed, -drop
     for rod, (height, gain) in enumerate(zip(chain.heights, gains, strict=True)):
-        arrival, duration = leg(rod, height - before, speed)
+        arrival, duration = leg(height - before, speed, gravity, rod)
         time += duration
         speed = arrival * (1.0 + gain)
         before = height
@@ -148,25 +138,27 @@ def fall(
         Where nothing would ever move: no gravity and no initial speed. Where a speed
         leaves the range of floats.
     """
+    length = unit = 0
     if not (
-        SMALL < chain.heights[-1] + drop < LARGE
-        and SMALL < gravity < LARGE
-        and initial_speed < LARGE
+        SMALL < chain.length + drop < LARGE and SMALL < gravity < LARGE and initial_speed < LARGE
     ):
-        return _fall_in_own_units(chain, alpha, gamma, drop, gravity, initial_speed)
-    return _fall(chain, alpha, gamma, drop, gravity, initial_speed)
-
-
-def _fall(
-    chain: Chain, alpha: float, gamma: float, drop: float, gravity: float, initial_speed: float
-) -> Fall:
-    """The legs one after another."""
-    arrival, time = _leg(drop, initial_speed, gravity)
+        # In units of the fall's own size no square over- or underflows. Units are powers of two:
+        # changing to them and back costs no digit.
+        length = math.frexp(chain.length + drop)[1]
+        # Of speed; what is 0 has no size.
+        speeds = [(math.frexp(gravity)[1] + length) // 2] if gravity else []
+        speeds += [math.frexp(initial_speed)[1]] if initial_speed else []
+        unit = max(speeds, default=0)
+        chain = replace(chain, heights=tuple(math.ldexp(z, -length) for z in chain.heights))
+        drop = math.ldexp(drop, -length)
+        gravity = math.ldexp(gravity, length - 2 * unit)
+        initial_speed = math.ldexp(initial_speed, -unit)
+    arrival, time = free_leg(drop, initial_speed, gravity)
     if arrival == 0.0 == gravity:
-        raise _never_falls()
+        raise never_falls()
     gained = separation = 0.0
     twice_g, root = 2.0 * gravity, math.sqrt
-    # `_leg` written out: calling it takes longer than its arithmetic (see ``./run bench bulk``).
+    # `free_leg` written out: a call takes longer than its arithmetic (see ``./run bench bulk``).
     try:
         for gap, ratio in chain.legs:
             step = arrival * (alpha / (gamma + ratio))
@@ -178,7 +170,12 @@ def _fall(
             separation += gained * duration
     except ZeroDivisionError:
         arrival = math.inf
-    return checked_fall(separation, arrival, time)
+    end = checked_fall(separation, arrival, time)
+    if not length and not unit:
+        return end
+    return Fall(
+        math.ldexp(separation, length), math.ldexp(arrival, unit), math.ldexp(time, length - unit)
+    )
 
 
 def checked_fall(separation: float, speed: float, time: float) -> Fall:
@@ -197,34 +194,6 @@ def checked_fall(separation: float, speed: float, time: float) -> Fall:
     return Fall(separation, speed, time)
 
 
-def _fall_in_own_units(
-    chain: Chain, alpha: float, gamma: float, drop: float, gravity: float, initial_speed: float
-) -> Fall:
-    """The same fall in units of its own size, so that no square over- or underflows.
-
-    Units are powers of two: changing to them and back costs no digit.
-    """
-    length = math.frexp(chain.heights[-1] + drop)[1]
-    # Of speed; what is 0 has no size.
-    speeds = [(math.frexp(gravity)[1] + length) // 2] if gravity else []
-    speeds += [math.frexp(initial_speed)[1]] if initial_speed else []
-    unit = max(speeds, default=0)
-    small = replace(chain, heights=tuple(math.ldexp(z, -length) for z in chain.heights))
-    scaled = _fall(
-        small,
-        alpha,
-        gamma,
-        math.ldexp(drop, -length),
-        math.ldexp(gravity, length - 2 * unit),
-        math.ldexp(initial_speed, -unit),
-    )
-    return Fall(
-        math.ldexp(scaled.separation_m, length),
-        math.ldexp(scaled.speed_m_s, unit),
-        math.ldexp(scaled.time_s, length - unit),
-    )
-
-
 def free_fall(
     chain: Chain, drop: float, gravity: float, initial_speed: float = 0.0
 ) -> tuple[float, float]:
@@ -235,20 +204,21 @@ def free_fall(
     DomainError
         Where nothing would ever move.
     """
-    return _leg(drop + chain.length, initial_speed, gravity)
+    return free_leg(drop + chain.length, initial_speed, gravity)
 
 
-def _leg(distance: float, speed: float, gravity: float) -> tuple[float, float]:
+def free_leg(distance: float, speed: float, gravity: float, _rod: int = 0) -> tuple[float, float]:
     """Speed at the end of a free-fall leg and its duration."""
     if distance == 0.0:
         return speed, 0.0
     arrival = math.sqrt(speed * speed + 2.0 * gravity * distance)
     if speed + arrival == 0.0:
-        raise _never_falls()
+        raise never_falls()
     return arrival, 2.0 * distance / (speed + arrival)
 
 
-def _never_falls() -> DomainError:
+def never_falls() -> DomainError:
+    """The fault of a scene in which nothing would ever move."""
     return DomainError(
         "the chain never falls: no gravity and no initial speed", "give a gravity above zero"
     )

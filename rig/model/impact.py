@@ -10,7 +10,7 @@ from rig.errors import DomainError
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 
 if TYPE_CHECKING:
-    from rig.model.surface import Surface
+    from rig.model.surface import Pile, Surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,17 +34,12 @@ class Impact:
 
 
 def alpha_level(restitution: float, inertia: float = UNIFORM_ROD_INERTIA) -> float:
-    """α of a long chain on a level surface, Eq. 8."""
-    return (1.0 + restitution) / 4.0 * (1.0 - inertia)
+    """α of a long chain on a level surface, Eq. 8; and of lift-off, N = αλV², Eq. S20.
 
-
-def alpha_liftoff(restitution: float = 0.0, inertia: float = UNIFORM_ROD_INERTIA) -> float:
-    """α of the surface's push on a rod that is pulled up by one end, N = αλV², Eq. S20.
-
-    The same as Eq. 8 for a rod that is laid down, but `restitution` is β' between rod and chain
-    through the string: 0 where the string damps all bouncing.
+    There the surface pushes on a rod that is pulled up by one end, and `restitution` is β' between
+    rod and chain through the string: 0 where the string damps all bouncing.
     """
-    return alpha_level(restitution, inertia)
+    return (1.0 + restitution) / 4.0 * (1.0 - inertia)
 
 
 def alpha_inclined(
@@ -106,32 +101,29 @@ def impact_on(
     DomainError
         Where Eq. 13 has no finite solution.
     """
+    gamma = chain.gamma
+    struck: Surface | Pile = surface
+    basis = "surface" if incline_deg else "level"
+    if surface.pile is not None and incline_deg < surface.pile.below_deg:
+        struck, basis = surface.pile, "pile"
+    beta = struck.restitution.value if restitution is None else restitution
+    notes = []
     if chain.alpha is not None:
-        return _with_notes(chain.alpha.value, chain.gamma or 0.0, "given")
-    gamma = gamma_finite(chain.inertia) if chain.gamma is None else chain.gamma
-    pile = surface.pile
-    if pile is not None and incline_deg < pile.below_deg:
-        beta = pile.restitution.value if restitution is None else restitution
-        return _with_notes(alpha_level(beta, chain.inertia), gamma, "pile")
-    beta = surface.restitution.value if restitution is None else restitution
-    if incline_deg == 0.0:
-        return _with_notes(alpha_level(beta, chain.inertia), gamma, "level")
-    mu = surface.friction.value if friction is None else friction
-    alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia, chain.inertia_z)
-    notes: list[str] = []
-    sliding = math.degrees(math.atan(mu))
-    if incline_deg < sliding:
-        notes.append(
-            f"the rod does not slide: incline {incline_deg:g}° is below arctan μ = {sliding:.1f}°, "
-            "so f = μN does not hold"
-        )
-    return _with_notes(alpha, gamma, "surface", *notes)
-
-
-def _with_notes(alpha: float, gamma: float, basis: str, *notes: str) -> Impact:
-    """Add the notes that apply to any α."""
+        alpha, gamma, basis = chain.alpha.value, gamma or 0.0, "given"
+    elif basis != "surface":
+        alpha = alpha_level(beta, chain.inertia)
+    else:
+        mu = surface.friction.value if friction is None else friction
+        alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia, chain.inertia_z)
+        sliding = math.degrees(math.atan(mu))
+        if incline_deg < sliding:
+            notes.append(
+                f"the rod does not slide: incline {incline_deg:g}° is below arctan μ = "
+                f"{sliding:.1f}°, so f = μN does not hold"
+            )
     if alpha > 0.5:
-        notes = (*notes, f"α = {alpha:.4g} is above ½: more energy than the rod brings")
+        notes.append(f"α = {alpha:.4g} is above ½: more energy than the rod brings")
     if alpha < 0.0:
-        notes = (*notes, f"α = {alpha:.4g} is negative: the rod would push the chain up")
-    return Impact(alpha, gamma, basis, notes)
+        notes.append(f"α = {alpha:.4g} is negative: the rod would push the chain up")
+    gamma = gamma_finite(chain.inertia) if gamma is None else gamma
+    return Impact(alpha, gamma, basis, tuple(notes))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from rig.model.fall import Hit, hits
@@ -58,26 +57,23 @@ class Motion:
         self.chain = chain
         self.gravity = gravity
         self.hits: list[Hit] = hits(chain, gains, drop, gravity, initial_speed)
-        self._times = [0.0, *(hit.time_s for hit in self.hits)]
-        self._heights = [drop, *(-height for height in chain.heights)]
-        self._speeds = [initial_speed, *(hit.speed_after for hit in self.hits)]
-        # Not the difference of two speeds: it has no digits left where α is tiny.
-        steps = (hit.speed_before * gain for hit, gain in zip(self.hits, gains, strict=True))
-        self._gained = [0.0, *accumulate(steps)]
-        # Nor the difference of two times: short legs late in a long fall would lose theirs.
-        self._legs = [
-            2.0 * (above - below) / (after + hit.speed_before) if above > below else 0.0
-            for (above, below), after, hit in zip(
-                pairwise(self._heights), self._speeds, self.hits, strict=False
-            )
-        ]
-        grown = [gained * leg for gained, leg in zip(self._gained, self._legs, strict=False)]
-        self._separations = [0.0, *accumulate(grown)]
+        # Where each leg begins, the speed gained before it, and its duration.
+        self._legs: list[tuple[Instant, float, float]] = []
+        start, gained = Instant(0.0, drop, initial_speed, 0.0), 0.0
+        for hit, height, gain in zip(self.hits, chain.heights, gains, strict=True):
+            # Not the difference of two times: short legs late in a long fall would lose theirs.
+            distance = start.height_m + height
+            duration = 2.0 * distance / (start.speed_m_s + hit.speed_before) if distance else 0.0
+            self._legs.append((start, gained, duration))
+            separation = start.separation_m + gained * duration
+            start = Instant(hit.time_s, -height, hit.speed_after, separation)
+            # Nor the difference of two speeds: it has no digits left where α is tiny.
+            gained += hit.speed_before * gain
 
     @property
     def end_s(self) -> float:
         """When the top rod strikes."""
-        return self._times[-1]
+        return self.hits[-1].time_s
 
     def at(self, time_s: float) -> Instant:
         """State at a time; the speed just before the top rod's impact at its very instant.
@@ -89,13 +85,13 @@ class Motion:
         """
         if not 0.0 <= time_s <= self.end_s:
             raise ValueError(f"{time_s} s is outside the fall, 0 to {self.end_s} s")
-        leg = min(bisect_right(self._times, time_s), len(self.hits)) - 1
-        since = self._legs[leg] if time_s == self.end_s else time_s - self._times[leg]
-        speed = self._speeds[leg] + self.gravity * since
-        fallen = (self._speeds[leg] + 0.5 * self.gravity * since) * since
+        number = bisect_right(self._legs, time_s, key=lambda leg: leg[0].time_s) - 1
+        start, gained, duration = self._legs[number]
+        since = duration if time_s == self.end_s else time_s - start.time_s
+        fallen = (start.speed_m_s + 0.5 * self.gravity * since) * since
         return Instant(
             time_s,
-            self._heights[leg] - fallen,
-            speed,
-            self._separations[leg] + self._gained[leg] * since,
+            start.height_m - fallen,
+            start.speed_m_s + self.gravity * since,
+            start.separation_m + gained * since,
         )

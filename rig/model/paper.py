@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from rig.model.chain import Chain
 from rig.model.continuum import UniformChain, end, separation_leading_order, speed
 from rig.model.fall import Fall, fall, free_fall, kicks
-from rig.model.impact import Impact, alpha_inclined, alpha_liftoff, impact_on
+from rig.model.impact import Impact, alpha_inclined, alpha_level, impact_on
 from rig.model.motion import Motion
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
@@ -43,6 +43,13 @@ def graded() -> Chain:
     gap = (LENGTH - sum(halves)) / len(halves)
     heights = (*accumulate((gap + half for half in halves[:-1]), initial=0.0), LENGTH)
     return Chain(tuple((d / GRADED_DIAMETERS[0]) ** 2 for d in GRADED_DIAMETERS), heights)
+
+
+def graded_motion() -> Motion:
+    """The fall of Fig. 4: the graded chain at 40°."""
+    chain = graded()
+    impact = impact_on(BARE, chain, MIDDLE_INCLINE)
+    return Motion(chain, kicks(chain, [impact.alpha] * chain.rods, impact.gamma), DROP, GRAVITY)
 
 
 def _fall(chain: Chain, impact: Impact) -> Fall:
@@ -80,17 +87,14 @@ def figure_4() -> Columns:
     Between impacts both are straight lines, so there are two points an impact: just before, and
     just after.
     """
-    chain = graded()
-    impact = impact_on(BARE, chain, MIDDLE_INCLINE)
-    gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
-    motion = Motion(chain, gains, DROP, GRAVITY)
+    motion = graded_motion()
     moments = [(0.0, 0.0)]
     for hit in motion.hits:
         moments += [(hit.time_s, hit.speed_before), (hit.time_s, hit.speed_after)]
     rows = []
     for time, velocity in moments[:-1]:  # the top rod's own impact pulls on nothing
         instant = motion.at(time)
-        top = instant.height_m + chain.length
+        top = instant.height_m + motion.chain.length
         rows.append((time, top, velocity**2, top + instant.separation_m, (GRAVITY * time) ** 2))
     return _columns(("time_s", "height_m", "speed2", "free_height_m", "free_speed2"), rows)
 
@@ -110,35 +114,21 @@ def _inertia_row(inertia: float) -> Sequence[float]:
     return inertia, fall_end.separation_m, fall_end.speed_m_s, eq15, speed(smooth, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """A number of the paper's text, what its equations give for it, and the figure it is on.
+def claims() -> dict[int | None, dict[str, str]]:
+    """Numbers of the text and what the equations give for them, by the figure they are on.
 
-    Attributes
-    ----------
-    figure
-        Of the paper; `None` for what no figure shows.
+    Where they part, computed here and now; `None` is for what no figure shows.
     """
-
-    text: str
-    equations: str
-    figure: int | None = None
-
-
-def claims() -> list[Claim]:
-    """Where the text and the equations part, computed here and now."""
-    rough = [
-        alpha_inclined(0.5, 0.2, 80.0) / alpha_inclined(0.5, 0.0, 80.0),
-        alpha_inclined(0.5, 0.2, 40.0) / alpha_inclined(0.5, 0.0, 40.0),
-    ]
+    at_80, at_40 = (
+        alpha_inclined(0.5, 0.2, incline) / alpha_inclined(0.5, 0.0, incline)
+        for incline in (80.0, 40.0)
+    )
     _, separation, fast, eq15, eq14 = _inertia_row(UNIFORM.inertia)
     off = [
         100 * abs(leading / exact - 1.0)
         for _, exact, _, leading, _ in map(_inertia_row, (0.05, 0.9, 0.01))
     ]
-    chain = graded()
-    impact = impact_on(BARE, chain, MIDDLE_INCLINE)
-    motion = Motion(chain, kicks(chain, [impact.alpha] * chain.rods, impact.gamma), DROP, GRAVITY)
+    motion = graded_motion()
     final = motion.at(motion.end_s).separation_m
     # The last frame is anywhere in the last 1/480 s; the one read is two before it.
     early = motion.at(motion.end_s - 2.0 * FRAME_S).separation_m
@@ -149,45 +139,31 @@ def claims() -> list[Claim]:
         / end(UniformChain(LENGTH, PITCH, alpha, 0.0, 0.0, GRAVITY)).separation_m - 100
         for alpha in (1e-9, 0.1)
     ]  # fmt: skip
-    lifted = alpha_liftoff()
-
-    return [
-        Claim(
-            "friction raises α by 2.25 at 80°",
-            f"{rough[0]:.3f} (and {rough[1]:.4f} at 40°, where the text says about 20 %)",
-            3,
-        ),
-        Claim(
-            f"free-fall speed {TEXT_FREE_FALL_SPEED:.2f} m/s",
-            f"{FREE_FALL_SPEED:.3f} m/s from {DROP + LENGTH:.3f} m",
-            3,
-        ),
-        Claim(
-            "Eq. 14 within 4 % of the discrete model",
-            f"{abs(eq14 / fast - 1.0) * 100:.1f} % at ξ = 1/3",
-            6,
-        ),
-        Claim(
-            "Eq. 15 within 4 %",
-            f"{abs(eq15 / separation - 1.0) * 100:.1f} % at ξ = 1/3, {off[0]:.0f} % at 0.05, "
-            f"{off[1]:.0f} % at 0.9, {off[2]:.0f} % at 0.01",
-            6,
-        ),
-        Claim(
-            "Δz only 20 % larger for very large initial speeds (S17)",
-            f"{larger[0]:.0f} % as α → 0, {larger[1]:.0f} % at α = 0.1",
-            6,
-        ),
-        Claim(
-            "lift-off (S20) similar to the fountains' α of {:.2f} to {:.2f}".format(
-                *TEXT_FOUNTAIN_ALPHAS
+    lifted = alpha_level(0.0)
+    low, high = TEXT_FOUNTAIN_ALPHAS
+    return {
+        3: {
+            "friction raises α by 2.25 at 80°": f"{at_80:.3f} (and {at_40:.4f} at 40°, "
+            "where the text says about 20 %)",
+            f"free-fall speed {TEXT_FREE_FALL_SPEED:.2f} m/s": f"{FREE_FALL_SPEED:.3f} m/s "
+            f"from {DROP + LENGTH:.3f} m",
+        },
+        6: {
+            "Eq. 14 within 4 % of the discrete model": f"{abs(eq14 / fast - 1.0) * 100:.1f} % "
+            "at ξ = 1/3",
+            "Eq. 15 within 4 %": f"{abs(eq15 / separation - 1.0) * 100:.1f} % at ξ = 1/3, "
+            "{:.0f} % at 0.05, {:.0f} % at 0.9, {:.0f} % at 0.01".format(*off),
+            "Δz only 20 % larger for very large initial speeds (S17)": f"{larger[0]:.0f} % "
+            f"as α → 0, {larger[1]:.0f} % at α = 0.1",
+        },
+        None: {
+            f"lift-off (S20) similar to the fountains' α of {low:.2f} to {high:.2f}": (
+                f"{lifted:.3f}, {lifted / high:.1f} to {lifted / low:.1f} times that"
             ),
-            f"{lifted:.3f}, {lifted / TEXT_FOUNTAIN_ALPHAS[1]:.1f} to "
-            f"{lifted / TEXT_FOUNTAIN_ALPHAS[0]:.1f} times that",
-        ),
-        Claim(
-            f"graded chain: Δz = {MEASURED_GRADED_SEPARATION * 100:.0f} cm, measured",
-            f"{final * 100:.1f} cm; {early * 100:.1f} cm two frames before the impact",
-            4,
-        ),
-    ]
+        },
+        4: {
+            f"graded chain: Δz = {MEASURED_GRADED_SEPARATION * 100:.0f} cm, measured": (
+                f"{final * 100:.1f} cm; {early * 100:.1f} cm two frames before the impact"
+            ),
+        },
+    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
 from rig.model.fall import Fall, fall, free_fall, kicks
@@ -12,12 +12,14 @@ from rig.model.impact import Impact, impact_on
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.model.chain import Chain
     from rig.model.surface import Surface
 
 AT_REST = Quantity(0.0)
+_ENDS = {"separation": "separation_m", "speed": "speed_m_s", "time": "time_s"}
+"""Results of a prediction, and what a fall's end calls them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +54,6 @@ class Prediction:
     time_u: float | None = None
 
 
-class _Inputs(NamedTuple):
-    """Everything a fall follows from, once the chain is known."""
-
-    alpha: float
-    gamma: float
-    drop: float
-    gravity: float
-    speed: float
-    drag: float  # times what is given
-
-
 def predict(
     chain: Chain,
     surface: Surface,
@@ -91,22 +82,33 @@ def predict(
     Uncertainties are first order: each input is moved by ± its standard uncertainty, or, where
     that would leave what is possible, by less and to one side; the slope counts either way.
     """
-    free, drops = _ways_down(chain, kappas)
-    free_speed = free(drop.value, gravity.value, initial_speed.value)
+    place = {"drop": drop.value, "gravity": gravity.value, "speed": initial_speed.value}
+    if kappas:
+        from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
+
+        free = drag_leg(drop.value + chain.length, place["speed"], place["gravity"], kappas[0])
+    else:
+        free = free_fall(chain, *place.values())
     air = ", drag" if kappas else ""
     try:
         impact = impact_on(surface, chain, incline_deg)
     except DomainError as error:
         return Prediction(
-            incline_deg, f"discrete{air}", free_speed, in_domain=False, notes=(error.message,)
+            incline_deg, f"discrete{air}", free[0], in_domain=False, notes=(error.message,)
         )
-    inputs = _Inputs(
-        impact.alpha, impact.gamma, drop.value, gravity.value, initial_speed.value, 1.0
-    )
-    centre = drops(inputs)
+    stated = {"alpha": impact.alpha, "drag": 1.0, **place}
+
+    def drop_with(**moved: float) -> Fall:
+        alpha, drag, *inputs = (stated | moved).values()
+        if not kappas:
+            return fall(chain, alpha, impact.gamma, *inputs)
+        gains = kicks(chain, [alpha] * chain.rods, impact.gamma)
+        return drag_fall(chain, gains, [drag * kappa for kappa in kappas], *inputs)
+
+    centre = drop_with()
     notes = impact.notes
-    separation_u = speed_u = time_u = None
-    moved = {
+    uncertainties: dict[str, float] = {}
+    moves = {
         "alpha": _moved_alphas(chain, surface, impact, incline_deg),
         "drop": _steps(drop, least=0.0),
         # Half of g is far enough for a slope, and a fall without gravity has no end.
@@ -116,54 +118,28 @@ def predict(
     }
     try:
         spread = [
-            (drops(inputs._replace(**{name: low})), drops(inputs._replace(**{name: high})), weight)
-            for name, steps in moved.items()
+            (drop_with(**{name: low}), drop_with(**{name: high}), weight)
+            for name, steps in moves.items()
             for low, high, weight in steps
         ]
     except DomainError as error:
         notes = (*notes, f"no uncertainty: within that of μ, {error.message}")
     else:
-        separation_u = math.hypot(*((b.separation_m - a.separation_m) * w for a, b, w in spread))
-        speed_u = math.hypot(*((b.speed_m_s - a.speed_m_s) * w for a, b, w in spread))
-        time_u = math.hypot(*((b.time_s - a.time_s) * w for a, b, w in spread))
+        for name, key in _ENDS.items():
+            slopes = ((getattr(b, key) - getattr(a, key)) * weight for a, b, weight in spread)
+            uncertainties[f"{name}_u"] = math.hypot(*slopes)
     if impact.basis == "pile":
         notes = (*notes, "rods gather on a pile: taken as level with the pile's restitution")
     return Prediction(
         incline_deg,
         ("discrete" if impact.basis in {"surface", "level"} else f"discrete, {impact.basis}") + air,
-        free_speed,
+        free[0],
         in_domain=not impact.notes,
         notes=notes,
         alpha=impact.alpha,
         gamma=impact.gamma,
-        separation=centre.separation_m,
-        speed=centre.speed_m_s,
-        time=centre.time_s,
-        separation_u=separation_u,
-        speed_u=speed_u,
-        time_u=time_u,
-    )
-
-
-def _ways_down(
-    chain: Chain, kappas: Sequence[float]
-) -> tuple[Callable[[float, float, float], float], Callable[[_Inputs], Fall]]:
-    """The speed of free fall from drop, gravity and initial speed; the fall from its inputs."""
-    if not kappas:
-        return (
-            lambda drop, gravity, speed: free_fall(chain, drop, gravity, speed)[0],
-            lambda x: fall(chain, x.alpha, x.gamma, x.drop, x.gravity, x.speed),
-        )
-    from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
-
-    def in_air(x: _Inputs) -> Fall:
-        gains = kicks(chain, [x.alpha] * chain.rods, x.gamma)
-        scaled = [x.drag * kappa for kappa in kappas]
-        return drag_fall(chain, gains, scaled, x.drop, x.gravity, x.speed)
-
-    return (
-        lambda drop, gravity, speed: drag_leg(drop + chain.length, speed, gravity, kappas[0])[0],
-        in_air,
+        **{name: getattr(centre, key) for name, key in _ENDS.items()},
+        **uncertainties,
     )
 
 
@@ -188,14 +164,14 @@ def _moved_alphas(
         yield from _steps(chain.alpha)
         return
     struck = surface.pile if impact.basis == "pile" and surface.pile else surface
-    for *ends, weight in _steps(struck.restitution):
-        low, high = (
-            impact_on(surface, chain, incline_deg, restitution=beta).alpha for beta in ends
-        )
-        yield low, high, weight
+    moves = {"restitution": _steps(struck.restitution)}
     if impact.basis == "surface":
-        for *ends, weight in _steps(surface.friction, least=0.0):
-            low, high = (impact_on(surface, chain, incline_deg, friction=mu).alpha for mu in ends)
+        moves["friction"] = _steps(surface.friction, least=0.0)
+    for name, steps in moves.items():
+        for *ends, weight in steps:
+            low, high = (
+                impact_on(surface, chain, incline_deg, **{name: end}).alpha for end in ends
+            )
             yield low, high, weight
 
 

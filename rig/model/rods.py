@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
+from rig.model.chain import sums_above
 from rig.model.impact import Impact, gamma_finite, impact_on
 
 if TYPE_CHECKING:
@@ -28,9 +28,8 @@ def rod_impacts(surface: Surface, chain: Chain, incline_deg: float) -> list[Impa
     if chain.inertias is None:
         return [impact_on(surface, chain, incline_deg)] * chain.rods
     moments = [m * xi for m, xi in zip(chain.masses, chain.inertias, strict=True)]
-    masses_above = list(accumulate(reversed(chain.masses[1:])))[::-1]
-    moments_above = list(accumulate(reversed(moments[1:])))[::-1]
-    above = [i / m for i, m in zip(moments_above, masses_above, strict=True)]
+    sums = zip(sums_above(moments), sums_above(chain.masses), strict=True)
+    above = [moment / mass for moment, mass in sums]
     impacts = []
     for xi, xi_above in zip(chain.inertias, [*above, chain.inertias[-1]], strict=True):
         impact = impact_on(surface, replace(chain, inertia=xi, inertias=None), incline_deg)

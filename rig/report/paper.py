@@ -43,7 +43,7 @@ def paper_figure(
     foot = [
         *([_NO_LINE] if number == 3 else []),
         "Where the paper's text and its equations differ:",
-        *(f"· {claim.text}; equations: {claim.equations}" for claim in claims),
+        *(f"· {text}; equations: {value}" for text, value in paper.claims()[number].items()),
     ]
     figure = chart(f"paper {number}", *_SOURCES[number](columns, resolved or {}))
     return replace(figure, caption=figure.title, foot=foot), columns

@@ -14,18 +14,17 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from rig.model.batch import Flags, Floats, Impacts, falls, given_impacts, surface_impacts
+from rig.model.batch import FallBatch, Flags, Floats, Impacts, falls, given_impacts, surface_impacts
 from rig.model.chain import XI
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
     from rig.sweep.layout import Layout
 
     _Numbers: TypeAlias = float | Floats
-    _Ends: TypeAlias = tuple[Floats, Floats]
 
 NOT_SLIDING, ABOVE_HALF, NO_ANSWER, PILE = 1, 2, 4, 8
 NOTES = {
@@ -93,35 +92,29 @@ def compute(
     """
     size = layout.grid.size
     separation, speed, notes = np.empty(size), np.empty(size), np.empty(size, np.uint8)
-    under_way: dict[Future[_Ends], slice] = {}
+    under_way: dict[Future[FallBatch], slice] = {}
     done = 0
 
     def collect() -> None:
         nonlocal done
         for future in wait(under_way, return_when=FIRST_COMPLETED).done:
             place = under_way.pop(future)
-            separation[place], speed[place] = future.result()
+            separation[place], speed[place], _ = future.result()
             done += place.stop - place.start
             show(done)
 
     try:
-        for chunk in layout.grid.chunks(length):
+        for place in layout.grid.chunks(length):
             if len(under_way) >= slots:
                 collect()
-            values = _values(layout, chunk)
+            values = layout.fixed | {
+                axis.name: np.array(axis.values)[along] for axis, along in layout.grid.places(place)
+            }
             impacts = _impacts(layout, values)
-            place = slice(chunk.start, chunk.stop)
             notes[place] = _notes(layout, values, impacts)
-            future = executor.submit(
-                ends,
-                layout.chain.masses,
-                layout.chain.heights,
-                impacts.alpha,
-                impacts.gamma,
-                values["drop"],
-                values["gravity"],
-                values.get("initial_speed", 0.0),
-            )
+            inputs = values["drop"], values["gravity"], values.get("initial_speed", 0.0)
+            chain = layout.chain
+            future = executor.submit(falls, chain.masses, chain.heights, impacts, *inputs)
             under_way[future] = place
         while under_way:
             collect()
@@ -134,39 +127,7 @@ def compute(
     return Swept(separation.reshape(shape), speed.reshape(shape), notes.reshape(shape))
 
 
-def ends(
-    masses: Sequence[float],
-    heights: Sequence[float],
-    alpha: _Numbers,
-    gamma: _Numbers,
-    drop: _Numbers,
-    gravity: _Numbers,
-    initial_speed: _Numbers,
-) -> _Ends:
-    """Return Δz and V of falls; the work that is sent to others, so it takes and returns little.
-
-    Parameters
-    ----------
-    masses, heights
-        Shape ``(rods,)``, as in `rig.model.chain.Chain`.
-    alpha, gamma, drop, gravity, initial_speed
-        Shape ``(falls,)`` or one number for all; m, m/s² and m/s.
-    """
-    flags = falls(masses, heights, given_impacts(alpha, gamma), drop, gravity, initial_speed)
-    return flags.separation_m, flags.speed_m_s
-
-
-def _values(layout: Layout, chunk: range) -> dict[str, _Numbers]:
-    """Every parameter at the points of a piece."""
-    places = np.unravel_index(np.arange(chunk.start, chunk.stop), layout.grid.shape)
-    varied = {
-        axis.name: np.array(axis.values)[place]
-        for axis, place in zip(layout.grid.axes, places, strict=True)
-    }
-    return {**layout.fixed, **varied}
-
-
-def _impacts(layout: Layout, values: dict[str, _Numbers]) -> Impacts:
+def _impacts(layout: Layout, values: Mapping[str, _Numbers]) -> Impacts:
     if "alpha" in values:
         return given_impacts(values["alpha"], values["gamma"])
     return surface_impacts(
@@ -180,7 +141,7 @@ def _impacts(layout: Layout, values: dict[str, _Numbers]) -> Impacts:
     )
 
 
-def _notes(layout: Layout, values: dict[str, _Numbers], impacts: Impacts) -> NDArray[np.uint8]:
+def _notes(layout: Layout, values: Mapping[str, _Numbers], impacts: Impacts) -> NDArray[np.uint8]:
     flags = NOT_SLIDING * ~impacts.sliding
     flags |= ABOVE_HALF * (impacts.alpha > 0.5)
     if layout.pile is not None:

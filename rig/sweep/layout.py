@@ -7,13 +7,17 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rig.errors import InputError
 from rig.protocol.fields import did_you_mean
 from rig.sweep.variables import VARIABLES, scene_values
 from rig.units import UnitError, parse, quoted
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Container, Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from rig.model.chain import Chain
     from rig.model.surface import Pile
@@ -57,10 +61,15 @@ class Grid:
         """Number of points."""
         return math.prod(self.shape)
 
-    def chunks(self, length: int) -> Iterator[range]:
+    def chunks(self, length: int) -> Iterator[slice]:
         """Cut the points, in their order, into pieces of `length`; the last may be shorter."""
         for start in range(0, self.size, length):
-            yield range(start, min(start + length, self.size))
+            yield slice(start, min(start + length, self.size))
+
+    def places(self, points: slice) -> Iterator[tuple[Axis, NDArray[np.intp]]]:
+        """Which of an axis's values each point of a piece has, axis by axis."""
+        numbers = np.unravel_index(np.arange(points.start, points.stop), self.shape)
+        return zip(self.axes, numbers, strict=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +95,7 @@ class Layout:
 
     grid: Grid
     layered: bool
-    fixed: Mapping[str, float]
+    fixed: dict[str, float]
     chain: Chain
     longer_m: float
     pile: Pile | None
@@ -132,11 +141,7 @@ def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
 
 
 class _FaultError(Exception):
-    """Something is wrong with the part of a text that starts at `column` (from 0)."""
-
-    def __init__(self, column: int, message: str) -> None:
-        super().__init__(message)
-        self.column = column
+    """The column (from 0) at which the part of a text starts that is wrong, and the message."""
 
 
 def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[float, ...]]:
@@ -166,7 +171,8 @@ def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[flo
         try:
             name, values = _read(text, names, varied_values)
         except _FaultError as fault:
-            problems.append(f"--vary {quoted(text, 80)}, column {fault.column + 1}: {fault}")
+            column, message = fault.args
+            problems.append(f"--vary {quoted(text, 80)}, column {column + 1}: {message}")
         else:
             varied_values[name] = values
     if problems:

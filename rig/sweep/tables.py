@@ -63,18 +63,16 @@ def write_csv(stream: BinaryIO, facts: Mapping[str, Any], layout: Layout, swept:
         stream.write(("\n".join(map(",".join, lines)) + "\n").encode())
 
 
-def _text(layout: Layout, swept: Swept, rows: range) -> Iterator[list[str]]:
+def _text(layout: Layout, swept: Swept, rows: slice) -> Iterator[list[str]]:
     """Each column of some rows; numbers have the digits that give the same float back."""
-    places = np.unravel_index(np.arange(rows.start, rows.stop), layout.grid.shape)
-    for axis, place in zip(layout.grid.axes, places, strict=True):
+    for axis, places in layout.grid.places(rows):
         values = list(map(repr, axis.values))
-        yield [values[number] for number in place.tolist()]
-    part = slice(rows.start, rows.stop)
+        yield [values[number] for number in places.tolist()]
     for column in (swept.separation_m, swept.speed_m_s):
         # The only number that is not equal to itself is NaN.
-        yield [repr(x) if x == x else "" for x in column.reshape(-1)[part].tolist()]  # noqa: PLR0124
-    yield ["1" if inside else "0" for inside in swept.in_domain.reshape(-1)[part].tolist()]
-    yield list(map(str, swept.notes.reshape(-1)[part].tolist()))
+        yield [repr(x) if x == x else "" for x in column.reshape(-1)[rows].tolist()]  # noqa: PLR0124
+    yield ["1" if inside else "0" for inside in swept.in_domain.reshape(-1)[rows].tolist()]
+    yield list(map(str, swept.notes.reshape(-1)[rows].tolist()))
 
 
 def write_npz(

@@ -17,7 +17,6 @@ from rig.model.drag import (
     fallen,
     falling_speed,
     leg_drags,
-    terminal_speed,
 )
 from rig.model.fall import fall, hits, kicks
 from tests.examples import examples
@@ -70,10 +69,6 @@ def test_a_leg_against_many_digits(distance, speed, gravity, kappa):
         wanted = exact_leg(distance, speed, gravity, kappa)
         assert close(arrival, wanted[0], tolerance(kappa, distance))
         assert close(duration, wanted[1], tolerance(kappa, distance))
-
-
-def test_no_drag_has_no_terminal_speed():
-    assert terminal_speed(9.81, 0.0) == math.inf
 
 
 @pytest.mark.parametrize(("speed", "kappa"), [(0.0, 0.0), (0.0, 0.1), (1.0, 1e4)])
