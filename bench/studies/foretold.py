@@ -111,7 +111,7 @@ def _compared(name: str, protocol: Protocol, analysis: Analysis) -> list[Foretol
 def _forecast(protocol: Protocol, components: Components) -> dict[str, float]:
     beams = beams_of(protocol)
     layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
-    return forecast(protocol, layout, sure=True).goals()
+    return forecast(protocol, layout).goals()
 
 
 def _words(each: Foretold) -> str:

@@ -10,8 +10,8 @@ from rig.commands.output import print_found, say
 from rig.design.cases import beams_of, cases, with_beams
 from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.rewriting import with_heights
-from rig.design.search import better, readable, room
-from rig.design.trials import trials, trials_text
+from rig.design.search import better, room
+from rig.design.trials import readable, trials, trials_text
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.measurands import MEASURANDS
@@ -79,7 +79,7 @@ def _forecast(
     """Return what a layout measures, and how well, as JSON has it."""
     assert protocol.gates is not None
     layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
-    expected: Forecast = forecast(protocol, layout, sure=True)
+    expected: Forecast = forecast(protocol, layout)
     outcome = trials(with_beams(protocol, beams))
     return {
         "gates": [

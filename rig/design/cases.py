@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
 from rig.analysis.square_root import EquationRows
 from rig.analysis.unknowns import SharedUnknowns
-from rig.model.rods import rod_impacts
+from rig.estimate.hypotheses import alphas
 from rig.protocol.contact import at_contact
 from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
@@ -103,10 +104,7 @@ def with_beams(protocol: Protocol, beams: Sequence[tuple[Role, float]]) -> Proto
 
 @one_thread
 def cases(
-    protocol: Protocol,
-    beams: Sequence[tuple[Role, float]],
-    components: Components,
-    inclines: Sequence[float] | None = None,
+    protocol: Protocol, beams: Sequence[tuple[Role, float]], components: Components
 ) -> tuple[Case, ...]:
     """Work out what beams at these heights say of every kind of drop, in order of incline.
 
@@ -118,25 +116,19 @@ def cases(
         Side and height of each.
     components
         How much everything scatters.
-    inclines
-        Only these, if given.
-
     """
     protocol = with_beams(protocol, beams)
-    planned = [run for run in runs(protocol) if inclines is None or run.incline_deg in inclines]
-    kinds: dict[tuple[object, ...], list[Run]] = {}
-    for run in planned:
-        kinds.setdefault((run.incline_deg, run.impact, run.free), []).append(run)
-    alike = sorted(kinds.values(), key=lambda group: (group[0].incline_deg, str(group[0].impact)))
-    models = [_model(protocol, group[0], components) for group in alike]
+    counts = Counter(replace(run, number=0) for run in runs(protocol))
+    kinds = sorted(counts, key=lambda run: (run.incline_deg, str(run.impact)))
+    models = [_model(protocol, run, components) for run in kinds]
     shared = SharedUnknowns(model for model, _ in models)
     # Beams are left out here and added by each layout: the rest is worked out once for all.
     places = np.full(len(shared), -1)
     others = np.setdiff1d(np.arange(len(shared)), _places(shared.blocks, *_BEAMS))
     places[others] = np.arange(others.size)
     return tuple(
-        _case(group, model, x, shared, places)
-        for group, (model, x) in zip(alike, models, strict=True)
+        _case(run, counts[run], model, x, shared, places)
+        for run, (model, x) in zip(kinds, models, strict=True)
     )
 
 
@@ -155,18 +147,15 @@ def predicted(protocol: Protocol, run: Run, components: Components) -> tuple[Dro
         With heights counted from the contact point.
     """
     records = chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0)
-    alphas = np.zeros(1)
-    if run.impact is not None and protocol.surface is not None:
-        chain = protocol.chains[run.impact].chain
-        impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
-        alphas = np.array([impact.alpha for impact in impacts])
-    # A free chain leaves α alone.
-    guess = Guess(RELEASE_S, protocol.drop.value, float(alphas.mean()))
+    each_rod = np.zeros(1)  # a free chain leaves α alone
+    if run.impact is not None:
+        each_rod, _ = alphas(protocol, protocol.chains[run.impact].chain, run.incline_deg, {})
+    guess = Guess(RELEASE_S, protocol.drop.value, float(each_rod.mean()))
     guesses: dict[str, Guess] = {record.role: guess for record in records}
     model = DropModel(protocol, records, guesses, CLOCK_U, components)
     x = np.zeros(len(model.unknowns))
     if "impulses" in model.unknowns:
-        x[model.unknowns["impulses"]] = alphas - alphas.mean()
+        x[model.unknowns["impulses"]] = each_rod - each_rod.mean()
     return model, x
 
 
@@ -194,7 +183,7 @@ def with_edges(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> Ed
 
 
 def _case(
-    alike: Sequence[Run], model: DropModel, x: Array, shared: SharedUnknowns, places: Index
+    run: Run, count: int, model: DropModel, x: Array, shared: SharedUnknowns, places: Index
 ) -> Case:
     """Work out one kind of drop; `places` are those of shared unknowns without beams, else −1."""
     at, sd = model.unknowns, model.unknowns.sd
@@ -209,8 +198,8 @@ def _case(
     place[order] = np.arange(order.size)
     blocks = dict(_blocks(model, x, place))
     return Case(
-        alike[0],
-        len(alike),
+        run,
+        count,
         own.size,
         alpha.size,
         here,

@@ -12,11 +12,11 @@ from rig.analysis.square_root import EquationRows, eliminate, square_root, trian
 from rig.analysis.summary import by_case
 from rig.design.cases import BEAM
 from rig.estimate.coefficients import KNOWN, held_back, stated_coefficients
-from rig.estimate.hypotheses import alphas, given_alphas
+from rig.estimate.hypotheses import alphas
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence, Set
 
     from rig.analysis.square_root import Eliminated
     from rig.arrays import Array, Index
@@ -58,19 +58,17 @@ class GateLayout:
 
     def without(self, counts: Iterable[int]) -> list[Eliminated]:
         """Eliminate so many of the first unknowns of each kind of drop, priors included."""
-        kinds = zip(self.cases, self.blocks, counts, strict=True)
-        return [_without(blocks, case.core + BEAM * self.beams, n) for case, blocks, n in kinds]
+        reduced = []
+        for case, blocks, count in zip(self.cases, self.blocks, counts, strict=True):
+            size = case.core + BEAM * self.beams
+            own, others = np.split(np.arange(size), [count])
+            reduced.append(eliminate(blocks, np.ones(size), np.zeros(size), own, others))
+        return reduced
 
     def triangles(self) -> GateLayout:
         """Return the same in no more rows than columns: for beams to be added again and again."""
         reduced = self.without([0] * len(self.cases))
         return replace(self, blocks=tuple((drop.rest,) for drop in reduced))
-
-
-def _without(blocks: Sequence[EquationRows], size: int, count: int) -> Eliminated:
-    unknowns = np.arange(size)
-    own, others = unknowns[:count], unknowns[count:]
-    return eliminate(blocks, np.ones(size), np.zeros(size), own, others)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +90,7 @@ class Forecast:
     single: Mapping[str, Mapping[Condition, float]]
     mean: Mapping[str, Mapping[Condition, float]]
     coefficients: Mapping[str, float]
-    held: frozenset[str] = frozenset()
+    held: Set[str]
 
     def typical(self, name: str) -> float:
         """Root mean square over inclines of one run's uncertainty."""
@@ -106,11 +104,7 @@ class Forecast:
 
 @one_thread
 def forecast(
-    protocol: Protocol,
-    layout: GateLayout,
-    names: Sequence[str] | None = None,
-    *,
-    sure: bool = False,
+    protocol: Protocol, layout: GateLayout, names: Sequence[str] | None = None
 ) -> Forecast:
     """Predict the uncertainties of a session.
 
@@ -120,8 +114,6 @@ def forecast(
         The beams that there are.
     names
         Only these measurands, if given.
-    sure
-        Whether also coefficients are kept that the edges hardly tell.
     """
     size = layout.cases[0].shared + BEAM * layout.beams
     places = [
@@ -152,9 +144,7 @@ def forecast(
                 common += share * shared
             single.setdefault(name, {})[at] = math.sqrt(by_one)
             mean.setdefault(name, {})[at] = math.sqrt(by_mean + float(common @ common))
-    coefficients, held = _coefficients(protocol, layout, places)
-    reported = {name: u for name, u in coefficients.items() if sure or name not in held}
-    return Forecast(single, mean, reported, frozenset(held))
+    return Forecast(single, mean, *_coefficients(protocol, layout, places))
 
 
 def _of_all_runs(case: Case, slopes: Array, columns: Index) -> EquationRows:
@@ -180,13 +170,11 @@ def _coefficients(
                 tied.append((case, drop.rest.slopes, place, struck))
     if not stated:
         return {}, set()
-    assert protocol.surface is not None
     values = {name: quantity.value for name, quantity in stated.items()}
-    alpha_names = given_alphas(protocol)
     size, count = layout.cases[0].shared + BEAM * layout.beams, len(values)
     behind, rows = size + np.arange(count), []
-    for case, slopes, place, (chain, incline) in tied:
-        _, by_value = alphas(protocol.surface, chain, incline, values, alpha_names.get(chain))
+    for case, slopes, place, struck in tied:
+        _, by_value = alphas(protocol, *struck, values)
         # α, the first of what is left, follows from the coefficients.
         by_values = np.outer(slopes[:, 0], by_value.mean(axis=0))
         observed = np.column_stack([slopes[:, 1:], by_values])

@@ -7,20 +7,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import stated
-from rig.analysis.verdict import LEAD
-from rig.design.cases import beams_of, cases, perfect, predicted, with_beams
+from rig.design.cases import beams_of, cases
 from rig.design.forecast import GateLayout, forecast
-from rig.design.trials import read_drop
+from rig.design.trials import MARGIN, margin
 from rig.measurands import averaged
-from rig.protocol.contact import at_contact
 from rig.protocol.gates import blocking_rod, hanging_rods
-from rig.protocol.plan import runs
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -33,9 +29,6 @@ COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""
 FEW = 3
 """Inclines that the search looks at; the forecast looks at all of them."""
-MARGIN = 2.0 * LEAD
-"""Log odds that perfect edges must have: real ones are missed, and flicker."""
-_OFF = 2.0  # standard uncertainties that the drop may be off
 _GRID_M = 4e-3  # between candidates
 _ROUNDING_M = 1e-9
 _COARSE = 5  # every so many of them are tried first, then those about the best
@@ -111,7 +104,10 @@ def better(
     heights = candidates(protocol, limits)
     sides = dict.fromkeys(side for side, _ in present)
     beams = [*present, *((side, height) for side in sides for height in heights)]
-    all_cases = cases(protocol, beams, components, _few(protocol.plan.inclines))
+    inclines = sorted(protocol.plan.inclines)
+    few = {inclines[round(n * (len(inclines) - 1) / (FEW - 1))] for n in range(FEW)}
+    fewer = replace(protocol, plan=replace(protocol.plan, inclines=tuple(few)))
+    all_cases = cases(fewer, beams, components)
     layout = list(range(len(present)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
     floor = min(MARGIN, margin(protocol, present))
@@ -158,47 +154,10 @@ def _see_before(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool
     return protocol.surface is None or all(enough)
 
 
-def _few(inclines: Sequence[float]) -> list[float]:
-    ordered = sorted(inclines)
-    if len(ordered) <= FEW:
-        return ordered
-    return [ordered[round(n * (len(ordered) - 1) / (FEW - 1))] for n in range(FEW)]
-
-
-def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
-    """Log odds by which the right fall leads the next best one; −∞ where it is not found at all.
-
-    The least over the outermost inclines, with chains hung higher or lower than stated and every
-    edge seen where it should be; no more than `MARGIN`.
-    """
-    protocol = with_beams(protocol, beams)
-    ends = {run.incline_deg: run for run in reversed(runs(protocol))}
-    least = MARGIN
-    for incline in {min(ends), max(ends)}:
-        here = at_contact(protocol, incline, ends[incline].impact)
-        model, x = predicted(here, ends[incline], stated(here))
-        for off in (-_OFF, _OFF):
-            x[model.unknowns["drop"]] = off * protocol.drop.u
-            fallen = [
-                (record, [np.arange(train.rods.size) for train in record.trains])
-                for record in perfect(model, x)
-            ]
-            identification, unclear = read_drop(here, fallen)
-            if identification.fit is None or unclear:
-                return -math.inf
-            least = min(least, identification.log_odds)
-    return least
-
-
-def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
-    """Whether every edge of a layout finds its rod, with something in hand."""
-    return margin(protocol, beams) >= MARGIN
-
-
 def score(protocol: Protocol, layout: GateLayout) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
     goals = (*(row.name for row in averaged()), *COEFFICIENTS)
-    uncertainties = forecast(protocol, layout, goals, sure=True).goals()
+    uncertainties = forecast(protocol, layout, goals).goals()
     values = [math.log(uncertainties[name]) for name in goals if name in uncertainties]
     return sum(values) / len(values)
 

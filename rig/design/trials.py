@@ -7,6 +7,7 @@ every edge that is given to a rod is that rod's.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
@@ -17,8 +18,8 @@ import numpy as np
 from rig.analysis.annealing import EVER, MISSED
 from rig.analysis.components import stated
 from rig.analysis.identify import Identification, deciding_gate, identify
-from rig.analysis.verdict import pattern_faults
-from rig.design.cases import CLOCK_U, predicted, with_edges
+from rig.analysis.verdict import LEAD, pattern_faults
+from rig.design.cases import CLOCK_U, perfect, predicted, with_beams, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -28,12 +29,15 @@ if TYPE_CHECKING:
 
     from rig.analysis.chain_records import ChainRecord
     from rig.arrays import Index
-    from rig.protocol.protocol import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run, Side
     from rig.vocabulary import Vocabulary
 
 
 DROPS = 20
 """Trials of a layout: one drop in twenty that fails shows in two lists of three."""
+MARGIN = 2.0 * LEAD
+"""Log odds that perfect edges must have: real ones are missed, and flicker."""
+_OFF = 2.0  # standard uncertainties that the drop may be off
 _WINDOW = (0.0, np.inf)
 _SEED = 1  # the same drops for every layout, and on every machine
 
@@ -77,12 +81,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
         identification, wrong = read_drop(protocol_here, fallen, _WINDOW)
         read += not wrong
         failing.update(wrong)
-        if (
-            wrong
-            and further_gate is None
-            and identification.fit is not None
-            and identification.other is not None
-        ):
+        if wrong and not further_gate and identification.fit and identification.other:
             further_gate = deciding_gate(identification.fit, identification.other)
     return Trials(drops, read, tuple(failing.items()), further_gate)
 
@@ -98,13 +97,9 @@ def _fall(
     model, x = predicted(protocol, run, stated(protocol))
     at, sd, fallen = model.unknowns, model.unknowns.sd, []
 
-    def shake(name: str, member: int | None = None) -> None:
-        block = (
-            at[name]
-            if member is None
-            else slice(at[name].start + member, at[name].start + member + 1)
-        )
-        x[block] += sd[block] * rng.standard_normal(sd[block].size)
+    def shake(name: str, members: int | slice = slice(None)) -> None:
+        places = np.atleast_1d(np.arange(x.size)[at[name]][members])
+        x[places] += sd[places] * rng.standard_normal(places.size)
 
     shake("drop")
     for role, record in model.records.items():
@@ -160,6 +155,36 @@ def read_drop(
             for match, true in zip(matches[record.role], truth, strict=True)
         )
     ]
+
+
+def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
+    """Log odds by which the right fall leads the next best one; −∞ where it is not found at all.
+
+    The least over the outermost inclines, with chains hung higher or lower than stated and every
+    edge seen where it should be; no more than `MARGIN`.
+    """
+    protocol = with_beams(protocol, beams)
+    ends = {run.incline_deg: run for run in reversed(runs(protocol))}
+    least = MARGIN
+    for incline in {min(ends), max(ends)}:
+        here = at_contact(protocol, incline, ends[incline].impact)
+        model, x = predicted(here, ends[incline], stated(here))
+        for off in (-_OFF, _OFF):
+            x[model.unknowns["drop"]] = off * protocol.drop.u
+            fallen = [
+                (record, [np.arange(train.rods.size) for train in record.trains])
+                for record in perfect(model, x)
+            ]
+            identification, unclear = read_drop(here, fallen)
+            if identification.fit is None or unclear:
+                return -math.inf
+            least = min(least, identification.log_odds)
+    return least
+
+
+def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
+    """Whether every edge of a layout finds its rod, with something in hand."""
+    return margin(protocol, beams) >= MARGIN
 
 
 def trials_text(outcome: Trials, words: Vocabulary) -> str:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.estimate.hypotheses import by_model, one_alpha
-from rig.estimate.hypothesis_fit import HypothesisFit, fit
-from rig.estimate.likelihood_ratio import LikelihoodRatio
+from rig.estimate.hypothesis_fit import HypothesisFit, LikelihoodRatio, fit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -120,22 +119,20 @@ def single_alphas(
         model = {
             case(form): float(supposed.alphas(form, values)[0].mean()) for form in problem.forms
         }
-        degrees = len(model) - len(problem.parameters)
-        if problem.parameters and not problem.held and degrees > 0:
+        if len(model) > len(problem.parameters) > len(problem.held) == 0:
             # Without the nuisances, so that both suppose the same but for α.
             open_ = fit(problem.forms, one_alpha(problem.forms, case))
-            against_model = LikelihoodRatio(fit(problem.forms, supposed).chi2 - open_.chi2, degrees)
-    cases = sorted(set(map(case, groups)))
-    fewer, counts = len(forms) - len(cases), Counter(map(case, forms))
+            against_model = fit(problem.forms, supposed).against(open_)
+    counts = Counter(map(case, forms))
     return SingleAlphas(
         tuple(
             ConditionAlpha(key, counts[key], Measured(*by_case[f"α {key}"]), model.get(key))
-            for key in cases
+            for key in sorted(counts)
         ),
         tuple(
             RunAlpha(form.run, Measured(*by_run[f"α {form.run.number}"]), model.get(case(form)))
             for form in forms
         ),
-        LikelihoodRatio(by_case.chi2 - by_run.chi2, fewer) if fewer > 0 else None,
+        by_case.against(by_run) if len(forms) > len(counts) else None,
         against_model,
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from rig.analysis.air import prior_air
 from rig.estimate.hypotheses import BETA, MU, PILE, by_model, given_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
 from rig.model.impact import impact_on
@@ -14,7 +13,6 @@ from rig.model.impact import impact_on
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from rig.arrays import Array
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
@@ -47,8 +45,8 @@ class CoefficientProblem:
 
     forms: tuple[QuadraticForm, ...]
     stated: dict[str, Quantity]
-    left_out: tuple[str, ...]
     held: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -63,6 +61,11 @@ class CoefficientProblem:
         """Inclines that the model describes, ascending."""
         return sorted({form.run.incline_deg for form in self.forms})
 
+    def hold(self, held: Mapping[str, float]) -> CoefficientProblem:
+        """Hold coefficients within these uncertainties; one that is exact leaves the fit."""
+        stated = {name: q for name, q in self.stated.items() if held.get(name) != 0.0}
+        return replace(self, stated=stated, held=tuple(name for name in held if name in stated))
+
 
 def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> CoefficientProblem:
     """Find out what drops at these inclines can tell.
@@ -72,18 +75,31 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
     forms
         Of like drops, see `rig.estimate.quadratic_forms.merge_like`.
     """
-    ordered = sorted(forms, key=lambda form: form.run.incline_deg)
     stated: dict[str, Quantity] = {}
     left_out, in_model = [], []
-    for form in ordered:
+    for form in sorted(forms, key=lambda form: form.run.incline_deg):
         depends_on, notes = stated_coefficients(protocol, form.chain, form.run.incline_deg)
         stated |= depends_on
         if depends_on:
             in_model.append(form)
         else:
             left_out.append(f"{form.run.incline_deg:g}° tells no coefficient: {'; '.join(notes)}")
-    problem = CoefficientProblem(tuple(in_model), stated, tuple(dict.fromkeys(left_out)))
-    return _hold_unknown(protocol, problem) if in_model else problem
+    problem = CoefficientProblem(tuple(in_model), stated)
+
+    def uncertainties(held: Mapping[str, float]) -> dict[str, float]:
+        candidate = problem.hold(held)
+        outcome = best(protocol, candidate)
+        return {name: outcome[name][1] for name in candidate.stated}
+
+    held = held_back(stated, uncertainties)
+    inclines = ", ".join(f"{incline:g}°" for incline in problem.inclines)
+    left_out += [
+        f"{words(name)} is not identified by drops at {inclines}: held at the protocol's "
+        f"{stated[name].value:g}"
+        + (f" ± {u:g}, which the other coefficients allow for" if u else "")
+        for name, u in held.items()
+    ]
+    return replace(problem.hold(held), left_out=tuple(dict.fromkeys(left_out)))
 
 
 def stated_coefficients(
@@ -141,41 +157,9 @@ def held_back(
     return held
 
 
-def _hold_unknown(protocol: Protocol, problem: CoefficientProblem) -> CoefficientProblem:
-    """Hold what the edges do not tell."""
-
-    def holding(held: Mapping[str, float]) -> CoefficientProblem:
-        stated = {name: q for name, q in problem.stated.items() if held.get(name) != 0.0}
-        return replace(problem, stated=stated, held=tuple(name for name in held if name in stated))
-
-    def uncertainties(held: Mapping[str, float]) -> dict[str, float]:
-        candidate = holding(held)
-        outcome = best(protocol, candidate)
-        return {name: outcome[name][1] for name in candidate.stated}
-
-    held = held_back(problem.stated, uncertainties)
-    inclines = ", ".join(f"{incline:g}°" for incline in problem.inclines)
-    left_out = [
-        f"{words(name)} is not identified by drops at {inclines}: held at the protocol's "
-        f"{problem.stated[name].value:g}"
-        + (f" ± {u:g}, which the other coefficients allow for" if u else "")
-        for name, u in held.items()
-    ]
-    return replace(holding(held), left_out=(*problem.left_out, *left_out))
-
-
 def best(
     protocol: Protocol, problem: CoefficientProblem, parameters: Sequence[Parameter] = ()
 ) -> HypothesisFit:
     """Fit the coefficients, or these parameters instead of theirs, with all nuisances."""
     supposed = by_model(protocol, parameters or problem.parameters)
-    return fit(problem.forms, with_nuisances(protocol, supposed, problem.inclines))
-
-
-def correlation(outcome: HypothesisFit, names: Sequence[str]) -> Array:
-    """Correlation matrix of some parameters, shape ``(names, names)``."""
-    at = [outcome.names.index(name) for name in names]
-    part = outcome.covariance[np.ix_(at, at)]
-    sd = np.sqrt(np.diag(part))
-    matrix: Array = part / np.outer(sd, sd)
-    return matrix
+    return fit(problem.forms, with_nuisances(supposed, problem.inclines, prior_air(protocol)))

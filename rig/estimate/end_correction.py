@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.air import prior_air
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
@@ -17,9 +18,7 @@ from rig.model.rods import rod_impacts
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rig.arrays import Array
     from rig.estimate.coefficients import CoefficientProblem
-    from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Protocol
 
 STRONG = 10.0
@@ -109,17 +108,14 @@ def end_correction(protocol: Protocol, problem: CoefficientProblem) -> EndCorrec
     EndCorrection or None
         `None` where γ is given as 0.
     """
-
-    def gammas(form: QuadraticForm) -> Array:
-        assert protocol.surface is not None
-        impacts = rod_impacts(protocol.surface, form.chain, 0.0)
-        return np.array([impact.gamma for impact in impacts])
-
-    by_eq10 = {float(gamma) for form in problem.forms for gamma in gammas(form)}
+    assert protocol.surface is not None
+    impacts = {form.chain: rod_impacts(protocol.surface, form.chain, 0.0) for form in problem.forms}
+    gammas = {chain: np.array([rod.gamma for rod in rods]) for chain, rods in impacts.items()}
+    by_eq10 = {rod.gamma for rods in impacts.values() for rod in rods}
     if by_eq10 == {0.0}:
         return None
     cases = one_alpha(problem.forms, lambda form: protocol.condition(form.run))
-    inclines = with_nuisances(protocol, cases, problem.inclines)
+    inclines = with_nuisances(cases, problem.inclines, prior_air(protocol))
     fits = {
         name: fit(problem.forms, with_end_correction(inclines, gammas, scale))
         for name, scale in {"open": None, "eq10": 1.0, "without": 0.0}.items()

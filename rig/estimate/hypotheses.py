@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.air import prior_air
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
 from rig.model.rods import rod_impacts
 from rig.units import Quantity
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from rig.arrays import Array
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
-    from rig.model.surface import Surface
     from rig.protocol.protocol import Protocol
 
     AlphasAndSlopes = tuple[Array, Array]
@@ -39,14 +37,11 @@ def given_alphas(protocol: Protocol) -> dict[Chain, str]:
 
 def by_model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
     """Suppose Eqs. 8 to 13 with these coefficients unknown, the others as stated."""
-    surface, alpha_names = protocol.surface, given_alphas(protocol)
-    assert surface is not None
     names = [parameter.name for parameter in parameters]
 
     @cache
     def alphas_at(chain: Chain, incline_deg: float, values: tuple[float, ...]) -> AlphasAndSlopes:
-        stated = dict(zip(names, values, strict=True))
-        return alphas(surface, chain, incline_deg, stated, alpha_names.get(chain))
+        return alphas(protocol, chain, incline_deg, dict(zip(names, values, strict=True)))
 
     return Hypothesis(
         tuple(parameters),
@@ -55,42 +50,31 @@ def by_model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
 
 
 def alphas(
-    surface: Surface,
-    chain: Chain,
-    incline_deg: float,
-    values: Mapping[str, float],
-    alpha_name: str | None = None,
-) -> tuple[Array, Array]:
+    protocol: Protocol, chain: Chain, incline_deg: float, values: Mapping[str, float]
+) -> AlphasAndSlopes:
     """α of every rod by Eqs. 8 to 13, shape ``(rods,)``, with its derivatives by coefficients.
 
     Parameters
     ----------
     values
         Coefficients by name; others are as stated.
-    alpha_name
-        Name of this chain's α, where it is simply given.
     """
+    alpha, stated = given_alphas(protocol).get(chain), protocol.surface
+    assert stated is not None
 
     def at(moved: Mapping[str, float]) -> Array:
-        given = chain if alpha_name is None else replace(chain, alpha=Quantity(moved[alpha_name]))
-        impacts = rod_impacts(with_coefficients(surface, moved), given, incline_deg)
-        return np.array([impact.alpha for impact in impacts])
+        new: dict[str, Any] = {name: Quantity(value) for name, value in moved.items()}
+        struck = replace(chain, alpha=new[alpha]) if alpha in new else chain
+        surface = replace(stated, **{name: new[name] for name in (BETA, MU) if name in new})
+        if stated.pile is not None and PILE in new:
+            surface = replace(surface, pile=replace(stated.pile, restitution=new[PILE]))
+        return np.array([impact.alpha for impact in rod_impacts(surface, struck, incline_deg)])
 
     slopes = np.zeros((chain.rods, len(values)))
     for n, (name, value) in enumerate(values.items()):
         low, high = (at({**values, name: value + step}) for step in (-_STEP, _STEP))
         slopes[:, n] = (high - low) / (2.0 * _STEP)
     return at(values), slopes
-
-
-def with_coefficients(surface: Surface, values: Mapping[str, float]) -> Surface:
-    """Return the surface with some of its coefficients replaced."""
-    changes: dict[str, Any] = {
-        name: Quantity(values[name]) for name in (BETA, MU) if name in values
-    }
-    if surface.pile is not None and PILE in values:
-        changes["pile"] = replace(surface.pile, restitution=Quantity(values[PILE]))
-    return replace(surface, **changes)
 
 
 def one_alpha(
@@ -112,7 +96,7 @@ def one_alpha(
         starts = (begin @ share / share.sum(axis=0)).tolist()
         parameters += [Parameter(f"α {group}", start) for start in starts]
 
-    def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
+    def alphas(form: QuadraticForm, values: Array) -> AlphasAndSlopes:
         first, share = shares[key(form)]
         slopes = np.zeros((form.alphas.size, values.size))
         slopes[:, first : first + share.shape[1]] = share
@@ -122,20 +106,20 @@ def one_alpha(
 
 
 def with_end_correction(
-    inner: Hypothesis, gammas: Callable[[QuadraticForm], Array], scale: float | None
+    inner: Hypothesis, gammas: Mapping[Chain, Array], scale: float | None
 ) -> Hypothesis:
     """Suppose γ to be exactly so many times that of Eq. 10, or (`None`) leave it open.
 
     Parameters
     ----------
     gammas
-        γ of Eq. 10 for every rod of a drop, shape ``(rods,)``.
+        γ of Eq. 10 for every rod of a chain, shape ``(rods,)``.
     """
 
-    def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
+    def alphas(form: QuadraticForm, values: Array) -> AlphasAndSlopes:
         target, slopes = inner.alphas(form, values[:-1])
         # m/(M + γm) is here r/(1 + (γ − γ₀)r), with r = m/(M + γ₀m) as in the form.
-        change = gammas(form) * form.ratios
+        change = gammas[form.chain] * form.ratios
         ratio = 1.0 / (1.0 + (values[-1] - 1.0) * change)
         by_scale = -target * change * ratio**2
         return target * ratio, np.column_stack([slopes * ratio[:, None], by_scale])
@@ -144,15 +128,17 @@ def with_end_correction(
     return Hypothesis((*inner.parameters, added), alphas)
 
 
-def with_contact(inner: Hypothesis, inclines: Sequence[float]) -> Hypothesis:
-    """Suppose the contact point to be at another height at each incline."""
+def with_nuisances(
+    inner: Hypothesis, inclines: Sequence[float], air: tuple[float, float] | None = None
+) -> Hypothesis:
+    """Suppose the contact point to be at another height at each incline.
+
+    Parameters
+    ----------
+    air
+        Mean and standard uncertainty of κ beforehand; not given where it stays as it is.
+    """
     prior = 0.0, CONTACT_U
-    added = (Parameter(f"contact {at:g}", 0.0, prior, "contact", at) for at in inclines)
+    added = [Parameter(f"contact {at:g}", 0.0, prior, "contact", at) for at in inclines]
+    added += [Parameter(AIR, air[0], air, "drag")] if air else []
     return inner._replace(parameters=(*inner.parameters, *added))
-
-
-def with_nuisances(protocol: Protocol, inner: Hypothesis, inclines: Sequence[float]) -> Hypothesis:
-    """Suppose also air of a κ that is known as well as the protocol says."""
-    prior = prior_air(protocol)
-    inner = with_contact(inner, inclines)
-    return inner._replace(parameters=(*inner.parameters, Parameter(AIR, prior[0], prior, "drag")))

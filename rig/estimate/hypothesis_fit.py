@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.adjust import least_squares
+from rig.analysis.distributions import chi2_tail
 from rig.analysis.equations import Linearization, scaled
+from rig.analysis.plain_data import attributes
 from rig.analysis.square_root import EquationRows
 from rig.errors import RigError
 from rig.estimate.quadratic_forms import EXTRA
@@ -106,6 +108,35 @@ class HypothesisFit:
         """Value and standard uncertainty of a parameter."""
         n = self.names.index(name)
         return float(self.values[n]), float(np.sqrt(self.covariance[n, n]))
+
+    def against(self, wider: HypothesisFit) -> LikelihoodRatio:
+        """Test it against a hypothesis in which it is contained; rounding makes no χ² negative."""
+        degrees = len(wider.names) - len(self.names)
+        return LikelihoodRatio(max(0.0, self.chi2 - wider.chi2), degrees)
+
+
+class LikelihoodRatio(NamedTuple):
+    """A likelihood-ratio test.
+
+    Attributes
+    ----------
+    chi2
+        By how much χ² is larger for the narrower hypothesis.
+    degrees
+        How many parameters it has less.
+    """
+
+    chi2: float
+    degrees: int
+
+    @property
+    def p(self) -> float | None:
+        """How often chance alone would make χ² as large; `None` without degrees of freedom."""
+        return chi2_tail(self.chi2, self.degrees) if self.degrees > 0 else None
+
+    def json(self) -> dict[str, Any]:
+        """``{"chi2", "degrees", "p"}``."""
+        return attributes(self, "chi2", "degrees", "p")
 
 
 def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit:

@@ -18,12 +18,11 @@ import numpy as np
 from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
 from rig.analysis.square_root import EquationRows, eliminate
-from rig.analysis.trajectory import COMMON, DRAG, Trajectory
+from rig.analysis.trajectory import COMMON, DRAG
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.analysis.drop_model import DropModel
     from rig.analysis.joint_step import JointDrop
     from rig.analysis.unknowns import SharedUnknowns
     from rig.arrays import Array, Index
@@ -85,15 +84,11 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     assert record.ratios is not None
     common, here = shared.places(model)
     alphas = model.guesses["impact"].alpha + x[at["alpha"]] + x[at["impulses"]]
-    inflation = drop.estimate.scatter if isinstance(drop, Fit) else 1.0
-    blocks, edges = _blocks(drop, alphas, inflation)
-    size, rods = len(at) + len(EXTRA), alphas.size
-    impulses = np.arange(at["impulses"].start, at["impulses"].stop)
-    eliminated = np.concatenate([common, impulses, [at["alpha"].start]])
+    blocks, edges = _blocks(drop, alphas)
+    sd = np.append(at.sd, np.ones(alphas.size + len(EXTRA)))
     # Of one drop alone: its own unknowns, and how far each impulse is off its mean.
-    own = np.append(np.setdiff1d(np.arange(len(at)), eliminated), impulses)
-    remaining = np.concatenate([common, size + np.arange(rods), np.arange(len(at), size)])
-    sd = np.append(at.sd, np.ones(len(EXTRA) + rods))
+    own = np.setdiff1d(np.arange(len(at)), np.append(common, at["alpha"].start))
+    remaining = np.append(common, np.arange(len(at), sd.size))
     rest = eliminate(blocks, sd, np.zeros(sd.size), own, remaining).rest
     hits = model.trajectory("impact", x).hits
     assert hits is not None
@@ -109,50 +104,39 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     )
 
 
-def _blocks(
-    drop: Fit | JointDrop, alphas: Array, inflation: float
-) -> tuple[list[EquationRows], int]:
-    """‖r/σ‖² in the drop's unknowns, `EXTRA`, and the mean of each impulse, all in SI.
+def _blocks(drop: Fit | JointDrop, alphas: Array) -> tuple[list[EquationRows], int]:
+    """‖r/σ‖² in the drop's unknowns, the mean of each impulse, and `EXTRA`, all in SI.
 
     The impulses stand for whole α, and the unknown α for nothing; κ stands behind, free of what is
     known of it beforehand.
     """
     model, x = drop.model, drop.x
-    at = model.unknowns
-    size, rods = len(at) + len(EXTRA), alphas.size
-    point = np.concatenate([x, np.zeros(len(EXTRA)), alphas])
+    at, means = model.unknowns, slice(x.size, x.size + alphas.size)
+    point = np.concatenate([x, alphas, [0.0, model.kappa(x) if "drag" in at else 0.0]])
     point[at["impulses"]] = 0.0
-    point[size - 1] = model.kappa(x) if "drag" in at else 0.0
+    inflation = drop.estimate.scatter if isinstance(drop, Fit) else 1.0
     nothing = [at[name].start for name in ("alpha", "drag") if name in at]
     blocks, edges = [], 0
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)
         pairing = model.pairings[role]
         times = pairing.times[pairing.observed(matches)[1]] * (1.0 + x[at["clock"]])
-        extra = np.column_stack(_extra(model, role, model.trajectory(role, x), times))
+        path = model.trajectory(role, x).derivatives(times)
+        # A contact point higher up is met as if every rod that strikes hung that much lower.
+        lower = -path[:, COMMON + alphas.size :].sum(axis=1)
+        extra = np.column_stack([lower, path[:, DRAG]])
         extra[1:] -= rows.told[1:, None] * extra[:-1]
-        stays = ~np.isin(rows.columns, nothing)
-        struck = rows.columns - at["impulses"].start
-        means = np.flatnonzero((struck >= 0) & (struck < rods))
-        slopes = np.column_stack([rows.slopes[:, stays], extra, rows.slopes[:, means]])
-        place = [rows.columns[stays], np.arange(len(at), size), size + struck[means]]
-        columns = np.concatenate(place)
+        slopes = np.zeros((times.size, point.size))
+        slopes[:, rows.columns], slopes[:, means.stop :] = rows.slopes, extra
+        slopes[:, means], slopes[:, nothing] = slopes[:, at["impulses"]], 0.0
         sigma = rows.residuals.sigma * inflation
         weight = np.sqrt(robust_weights(rows.residuals.values / sigma, STRAY)) / sigma
-        remainder = rows.residuals.values - slopes @ point[columns]
-        blocks.append(EquationRows(slopes * weight[:, None], remainder * weight, columns))
+        remainder = rows.residuals.values - slopes @ point
+        columns = np.flatnonzero(slopes.any(axis=0))
+        slopes = slopes[:, columns] * weight[:, None]
+        blocks.append(EquationRows(slopes, remainder * weight, columns))
         edges += int((weight > 0.0).sum())
     return blocks, edges
-
-
-def _extra(model: DropModel, role: str, path: Trajectory, times: Array) -> tuple[Array, Array]:
-    """Derivatives of the height by that of the contact point and by κ, shape ``(times,)`` each."""
-    slopes = path.derivatives(times)
-    if role == "free":
-        return np.zeros(times.size), slopes[:, DRAG]
-    # A contact point higher up is met as if every rod hung that much lower.
-    rods = len(model.records["impact"].chain.widths)
-    return -slopes[:, COMMON + rods :].sum(axis=1), slopes[:, DRAG]
 
 
 def merge_like(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
@@ -166,12 +150,11 @@ def merge_like(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
     return [
         replace(
             group[0],
-            rows=group[0]
-            .rows._replace(
-                slopes=np.concatenate([form.rows.slopes for form in group]),
-                left=np.concatenate([form.rows.left for form in group]),
-            )
-            .triangle(),
+            rows=EquationRows(
+                np.concatenate([form.rows.slopes for form in group]),
+                np.concatenate([form.rows.left for form in group]),
+                group[0].rows.columns,
+            ).triangle(),
             alphas=np.mean([form.alphas for form in group], axis=0),
             arrivals=np.mean([form.arrivals for form in group], axis=0),
             edges=sum(form.edges for form in group),

@@ -10,9 +10,8 @@ import numpy as np
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
-from rig.estimate.hypotheses import one_alpha, with_contact
-from rig.estimate.hypothesis_fit import fit
-from rig.estimate.likelihood_ratio import LikelihoodRatio
+from rig.estimate.hypotheses import one_alpha, with_nuisances
+from rig.estimate.hypothesis_fit import LikelihoodRatio, fit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -137,7 +136,7 @@ def resolution(impulses_by_case: Sequence[Impulses]) -> str:
 def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
     inclines = [condition.incline_deg]
     single, open_fit = (
-        fit(forms, with_contact(one_alpha(forms, lambda _: "one", each_rod=each_rod), inclines))
+        fit(forms, with_nuisances(one_alpha(forms, lambda _: "one", each_rod=each_rod), inclines))
         for each_rod in (False, True)
     )
     rods = forms[0].alphas.size - 1
@@ -149,7 +148,7 @@ def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
         condition,
         rods,
         Measured(*single["α one"]),
-        LikelihoodRatio(single.chi2 - open_fit.chi2, rods - 1),
+        single.against(open_fit),
         _gains(gains, covariance, model),
     )
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rig.analysis.air import prior_air
 from rig.analysis.comparison import Comparison, compare
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured
-from rig.analysis.summary import good_cases
+from rig.analysis.summary import by_case, good_cases
 from rig.analysis.unknowns import SharedUnknowns
 from rig.errors import InputError
 from rig.estimate import coefficients as of
@@ -24,13 +26,11 @@ from rig.sections import Sections
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from rig.analysis.session import Analysis
     from rig.arrays import Array
     from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.hypothesis_fit import HypothesisFit
-    from rig.protocol.protocol import Condition, Protocol
+    from rig.protocol.protocol import Protocol
     from rig.units import Quantity
 
 
@@ -64,9 +64,8 @@ class Coefficient:
     def json(self) -> dict[str, Any]:
         """One of ``parameters``."""
         record = attributes(self, "name", "identified", "least_squares")
-        record["stated"] = {"value": self.stated.value, "u": self.stated.u}
         posterior = {"value": self.mean, "u": self.sd, "low": self.low, "high": self.high}
-        return record | {"posterior": posterior}
+        return record | {"stated": attributes(self.stated, "value", "u"), "posterior": posterior}
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,12 +223,9 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     with sections.alone("The comparison with the model"):
         results.comparison = compare(protocol, good_cases(protocol, analysis.runs))
     with sections.alone("The curves"):
-        first: Mapping[Condition, tuple[int, int]] = {
-            protocol.condition(good[key]): key for key in reversed(drops)
-        }
         results.curves = tuple(
             drop_curves(protocol, good[key], drops[key], analysis.joint)
-            for _, key in sorted(first.items())
+            for key, *_ in by_case(protocol, drops, lambda key: good[key])
         )
     results.failed = tuple(sections.failed.values())
     return results
@@ -239,9 +235,9 @@ def _coefficients(
     protocol: Protocol, problem: CoefficientProblem, outcome: HypothesisFit
 ) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
-    names = list(problem.stated)
-    drag = Measured(*outcome[AIR])
-    spread = posterior(protocol, problem, outcome)
+    names, spread = list(problem.stated), posterior(protocol, problem, outcome)
+    covariance = outcome.covariance[: len(names), : len(names)]  # behind them are nuisances
+    sd, drag = np.sqrt(covariance.diagonal()), Measured(*outcome[AIR])
     heights = {at: Measured(*outcome[f"contact {at:g}"]) for at in problem.inclines}
     return Coefficients(
         tuple(
@@ -255,7 +251,7 @@ def _coefficients(
             )
             for name in names
         ),
-        of.correlation(outcome, names),
+        covariance / np.outer(sd, sd),
         spread if names else None,
         tuple(
             ContactPoint(incline, height, height.u < of.FOUND * CONTACT_U)

@@ -97,7 +97,7 @@ def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
     protocol, floor = RIGS[name]
     beams, surface = beams_of(protocol), protocol.surface
     kinds = cases(protocol, beams, replace(stated(protocol), floor=floor))
-    found = forecast(protocol, GateLayout.of(kinds, range(len(beams))), sure=True)
+    found = forecast(protocol, GateLayout.of(kinds, range(len(beams))))
     # All unknowns of the session: each drop's own and its α, what is common, beams.
     common = sum(case.own + case.struck for case in kinds)
     size, first, rows, at_alpha, gradients = (
@@ -121,7 +121,7 @@ def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
                 rows[-1][np.append(place, beam)[block.columns]] = slopes
     now = {"restitution": surface.restitution.value, "friction": surface.friction.value}
     chain = protocol.chains["A"].chain
-    ties = [alphas(surface, chain, case.run.incline_deg, now)[1].mean(axis=0) for case in kinds]
+    ties = [alphas(protocol, chain, case.run.incline_deg, now)[1].mean(axis=0) for case in kinds]
     with localcontext(prec=60):
         slopes = exact(np.array(rows))
         u = [float(x.sqrt()) for x in variances(slopes, exact(np.array(gradients)))]
