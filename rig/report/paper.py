@@ -39,7 +39,6 @@ def paper_figure(
         numbers.
     """
     columns = getattr(paper, f"figure_{number}")()
-    claims = [claim for claim in paper.claims() if claim.figure == number]
     foot = [
         *([_NO_LINE] if number == 3 else []),
         "Where the paper's text and its equations differ:",
