@@ -164,8 +164,9 @@ def _named(words: Sequence[str] | None) -> list[Command]:
     every = [*COMMANDS.values()]
     if words is None:
         return every
-    first = [command for command in every if command.name.split()[0] == "".join(words[:1])]
-    return first or [command for command in every if any(word[:1] != "-" for word in words)]
+    if named := [command for command in every if command.name.split()[:1] == [*words[:1]]]:
+        return named
+    return every if any(not word.startswith("-") for word in words) else []
 
 
 def build_parser(
@@ -185,7 +186,7 @@ def build_parser(
     modules
         Modules of commands whose names are not theirs.
     words
-        What is to be parsed: commands that it cannot name are left out, which take 30 ms.
+        What is to be parsed: commands that it cannot name are left out, as they take time.
     """
     lines = []
     for group, commands in GROUPS.items():

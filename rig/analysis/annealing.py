@@ -383,6 +383,7 @@ class SideFall:
         cls,
         protocol: Protocol,
         record: ChainRecord,
+        pairing: Pairing,
         clock_u: float,
         components: Components,
         sigma: Array = ONE,
@@ -397,7 +398,6 @@ class SideFall:
             sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
             sd[GROWTH] = protocol.priors.strings * abs(record.alpha)
         stated, gravity = Guess.stated(protocol, record), protocol.gravity.value
-        pairing = Pairing.of(record.trains, record.crossed)
         return cls(record, pairing, stated, gravity, sd, sigma)
 
     @cached_property

@@ -115,7 +115,7 @@ class DropModel:
         return _model_of(_Condition(protocol, content, tuple(records))).changed(
             records={record.role: record for record in records},
             pairings=_pairings(records),
-            guesses=_begin(protocol, records) if guesses is None else guesses,
+            guesses=_stated_guesses(protocol, records) if guesses is None else guesses,
             clock_u=clock_u,
             components=components or stated(protocol),
         )
@@ -144,12 +144,13 @@ class DropModel:
             x[at] = 0.0
         return self.changed(components=components, clock_u=clock_u, guesses=guesses)
 
-    def begin(self, role: str) -> SideFall:
-        """Take a side by itself, with what else moves its edges as their scatter."""
+    def side(self, role: str) -> SideFall:
+        """Take a side as it begins, with what else moves its edges as their scatter."""
         record, scales = self.records[role], self.components
         sd = np.hypot(scales.floor, scales.departure if record.ratios is not None else 0.0)
         variance = sd**2 + (self.slopes[role].levels ** 2) @ self.unknowns.sd**2
-        return SideFall.of(self.protocol, record, self.clock_u, scales, np.sqrt(variance))
+        about = self.protocol, record, self.pairings[role], self.clock_u, scales
+        return SideFall.of(*about, np.sqrt(variance))
 
     def begun(self, guesses: Mapping[str, Guess]) -> DropModel:
         """Return the same drop with other first guesses."""
@@ -383,7 +384,7 @@ class _Condition:
 @lru_cache(maxsize=64)
 def _model_of(condition: _Condition) -> DropModel:
     protocol, records = condition.protocol, condition.records
-    return DropModel(protocol, records, _begin(protocol, records), 0.0)
+    return DropModel(protocol, records, _stated_guesses(protocol, records), 0.0)
 
 
 def _expectations(record: ChainRecord) -> tuple[object, ...]:
@@ -401,7 +402,7 @@ def _expectations(record: ChainRecord) -> tuple[object, ...]:
     )
 
 
-def _begin(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
+def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
     return {record.role: Guess.stated(protocol, record) for record in records}
 
 

@@ -69,13 +69,14 @@ class GravityCheck:
     @property
     def doubts(self) -> tuple[Reason, ...]:
         """Where they do not, that something is not as stated."""
-        values = {
+        if self.agrees:
+            return ()
+        found = {
             "g": self.measured.value,
             "U": self.measured.expanded,
             "E_n": self.normalized_error,
         }
-        doubt = make_reason("gravity_unlike", stated=self.stated.value, **values)
-        return () if self.agrees else (doubt,)
+        return (make_reason("gravity_unlike", stated=self.stated.value, **found),)
 
     def json(self) -> dict[str, Any]:
         """A member of ``calibration``."""

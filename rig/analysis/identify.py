@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, SideFall, log_density
+from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, Pairing, SideFall, log_density
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY, scaled
 from rig.analysis.fit import Fit, count_matched, settle
@@ -119,7 +119,7 @@ def identify(
         How many batches of starts are tried at most, the likeliest first.
     """
     model = DropModel.of(protocol, records, None, clock_u, components)
-    readings = {role: _read(model.begin(role), window, batches) for role in model.records}
+    readings = {role: _read(model.side(role), window, batches) for role in model.records}
     # Likelier than that all edges are strays and every rod was missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
@@ -142,7 +142,8 @@ def most_votes(
     protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
 ) -> int:
     """Count the expected edges of a side that agree on one fall near the stated one, at most."""
-    votes = SideFall.of(protocol, record, clock_u, components).most_votes()
+    pairing = Pairing.of(record.trains, record.crossed)
+    votes = SideFall.of(protocol, record, pairing, clock_u, components).most_votes()
     return min(votes, possible(record))  # of a flicker many edges vote for one rod
 
 

@@ -89,7 +89,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     # Of gates that the file does not have nothing is due.
     protocol = with_gates(protocol, {edge.channel for drop in drops for edge in drop.edges})
     shares, near, expected = [1.0], 0, 0
-    evidence = 0.0
+    evidence, gravity = 0.0, list[float]()
     results: list[DropResult] = []
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
     for drop in [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]:
@@ -102,13 +102,13 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         if exact and len(results) < _COMPARED:
             result, fit = fit_drop(protocol, run, drop, rate, explain=False)
             evidence += log_evidence(fit) if fit else 0.0
+            gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
             results.append(result)
     text = make_reason("falls_fit", runs=len(drops), near=near, due=expected).text
+    if gravity:
+        text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)
-    if check is None:
-        return FallMatch(min(shares), evidence, text)
-    text += f"; g {check.measured.value:.2f} m/s²"
-    return FallMatch(min(shares), evidence, text, check.doubts)
+    return FallMatch(min(shares), evidence, text, check.doubts if check else ())
 
 
 def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:

@@ -147,7 +147,9 @@ def motion_by_model(protocol: Protocol, run: Run) -> Motion:
 def _squares_by_model(motion: Motion, fallen: Array) -> Array:
     """V² by the model when the chain has come down so far below where its bottom rod strikes."""
     begin = motion.at(0.0)
-    places = [-begin.height_m, *np.repeat(motion.chain.heights, 2)]
-    speeds = [speed for hit in motion.hits for speed in (hit.speed_before, hit.speed_after)]
-    # Linear between impacts, with a step at each.
-    return np.interp(fallen, places[:-1], np.square([begin.speed_m_s, *speeds[:-1]]))
+    before = np.array([-begin.height_m, *motion.chain.heights[:-1]])
+    after = np.array([begin.speed_m_s, *(hit.speed_after for hit in motion.hits[:-1])])
+    leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)
+    gained = 2.0 * motion.gravity * (fallen - before[leg])
+    squares: Array = np.maximum(after[leg] ** 2 + gained, 0.0)
+    return squares

@@ -45,6 +45,7 @@ _PAGE = (
 _AREAS = ("bar", "band", "map", "levels")
 _LINES = ("line", "dash", "level", "limit")
 _LOOKS = tomllib.loads(Path(__file__).with_name("roles.toml").read_text("utf-8"))
+_LOOKS["ring"]["markerfacecolor"] = COLORS[PAPER][0]
 
 
 def plot(chart: Chart, width: float | None = None) -> Figure:

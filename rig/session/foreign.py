@@ -65,8 +65,9 @@ def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     changed = [name for name in own if shapes.get(name) != own[name]]
     altered = [f"{name} is missing or not as rig makes it" for name in changed]
     strange = sorted(shapes.keys() - own.keys() - _OF_ANALYZE)
-    for text in [*altered, *(f"it has {name}, which rig does not make" for name in strange)]:
-        raise make_error(SessionError, "session_altered", path=path, text=text)
+    altered += [f"it has {name}, which rig does not make" for name in strange]
+    if altered:
+        raise make_error(SessionError, "session_altered", path=path, text=altered[0])
     return int(version)
 
 

@@ -197,8 +197,8 @@ class Reader:
 
     def latest_drops(self, run: int | None = None) -> list[Drop]:
         """Return the last attempt at each run, by run, or at one run, compared with its bytes."""
-        drops = sorted(self.drops(), key=lambda drop: drop.job)
-        return [*{drop.run: drop for drop in drops if run in {None, drop.run}}.values()]
+        drops = (drop for drop in self.drops() if run in {None, drop.run})
+        return [*{drop.run: drop for drop in sorted(drops, key=lambda drop: drop.job)}.values()]
 
     def states(self, run: int | None = None) -> list[StateEntry]:
         """Return the log of run states, in order: the whole of it, or of one run."""

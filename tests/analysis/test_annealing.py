@@ -32,7 +32,7 @@ def falls_of(one: Case, protocol: Protocol | None = None) -> list[SideFall]:
     """What annealing knows of each side."""
     protocol = protocol or one.protocol
     model = DropModel.of(protocol, one.records, None, CLOCK_U, STATED)
-    return [model.begin(role) for role in model.records]
+    return [model.side(role) for role in model.records]
 
 
 @pytest.mark.parametrize("scene", SCENES)
