@@ -6,15 +6,17 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.air import prior_air
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
-from rig.estimate.hypotheses import by_model, one_alpha
+from rig.estimate.hypotheses import by_model, one_alpha, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, LikelihoodRatio, fit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.estimate.coefficients import CoefficientProblem
+    from rig.estimate.hypothesis_fit import Hypothesis
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Condition, Protocol, Run
 
@@ -109,8 +111,11 @@ def single_alphas(
     def case(form: QuadraticForm) -> Condition:
         return protocol.condition(form.run)
 
-    by_run = fit(forms, one_alpha(forms, lambda form: form.run.number))
-    by_case = fit(groups, one_alpha(groups, case))
+    def in_air(supposed: Hypothesis) -> Hypothesis:
+        return with_nuisances(supposed, (), prior_air(protocol))
+
+    by_run = fit(forms, in_air(one_alpha(forms, lambda form: form.run.number)))
+    by_case = fit(groups, in_air(one_alpha(groups, case)))
     model: dict[Condition, float] = {}
     against_model = None
     if problem is not None and outcome is not None:
@@ -120,9 +125,9 @@ def single_alphas(
             case(form): float(supposed.alphas(form, values)[0].mean()) for form in problem.forms
         }
         if len(model) > len(problem.parameters) > len(problem.held) == 0:
-            # Without the nuisances, so that both suppose the same but for α.
-            open_ = fit(problem.forms, one_alpha(problem.forms, case))
-            against_model = fit(problem.forms, supposed).against(open_)
+            # With the contact where it is, so that both suppose the same but for α.
+            open_ = fit(problem.forms, in_air(one_alpha(problem.forms, case)))
+            against_model = fit(problem.forms, in_air(supposed)).against(open_)
     counts = Counter(map(case, forms))
     return SingleAlphas(
         tuple(

@@ -107,8 +107,7 @@ def drop_curves(
         moments = np.minimum(times, motion.end_s).tolist()
         by_model = np.array([motion.at(moment).separation_m for moment in moments])
         separation = with_band(_separations(adjusted, times), by_model)
-    fallen = drop.model.records["impact"].chain.chain.length - heights
-    squares = with_band(_squares(adjusted, heights), _squares_by_model(motion, fallen))
+    squares = with_band(_squares(adjusted, heights), _squares_by_model(motion, heights))
     return DropCurves(run, heights, squares, times, separation)
 
 
@@ -144,9 +143,10 @@ def motion_by_model(protocol: Protocol, run: Run) -> Motion:
     return Motion(chain, gains, drop.value, protocol.gravity.value, start)
 
 
-def _squares_by_model(motion: Motion, fallen: Array) -> Array:
-    """V² by the model when the chain has come down so far below where its bottom rod strikes."""
-    begin = motion.at(0.0)
+def _squares_by_model(motion: Motion, heights: Array) -> Array:
+    """V² by the model when the top rod is at some heights above the contact point."""
+    # Of the chain as it strikes: where rods differ, it is not as long as it hangs.
+    begin, fallen = motion.at(0.0), motion.chain.length - heights
     before = np.array([-begin.height_m, *motion.chain.heights[:-1]])
     after = np.array([begin.speed_m_s, *(hit.speed_after for hit in motion.hits[:-1])])
     leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)

@@ -129,16 +129,16 @@ def with_end_correction(
 
 
 def with_nuisances(
-    inner: Hypothesis, inclines: Sequence[float], air: tuple[float, float] | None = None
+    inner: Hypothesis, inclines: Sequence[float], air: tuple[float, float]
 ) -> Hypothesis:
-    """Suppose the contact point to be at another height at each incline.
+    """Suppose air, and the contact point to be at another height at each of some inclines.
 
     Parameters
     ----------
     air
-        Mean and standard uncertainty of κ beforehand; not given where it stays as it is.
+        Mean and standard uncertainty of κ beforehand, see `rig.analysis.air.prior_air`.
     """
     prior = 0.0, CONTACT_U
     added = [Parameter(f"contact {at:g}", 0.0, prior, "contact", at) for at in inclines]
-    added += [Parameter(AIR, air[0], air, "drag")] if air else []
+    added.append(Parameter(AIR, air[0], air, "drag"))
     return inner._replace(parameters=(*inner.parameters, *added))

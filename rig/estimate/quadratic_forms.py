@@ -112,10 +112,10 @@ def _blocks(drop: Fit | JointDrop, alphas: Array) -> tuple[list[EquationRows], i
     """
     model, x = drop.model, drop.x
     at, means = model.unknowns, slice(x.size, x.size + alphas.size)
-    point = np.concatenate([x, alphas, [0.0, model.kappa(x) if "drag" in at else 0.0]])
+    point = np.concatenate([x, alphas, [0.0, model.kappa(x)]])
     point[at["impulses"]] = 0.0
     inflation = drop.estimate.scatter if isinstance(drop, Fit) else 1.0
-    nothing = [at[name].start for name in ("alpha", "drag") if name in at]
+    nothing = [at["alpha"].start, at["drag"].start]
     blocks, edges = [], 0
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.analysis.air import prior_air
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
@@ -114,7 +115,7 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
         One a condition.
     """
     cases = by_case(protocol, forms, lambda form: form.run)
-    return tuple(_impulses(protocol.condition(group[0].run), group) for group in cases)
+    return tuple(_impulses(protocol, group) for group in cases)
 
 
 def resolution(impulses_by_case: Sequence[Impulses]) -> str:
@@ -133,11 +134,13 @@ def resolution(impulses_by_case: Sequence[Impulses]) -> str:
     return f"{_TOGETHER} Resolved alone at {short}."
 
 
-def _impulses(condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
-    inclines = [condition.incline_deg]
+def _impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> Impulses:
+    condition, air = protocol.condition(forms[0].run), prior_air(protocol)
     single, open_fit = (
-        fit(forms, with_nuisances(one_alpha(forms, lambda _: "one", each_rod=each_rod), inclines))
-        for each_rod in (False, True)
+        fit(forms, with_nuisances(alphas, [condition.incline_deg], air))
+        for alphas in (
+            one_alpha(forms, lambda _: "one", each_rod=each_rod) for each_rod in (False, True)
+        )
     )
     rods = forms[0].alphas.size - 1
     weight = forms[0].ratios[:rods] * np.mean([form.arrivals[:rods] for form in forms], axis=0)

@@ -15,8 +15,10 @@ from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merge_like
 from rig.estimate.session import estimate
 from rig.model.impact import alpha_inclined
+from rig.predictions import predict_incline
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Priors
+from rig.protocol.reader import parse
 from rig.report.estimate import estimate_text
 from rig.sections import Sections
 from rig.units import Quantity
@@ -24,6 +26,7 @@ from sim.dials import Dials
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
 from tests.analysis.sessions import analysis as analyzed
 from tests.analysis.sessions import cases
+from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.estimate.sessions import BETA, MU, analysis, forms
 
 SURFACE = (30.0, 50.0, 70.0)
@@ -196,6 +199,29 @@ def test_an_alpha_that_is_given_is_what_is_estimated():
     assert (alpha["name"], alpha["identified"]) == ("alpha", True)
     assert abs(alpha["least_squares"]["value"] - 0.15) < 4 * alpha["least_squares"]["u"]
     assert alpha["least_squares"]["u"] < 0.1 * 0.02  # of what the protocol says
+
+
+@pytest.mark.parametrize("u", ["", " ± 1 m/s"])
+def test_air_that_the_protocol_states_counts_once(u):
+    """For the coefficients, every α and every impulse, be it exact or not."""
+    protocol = parse(f"{UNIFORM.text}drag: {{terminal_speed: 15 m/s{u}}}\n")
+    found = estimate(protocol, dropped(protocol, first(2, protocol, SURFACE))).json()
+    for name, truth in (("restitution", 0.5), ("friction", 0.2)):
+        measured = parameter(found, name)["least_squares"]
+        assert abs(measured["value"] - truth) < 4 * measured["u"]
+    assert abs(found["end_correction"]["scale"]["value"] - 1) < 0.1
+    lines = [line for name in ("alpha", "impulses") for line in found[name]["inclines"]]
+    for line, incline in zip(lines, 2 * SURFACE, strict=True):
+        truth = alpha_inclined(0.5, 0.2, incline)
+        assert abs(line["alpha"]["value"] - truth) < 4 * line["alpha"]["u"]
+
+
+def test_the_models_curve_ends_at_the_prediction_where_rods_touch_higher_than_the_top_one():
+    protocol, run = BOARD_GRADED, first(1, BOARD_GRADED, (40.0,))
+    (curve,) = estimate(protocol, dropped(protocol, run)).json()["curves"]
+    predicted = predict_incline(protocol, 40.0, "A").speed
+    assert curve["speed2_m2_s2_model"][-1] == pytest.approx(predicted**2)
+    assert curve["speed2_m2_s2_model"][0] == pytest.approx(0.0, abs=1e-2)
 
 
 def test_inclines_outside_the_model_tell_no_coefficient():
