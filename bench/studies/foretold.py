@@ -13,7 +13,7 @@ from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD
 from rig.bench.findings import Findings
 from rig.commands.output import say
-from rig.design.cases import beams_of, cases
+from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
 from rig.errors import InputError
 from rig.estimate.session import estimate
@@ -109,9 +109,7 @@ def _compared(name: str, protocol: Protocol, analysis: Analysis) -> list[Foretol
 
 
 def _forecast(protocol: Protocol, components: Components) -> dict[str, float]:
-    beams = beams_of(protocol)
-    layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
-    return forecast(protocol, layout).goals()
+    return forecast(protocol, GateLayout.of(cases(protocol, components))).goals()
 
 
 def _words(each: Foretold) -> str:

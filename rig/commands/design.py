@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.components import Components, stated
 from rig.commands.output import print_found, say
-from rig.design.cases import beams_of, cases, with_beams
-from rig.design.forecast import Forecast, GateLayout, forecast
-from rig.design.rewriting import with_heights
+from rig.design.cases import cases
+from rig.design.forecast import GateLayout, forecast
+from rig.design.rewriting import rewrite_heights
 from rig.design.search import better, room
 from rig.design.trials import readable, trials, trials_text
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
-from rig.protocol.measurable import check_measurable
+from rig.protocol.measurable import check_gates, check_measurable
 from rig.reasons import make_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
@@ -24,9 +24,9 @@ from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
-    from rig.protocol.protocol import Protocol, Side
+    from rig.protocol.protocol import Protocol
 
 SPACING_M = 0.01
 
@@ -39,7 +39,7 @@ def main(arguments: Namespace) -> int:
         check_place(arguments.output)
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
-    beams = beams_of(protocol)
+    check_gates(protocol)
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
     components = stated(protocol) if arguments.learned is None else _read_scatter(arguments.learned)
@@ -49,13 +49,13 @@ def main(arguments: Namespace) -> int:
     layouts: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
         "scatter": "stated" if arguments.learned is None else "learned",
-        "current": _forecast(protocol, beams, components),
+        "current": _forecast(protocol, components),
     }
     if not arguments.no_search:
         proposed = better(protocol, components, limits, say)
-        layouts["proposed"] = _forecast(protocol, proposed, components)
+        layouts["proposed"] = _forecast(proposed, components)
         if arguments.output:
-            write_atomic(arguments.output, with_heights(protocol, proposed))
+            write_atomic(arguments.output, rewrite_heights(proposed))
             say(f"protocol: {arguments.output}")
     print_found(layouts, lambda: design_text(layouts), as_json=arguments.json)
     return 0
@@ -73,20 +73,16 @@ def _read_scatter(path: str) -> Components:
     return joint.components
 
 
-def _forecast(
-    protocol: Protocol, beams: Sequence[tuple[Side, float]], components: Components
-) -> dict[str, Any]:
+def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
     """Return what a layout measures, and how well, as JSON has it."""
-    assert protocol.gates is not None
-    layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
-    expected: Forecast = forecast(protocol, layout)
-    outcome = trials(with_beams(protocol, beams))
+    expected = forecast(protocol, GateLayout.of(cases(protocol, components)))
+    outcome = trials(protocol)
     return {
         "gates": [
-            {"channel": gate.channel, "side": side, "height_m": height}
-            for gate, (side, height) in zip(protocol.gates.gates, beams, strict=True)
+            {"channel": gate.channel, "side": gate.side, "height_m": gate.height}
+            for gate in check_gates(protocol).gates
         ],
-        "readable": readable(protocol, beams),
+        "readable": readable(protocol),
         "trials": {
             "drops": outcome.drops,
             "read": outcome.read,

@@ -18,18 +18,15 @@ from rig.estimate.hypotheses import alphas
 from rig.protocol.contact import at_contact
 from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
-from rig.protocol.protocol import Gate, Protocol, Run
-from rig.protocol.protocol import Side as Role
 from rig.records import Drop
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
+    from collections.abc import Iterable, Iterator, Mapping
 
     from rig.analysis.components import Components
     from rig.arrays import Array, Index
+    from rig.protocol.protocol import Gate, Protocol, Run
 
 
 CLOCK_U = 1e-6
@@ -84,40 +81,20 @@ class Case:
         return rows._replace(columns=rows.columns + BEAM * place * (rows.columns >= self.core))
 
 
-def beams_of(protocol: Protocol) -> list[tuple[Role, float]]:
-    """Side and height of each beam of a protocol.
-
-    Raises
-    ------
-    InputError
-        Where it has none.
-    """
-    return [(gate.side, gate.height) for gate in check_gates(protocol).gates]
-
-
-def with_beams(protocol: Protocol, beams: Sequence[tuple[Role, float]]) -> Protocol:
-    """The protocol with these beams instead of its own."""
-    assert protocol.gates is not None
-    gates = tuple(Gate(n, height, side) for n, (side, height) in enumerate(beams))
-    return replace(protocol, gates=replace(protocol.gates, gates=gates))
+def with_gates(protocol: Protocol, gates: Iterable[Gate]) -> Protocol:
+    """Return a protocol with other gates."""
+    return replace(protocol, gates=replace(check_gates(protocol), gates=tuple(gates)))
 
 
 @one_thread
-def cases(
-    protocol: Protocol, beams: Sequence[tuple[Role, float]], components: Components
-) -> tuple[Case, ...]:
-    """Work out what beams at these heights say of every kind of drop, in order of incline.
+def cases(protocol: Protocol, components: Components) -> tuple[Case, ...]:
+    """Work out what a protocol's beams say of every kind of drop, in order of incline.
 
     Parameters
     ----------
-    protocol
-        The scene and its plan; where its gates are does not matter.
-    beams
-        Side and height of each.
     components
         How much everything scatters.
     """
-    protocol = with_beams(protocol, beams)
     counts = Counter(replace(run, number=0) for run in runs(protocol))
     kinds = sorted(counts, key=lambda run: (run.incline_deg, str(run.impact)))
     models = [_model(protocol, run, components) for run in kinds]
@@ -164,7 +141,10 @@ def perfect(model: DropModel, x: Array) -> list[ChainRecord]:
     collected = []
     for role, record in model.records.items():
         path = model.trajectory(role, x)
-        trains = (with_edges(t, path.times(t.levels), t.blocks) for t in record.trains)
+        trains = (
+            with_edges(train, np.arange(train.levels.size), path.times(train.levels))
+            for train in record.trains
+        )
         collected.append(replace(record, trains=tuple(trains)))
     return collected
 
@@ -176,10 +156,13 @@ def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropMo
     return DropModel(model.protocol, records, model.guesses, CLOCK_U, components), x
 
 
-def with_edges(train: EdgeTrain, times: Array, blocked: NDArray[np.bool_]) -> EdgeTrain:
-    """Return the train of a beam that saw these edges and no flicker."""
-    number = np.arange(times.size)
-    return replace(train, times=times, blocked=blocked, burst=0.0 * times, edge=number)
+def with_edges(train: EdgeTrain, edges: Index, times: Array) -> EdgeTrain:
+    """Return the train of a beam that saw some of its expected edges, and no flicker.
+
+    The number of each edge is that of the expected edge that it is.
+    """
+    blocked = train.blocks[edges]
+    return replace(train, times=times, blocked=blocked, burst=0.0 * times, edge=edges)
 
 
 def _case(

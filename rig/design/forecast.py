@@ -44,9 +44,19 @@ class GateLayout:
     blocks: tuple[tuple[EquationRows, ...], ...]
 
     @classmethod
-    def of(cls, cases: tuple[Case, ...], beams: Sequence[int]) -> GateLayout:
-        """Choose beams by their numbers."""
-        return cls(cases, 0, ((),) * len(cases)).plus(*beams)
+    def of(cls, cases: tuple[Case, ...], beams: Iterable[int] | None = None) -> GateLayout:
+        """Choose beams by their numbers, or all that there are."""
+        numbers = range(len(cases[0].blocks)) if beams is None else beams
+        return cls(cases, 0, ((),) * len(cases)).plus(*numbers)
+
+    @property
+    def size(self) -> int:
+        """Number of the session's unknowns."""
+        return self.cases[0].shared + BEAM * self.beams
+
+    def places(self, case: Case) -> Index:
+        """Where what a kind of drop leaves of them is in the session's vector."""
+        return np.append(case.here, np.arange(case.shared, self.size))
 
     def plus(self, *beams: int) -> GateLayout:
         """Return the layout with more beams."""
@@ -115,36 +125,33 @@ def forecast(
     names
         Only these measurands, if given.
     """
-    size = layout.cases[0].shared + BEAM * layout.beams
-    places = [
-        np.append(case.here, case.shared + np.arange(BEAM * layout.beams)) for case in layout.cases
-    ]
+    size = layout.size
     reduced = layout.without(case.own + case.struck for case in layout.cases)
-    drops = list(zip(layout.cases, reduced, places, strict=True))
-    rows = [_of_all_runs(case, drop.rest.slopes, place) for case, drop, place in drops]
+    drops = list(zip(layout.cases, reduced, strict=True))
+    rows = [_of_all_runs(case, drop.rest.slopes, layout.places(case)) for case, drop in drops]
     # Once a layout, then asked by every measurand and incline.
     inverse = np.linalg.inv(square_root(rows, np.ones(size), np.zeros(size)).matrix)
     single: dict[str, dict[Condition, float]] = {}
     mean: dict[str, dict[Condition, float]] = {}
     for group in by_case(protocol, drops, lambda drop: drop[0].run):
         at = protocol.condition(group[0][0].run)
-        n = sum(case.count for case, _, _ in group)
+        n = sum(case.count for case, _ in group)
         gradients = group[0][0].gradients
         for name in (name for name in gradients if name in (names or gradients)):
             by_one, by_mean, common = 0.0, 0.0, np.zeros(size)
-            for case, drop, place in group:
+            for case, drop in group:
                 share, gradient = case.count / n, case.gradients[name]
                 by_own, by_others = np.split(gradient, [case.own + case.struck])
                 slopes = -by_own @ drop.gain
                 slopes[: by_others.size] += by_others
-                own, shared = by_own @ drop.inverse, slopes @ inverse[place]
+                own, shared = by_own @ drop.inverse, slopes @ inverse[layout.places(case)]
                 chance = gradient[case.by_chance]
                 by_one += share * float(own @ own + shared @ shared)
                 by_mean += share * float(own @ own + chance @ chance) / n
                 common += share * shared
             single.setdefault(name, {})[at] = math.sqrt(by_one)
             mean.setdefault(name, {})[at] = math.sqrt(by_mean + float(common @ common))
-    return Forecast(single, mean, *_coefficients(protocol, layout, places))
+    return Forecast(single, mean, *_coefficients(protocol, layout))
 
 
 def _of_all_runs(case: Case, slopes: Array, columns: Index) -> EquationRows:
@@ -152,33 +159,29 @@ def _of_all_runs(case: Case, slopes: Array, columns: Index) -> EquationRows:
     return EquationRows(math.sqrt(case.count) * slopes, np.zeros(len(slopes)), columns)
 
 
-def _coefficients(
-    protocol: Protocol, layout: GateLayout, places: Sequence[Index]
-) -> tuple[dict[str, float], set[str]]:
+def _coefficients(protocol: Protocol, layout: GateLayout) -> tuple[dict[str, float], set[str]]:
     """Standard uncertainties of β, μ and a pile's β, and those that edges do not tell."""
     stated: dict[str, Quantity] = {}
     tied = []
-    kinds = zip(
-        layout.cases, layout.without(case.own for case in layout.cases), places, strict=True
-    )
-    for case, drop, place in kinds:
+    reduced = layout.without(case.own for case in layout.cases)
+    for case, drop in zip(layout.cases, reduced, strict=True):
         if case.struck:
             struck = protocol.chains[case.run.impact or ""].chain, case.run.incline_deg
             depends_on, _ = stated_coefficients(protocol, *struck)
             stated |= depends_on
             if depends_on:
-                tied.append((case, drop.rest.slopes, place, struck))
+                tied.append((case, drop.rest.slopes, struck))
     if not stated:
         return {}, set()
     values = {name: quantity.value for name, quantity in stated.items()}
-    size, count = layout.cases[0].shared + BEAM * layout.beams, len(values)
+    size, count = layout.size, len(values)
     behind, rows = size + np.arange(count), []
-    for case, slopes, place, struck in tied:
+    for case, slopes, struck in tied:
         _, by_value = alphas(protocol, *struck, values)
         # α, the first of what is left, follows from the coefficients.
         by_values = np.outer(slopes[:, 0], by_value.mean(axis=0))
         observed = np.column_stack([slopes[:, 1:], by_values])
-        rows.append(_of_all_runs(case, observed, np.append(place, behind)))
+        rows.append(_of_all_runs(case, observed, np.append(layout.places(case), behind)))
     nothing = np.zeros(size + count)
     edges = eliminate(rows, nothing + 1.0, nothing, np.arange(size), behind).rest.slopes
 

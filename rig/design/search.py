@@ -12,18 +12,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.design.cases import beams_of, cases
+from rig.design.cases import cases, with_gates
 from rig.design.forecast import GateLayout, forecast
 from rig.design.trials import MARGIN, margin
 from rig.measurands import averaged
 from rig.protocol.gates import blocking_rod, hanging_rods
+from rig.protocol.measurable import check_gates
+from rig.protocol.protocol import Gate
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from rig.analysis.components import Components
-    from rig.protocol.protocol import Protocol, Side
+    from rig.protocol.protocol import Gates, Protocol
 
 COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""
@@ -56,7 +58,7 @@ class Room:
 
 def room(protocol: Protocol, lowest: float | None, highest: float | None, spacing: float) -> Room:
     """Take limits as they are given, else from the gates that are there and the chains."""
-    heights = [height for _, height in beams_of(protocol)]
+    heights = [gate.height for gate in check_gates(protocol).gates]
     top = min(protocol.drop.value + rods.chain.length for rods in protocol.chains.values())
     return Room(
         min(heights) if lowest is None else lowest,
@@ -79,8 +81,8 @@ def better(
     components: Components,
     limits: Room,
     say: Callable[[str], None] = lambda _: None,
-) -> list[tuple[Side, float]]:
-    """Find better heights for a protocol's beams.
+) -> Protocol:
+    """Return a protocol with its gates at better heights; those of a side keep their order.
 
     Each beam in turn is tried at candidate heights while the others stay; sweeps go on until none
     moves. That finds no worse a layout than it begins with, and not always the best of all. A
@@ -94,35 +96,29 @@ def better(
         Where beams may be.
     say
         Told how far it is.
-
-    Returns
-    -------
-    list
-        Side and height of each beam, in the protocol's order.
     """
-    present = beams_of(protocol)
-    heights = candidates(protocol, limits)
-    sides = dict.fromkeys(side for side, _ in present)
-    beams = [*present, *((side, height) for side in sides for height in heights)]
+    present, heights = check_gates(protocol), candidates(protocol, limits)
+    gates = [*present.gates, *(Gate(0, z, side) for side in present.posts for z in heights)]
     inclines = sorted(protocol.plan.inclines)
     few = {inclines[round(n * (len(inclines) - 1) / (FEW - 1))] for n in range(FEW)}
     fewer = replace(protocol, plan=replace(protocol.plan, inclines=tuple(few)))
-    all_cases = cases(fewer, beams, components)
-    layout = list(range(len(present)))
+    all_cases = cases(with_gates(fewer, gates), components)
+    layout = list(range(len(present.gates)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
-    floor = min(MARGIN, margin(protocol, present))
+    floor = min(MARGIN, margin(protocol))
     best = score(protocol, GateLayout.of(all_cases, layout))
     for sweep in range(1, _SWEEPS + 1):
         before = best
-        for slot, (side, _) in enumerate(present):
+        for slot, gate in enumerate(present.gates):
             stay = [n for other, n in enumerate(layout) if other != slot]
             fixed = GateLayout.of(all_cases, stay).triangles()
-            taken = np.array([beams[n][1] for n in stay if beams[n][0] == side])
+            taken = np.array([gates[n].height for n in stay if gates[n].side == gate.side])
             places = [
                 n
-                for n in range(len(present), len(beams))
-                if beams[n][0] == side
-                and (np.abs(beams[n][1] - taken) >= limits.spacing - _ROUNDING_M).all()
+                for n, place in enumerate(gates)
+                if n >= len(layout)
+                and place.side == gate.side
+                and (np.abs(place.height - taken) >= limits.spacing - _ROUNDING_M).all()
             ]
             for stride, reach in ((_COARSE, len(places)), (1, _COARSE - 1)):
                 centre = places.index(layout[slot]) if layout[slot] in places else len(places) // 2
@@ -132,23 +128,24 @@ def better(
                     if trial >= best - _WORTH:
                         continue
                     # Only now: whether it can be read takes a few drops to be read.
-                    proposed = [beams[beam] for beam in (*layout[:slot], n, *layout[slot + 1 :])]
-                    if _see_before(protocol, proposed) and margin(protocol, proposed) >= floor:
+                    numbers = *layout[:slot], n, *layout[slot + 1 :]
+                    proposed = with_gates(protocol, (gates[number] for number in numbers))
+                    if _see_before(protocol, proposed) and margin(proposed) >= floor:
                         best, layout[slot] = trial, n
         say(f"sweep {sweep}: uncertainties × {math.exp(best):.3g} in the geometric mean")
         if before - best < _WORTH:
             break
-    return _sort_sides([beams[n] for n in layout])
+    return with_gates(protocol, _in_order(present, [gates[n] for n in layout]))
 
 
-def _see_before(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
+def _see_before(protocol: Protocol, proposed: Protocol) -> bool:
     """Whether enough beams of each side still see the chain before anything strikes.
 
     With fewer, one missed edge too many leaves the fall open.
     """
     before, after = (
-        Counter(side for side, height in layout if height > protocol.drop.value)
-        for layout in (beams_of(protocol), beams)
+        Counter(gate.side for gate in check_gates(p).gates if gate.height > protocol.drop.value)
+        for p in (protocol, proposed)
     )
     enough = (after[side] >= min(number, _BEFORE) for side, number in before.items())
     return protocol.surface is None or all(enough)
@@ -162,9 +159,12 @@ def score(protocol: Protocol, layout: GateLayout) -> float:
     return sum(values) / len(values)
 
 
-def _sort_sides(beams: Sequence[tuple[Side, float]]) -> list[tuple[Side, float]]:
-    """Sort each side's beams upwards, sides staying where they are."""
-    heights = {
-        side: iter(sorted(height for other, height in beams if other == side)) for side, _ in beams
-    }
-    return [(side, next(heights[side])) for side, _ in beams]
+def _in_order(present: Gates, moved: Sequence[Gate]) -> list[Gate]:
+    """Give the lowest gate of each side its lowest new height, and so on upwards."""
+
+    def upwards(gates: Iterable[Gate]) -> list[Gate]:
+        return sorted(gates, key=lambda gate: (gate.side, gate.height))
+
+    pairs = zip(upwards(present.gates), upwards(moved), strict=True)
+    heights = {gate.channel: place.height for gate, place in pairs}
+    return [replace(gate, height=heights[gate.channel]) for gate in present.gates]

@@ -19,7 +19,7 @@ from rig.analysis.annealing import EVER, MISSED
 from rig.analysis.components import stated
 from rig.analysis.identify import Identification, deciding_gate, identify
 from rig.analysis.verdict import LEAD, pattern_faults
-from rig.design.cases import CLOCK_U, perfect, predicted, with_beams, with_edges
+from rig.design.cases import CLOCK_U, perfect, predicted, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rig.analysis.chain_records import ChainRecord
-    from rig.arrays import Index
-    from rig.protocol.protocol import Protocol, Run, Side
+    from rig.protocol.protocol import Protocol, Run
     from rig.vocabulary import Vocabulary
 
 
@@ -86,13 +85,8 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     return Trials(drops, read, tuple(failing.items()), further_gate)
 
 
-def _fall(
-    protocol: Protocol, run: Run, rng: np.random.Generator
-) -> list[tuple[ChainRecord, list[Index]]]:
-    """Let chains fall that hang and are let go a little off, with impulses that scatter.
-
-    With each, for each of its trains, which edge each expected edge is.
-    """
+def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainRecord]:
+    """Let chains fall that hang and are let go a little off, with impulses that scatter."""
     assert protocol.gates is not None
     model, x = predicted(protocol, run, stated(protocol))
     at, sd, fallen = model.unknowns, model.unknowns.sd, []
@@ -110,27 +104,21 @@ def _fall(
             shake("impulses")
         shake("datum", protocol.gates.posts.index(record.role))
         path = model.trajectory(role, x)
-        trains, truth = [], []
+        trains = []
         for train in record.trains:
             shake("beams", train.gate)
             levels = model.all_levels(role, x)[model.expected[role].gate == train.gate]
             seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
-            times = path.times(levels[seen]) + protocol.priors.jitter * rng.standard_normal(
-                seen.size
-            )
+            jitter = protocol.priors.jitter * rng.standard_normal(seen.size)
+            times = path.times(levels[seen]) + jitter
             order = np.argsort(times, kind="stable")
-            edges = np.full(levels.size, -1)
-            edges[seen[order]] = np.arange(seen.size)
-            trains.append(with_edges(train, times[order], train.blocks[seen[order]]))
-            truth.append(edges)
-        fallen.append((replace(record, trains=tuple(trains)), truth))
+            trains.append(with_edges(train, seen[order], times[order]))
+        fallen.append(replace(record, trains=tuple(trains)))
     return fallen
 
 
 def read_drop(
-    protocol: Protocol,
-    fallen: Sequence[tuple[ChainRecord, Sequence[Index]]],
-    window: tuple[float, float] = EVER,
+    protocol: Protocol, records: Sequence[ChainRecord], window: tuple[float, float] = EVER
 ) -> tuple[Identification, list[str]]:
     """Read a drop; with it return the sides of which no fall, or the wrong one, was found.
 
@@ -138,10 +126,9 @@ def read_drop(
     ----------
     protocol
         With heights counted from the contact point.
-    fallen
-        Each chain, and for each of its trains which edge every expected edge is, −1 if missed.
+    records
+        Each chain, with edges numbered as `rig.design.cases.with_edges` has them.
     """
-    records = [record for record, _ in fallen]
     identification = identify(protocol, records, CLOCK_U, stated(protocol), window)
     unlike = list(pattern_faults(identification))
     if unlike or identification.fit is None:
@@ -149,21 +136,20 @@ def read_drop(
     matches = identification.fit.matches
     return identification, [
         record.role
-        for record, truth in fallen
+        for record in records
         if any(
-            np.any((match >= 0) & (match != true))
-            for match, true in zip(matches[record.role], truth, strict=True)
+            np.any(train.edge[match[match >= 0]] != np.flatnonzero(match >= 0))
+            for match, train in zip(matches[record.role], record.trains, strict=True)
         )
     ]
 
 
-def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
+def margin(protocol: Protocol) -> float:
     """Log odds by which the right fall leads the next best one; −∞ where it is not found at all.
 
     The least over the outermost inclines, with chains hung higher or lower than stated and every
     edge seen where it should be; no more than `MARGIN`.
     """
-    protocol = with_beams(protocol, beams)
     ends = {run.incline_deg: run for run in reversed(runs(protocol))}
     least = MARGIN
     for incline in {min(ends), max(ends)}:
@@ -171,20 +157,16 @@ def margin(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> float:
         model, x = predicted(here, ends[incline], stated(here))
         for off in (-_OFF, _OFF):
             x[model.unknowns["drop"]] = off * protocol.drop.u
-            fallen = [
-                (record, [np.arange(train.rods.size) for train in record.trains])
-                for record in perfect(model, x)
-            ]
-            identification, unclear = read_drop(here, fallen)
+            identification, unclear = read_drop(here, perfect(model, x))
             if identification.fit is None or unclear:
                 return -math.inf
             least = min(least, identification.log_odds)
     return least
 
 
-def readable(protocol: Protocol, beams: Sequence[tuple[Side, float]]) -> bool:
+def readable(protocol: Protocol) -> bool:
     """Whether every edge of a layout finds its rod, with something in hand."""
-    return margin(protocol, beams) >= MARGIN
+    return margin(protocol) >= MARGIN
 
 
 def trials_text(outcome: Trials, words: Vocabulary) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 from rig.analysis.components import Components
 from rig.analysis.session import Analysis
-from rig.design.cases import beams_of, cases, with_beams
+from rig.design.cases import cases, with_gates
 from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.search import Room, better, score
 from rig.design.trials import Trials, readable, trials, trials_text
@@ -44,9 +44,7 @@ def placed(protocol: Protocol, heights: list[float], **plan) -> Protocol:
 
 def foretold(protocol: Protocol, components: Components, *names: str) -> Forecast:
     """What the protocol's own beams will tell."""
-    beams = beams_of(protocol)
-    layout = GateLayout.of(cases(protocol, beams, components), range(len(beams)))
-    return forecast(protocol, layout, names or None)
+    return forecast(protocol, GateLayout.of(cases(protocol, components)), names or None)
 
 
 @cache
@@ -137,7 +135,8 @@ def predicted_speed_u(layout: tuple[float, ...]) -> float:
 def test_a_proposed_layout_is_better_as_predicted_and_in_fact():
     """Root mean square over sixteen drops: χ² of 16 stays within a factor 1.6 of its mean."""
     protocol = placed(SINGLE, list(BEFORE), repeats=16)
-    proposed = tuple(h for _, h in better(protocol, TRUE, Room(0.02, 0.8, 0.01)))
+    found = better(protocol, TRUE, Room(0.02, 0.8, 0.01))
+    proposed = tuple(gate.height for gate in found.gates.gates)
     assert min(proposed) < 0.048
     before, after = (float(np.sqrt(np.mean(speed_errors(x) ** 2))) for x in (BEFORE, proposed))
     assert after < 0.7 * before
@@ -145,16 +144,16 @@ def test_a_proposed_layout_is_better_as_predicted_and_in_fact():
         assert 0.6 < realised / predicted_speed_u(layout) < 1.6
 
 
-LOW = [("impact", h) for h in (0.02, 0.044, 0.056, 0.084)]
+LOW = placed(SINGLE, [0.02, 0.044, 0.056, 0.084])
 
 
 def test_low_beams_alone_are_read_too():
     """No beam sees the chain before it strikes: what rods pass is enough to tell the fall."""
-    assert readable(SINGLE, LOW)
+    assert readable(LOW)
     # Counted from the board, rods touch higher where it is steep.
     steep = parse(from_board(raised(UNIFORM.text, 25.0)).replace("10 deg, 40 deg, 50", "60"))
-    assert readable(steep, beams_of(steep))
-    assert trials(with_beams(SINGLE, LOW), 6) == Trials(6, 6)
+    assert readable(steep)
+    assert trials(LOW, 6) == Trials(6, 6)
 
 
 def test_trials_that_fail_name_the_side_and_a_gate():
@@ -170,15 +169,16 @@ def test_proposals_respect_limits_and_are_never_worse():
     there = [0.06, 0.1, 0.35, 0.69]
     protocol = placed(SINGLE, there, repeats=4)
     limits = Room(0.05, 0.7, 0.03)
-    found = better(protocol, TRUE, limits)
-    heights = sorted(height for _, height in found)
+    found = better(protocol, TRUE, limits).gates.gates
+    heights = [gate.height for gate in found]
+    assert heights == sorted(heights)
     assert limits.lowest <= heights[0]
     assert heights[-1] <= limits.highest
     assert min(np.diff(heights)) >= limits.spacing - 1e-9
     hanging = 0.18 + np.array(protocol.chains["A"].chain.heights)
     moved = [h for h in heights if h not in there]
     assert all(np.abs(hanging - h).min() >= 0.0127 / 2 for h in moved)
-    every = cases(protocol, [*beams_of(protocol), *found], TRUE)
+    every = cases(with_gates(protocol, [*protocol.gates.gates, *found]), TRUE)
     assert score(protocol, GateLayout.of(every, range(4, 8))) <= (
         score(protocol, GateLayout.of(every, range(4))) + 1e-9
     )
@@ -186,4 +186,4 @@ def test_proposals_respect_limits_and_are_never_worse():
 
 def test_a_scene_without_gates_has_no_layout():
     with pytest.raises(InputError, match="no gates"):
-        beams_of(replace(SINGLE, gates=None))
+        with_gates(replace(SINGLE, gates=None), ())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.components import stated
-from rig.design.cases import BEAM, beams_of, cases
+from rig.design.cases import BEAM, cases
 from rig.design.forecast import GateLayout, forecast
 from rig.estimate.hypotheses import alphas
 from rig.protocol import reader
@@ -95,9 +95,9 @@ def variances(slopes: np.ndarray, gradients: np.ndarray) -> list[Decimal]:
 @pytest.mark.parametrize("name", RIGS)
 def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
     protocol, floor = RIGS[name]
-    beams, surface = beams_of(protocol), protocol.surface
-    kinds = cases(protocol, beams, replace(stated(protocol), floor=floor))
-    found = forecast(protocol, GateLayout.of(kinds, range(len(beams))))
+    beams, surface = protocol.gates.gates, protocol.surface
+    kinds = cases(protocol, replace(stated(protocol), floor=floor))
+    found = forecast(protocol, GateLayout.of(kinds))
     # All unknowns of the session: each drop's own and its α, what is common, beams.
     common = sum(case.own + case.struck for case in kinds)
     size, first, rows, at_alpha, gradients = (
