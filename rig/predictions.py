@@ -5,6 +5,7 @@ Mechanics that a scene does not have are not loaded.
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from rig.protocol.contact import as_struck, at_contact
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.model.predict import Prediction
     from rig.protocol.protocol import Protocol, RodChain, Run
@@ -173,30 +174,21 @@ def _vary_coefficients(
     protocol: Protocol, run: Run, struck: str
 ) -> Iterator[tuple[str, Protocol, Protocol, float]]:
     """Each coefficient, made less and more, and its uncertainty over the distance between them."""
+    from rig.model import impact, predict  # noqa: PLC0415 - only where something is struck
+
     surface, rods = protocol.surface, protocol.chains[struck]
     assert surface is not None
 
-    def on(**changed: Any) -> Protocol:
-        return replace(protocol, surface=replace(surface, **changed))
+    def changed(values: dict[str, float]) -> Protocol:
+        other, chain = impact.with_coefficients(surface, rods.chain, values)
+        chains = {**protocol.chains, struck: replace(rods, chain=chain)}
+        return replace(protocol, surface=other, chains=chains)
 
-    def giving(alpha: Quantity) -> Protocol:
-        chain = replace(rods, chain=replace(rods.chain, alpha=alpha))
-        return replace(protocol, chains={**protocol.chains, struck: chain})
-
-    stated: list[tuple[str, Quantity, Callable[[Quantity], Protocol]]] = [
-        ("restitution", surface.restitution, lambda to: on(restitution=to)),
-        ("friction", surface.friction, lambda to: on(friction=to)),
-    ]
-    pile, alpha = surface.pile, rods.chain.alpha
-    if pile is not None:
-        stated.append(("pile", pile.restitution, lambda to: on(pile=replace(pile, restitution=to))))
-    if alpha is not None:
-        stated.append((f"alpha {protocol.condition(run).impact_chain}", alpha, giving))
-    for name, value, change in stated:
-        if value.u:
-            low, high = value.value - value.u, value.value + value.u
-            low = max(0.0, low) if name == "friction" else low
-            yield name, change(Quantity(low)), change(Quantity(high)), value.u / (high - low)
+    own = {impact.ALPHA: f"alpha {protocol.condition(run).impact_chain}"}
+    stated = impact.stated_coefficients(surface, rods.chain, run.incline_deg)
+    for name, value in stated.items():
+        for low, high, share in predict.steps(value, predict.LEAST.get(name, -math.inf)):
+            yield own.get(name, name), changed({name: low}), changed({name: high}), share
 
 
 def notes(protocol: Protocol) -> list[str]:

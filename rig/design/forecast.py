@@ -11,7 +11,7 @@ import numpy as np
 from rig.analysis.square_root import EquationRows, eliminate, square_root, triangle
 from rig.analysis.summary import by_case
 from rig.design.cases import BEAM
-from rig.estimate.coefficients import KNOWN, held_back, stated_coefficients
+from rig.estimate.coefficients import KNOWN, coefficients_of, held_back
 from rig.estimate.hypotheses import alphas
 from rig.threads import one_thread
 
@@ -167,7 +167,7 @@ def _coefficients(protocol: Protocol, layout: GateLayout) -> tuple[dict[str, flo
     for case, drop in zip(layout.cases, reduced, strict=True):
         if case.struck:
             struck = protocol.chains[case.run.impact or ""].chain, case.run.incline_deg
-            depends_on, _ = stated_coefficients(protocol, *struck)
+            depends_on, _ = coefficients_of(protocol, *struck)
             stated |= depends_on
             if depends_on:
                 tied.append((case, drop.rest.slopes, struck))

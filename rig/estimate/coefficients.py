@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rig.analysis.air import prior_air
-from rig.estimate.hypotheses import BETA, MU, PILE, by_model, given_alphas, with_nuisances
+from rig.estimate.hypotheses import by_model, given_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
-from rig.model.impact import impact_on
+from rig.model.impact import ALPHA, BETA, MU, PILE, impact_on, stated_coefficients
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -78,7 +78,7 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
     stated: dict[str, Quantity] = {}
     left_out, in_model = [], []
     for form in sorted(forms, key=lambda form: form.run.incline_deg):
-        depends_on, notes = stated_coefficients(protocol, form.chain, form.run.incline_deg)
+        depends_on, notes = coefficients_of(protocol, form.chain, form.run.incline_deg)
         stated |= depends_on
         if depends_on:
             in_model.append(form)
@@ -102,24 +102,19 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
     return replace(problem.hold(held), left_out=tuple(dict.fromkeys(left_out)))
 
 
-def stated_coefficients(
+def coefficients_of(
     protocol: Protocol, chain: Chain, incline_deg: float
 ) -> tuple[dict[str, Quantity], Sequence[str]]:
     """Return the protocol's coefficients that a drop depends on by the model, by name.
 
     Where the model does not describe it there are none, but sentences that say why.
     """
-    surface = protocol.surface
-    assert surface is not None
-    impact = impact_on(surface, chain, incline_deg)
-    if chain.alpha is not None:
-        return {given_alphas(protocol)[chain]: chain.alpha}, ()
-    if impact.notes:
-        return {}, impact.notes
-    if impact.basis == "pile" and surface.pile is not None:
-        return {PILE: surface.pile.restitution}, ()
-    friction = {MU: surface.friction} if impact.basis == "surface" else {}
-    return {BETA: surface.restitution, **friction}, ()
+    assert protocol.surface is not None
+    scene = protocol.surface, chain, incline_deg
+    if chain.alpha is None and (notes := impact_on(*scene).notes):
+        return {}, notes
+    own = {ALPHA: given_alphas(protocol).get(chain, ALPHA)}
+    return {own.get(name, name): stated for name, stated in stated_coefficients(*scene).items()}, ()
 
 
 def words(name: str) -> str:

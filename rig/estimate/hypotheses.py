@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
+from rig.model.impact import ALPHA, with_coefficients
 from rig.model.rods import rod_impacts
-from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 
     AlphasAndSlopes = tuple[Array, Array]
 
-ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 END, AIR = "end_correction", "drag"
 CONTACT_U = 1e-3
 """How far the contact point may move when the board is inclined anew, m."""
@@ -59,16 +57,15 @@ def alphas(
     values
         Coefficients by name; others are as stated.
     """
-    alpha, stated = given_alphas(protocol).get(chain), protocol.surface
-    assert stated is not None
+    alpha, surface = given_alphas(protocol).get(chain, ""), protocol.surface
+    assert surface is not None
 
     def at(moved: Mapping[str, float]) -> Array:
-        new: dict[str, Any] = {name: Quantity(value) for name, value in moved.items()}
-        struck = replace(chain, alpha=new[alpha]) if alpha in new else chain
-        surface = replace(stated, **{name: new[name] for name in (BETA, MU) if name in new})
-        if stated.pile is not None and PILE in new:
-            surface = replace(surface, pile=replace(stated.pile, restitution=new[PILE]))
-        return np.array([impact.alpha for impact in rod_impacts(surface, struck, incline_deg)])
+        # Of given α's only the chain's own.
+        own = {name: value for name, value in moved.items() if not name.startswith(ALPHA)}
+        own |= {ALPHA: moved[alpha]} if alpha in moved else {}
+        struck = with_coefficients(surface, chain, own)
+        return np.array([impact.alpha for impact in rod_impacts(*struck, incline_deg)])
 
     slopes = np.zeros((chain.rods, len(values)))
     for n, (name, value) in enumerate(values.items()):

@@ -15,8 +15,8 @@ import numpy as np
 
 from rig.analysis.plain_data import attributes
 from rig.estimate.coefficients import CoefficientProblem, best
-from rig.estimate.hypotheses import MU
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter
+from rig.model.impact import MU
 
 if TYPE_CHECKING:
     from rig.arrays import Array

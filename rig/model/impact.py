@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import DomainError
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
+from rig.units import Quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rig.model.surface import Pile, Surface
+
+ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
+"""Names of the coefficients that a protocol states."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,20 +87,28 @@ def gamma_finite(inertia: float, inertia_above: float | None = None) -> float:
     return 0.25 * (1.0 + inertia) * (1.0 + 1.0 / above)
 
 
-def impact_on(
-    surface: Surface,
-    chain: Chain,
-    incline_deg: float,
-    *,
-    restitution: float | None = None,
-    friction: float | None = None,
-) -> Impact:
-    """Coefficients for a chain on a surface, with every departure from the domain noted.
+def stated_coefficients(surface: Surface, chain: Chain, incline_deg: float) -> dict[str, Quantity]:
+    """Return what α rests on, by name: α itself, a pile's β, or β and, inclined, μ."""
+    if chain.alpha is not None:
+        return {ALPHA: chain.alpha}
+    if surface.pile is not None and incline_deg < surface.pile.below_deg:
+        return {PILE: surface.pile.restitution}
+    return {BETA: surface.restitution} | ({MU: surface.friction} if incline_deg else {})
 
-    Parameters
-    ----------
-    restitution, friction
-        Replace the surface's (and the pile's) central values; used to vary them.
+
+def with_coefficients(
+    surface: Surface, chain: Chain, values: Mapping[str, float]
+) -> tuple[Surface, Chain]:
+    """Return a surface and a chain with other coefficients, by the names of the stated ones."""
+    new: dict[str, Any] = {name: Quantity(value) for name, value in values.items()}
+    if PILE in new and surface.pile is not None:
+        surface = replace(surface, pile=replace(surface.pile, restitution=new[PILE]))
+    surface = replace(surface, **{name: new[name] for name in (BETA, MU) if name in new})
+    return surface, replace(chain, alpha=new[ALPHA]) if ALPHA in new else chain
+
+
+def impact_on(surface: Surface, chain: Chain, incline_deg: float) -> Impact:
+    """Coefficients for a chain on a surface, with every departure from the domain noted.
 
     Raises
     ------
@@ -106,14 +120,14 @@ def impact_on(
     basis = "surface" if incline_deg else "level"
     if surface.pile is not None and incline_deg < surface.pile.below_deg:
         struck, basis = surface.pile, "pile"
-    beta = struck.restitution.value if restitution is None else restitution
+    beta = struck.restitution.value
     notes = []
     if chain.alpha is not None:
         alpha, gamma, basis = chain.alpha.value, gamma or 0.0, "given"
     elif basis != "surface":
         alpha = alpha_level(beta, chain.inertia)
     else:
-        mu = surface.friction.value if friction is None else friction
+        mu = surface.friction.value
         alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia, chain.inertia_z)
         sliding = math.degrees(math.atan(mu))
         if incline_deg < sliding:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
 from rig.model.fall import Fall, fall, free_fall, kicks
-from rig.model.impact import Impact, impact_on
+from rig.model.impact import MU, impact_on, stated_coefficients, with_coefficients
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from rig.model.surface import Surface
 
 AT_REST = Quantity(0.0)
+LEAST = {MU: 0.0}
+"""Coefficients that cannot be below a value."""
 _ENDS = {"separation": "separation_m", "speed": "speed_m_s", "time": "time_s"}
 """Results of a prediction, and what a fall's end calls them."""
 
@@ -109,18 +111,18 @@ def predict(
     notes = impact.notes
     uncertainties: dict[str, float] = {}
     moves = {
-        "alpha": _moved_alphas(chain, surface, impact, incline_deg),
-        "drop": _steps(drop, least=0.0),
+        "alpha": _moved_alphas(chain, surface, incline_deg),
+        "drop": steps(drop, least=0.0),
         # Half of g is far enough for a slope, and a fall without gravity has no end.
-        "gravity": _steps(gravity, least=gravity.value / 2),
-        "speed": _steps(initial_speed, least=0.0),
-        "drag": _steps(Quantity(1.0, drag_u), least=0.0),
+        "gravity": steps(gravity, least=gravity.value / 2),
+        "speed": steps(initial_speed, least=0.0),
+        "drag": steps(Quantity(1.0, drag_u), least=0.0),
     }
     try:
         spread = [
             (drop_with(**{name: low}), drop_with(**{name: high}), weight)
-            for name, steps in moves.items()
-            for low, high, weight in steps
+            for name, ends in moves.items()
+            for low, high, weight in ends
         ]
     except DomainError as error:
         notes = (*notes, f"no uncertainty: within that of μ, {error.message}")
@@ -152,30 +154,24 @@ def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quanti
         Where Eq. 13 has no finite solution, or none within the uncertainty of μ.
     """
     impact = impact_on(surface, chain, incline_deg)
-    steps = _moved_alphas(chain, surface, impact, incline_deg)
-    return Quantity(impact.alpha, math.hypot(*((b - a) * weight for a, b, weight in steps)))
+    ends = _moved_alphas(chain, surface, incline_deg)
+    return Quantity(impact.alpha, math.hypot(*((b - a) * weight for a, b, weight in ends)))
 
 
 def _moved_alphas(
-    chain: Chain, surface: Surface, impact: Impact, incline_deg: float
+    chain: Chain, surface: Surface, incline_deg: float
 ) -> Iterator[tuple[float, float, float]]:
     """α with each of what it rests on moved down and up, and the weight."""
-    if chain.alpha is not None:
-        yield from _steps(chain.alpha)
-        return
-    struck = surface.pile if impact.basis == "pile" and surface.pile else surface
-    moves = {"restitution": _steps(struck.restitution)}
-    if impact.basis == "surface":
-        moves["friction"] = _steps(surface.friction, least=0.0)
-    for name, steps in moves.items():
-        for *ends, weight in steps:
+    for name, stated in stated_coefficients(surface, chain, incline_deg).items():
+        for *ends, weight in steps(stated, least=LEAST.get(name, -math.inf)):
             low, high = (
-                impact_on(surface, chain, incline_deg, **{name: end}).alpha for end in ends
+                impact_on(*with_coefficients(surface, chain, {name: end}), incline_deg).alpha
+                for end in ends
             )
             yield low, high, weight
 
 
-def _steps(quantity: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:
+def steps(quantity: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:
     """An input moved down and up by u, not below `least`; nothing where it is exact."""
     low, high = max(least, quantity.value - quantity.u), quantity.value + quantity.u
     if high > low:

@@ -13,6 +13,7 @@ from rig.analysis.verdict import SUPPORT
 from rig.model.impact import impact_on
 from rig.protocol.protocol import Protocol
 from rig.records import Edge
+from rig.units import Quantity
 from sim.dials import Dials
 from tests.analysis.drops import CLOCK_U, FENCE, HZ, SCENES, STATED, UNIFORM, Case, case, codes
 from tests.examples import examples
@@ -23,8 +24,8 @@ RECORD = case(UNIFORM, Dials.quiet(), incline=40.0)
 @pytest.mark.parametrize("restitution", [0.0, 0.2, 0.8])
 def test_alpha_is_found_far_from_what_the_model_expects(restitution):
     one = case(UNIFORM, replace(Dials.quiet(), restitution=restitution), incline=40.0)
-    chain = UNIFORM.chains["A"].chain
-    true = impact_on(UNIFORM.surface, chain, 40.0, restitution=restitution).alpha
+    surface = replace(UNIFORM.surface, restitution=Quantity(restitution))
+    true = impact_on(surface, UNIFORM.chains["A"].chain, 40.0).alpha
     assert one.guesses()["impact"].alpha == pytest.approx(true, abs=2e-3)
 
 

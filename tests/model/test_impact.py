@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 
 from rig.errors import DomainError
 from rig.model.chain import Chain
-from rig.model.impact import alpha_inclined, alpha_level, gamma_finite, impact_on
+from rig.model.impact import (
+    ALPHA,
+    PILE,
+    alpha_inclined,
+    alpha_level,
+    gamma_finite,
+    impact_on,
+    stated_coefficients,
+    with_coefficients,
+)
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
@@ -78,20 +87,26 @@ def test_what_alpha_rests_on(surface, incline, basis, alpha):
     assert impact.notes == ()
 
 
+OTHER = {"restitution": 0.1, "friction": 0.3, PILE: 0.2}
+
+
 def test_given_coefficients_win_over_the_surface():
     beads = Chain(RODS.masses, RODS.heights, alpha=Quantity(0.12, 0.02))
     assert impact_on(PILED, beads, 10.0).gamma == 0.0
     stiff = Chain(RODS.masses, RODS.heights, alpha=Quantity(0.12), gamma=0.7)
-    impact = impact_on(SURFACE, stiff, 40.0, restitution=0.9, friction=0.9)
+    impact = impact_on(*with_coefficients(SURFACE, stiff, OTHER), 40.0)
     assert (impact.alpha, impact.gamma, impact.basis) == (0.12, 0.7, "given")
     free = impact_on(SURFACE, Chain(RODS.masses, RODS.heights, gamma=0.7), 40.0)
     assert (free.alpha, free.gamma) == (alpha_inclined(0.5, 0.2, 40.0), 0.7)
 
 
 def test_central_values_can_be_replaced():
-    changed = impact_on(PILED, RODS, 40.0, restitution=0.1, friction=0.3)
-    assert changed.alpha == alpha_inclined(0.1, 0.3, 40.0)
-    assert impact_on(PILED, RODS, 10.0, restitution=0.1, friction=0.3).alpha == alpha_level(0.1)
+    changed = with_coefficients(PILED, RODS, OTHER)
+    assert impact_on(*changed, 40.0).alpha == alpha_inclined(0.1, 0.3, 40.0)
+    assert impact_on(*changed, 10.0).alpha == alpha_level(0.2)
+    assert {k: q.value for k, q in stated_coefficients(*changed, 10.0).items()} == {PILE: 0.2}
+    given = with_coefficients(*changed, {ALPHA: 0.3})
+    assert stated_coefficients(*given, 10.0) == {ALPHA: Quantity(0.3)}
 
 
 @examples(80)
