@@ -13,7 +13,7 @@ from rig.estimate.hypotheses import by_model, one_alpha, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, LikelihoodRatio, fit
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.hypothesis_fit import Hypothesis
@@ -72,23 +72,19 @@ class SingleAlphas:
     ----------
     inclines, runs
         Of each condition and of each run.
-    runs_share_alpha
-        One α for the runs of a condition against one for each; `None` with one run a condition.
-    by_model
-        Eqs. 8 to 13 with the fitted coefficients against one α a condition; `None` where that
-        leaves no degree of freedom.
+    tests
+        ``runs_share_alpha``: one α for the runs of a condition against one for each; ``model``:
+        Eqs. 8 to 13 with the fitted coefficients against one α a condition. Neither is there where
+        it leaves no degree of freedom.
     """
 
     inclines: tuple[ConditionAlpha, ...]
     runs: tuple[RunAlpha, ...]
-    runs_share_alpha: LikelihoodRatio | None
-    by_model: LikelihoodRatio | None
+    tests: Mapping[str, LikelihoodRatio]
 
     def json(self) -> dict[str, Any]:
         """``alpha`` and ``tests``."""
-        tests = {"runs_share_alpha": self.runs_share_alpha, "model": self.by_model}
-        results = {name: plain(test) for name, test in tests.items() if test is not None}
-        return {"alpha": attributes(self, "inclines", "runs"), "tests": results}
+        return {"alpha": attributes(self, "inclines", "runs"), "tests": plain(self.tests)}
 
 
 def single_alphas(
@@ -116,8 +112,11 @@ def single_alphas(
 
     by_run = fit(forms, in_air(one_alpha(forms, lambda form: form.run.number)))
     by_case = fit(groups, in_air(one_alpha(groups, case)))
+    counts = Counter(map(case, forms))
     model: dict[Condition, float] = {}
-    against_model = None
+    tests: dict[str, LikelihoodRatio] = {}
+    if len(forms) > len(counts):
+        tests["runs_share_alpha"] = by_case.against(by_run)
     if problem is not None and outcome is not None:
         supposed = by_model(protocol, problem.parameters)
         values = outcome.values[: len(problem.parameters)]
@@ -127,8 +126,7 @@ def single_alphas(
         if len(model) > len(problem.parameters) > len(problem.held) == 0:
             # With the contact where it is, so that both suppose the same but for α.
             open_ = fit(problem.forms, in_air(one_alpha(problem.forms, case)))
-            against_model = fit(problem.forms, in_air(supposed)).against(open_)
-    counts = Counter(map(case, forms))
+            tests["model"] = fit(problem.forms, in_air(supposed)).against(open_)
     return SingleAlphas(
         tuple(
             ConditionAlpha(key, counts[key], Measured(*by_case[f"α {key}"]), model.get(key))
@@ -138,6 +136,5 @@ def single_alphas(
             RunAlpha(form.run, Measured(*by_run[f"α {form.run.number}"]), model.get(case(form)))
             for form in forms
         ),
-        by_case.against(by_run) if len(forms) > len(counts) else None,
-        against_model,
+        tests,
     )

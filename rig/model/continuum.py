@@ -95,6 +95,16 @@ class UniformChain:
         return self.gamma * self.spacing_m
 
     @property
+    def power(self) -> float:
+        """1 + 2α of Eq. 14."""
+        return 1.0 + 2.0 * self.alpha
+
+    @property
+    def pull(self) -> float:
+        """2gA of Eq. 14, m²/s²."""
+        return 2.0 * self.gravity * (self.length_m + self.reach_m)
+
+    @property
     def strike_speed(self) -> float:
         """V_h, speed as the chain first strikes, m/s."""
         return math.sqrt(self.initial_speed**2 + 2.0 * self.gravity * self.drop_m)
@@ -147,9 +157,8 @@ def speed(chain: UniformChain, height_m: float) -> float:
         if chain.alpha > 0.0:
             return math.inf
         return math.sqrt(squared + 2.0 * chain.gravity * chain.length_m)
-    ratio, power = fallen / below, 1.0 + 2.0 * chain.alpha
-    gravity = 2.0 * chain.gravity * (chain.length_m + chain.reach_m)
-    bracket = squared - gravity * math.expm1(-power * math.log1p(ratio)) / power
+    ratio, power = fallen / below, chain.power
+    bracket = squared - chain.pull * math.expm1(-power * math.log1p(ratio)) / power
     try:
         # A power of the ratio itself: its logarithm would be rounded before it is multiplied up.
         grown = math.pow(1.0 + ratio, chain.alpha)
@@ -204,11 +213,9 @@ def _substitution(chain: UniformChain, span: float) -> tuple[float, float]:
     V² is zero at x = −x₀ (x₀ ≈ V_h²/2gA for a small drop), and x + x₀ is to be the square of
     p + q/2 but for a factor: q²/(4(1 + q)) = x₀/X.
     """
-    power = 1.0 + 2.0 * chain.alpha
-    gravity = 2.0 * chain.gravity * (chain.length_m + chain.reach_m)
-    if gravity == 0.0:
+    if chain.pull == 0.0:
         return 0.0, 1.0
-    zero = math.log1p(power * chain.strike_speed**2 / gravity) / power / span
+    zero = math.log1p(chain.power * chain.strike_speed**2 / chain.pull) / chain.power / span
     if math.isinf(zero):
         return 0.0, 1.0
     q = 2.0 * (zero + math.sqrt(zero) * math.sqrt(1.0 + zero))
@@ -243,8 +250,6 @@ def separation_leading_order(alpha: float, length_m: float, reach_m: float) -> f
 
 def _speeds(chain: UniformChain, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Eq. 14 as a function of x = ln(A/(z + γs))."""
-    power = 1.0 + 2.0 * chain.alpha
-    gravity = 2.0 * chain.gravity * (chain.length_m + chain.reach_m)
-    bracket = chain.strike_speed**2 - gravity * np.expm1(-power * x) / power
+    bracket = chain.strike_speed**2 - chain.pull * np.expm1(-chain.power * x) / chain.power
     grown: NDArray[np.float64] = np.exp(chain.alpha * x) * np.sqrt(bracket)
     return grown

@@ -84,13 +84,13 @@ def predict(
     Uncertainties are first order: each input is moved by ± its standard uncertainty, or, where
     that would leave what is possible, by less and to one side; the slope counts either way.
     """
-    place = {"drop": drop.value, "gravity": gravity.value, "speed": initial_speed.value}
+    start, pull = initial_speed.value, gravity.value
     if kappas:
         from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
 
-        free = drag_leg(drop.value + chain.length, place["speed"], place["gravity"], kappas[0])
+        free = drag_leg(drop.value + chain.length, start, pull, kappas[0])
     else:
-        free = free_fall(chain, *place.values())
+        free = free_fall(chain, drop.value, pull, start)
     air = ", drag" if kappas else ""
     try:
         impact = impact_on(surface, chain, incline_deg)
@@ -98,29 +98,33 @@ def predict(
         return Prediction(
             incline_deg, f"discrete{air}", free[0], in_domain=False, notes=(error.message,)
         )
-    stated = {"alpha": impact.alpha, "drag": 1.0, **place}
 
-    def drop_with(**moved: float) -> Fall:
-        alpha, drag, *inputs = (stated | moved).values()
+    def fall_with(
+        alpha: float = impact.alpha,
+        drop: float = drop.value,
+        gravity: float = pull,
+        speed: float = start,
+        drag: float = 1.0,
+    ) -> Fall:
         if not kappas:
-            return fall(chain, alpha, impact.gamma, *inputs)
+            return fall(chain, alpha, impact.gamma, drop, gravity, speed)
         gains = kicks(chain, [alpha] * chain.rods, impact.gamma)
-        return drag_fall(chain, gains, [drag * kappa for kappa in kappas], *inputs)
+        return drag_fall(chain, gains, [drag * kappa for kappa in kappas], drop, gravity, speed)
 
-    centre = drop_with()
+    centre = fall_with()
     notes = impact.notes
     uncertainties: dict[str, float] = {}
     moves = {
         "alpha": _moved_alphas(chain, surface, incline_deg),
         "drop": steps(drop, least=0.0),
         # Half of g is far enough for a slope, and a fall without gravity has no end.
-        "gravity": steps(gravity, least=gravity.value / 2),
+        "gravity": steps(gravity, least=pull / 2),
         "speed": steps(initial_speed, least=0.0),
         "drag": steps(Quantity(1.0, drag_u), least=0.0),
     }
     try:
         spread = [
-            (drop_with(**{name: low}), drop_with(**{name: high}), weight)
+            (fall_with(**{name: low}), fall_with(**{name: high}), weight)
             for name, ends in moves.items()
             for low, high, weight in ends
         ]
