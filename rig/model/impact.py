@@ -13,10 +13,11 @@ from rig.units import Quantity
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rig.model.surface import Pile, Surface
+    from rig.model.surface import Surface
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 """Names of the coefficients that a protocol states."""
+_BASES = {(ALPHA,): "given", (PILE,): "pile", (BETA,): "level", (BETA, MU): "surface"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,20 +116,16 @@ def impact_on(surface: Surface, chain: Chain, incline_deg: float) -> Impact:
     DomainError
         Where Eq. 13 has no finite solution.
     """
-    gamma = chain.gamma
-    struck: Surface | Pile = surface
-    basis = "surface" if incline_deg else "level"
-    if surface.pile is not None and incline_deg < surface.pile.below_deg:
-        struck, basis = surface.pile, "pile"
-    beta = struck.restitution.value
-    notes = []
-    if chain.alpha is not None:
-        alpha, gamma, basis = chain.alpha.value, gamma or 0.0, "given"
-    elif basis != "surface":
-        alpha = alpha_level(beta, chain.inertia)
+    gamma, notes = chain.gamma, []
+    stated = stated_coefficients(surface, chain, incline_deg)
+    basis, (first, *friction) = _BASES[tuple(stated)], [each.value for each in stated.values()]
+    if basis == "given":
+        alpha, gamma = first, gamma or 0.0
+    elif not friction:
+        alpha = alpha_level(first, chain.inertia)
     else:
-        mu = surface.friction.value
-        alpha = alpha_inclined(beta, mu, incline_deg, chain.inertia, chain.inertia_z)
+        (mu,) = friction
+        alpha = alpha_inclined(first, mu, incline_deg, chain.inertia, chain.inertia_z)
         sliding = math.degrees(math.atan(mu))
         if incline_deg < sliding:
             notes.append(

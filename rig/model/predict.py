@@ -95,9 +95,7 @@ def predict(
     try:
         impact = impact_on(surface, chain, incline_deg)
     except DomainError as error:
-        return Prediction(
-            incline_deg, f"discrete{air}", free[0], in_domain=False, notes=(error.message,)
-        )
+        return Prediction(incline_deg, f"discrete{air}", free[0], False, (error.message,))
 
     def fall_with(
         alpha: float = impact.alpha,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -226,12 +227,10 @@ def _value(name: str, text: str, column: int) -> float:
 
 def _count(text: str, column: int) -> int:
     digits = text.strip()
-    if digits.isascii() and digits.isdigit() and len(digits) < 10:
-        number = int(digits)
-        if 2 <= number <= MOST_VALUES:
-            return number
-    range_words = f"a whole number from 2 to {MOST_VALUES} is wanted"
-    raise _FaultError(column, f"found {quoted(digits)}; {range_words}")
+    if re.fullmatch("[0-9]{1,9}", digits) and 2 <= int(digits) <= MOST_VALUES:
+        return int(digits)
+    message = f"found {quoted(digits)}; a whole number from 2 to {MOST_VALUES} is wanted"
+    raise _FaultError(column, message)
 
 
 def spaced(low: float, high: float, count: int) -> tuple[float, ...]:

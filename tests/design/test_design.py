@@ -12,7 +12,6 @@ from rig.design.cases import cases, with_gates
 from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.search import Room, better, score
 from rig.design.trials import Trials, readable, trials, trials_text
-from rig.errors import InputError
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.quadratic_forms import merge_like
 from rig.protocol.plan import runs
@@ -182,8 +181,3 @@ def test_proposals_respect_limits_and_are_never_worse():
     assert score(protocol, GateLayout.of(every, range(4, 8))) <= (
         score(protocol, GateLayout.of(every, range(4))) + 1e-9
     )
-
-
-def test_a_scene_without_gates_has_no_layout():
-    with pytest.raises(InputError, match="no gates"):
-        with_gates(replace(SINGLE, gates=None), ())
