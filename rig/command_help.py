@@ -6,11 +6,12 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+from rig import __version__
 from rig.streams import say
 
 
@@ -118,6 +119,8 @@ class Parser(argparse.ArgumentParser):
         self.exit(2)
 
 
+_MODULES = {"import": "import_edges"}
+"""Modules of commands whose names are not theirs."""
 _WORDS: dict[str, dict[str, Any]] = {
     "flag": {"action": "store_true"},
     "yes-no": {"action": argparse.BooleanOptionalAction},
@@ -134,9 +137,7 @@ and kinds of values; of several with ``either`` at most one is accepted, of ``on
 
 
 def _add_argument(
-    parser: Parser | argparse._MutuallyExclusiveGroup,
-    row: str,
-    kinds: Mapping[str, Callable[[str], dict[str, Any]]],
+    parser: argparse._ActionsContainer, row: str, kinds: dict[str, dict[str, Any]]
 ) -> None:
     """Accept what a row of the page describes."""
     names, words, text = (part.strip() for part in row.split("|", 2))
@@ -147,15 +148,15 @@ def _add_argument(
     else:
         options["metavar"] = metavar
     for word in words.split():
-        if word in _WORDS:
-            options |= _WORDS[word]
-        elif word.startswith("="):
+        if word.startswith("="):
             options["default"] = word.removeprefix("=")
         elif word.startswith("{"):
             options["choices"] = list(map(options.get("type", str), word.strip("{}").split(",")))
         else:
             kind, _, detail = word.partition(":")
-            options |= kinds[kind](detail)
+            options |= kinds[kind]
+            if detail:
+                options["type"] = partial(options["type"], detail)
     parser.add_argument(*flags, **options)
 
 
@@ -169,22 +170,14 @@ def _named(words: Sequence[str] | None) -> list[Command]:
     return every if any(not word.startswith("-") for word in words) else []
 
 
-def build_parser(
-    version: str,
-    kinds: Mapping[str, Callable[[str], dict[str, Any]]],
-    modules: Mapping[str, str],
-    words: Sequence[str] | None = None,
-) -> Parser:
+def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None = None) -> Parser:
     """Make the parser of all commands.
 
     Parameters
     ----------
-    version
-        What ``--version`` prints.
     kinds
-        What argparse needs to know of each kind of value: of what stands behind its colon.
-    modules
-        Modules of commands whose names are not theirs.
+        What argparse needs to know of each kind of value. What stands behind a kind's colon is the
+        first argument of its ``type``.
     words
         What is to be parsed: commands that it cannot name are left out, as they take time.
     """
@@ -200,7 +193,7 @@ def build_parser(
         "Exit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a run was\n"
         "void, 4 device trouble, 130 interrupted. rig replay: 1 the results differ.",
     )
-    parser.add_argument("--version", action="version", version=version)
+    parser.add_argument("--version", action="version", version=f"rig {__version__}")
     below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
     parsers = parser.commands
     for command in _named(words):
@@ -213,12 +206,12 @@ def build_parser(
         parsers[name] = below[outer].add_parser(
             last, description=command.text, epilog=examples, **options
         )
-        parsers[name].set_defaults(module=modules.get(name, name.replace(" ", "_")))
+        parsers[name].set_defaults(module=_MODULES.get(name, name.replace(" ", "_")))
         either = None
         for row in command.arguments:
             alone = {"either", "one-of"} & set(row.split("|")[1].split())
             if alone:
                 needed = "one-of" in alone
                 either = either or parsers[name].add_mutually_exclusive_group(required=needed)
-            _add_argument(either if either and alone else parsers[name], row, kinds)
+            _add_argument(either if either and alone else parsers[name], row, _WORDS | kinds)
     return parser

@@ -11,7 +11,7 @@ from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
 from rig.analysis.session import Analysis, planned_run
 from rig.cache.entry import recall
-from rig.commands.output import print_found, tell_damage
+from rig.commands.output import print_data, tell_damage
 from rig.errors import InputError
 from rig.measurands import MEASURANDS, Measurand
 from rig.protocol.plan import runs
@@ -39,7 +39,7 @@ def main(arguments: Namespace) -> int:
         outcome = results(session, fresh=fresh)
         make = partial(budget, session, outcome, *asked)
         account = recall(dict, make, "budget", outcome.digest, asked, fresh=fresh)
-    print_found(account, lambda: "\n".join(_table(account)), as_json=arguments.json)
+    print_data(account, _table(account), as_json=arguments.json)
     return tell_damage(outcome.analysis)
 
 

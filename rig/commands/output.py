@@ -9,7 +9,6 @@ import sys
 from contextlib import contextmanager
 from shutil import get_terminal_size
 from textwrap import wrap
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rig.command_help import runnable
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.results import SessionResults
+    from rig.selftest.findings import Finding
 
 VOID = 3
 
@@ -88,7 +88,7 @@ def stage(label: str) -> None:
 
     Parameters
     ----------
-    what
+    label
         Empty to clear the line.
     """
     if sys.stderr.isatty():
@@ -96,12 +96,26 @@ def stage(label: str) -> None:
             print(f"\r\x1b[K{label}", end="", file=sys.stderr, flush=True)
 
 
-def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bool) -> None:
-    """Print what was found, as JSON or as text."""
+def print_data(data: Mapping[str, Any], lines: Iterable[str], *, as_json: bool) -> None:
+    """Print a result as JSON, or as lines of text."""
     if as_json:
         print_json(data)
     else:
-        show(text().splitlines())
+        show(lines)
+
+
+def print_findings(
+    key: str, findings: Iterable[Finding], write: Callable[[Finding], str], *, as_json: bool
+) -> list[Finding]:
+    """Print each finding as soon as it is made, or all of them as JSON; return them."""
+    checks = []
+    for finding in findings:
+        checks.append(finding)
+        if not as_json:
+            print(write(finding), flush=True)
+    if as_json:
+        print_json({key: [finding.json() for finding in checks]})
+    return checks
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -109,12 +123,10 @@ def print_json(data: Mapping[str, Any]) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
 
 
-def print_results(
-    outcome: SessionResults, *, as_json: bool, members: Mapping[str, Any] = MappingProxyType({})
-) -> int:
+def print_results(outcome: SessionResults, *, as_json: bool, **members: object) -> int:
     """Print an analysis, as JSON with more members; the exit code says whether a run is void."""
     if as_json:
-        print_json({**outcome.json(), **members})
+        print_json(outcome.json() | members)
     else:
         if outcome.simulated:
             print("SIMULATED DATA")
