@@ -160,7 +160,7 @@ def _add_argument(
     parser.add_argument(*flags, **options)
 
 
-def _named(words: Sequence[str] | None) -> list[Command]:
+def _matching_commands(words: Sequence[str] | None) -> list[Command]:
     """Return the commands that words may name: that of the first one, else all, or none."""
     every = [*COMMANDS.values()]
     if words is None:
@@ -196,7 +196,7 @@ def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None =
     parser.add_argument("--version", action="version", version=f"rig {__version__}")
     below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
     parsers = parser.commands
-    for command in _named(words):
+    for command in _matching_commands(words):
         name = command.name
         outer, _, last = name.rpartition(" ")
         if outer not in below:

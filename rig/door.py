@@ -290,7 +290,7 @@ class RunResult(_Quantities):
     fall_time = _Quantity("fall_time_s")
     """From the impact chain's release to its top rod's strike, s."""
 
-    def __init__(self, drop: DropResult, session: str = "") -> None:
+    def __init__(self, drop: DropResult, session: str) -> None:
         super().__init__(drop.quantities)
         self.run = drop.run.number
         self.attempt = drop.attempt

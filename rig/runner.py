@@ -282,7 +282,7 @@ class Campaign:
             self._take(machine.EffectDone(self.flow.ticket, token))
 
     def _judge(self, job: Job) -> None:
-        if self._drop is None or job != (self._drop.run, self._drop.attempt):
+        if self._drop is None or job != self._drop.job:
             self._drop = self.rig.collect(*job)
         result = self._result = self.live.judge(self.session, self._drop)
         self._take(machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons))

@@ -90,9 +90,7 @@ def _can_ask(arguments: Namespace) -> bool:
     return not arguments.yes and sys.stdin.isatty()
 
 
-def _ask(
-    arguments: Namespace, option: str, words: str, usual: str, accepted: Sequence[str] = ()
-) -> str:
+def _ask(arguments: Namespace, option: str, words: str, usual: str, accepted: Sequence[str]) -> str:
     """Return the answer of the command line or of the user, or the default.
 
     `accepted` is empty where any answer is.

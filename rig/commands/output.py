@@ -51,7 +51,7 @@ def show(lines: Iterable[str]) -> None:
         return
     width = get_terminal_size().columns
     for line in lines:
-        for part in _broken(line, width):
+        for part in _break_sentence(line, width):
             print(tint(part))
 
 
@@ -65,7 +65,7 @@ def has_colours() -> bool:
     return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
-def _broken(line: str, width: int) -> list[str]:
+def _break_sentence(line: str, width: int) -> list[str]:
     """Break a sentence at words, what goes on indented; tables stay as they are."""
     words = line.lstrip()
     if len(line) <= width or _GAP in words:

@@ -55,9 +55,9 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
         }
         if protocol.two_chains:
             heading = f"{apart.symbol} ± U ({apart.unit})"
-            columns[heading] = lambda line: _written(line.separation_m, line.separation_u_m, apart)
+            columns[heading] = lambda line: _number(line.separation_m, line.separation_u_m, apart)
         heading = f"{end.symbol} ± U ({end.unit})"
-        columns[heading] = lambda line: _written(line.speed_m_s, line.speed_u_m_s, end)
+        columns[heading] = lambda line: _number(line.speed_m_s, line.speed_u_m_s, end)
     columns["t (s)"] = lambda line: fixed(line.fall_time_s, 5)
     columns["model"] = lambda line: line.model
     cells = {name: [tell(line) for line in lines] for name, tell in columns.items()}
@@ -70,7 +70,7 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     return [*text_table([*zip(*rows, strict=True)], left=words), *notes]
 
 
-def _written(value: float | None, u: float | None, row: Measurand) -> str:
+def _number(value: float | None, u: float | None, row: Measurand) -> str:
     """Write a prediction with what its own numbers leave open."""
     if value is None or u is None:
         return fixed(value and value * row.scale, row.decimals + 1)

@@ -47,8 +47,8 @@ def test_a_port_is_named_so_that_it_stays(tmp_path, monkeypatch):
     monkeypatch.setattr(
         service_install, "Path", lambda path: tmp_path if "by-id" in path else Path(path)
     )
-    assert service_install._lasting(str(device)) == str(link)
-    assert service_install._lasting("/dev/ttyS9") == "/dev/ttyS9"
+    assert service_install._lasting_name(str(device)) == str(link)
+    assert service_install._lasting_name("/dev/ttyS9") == "/dev/ttyS9"
 
 
 def test_without_a_board_there_is_no_unit(units, monkeypatch, capsys):
