@@ -30,14 +30,18 @@ class Command(NamedTuple):
 def _read_page(page: str) -> dict[str, list[Command]]:
     """Return the commands of each group."""
     groups: dict[str, list[Command]] = {}
+    shared: dict[str, str] = {}
     for paragraph in page.strip().split("\n\n"):
         head, *lines = paragraph.splitlines()
-        if head.startswith("## "):
+        if head == "shared":
+            shared = {line.partition(" |")[0]: line for line in lines}
+        elif head.startswith("## "):
             groups[head.removeprefix("## ")] = commands = []
         elif not head.startswith("#"):
             examples = [line.strip(" $") for line in lines if line.startswith("  $ ")]
             name, text = head.split(": ", 1)
-            commands.append(Command(name, text, lines[: len(lines) - len(examples)], examples))
+            rows = [shared.get(line, line) for line in lines[: len(lines) - len(examples)]]
+            commands.append(Command(name, text, rows, examples))
     return groups
 
 
