@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.result import GOOD
 from rig.commands import report
 from rig.commands.narration import narrator
-from rig.commands.output import VOID, goes_on, say, show
+from rig.commands.output import exit_code, goes_on, say, show
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
 from rig.measurands import averaged
@@ -79,7 +79,7 @@ def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
 
         webbrowser.open(page.absolute().as_uri())
     say(f"show it: rig tui --session {session}\nyour own set-up: rig new my.yaml")
-    return code or (VOID if any(run.verdict == "void" for run in outcome.analysis.runs) else 0)
+    return code or exit_code(outcome.analysis)
 
 
 def beside_truth(analysis: Analysis, session: Path) -> list[str]:

@@ -138,7 +138,12 @@ def print_results(outcome: SessionResults, *, as_json: bool, **members: object) 
         if not outcome.blind:
             show(summary_table(outcome.analysis.summary).splitlines())
         show([*void_lines(outcome.analysis), *outcome.analysis.damage, *remarks(outcome)])
-    void = any(run.verdict == "void" for run in outcome.analysis.runs) or outcome.analysis.damaged
+    return exit_code(outcome.analysis)
+
+
+def exit_code(analysis: Analysis) -> int:
+    """Return the exit code of a command whose result rests on all runs."""
+    void = analysis.damaged or any(run.verdict == "void" for run in analysis.runs)
     return VOID if void else 0
 
 
