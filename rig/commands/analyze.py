@@ -48,8 +48,7 @@ def main(arguments: Namespace) -> int:
     track = None if arguments.video is None else read_video(arguments.video)
     with Session.open(arguments.session, readonly=True) as session:
         deep = arguments.priors or arguments.session_trials is not None
-        fresh, show_run = arguments.fresh, progress("analysing run")
-        outcome = results(session, show_run, fresh=fresh, with_joint_fit=deep)
+        outcome = results(session, progress, fresh=arguments.fresh, with_joint_fit=deep)
         members = _by_joint_fit(arguments, session, outcome) if deep else {}
     video = None if track is None else video_fall(*track)
     if video is not None and not outcome.blind:
@@ -78,7 +77,7 @@ def _by_joint_fit(
     """Compute what takes the joint fit, and its time."""
     members: dict[str, Any] = {}
     trials = arguments.session_trials
-    analysis = cache(lambda: complete_analysis(session, outcome, progress("analysing run")))
+    analysis = cache(lambda: complete_analysis(session, outcome, progress))
     if trials is not None:
         from rig.commands.budget import session_trials  # noqa: PLC0415 - only when it is asked for
 

@@ -54,5 +54,5 @@ def read_together(arguments: Namespace) -> TogetherResults:
             same_rig=arguments.same_rig,
             unfinished=arguments.unfinished,
             fresh=arguments.fresh,
-            progress=progress("analysing run"),
+            progress=progress,
         )

@@ -74,13 +74,9 @@ def _break_sentence(line: str, width: int) -> list[str]:
     return wrap(line, width, subsequent_indent=f"{indent}  ", break_on_hyphens=False)
 
 
-def progress(label: str) -> Callable[[int, int], None]:
+def progress(done: int, of: int, label: str = "analysing run") -> None:
     """Count up on one line of a terminal; silent elsewhere."""
-
-    def show(done: int, of: int) -> None:
-        stage("" if done == of else f"{label} {done}/{of}")
-
-    return show
+    stage("" if done == of else f"{label} {done}/{of}")
 
 
 def stage(label: str) -> None:
