@@ -169,7 +169,7 @@ class Campaign:
             self._carry_out()
         if self.flow.stage is Stage.HALTED:
             why, _, hint = self.flow.trouble.partition("\n")
-            self.operator.say(f"stopped: {why}\n  hint: {hint} (the same command goes on)")
+            self.operator.say(f"stopped: {why}\n  hint: {hint} (the same command continues)")
 
     def _next(self) -> Event:
         """Say what the operator would: at each stage where the campaign waits for one."""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rig.selftest.findings import Finding
 
 VOID = 3
+GO_ON = "  then press Enter (Ctrl-C stops; the same command continues) "
 
 
 def say(line: str) -> None:
