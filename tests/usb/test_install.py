@@ -40,7 +40,6 @@ def test_the_unit_starts_a_daemon_at_the_board(units, capsys, words, service, co
 
 def test_a_port_is_named_so_that_it_stays(units, tmp_path, monkeypatch, capsys):
     link, device = tmp_path / "usb-Pico", tmp_path / "ttyACM0"
-    device.touch()
     link.symlink_to(device)
     monkeypatch.setattr(
         "rig.commands.service_install.Path",
