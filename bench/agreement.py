@@ -166,10 +166,9 @@ def run(arguments: Namespace) -> Iterator[Findings]:
         seeds = [seed for seed in seeds if (drops, seed) not in present]
         parts = [seeds[n : n + _CHUNK] for n in range(0, len(seeds), _CHUNK)]
         calls += [(compare_sessions, Path(arguments.protocol), drops, part) for part in parts]
-    count = progress("sessions")
     for done, part in enumerate(results(calls, arguments.jobs), 1):
         agreements += part
-        count(done * _CHUNK, len(calls) * _CHUNK)
+        progress(done * _CHUNK, len(calls) * _CHUNK, "sessions")
         yield _findings(agreements)
     if not calls:
         yield _findings(agreements)

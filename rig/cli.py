@@ -13,7 +13,6 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
-from rig import __version__
 from rig.boards import GATES
 from rig.command_help import Parser, build_parser, runnable
 from rig.ctrl_c import ctrl_c_goes_to
@@ -109,12 +108,12 @@ def _run(argv: Sequence[str] | None) -> int:
 
 
 def _parser(words: Sequence[str] | None = None) -> Parser:
-    return build_parser(f"rig {__version__}", _KINDS, {"import": "import_edges"}, words)
+    return build_parser(_KINDS, words)
 
 
 def _accept(
-    accepted: str, read: Callable[[str], Any], holds: Callable[[Any], bool]
-) -> Callable[[str], dict[str, Any]]:
+    accepted: str, read: Callable[[str], Any], holds: Callable[[Any], object]
+) -> dict[str, Any]:
     """Return a kind of value; text that cannot be read so, or does not hold, is refused."""
 
     def convert(text: str) -> object:
@@ -124,19 +123,15 @@ def _accept(
                 return value
         raise argparse.ArgumentTypeError(f"found '{text}'; accepted: {accepted}")
 
-    return lambda _: {"type": convert}
+    return {"type": convert}
 
 
-def _place(name: str) -> Callable[[str], str]:
-    """Return a reader of a file's place: in a folder it has this name, else at least its ending."""
-
-    def place(text: str) -> str:
-        if text.endswith("/") or os.path.isdir(text):  # noqa: PTH112 - pathlib takes 5 ms
-            return os.path.join(text, name)  # noqa: PTH118
-        named = os.path.splitext(text)[1] or os.path.exists(text)  # noqa: PTH110, PTH122
-        return text if named else text + os.path.splitext(name)[1]  # noqa: PTH122
-
-    return place
+def _place(name: str, text: str) -> str:
+    """Read a file's place: in a folder it has this name, else at least its ending."""
+    if text.endswith("/") or os.path.isdir(text):  # noqa: PTH112 - pathlib takes 5 ms
+        return os.path.join(text, name)  # noqa: PTH118
+    named = os.path.splitext(text)[1] or os.path.exists(text)  # noqa: PTH110, PTH122
+    return text if named else text + os.path.splitext(name)[1]  # noqa: PTH122
 
 
 def _quantity(text: str, dimension: str) -> float:
@@ -145,20 +140,15 @@ def _quantity(text: str, dimension: str) -> float:
     return float(units.parse(text, units.Dimension[dimension]).value)
 
 
-def _is_name(text: str) -> bool:
-    """Whether a rig may be called so: the name becomes a part of a file's."""
-    return re.fullmatch(r"[\w-]{1,40}", text, re.ASCII) is not None
-
-
 def _socket(name: str) -> str:
     """Return the socket of the daemon of a rig, by the rig's name."""
-    if not _is_name(name):
-        raise ValueError(name)
-    return str(import_module("rig.daemon.socket_path").default_socket(name))
+    return str(import_module("rig.daemon.socket_path").default_socket(_NAME["type"](name)))
 
 
-_KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
-    "int": lambda _: {"type": int},
+_NAME = _accept("letters, digits, - and _", str, re.compile(r"(?a:[\w-]{1,40})").fullmatch)
+"""A rig's name, which becomes a part of a file's."""
+_KINDS: dict[str, dict[str, Any]] = {
+    "int": {"type": int},
     "count": _accept("a whole number, 1 or more", int, lambda n: n >= 1),
     "gates": _accept(
         f"numbers from 0 to {GATES - 1}, with commas between",
@@ -170,8 +160,8 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
         lambda text: _quantity(text, "LENGTH"),
         lambda metres: metres > 0.0,
     ),
-    "name": _accept("letters, digits, - and _", str, _is_name),
-    "rig": lambda _: {"dest": "socket"} | _accept("letters, digits, - and _", _socket, bool)(""),
+    "name": _NAME,
+    "rig": {"dest": "socket", "type": _socket},
     "address": _accept(
         ":8080 for this computer alone, HOST:8080 or 0.0.0.0:8080 for others too",
         lambda text: (text.rpartition(":")[0].strip("[]") or "localhost", int(text.split(":")[-1])),
@@ -182,8 +172,8 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
         lambda text: import_module("rig.usb.listing").sole_port() if text == "auto" else text,
         bool,
     ),
-    "protocol": lambda _: {"type": find_protocol},
-    "text": _accept("words", str, lambda words: bool(words.strip())),
+    "protocol": {"type": find_protocol},
+    "text": _accept("words", str, str.strip),
     "seconds": _accept("a time in seconds above 0", float, lambda s: 0.0 < s < math.inf),
     "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),
     "share": _accept(
@@ -196,8 +186,8 @@ _KINDS: dict[str, Callable[[str], dict[str, Any]]] = {
         lambda text: text if text == "adaptive" else int(text),
         lambda trials: trials == "adaptive" or trials >= 1,
     ),
-    "file": lambda name: {"type": _place(name)},
-    "formats": lambda _: {"action": _ListFormats, "nargs": 0},
+    "file": {"type": _place},
+    "formats": {"action": _ListFormats, "nargs": 0},
 }
 """Kinds of values that `rig.command_help` names, as argparse takes them."""
 

@@ -6,11 +6,12 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+from rig import __version__
 from rig.streams import say
 
 
@@ -29,14 +30,18 @@ class Command(NamedTuple):
 def _read_page(page: str) -> dict[str, list[Command]]:
     """Return the commands of each group."""
     groups: dict[str, list[Command]] = {}
+    shared: dict[str, str] = {}
     for paragraph in page.strip().split("\n\n"):
         head, *lines = paragraph.splitlines()
-        if head.startswith("## "):
+        if head == "shared":
+            shared = {line.partition(" |")[0]: line for line in lines}
+        elif head.startswith("## "):
             groups[head.removeprefix("## ")] = commands = []
         elif not head.startswith("#"):
             examples = [line.strip(" $") for line in lines if line.startswith("  $ ")]
             name, text = head.split(": ", 1)
-            commands.append(Command(name, text, lines[: len(lines) - len(examples)], examples))
+            rows = [shared.get(line, line) for line in lines[: len(lines) - len(examples)]]
+            commands.append(Command(name, text, rows, examples))
     return groups
 
 
@@ -118,6 +123,8 @@ class Parser(argparse.ArgumentParser):
         self.exit(2)
 
 
+_MODULES = {"import": "import_edges"}
+"""Modules of commands whose names are not theirs."""
 _WORDS: dict[str, dict[str, Any]] = {
     "flag": {"action": "store_true"},
     "yes-no": {"action": argparse.BooleanOptionalAction},
@@ -134,9 +141,7 @@ and kinds of values; of several with ``either`` at most one is accepted, of ``on
 
 
 def _add_argument(
-    parser: Parser | argparse._MutuallyExclusiveGroup,
-    row: str,
-    kinds: Mapping[str, Callable[[str], dict[str, Any]]],
+    parser: argparse._ActionsContainer, row: str, kinds: dict[str, dict[str, Any]]
 ) -> None:
     """Accept what a row of the page describes."""
     names, words, text = (part.strip() for part in row.split("|", 2))
@@ -147,19 +152,19 @@ def _add_argument(
     else:
         options["metavar"] = metavar
     for word in words.split():
-        if word in _WORDS:
-            options |= _WORDS[word]
-        elif word.startswith("="):
+        if word.startswith("="):
             options["default"] = word.removeprefix("=")
         elif word.startswith("{"):
             options["choices"] = list(map(options.get("type", str), word.strip("{}").split(",")))
         else:
             kind, _, detail = word.partition(":")
-            options |= kinds[kind](detail)
+            options |= kinds[kind]
+            if detail:
+                options["type"] = partial(options["type"], detail)
     parser.add_argument(*flags, **options)
 
 
-def _named(words: Sequence[str] | None) -> list[Command]:
+def _matching_commands(words: Sequence[str] | None) -> list[Command]:
     """Return the commands that words may name: that of the first one, else all, or none."""
     every = [*COMMANDS.values()]
     if words is None:
@@ -169,22 +174,14 @@ def _named(words: Sequence[str] | None) -> list[Command]:
     return every if any(not word.startswith("-") for word in words) else []
 
 
-def build_parser(
-    version: str,
-    kinds: Mapping[str, Callable[[str], dict[str, Any]]],
-    modules: Mapping[str, str],
-    words: Sequence[str] | None = None,
-) -> Parser:
+def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None = None) -> Parser:
     """Make the parser of all commands.
 
     Parameters
     ----------
-    version
-        What ``--version`` prints.
     kinds
-        What argparse needs to know of each kind of value: of what stands behind its colon.
-    modules
-        Modules of commands whose names are not theirs.
+        What argparse needs to know of each kind of value. What stands behind a kind's colon is the
+        first argument of its ``type``.
     words
         What is to be parsed: commands that it cannot name are left out, as they take time.
     """
@@ -200,10 +197,10 @@ def build_parser(
         "Exit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a run was\n"
         "void, 4 device trouble, 130 interrupted. rig replay: 1 the results differ.",
     )
-    parser.add_argument("--version", action="version", version=version)
+    parser.add_argument("--version", action="version", version=f"rig {__version__}")
     below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
     parsers = parser.commands
-    for command in _named(words):
+    for command in _matching_commands(words):
         name = command.name
         outer, _, last = name.rpartition(" ")
         if outer not in below:
@@ -213,12 +210,12 @@ def build_parser(
         parsers[name] = below[outer].add_parser(
             last, description=command.text, epilog=examples, **options
         )
-        parsers[name].set_defaults(module=modules.get(name, name.replace(" ", "_")))
+        parsers[name].set_defaults(module=_MODULES.get(name, name.replace(" ", "_")))
         either = None
         for row in command.arguments:
             alone = {"either", "one-of"} & set(row.split("|")[1].split())
             if alone:
                 needed = "one-of" in alone
                 either = either or parsers[name].add_mutually_exclusive_group(required=needed)
-            _add_argument(either if either and alone else parsers[name], row, kinds)
+            _add_argument(either if either and alone else parsers[name], row, _WORDS | kinds)
     return parser

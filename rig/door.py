@@ -151,8 +151,8 @@ class RecordedSession:
         """
         import numpy as np  # noqa: PLC0415 - a door costs nothing before it is used
 
-        drops = [drop for drop in self._file.drops() if drop.run == run]
-        drops = [drop for drop in drops if attempt is None or drop.attempt == attempt]
+        attempts = (drop for drop in self._file.drops() if drop.run == run)
+        drops = [drop for drop in attempts if attempt in {None, drop.attempt}]
         if not drops:
             recorded = sorted({drop.run for drop in self._file.drops()})
             raise InputError(f"no recorded drop of run {run}", f"recorded are the runs {recorded}")
@@ -290,7 +290,7 @@ class RunResult(_Quantities):
     fall_time = _Quantity("fall_time_s")
     """From the impact chain's release to its top rod's strike, s."""
 
-    def __init__(self, drop: DropResult, session: str = "") -> None:
+    def __init__(self, drop: DropResult, session: str) -> None:
         super().__init__(drop.quantities)
         self.run = drop.run.number
         self.attempt = drop.attempt

@@ -55,11 +55,9 @@ class Problem(NamedTuple):
 
 
 class InputError(RigError):
-    """Bad input: one located line a problem, or one `reason` for all of it; exit code 2."""
+    """Bad input: one located line a problem, or one reason for all of it; exit code 2."""
 
     exit_code = 2
-
-    reason: Any = None
 
     def __init__(self, message: str = "", hint: str = "", *, problems: Iterable[Problem] = ()):
         self.problems = tuple(sorted(problems, key=lambda problem: problem[:-1]))

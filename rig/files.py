@@ -182,7 +182,11 @@ def sync_directory(path: Path) -> None:
 
 @contextmanager
 def _replacing(target: Path) -> Iterator[BinaryIO]:
-    with _temporary(target) as temporary:
+    # Hidden and in the same folder: a rename is atomic only within one file system. The name is
+    # cut because the target's own may already be as long as a name can be.
+    temporary = target.with_name(f".{target.name[:40]}.{os.getpid()}.tmp")
+    temporary.unlink(missing_ok=True)  # left by a killed process that had this id
+    try:
         # Plain open, not tempfile: the result keeps the permissions of the user's umask.
         with temporary.open("xb") as stream:
             yield stream
@@ -191,16 +195,6 @@ def _replacing(target: Path) -> Iterator[BinaryIO]:
             # would leave an empty file under the right name.
             os.fsync(stream.fileno())
         temporary.replace(target)
-    sync_directory(target.parent)
-
-
-@contextmanager
-def _temporary(target: Path) -> Iterator[Path]:
-    # Hidden and in the same folder: a rename is atomic only within one file system. The name is
-    # cut because the target's own may already be as long as a name can be.
-    temporary = target.with_name(f".{target.name[:40]}.{os.getpid()}.tmp")
-    temporary.unlink(missing_ok=True)  # left by a killed process that had this id
-    try:
-        yield temporary
     finally:
         temporary.unlink(missing_ok=True)
+    sync_directory(target.parent)

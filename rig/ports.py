@@ -60,7 +60,7 @@ def completed(url: str, protocol: Path, session: Path, seed: int | None, before:
     settings.setdefault("protocol", str(protocol.resolve()))
     settings.setdefault("truth", str(truth_file(session)))
     settings.setdefault("seed", "0")
-    return _joined(parts, settings)
+    return _join_url(parts, settings)
 
 
 def check_name(url: str) -> None:
@@ -105,7 +105,7 @@ def told(url: str) -> str:
         return url
     parts = _split(url)
     settings = _settings(parts)
-    return _joined(parts, {name: settings[name] for name in settings if name not in _FILES})
+    return _join_url(parts, {name: settings[name] for name in settings if name not in _FILES})
 
 
 def simulation_package() -> str:
@@ -136,6 +136,6 @@ def _settings(parts: SplitResult) -> dict[str, str]:
     return settings
 
 
-def _joined(parts: SplitResult, settings: dict[str, str]) -> str:
+def _join_url(parts: SplitResult, settings: dict[str, str]) -> str:
     # urlunsplit would drop the empty authority that pyserial looks for.
     return f"{parts.scheme}://{parts.netloc}{parts.path}?{urlencode(settings, errors=_BYTES)}"

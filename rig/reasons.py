@@ -104,11 +104,11 @@ def make_error(kind: type[Failure], code: str, /, **values: Any) -> Failure:
     code, **values
         As for `make_reason`; of a path its name is kept, of an exception its words.
     """
-    words = {name: _written(value) for name, value in values.items()}
+    words = {name: _plain_value(value) for name, value in values.items()}
     return error_of(kind, make_reason(code, **words))
 
 
-def _written(value: object) -> object:
+def _plain_value(value: object) -> object:
     if isinstance(value, OSError) and value.strerror:
         return value.strerror
     return str(value) if isinstance(value, Exception | PurePath) else value

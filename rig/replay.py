@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.records import ClockSample, Drop, Pulse
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from rig.analysis.session import Progress
+
+
+_JOB = attrgetter("job")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +40,11 @@ class _ByBytes(Reader):
         self._pulses = [pulse for pulse in replay.records if isinstance(pulse, Pulse)]
         acknowledged = replay.acknowledged_drops()
         # What was stored and not acknowledged any more still is in the bytes.
-        have = {_key(drop) for drop in acknowledged}
-        stored = {_key(drop): drop for drop in session.drops()}
-        late = [drop for drop in replay.unfinished_drops() if _key(drop) in stored.keys() - have]
-        drops = sorted(_once([*acknowledged, *late]), key=_key)
-        self._drops = [as_old_as(stored.get(_key(drop), drop), drop) for drop in drops]
+        have = {drop.job for drop in acknowledged}
+        stored = {drop.job: drop for drop in session.drops()}
+        late = [drop for drop in replay.unfinished_drops() if drop.job in stored.keys() - have]
+        drops = sorted(_once([*acknowledged, *late]), key=_JOB)
+        self._drops = [as_old_as(stored.get(drop.job, drop), drop) for drop in drops]
 
     def digest(self) -> None:
         return None
@@ -79,7 +83,7 @@ def _compare(session: Reader, progress: Progress | None) -> Outcome:
     if not again.chunks:
         lines.append("no bytes were recorded: the edges come from a file")
     else:
-        compare("drops", list(again.drops()), sorted(session.drops(), key=_key))
+        compare("drops", list(again.drops()), sorted(session.drops(), key=_JOB))
         compare("clock samples", again.pings(), session.pings())
         if again.pulses() or session.pulses():
             compare("reference pulses", again.pulses(), session.pulses())
@@ -94,9 +98,5 @@ def _once(drops: list[Drop]) -> list[Drop]:
     """Leave out what was acknowledged again because the first ACKNOWLEDGE was lost on its way."""
     unique: dict[object, Drop] = {}
     for drop in drops:
-        unique.setdefault((_key(drop), drop.certificate, drop.fire_tick, drop.edges), drop)
+        unique.setdefault((drop.job, drop.certificate, drop.fire_tick, drop.edges), drop)
     return list(unique.values())
-
-
-def _key(drop: Drop) -> tuple[int, int]:
-    return drop.run, drop.attempt

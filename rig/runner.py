@@ -169,7 +169,7 @@ class Campaign:
             self._carry_out()
         if self.flow.stage is Stage.HALTED:
             why, _, hint = self.flow.trouble.partition("\n")
-            self.operator.say(f"stopped: {why}\n  hint: {hint} (the same command goes on)")
+            self.operator.say(f"stopped: {why}\n  hint: {hint} (the same command continues)")
 
     def _next(self) -> Event:
         """Say what the operator would: at each stage where the campaign waits for one."""
@@ -282,7 +282,7 @@ class Campaign:
             self._take(machine.EffectDone(self.flow.ticket, token))
 
     def _judge(self, job: Job) -> None:
-        if self._drop is None or job != (self._drop.run, self._drop.attempt):
+        if self._drop is None or job != self._drop.job:
             self._drop = self.rig.collect(*job)
         result = self._result = self.live.judge(self.session, self._drop)
         self._take(machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons))

@@ -111,9 +111,9 @@ _LONGEST = 100
 _LARGEST_EXPONENT = 400  # beyond any float, and small enough to expand into a fraction
 
 
-def significant(value: float, digits: int = 2) -> str:
-    """Write a number with so many significant digits and never an exponent."""
-    return f"{Decimal(f'{value:.{digits}g}'):f}"
+def significant(value: float) -> str:
+    """Write a number with two significant digits and never an exponent."""
+    return f"{Decimal(f'{value:.2g}'):f}"
 
 
 def quoted(text: str, limit: int = 40) -> str:
@@ -158,15 +158,15 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     if parts["u"] is not None and match.re is _PLAIN:
         unit, u_unit = _shared_unit(clean, unit, u_unit)
     factor = _factor(unit, dimension, clean)
-    value = _scaled(parts["value"], factor / int(parts.get("per") or 1), clean)
+    value = _scale(parts["value"], factor / int(parts.get("per") or 1), clean)
     if parts.get("last"):
         if parts["u"] is not None:
             raise UnitError(f"found {quoted(text)} with two uncertainties; {accepted_form}")
         digits = Decimal(parts["value"]).as_tuple().exponent
-        return Quantity(value, _scaled(f"{parts['last']}e{digits}", factor, clean))
+        return Quantity(value, _scale(f"{parts['last']}e{digits}", factor, clean))
     if parts["u"] is None:
         return Quantity(value)
-    u = _scaled(parts["u"], _factor(u_unit or unit, dimension, clean), clean)
+    u = _scale(parts["u"], _factor(u_unit or unit, dimension, clean), clean)
     if u < 0:
         raise UnitError(f"found {quoted(text)}; an uncertainty is at least 0")
     return Quantity(value, u)
@@ -209,7 +209,7 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
     return factor
 
 
-def _scaled(number: str, factor: Fraction, text: str) -> float:
+def _scale(number: str, factor: Fraction, text: str) -> float:
     """Return ``number × factor``, rounded once."""
     try:
         exact = Decimal(number)

@@ -448,10 +448,9 @@ def run(arguments: Namespace) -> Iterator[Findings]:
             raise InputError("no rig of the cube has such a number", "give --only up to --rigs")
         chunks = [(measure, rigs[n : n + _CHUNK]) for n in range(0, len(rigs), _CHUNK)]
         outcomes: list[RigResult] = []
-        count = progress(world)
         for chunk in results(chunks, arguments.jobs):
             outcomes += chunk
-            count(len(outcomes), len(rigs))
+            progress(len(outcomes), len(rigs), world)
         record[world] = _record(outcomes)
         lines += [*([""] if lines else []), *_lines(world, outcomes, record[world])]
         say(f"{world}: {record[world]['all']['drops']} drops of {len(rigs)} rigs")

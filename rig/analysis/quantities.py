@@ -70,7 +70,7 @@ BUDGET = {
     "late pull": BudgetLine(guessed=True, scale="bounce"),
     "contact": BudgetLine(guessed=True),
 }
-COMMON = frozenset(name for name, line in BUDGET.items() if line.common)
+COMMON = tuple(name for name, line in BUDGET.items() if line.common)
 
 
 def measurands(model: DropModel, x: Array) -> dict[str, Dual]:

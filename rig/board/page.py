@@ -88,7 +88,7 @@ class BoardPage:
         """Return what the page says; what takes long is drawn once of each state of the file."""
         key = view.path, view.states, view.fitted, view.blind
         if key != self._drawn[0]:
-            self._drawn = key, _drawn(view)
+            self._drawn = key, _draw_parts(view)
         last = view.jobs[-1] if view.jobs else Job(min(view.plan), 1)
         job = Job(drop["run"], drop["attempt"]) if drop.get("run") in view.plan else last
         now = headline(view.plan[job.run], len(view.plan), job.attempt)
@@ -100,7 +100,7 @@ class BoardPage:
         }
 
 
-def _drawn(view: SessionView) -> dict[str, Any]:
+def _draw_parts(view: SessionView) -> dict[str, Any]:
     """Return words and pictures of the latest drop, and of all."""
     chart = result_figure(view.analysis, view.curves, site_m_s2=view.protocol.gravity.value)
     parts: dict[str, Any] = {"figure": chart and _svg(chart)}

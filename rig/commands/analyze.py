@@ -24,16 +24,23 @@ if TYPE_CHECKING:
     from rig.analysis.result import Measured
 
 
+_SINGLE = {"budget": None, "video": None, "session_trials": None, "priors": False, "scatter": False}
+_SEVERAL = {"same_rig": None, "unfinished": False}
+"""Options of one session only, and of several, with what they are when they are not used."""
+
+
 def main(arguments: Namespace) -> int:
-    """Compute the results of a session."""
+    """Compute the results of a session, or of several together."""
+    refusal, unused = "option_for_several_sessions", _SEVERAL
+    if arguments.further:
+        refusal, unused = "option_for_one_session", _SINGLE
+    if misplaced := [name for name in unused if getattr(arguments, name) != unused[name]]:
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in misplaced)
+        raise make_error(InputError, refusal, options=options)
     if arguments.further:
         from rig.commands.compare import analyze_together  # noqa: PLC0415 - likewise
 
         return analyze_together(arguments)
-    given = {"--same-rig": arguments.same_rig is not None, "--unfinished": arguments.unfinished}
-    if any(given.values()):
-        options = ", ".join(name for name, is_given in given.items() if is_given)
-        raise make_error(InputError, "option_for_several_sessions", options=options)
     if arguments.budget is not None:
         from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
 
@@ -41,13 +48,12 @@ def main(arguments: Namespace) -> int:
     track = None if arguments.video is None else read_video(arguments.video)
     with Session.open(arguments.session, readonly=True) as session:
         deep = arguments.priors or arguments.session_trials is not None
-        fresh, show_run = arguments.fresh, progress("analysing run")
-        outcome = results(session, show_run, fresh=fresh, with_joint_fit=deep)
+        outcome = results(session, progress, fresh=arguments.fresh, with_joint_fit=deep)
         members = _by_joint_fit(arguments, session, outcome) if deep else {}
     video = None if track is None else video_fall(*track)
     if video is not None and not outcome.blind:
         members["video"] = video.json(_by_gates(outcome))
-    code = print_results(outcome, as_json=arguments.json, members=members)
+    code = print_results(outcome, as_json=arguments.json, **members)
     if not arguments.json:
         summary = outcome.analysis.summary
         asked = [*scatter_parts(summary)] if arguments.scatter else []
@@ -71,7 +77,7 @@ def _by_joint_fit(
     """Compute what takes the joint fit, and its time."""
     members: dict[str, Any] = {}
     trials = arguments.session_trials
-    analysis = cache(lambda: complete_analysis(session, outcome, progress("analysing run")))
+    analysis = cache(lambda: complete_analysis(session, outcome, progress))
     if trials is not None:
         from rig.commands.budget import session_trials  # noqa: PLC0415 - only when it is asked for
 

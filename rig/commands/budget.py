@@ -11,7 +11,7 @@ from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import fit_drop
 from rig.analysis.session import Analysis, planned_run
 from rig.cache.entry import recall
-from rig.commands.output import print_found, tell_damage
+from rig.commands.output import print_data, tell_damage
 from rig.errors import InputError
 from rig.measurands import MEASURANDS, Measurand
 from rig.protocol.plan import runs
@@ -39,7 +39,7 @@ def main(arguments: Namespace) -> int:
         outcome = results(session, fresh=fresh)
         make = partial(budget, session, outcome, *asked)
         account = recall(dict, make, "budget", outcome.digest, asked, fresh=fresh)
-    print_found(account, lambda: "\n".join(_table(account)), as_json=arguments.json)
+    print_data(account, _table(account), as_json=arguments.json)
     return tell_damage(outcome.analysis)
 
 
@@ -118,18 +118,18 @@ def _table(account: Mapping[str, Any]) -> Iterator[str]:
     trials = account["monte_carlo"]
     for name, value in account["budget"].items():
         row, trial = MEASURANDS[name], trials["quantities"][name]
-        single = _written(row, account["by_itself"][name]["u"])
+        single = _in_fine(row, account["by_itself"][name]["u"])
         yield ""
         yield (
             f"{row.symbol} = {plus_minus(value, row.scale)} {row.unit} (U, 95 %), "
-            f"u = {_written(row, value['u'])}, ν = {value['degrees']:.0f}, k = {value['k']:.2f}"
+            f"u = {_in_fine(row, value['u'])}, ν = {value['degrees']:.0f}, k = {value['k']:.2f}"
         )
         for line in value["lines"]:
-            u, _, unit = _written(row, line["u"]).rpartition(" ")
+            u, _, unit = _in_fine(row, line["u"]).rpartition(" ")
             yield f"  {line['name']:<18}{u:>10} {unit:<5}{100 * line['share']:6.1f} %"
         yield (
             f"  by itself u = {single}; by {trials['trials']} trials (seed {trials['seed']}) "
-            f"{_written(row, trial['u'])}"
+            f"{_in_fine(row, trial['u'])}"
         )
         digits = decimals_for(row.scale * trial["u"])
         low, high = (fixed(row.scale * trial[end], digits) for end in ("low", "high"))
@@ -139,7 +139,7 @@ def _table(account: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _written(row: Measurand, u: float) -> str:
+def _in_fine(row: Measurand, u: float) -> str:
     """Write a standard uncertainty in a quantity's finer unit."""
     fine = row.fine_scale * u
     return f"{fixed(fine, decimals_for(fine)) if fine >= _LEAST else f'< {_LEAST:g}'} {row.fine}"

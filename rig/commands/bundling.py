@@ -68,8 +68,7 @@ def derive_bundle(data: bytes) -> DerivedBundle:
         examined = examine(copy)
         with Session.open(copy, readonly=True) as session:
             # Every number from the raw edges: what is kept of earlier results proves nothing.
-            show = progress("analysing run")
-            outcome = results(session, show, fresh=True, with_joint_fit=True)
+            outcome = results(session, progress, fresh=True, with_joint_fit=True)
             report = make_report(session, outcome, "U95", estimate=False, fresh=True)
             drawn = {"report.html": report.html.encode()} | {
                 f"figures/figure-{number}.svg": figure_file(figure, "svg")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
+from rig.commands.output import print_json
 from rig.errors import InputError
 from rig.predictions import notes
 from rig.protocol import reader
@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Describe a protocol, or what any protocol may say."""
     if arguments.keys or arguments.schema:
-        return _reference(as_schema=arguments.schema)
+        from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol
+
+        if arguments.schema:
+            print_json(schema())
+        else:
+            print(page().rstrip())
+        return 0
     if arguments.protocol is None:
         hint = "rig check PROTOCOL; rig check --keys lists all keys"
         raise InputError("PROTOCOL is missing", hint)
@@ -32,14 +38,6 @@ def main(arguments: Namespace) -> int:
     if arguments.output:
         _draw(protocol, Path(arguments.output))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
-    return 0
-
-
-def _reference(*, as_schema: bool) -> int:
-    """Print every key that there is, for people or for editors."""
-    from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol
-
-    print(json.dumps(schema(), indent=2, ensure_ascii=False) if as_schema else page().rstrip())
     return 0
 
 

@@ -6,10 +6,8 @@ from argparse import Namespace
 from contextlib import ExitStack
 from pathlib import Path
 
-from rig.commands.output import VOID, print_found, progress, say
-from rig.errors import InputError
+from rig.commands.output import VOID, print_data, progress, say
 from rig.files import check_place, write_atomic
-from rig.reasons import make_error
 from rig.report.canvas import write_figure
 from rig.report.comparison import (
     comparison_page,
@@ -27,7 +25,7 @@ def main(arguments: Namespace) -> int:
         check_place(arguments.output)
     together = read_together(arguments)
     lines = difference_lines(together)
-    print_found(together.comparison_json(), lambda: "\n".join(lines), as_json=arguments.json)
+    print_data(together.comparison_json(), lines, as_json=arguments.json)
     if arguments.output is not None:
         if arguments.output.endswith((".html", ".htm")):
             write_atomic(arguments.output, comparison_page(together))
@@ -39,13 +37,8 @@ def main(arguments: Namespace) -> int:
 
 def analyze_together(arguments: Namespace) -> int:
     """Print the results of several sessions in one joint fit, as ``rig analyze A B`` does."""
-    single = ("budget", "video", "session_trials", "priors", "scatter")
-    if options := [name for name in single if getattr(arguments, name) not in {None, False}]:
-        names = ", ".join(f"--{name.replace('_', '-')}" for name in options)
-        raise make_error(InputError, "option_for_one_session", options=names)
     together = read_together(arguments)
-    lines = pooled_lines(together)
-    print_found(together.json(), lambda: "\n".join(lines), as_json=arguments.json)
+    print_data(together.json(), pooled_lines(together), as_json=arguments.json)
     return VOID if together.void else 0
 
 
@@ -61,5 +54,5 @@ def read_together(arguments: Namespace) -> TogetherResults:
             same_rig=arguments.same_rig,
             unfinished=arguments.unfinished,
             fresh=arguments.fresh,
-            progress=progress("analysing run"),
+            progress=progress,
         )

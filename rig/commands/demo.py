@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from rig.analysis.result import GOOD
 from rig.commands import report
 from rig.commands.narration import narrator
-from rig.commands.output import VOID, goes_on, say, show
+from rig.commands.output import exit_code, goes_on, say, show
 from rig.errors import InputError
 from rig.files import make_folder, write_atomic
 from rig.measurands import averaged
@@ -68,17 +68,9 @@ def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
     with Session.open(session, readonly=True) as recorded:
         show([impacts(recorded, outcome)])
     page = session.with_name("report.html")
-    code = report.main(
-        Namespace(
-            session=str(session),
-            output=str(page),
-            figures=str(page.parent),
-            bars="U95",
-            fresh=False,
-            estimate=False,
-            pdf=None,
-        )
-    )
+    places = {"session": str(session), "output": str(page), "figures": str(page.parent)}
+    usual = {"bars": "U95", "fresh": False, "estimate": False, "pdf": None}
+    code = report.main(Namespace(**places, **usual))
     # A browser in a terminal would be in the way.
     screens = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))
     has_screen = sys.stdout.isatty() and (sys.platform == "darwin" or any(screens))
@@ -87,7 +79,7 @@ def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
 
         webbrowser.open(page.absolute().as_uri())
     say(f"show it: rig tui --session {session}\nyour own set-up: rig new my.yaml")
-    return code or (VOID if any(run.verdict == "void" for run in outcome.analysis.runs) else 0)
+    return code or exit_code(outcome.analysis)
 
 
 def beside_truth(analysis: Analysis, session: Path) -> list[str]:
@@ -106,21 +98,19 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
     lines = map(json.loads, truth_file(session).read_text("utf-8").splitlines())
     truths = {(truth["run"], truth["attempt"]): truth for truth in lines}
     rows: list[dict[str, str]] = []
-    held = of = 0
-    measured = [row for row in averaged() if any(row.name in r.quantities for r in analysis.runs)]
+    agreements: list[bool] = []
     for result in analysis.runs:
         true = truths.get((result.run.number, result.attempt))
         if true is None or result.verdict not in GOOD:
             continue
         cells = {"incline (°)": f"{result.run.incline_deg:g}"}
-        for row in measured:
+        for row in averaged():
             value, hidden = result.quantities.get(row.name), true.get(row.name)
             if value is None or hidden is None:
                 continue
             cells[f"{row.symbol} ± U ({row.unit})"] = plus_minus(value, row.scale, row.decimals)
             cells[f"true {row.symbol}"] = fixed(hidden * row.scale, row.decimals)
-            of += 1
-            held += abs(value.value - hidden) <= value.expanded
+            agreements.append(abs(value.value - hidden) <= value.expanded)
         rows.append(cells)
     rows.sort(key=lambda cells: float(cells["incline (°)"]))
     if not rows:
@@ -129,7 +119,8 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
     table = [[cells.get(heading, "") for heading in headings] for cells in rows]
     return [
         *text_table([[*headings], *table], rule=True),
-        f"{held} of {of} results agree with the hidden truth within ± U (95 % expected)",
+        f"{sum(agreements)} of {len(agreements)} results agree with the hidden truth "
+        "within ± U (95 % expected)",
     ]
 
 

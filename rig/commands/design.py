@@ -57,7 +57,7 @@ def main(arguments: Namespace) -> int:
         if arguments.output:
             write_atomic(arguments.output, rewrite_heights(proposed))
             say(f"protocol: {arguments.output}")
-    print_found(layouts, lambda: design_text(layouts), as_json=arguments.json)
+    print_data(layouts, design_lines(layouts), as_json=arguments.json)
     return 0
 
 
@@ -106,7 +106,7 @@ def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
     }
 
 
-def design_text(design: Mapping[str, Any]) -> str:
+def design_lines(design: Mapping[str, Any]) -> list[str]:
     """Write layouts and their uncertainties, for a terminal."""
     layouts = {name: design[name] for name in ("current", "proposed") if name in design}
     cells = {name: _uncertainties(layout) for name, layout in layouts.items()}
@@ -131,7 +131,7 @@ def design_text(design: Mapping[str, Any]) -> str:
                 f"{name}: drops may be void, because edges are ambiguous; "
                 "add a beam above the drop height"
             )
-    return "\n".join(lines)
+    return lines
 
 
 def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:

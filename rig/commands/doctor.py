@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rig.cache.store import CacheFile
 from rig.command_help import runnable
-from rig.commands.output import print_json, say
+from rig.commands.output import print_findings, say
 from rig.doctor import computer
 from rig.doctor.board import BOARD_CHECKS, look_at_board
 from rig.doctor.session import check_session
@@ -26,13 +26,10 @@ def main(arguments: Namespace) -> int:
         CacheFile().clear()
     for note in note_early_boards(arguments.port):
         say(note)
-    findings = []
-    for finding in _findings(arguments.port, arguments.session):
-        findings.append(finding)
-        if not arguments.json:
-            print(runnable(str(finding)), flush=True)
-    if arguments.json:
-        print_json({"findings": [finding.json() for finding in findings]})
+    checks = _findings(arguments.port, arguments.session)
+    findings = print_findings(
+        "findings", checks, lambda finding: runnable(str(finding)), as_json=arguments.json
+    )
     troubles = sum(bool(finding.advice) for finding in findings)
     things = f"{troubles} thing{'s' * (troubles > 1)}" if troubles else "nothing"
     more = "" if troubles or arguments.port else "; --port PORT asks the board too"

@@ -22,9 +22,9 @@ def main(arguments: Namespace) -> int:
     with Session.open(arguments.session, readonly=True) as session:
         folder = None if arguments.output is None else make_folder(arguments.output)
         check_open(session, protocol_of(session))
-        show, fresh = progress("analysing run"), arguments.fresh
-        outcome = results(session, show, fresh=fresh, with_joint_fit=True)
-        estimate = session_estimate(session, outcome, show, fresh=fresh)
+        fresh = arguments.fresh
+        outcome = results(session, progress, fresh=fresh, with_joint_fit=True)
+        estimate = session_estimate(session, outcome, progress, fresh=fresh)
     analysis, simulated = outcome.analysis, outcome.simulated
     likeness = None if analysis.rig is None else analysis.rig.likeness
     sections = Sections()

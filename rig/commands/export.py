@@ -23,7 +23,7 @@ def main(arguments: Namespace) -> int:
         return write_bundle(arguments)
     with Session.open(arguments.session, readonly=True) as session:
         folder = make_folder(arguments.csv)
-        outcome = results(session, progress("analysing run"), fresh=arguments.fresh)
+        outcome = results(session, progress, fresh=arguments.fresh)
         tables = csv_files(session, outcome.json(), outcome.clock)
         for name, text in tables.items():
             write_atomic(folder / name, text)

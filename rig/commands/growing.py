@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 from rig.analysis.curves import model_curves
 from rig.analysis.session import Analysis
 from rig.analysis.summary import summarize
-from rig.commands.output import has_colours, tint
+from rig.commands.output import GO_ON, has_colours, tint
 from rig.printable import printable
 from rig.report.figures import result_figure
 from rig.runner import narration
@@ -68,8 +68,7 @@ class Growing:
         """Ask for something below the picture, and wait until it is done."""
         width = get_terminal_size().columns - 1
         self._write([request[:width]])
-        go_on = "  then press Enter (Ctrl-C stops, the same command goes on) "
-        print(go_on[:width], end="", file=self._stream, flush=True)
+        print(GO_ON[:width], end="", file=self._stream, flush=True)
         if not sys.stdin.readline():
             raise KeyboardInterrupt
         self._height += 1  # Enter ended the second line

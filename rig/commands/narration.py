@@ -21,10 +21,10 @@ def narrator(source: str, ask: Callable[[str], None] | None) -> Operator:
     ask
         How lines ask for what is to be hung; `None` where nobody is there.
     """
-    if not sys.stderr.isatty() or sys.stderr.encoding.lower() != "utf-8":
-        return Operator(say, ask)
-    protocol = reader.read(source)
-    if protocol.surface is None or protocol.blind or os.environ.get("TERM") == "dumb":
+    draws = sys.stderr.isatty() and sys.stderr.encoding.lower() == "utf-8"
+    draws = draws and os.environ.get("TERM") != "dumb"
+    protocol = reader.read(source) if draws else None
+    if protocol is None or protocol.surface is None or protocol.blind:
         return Operator(say, ask)
     from rig.commands.growing import Growing  # noqa: PLC0415 - only where somebody looks
 

@@ -7,6 +7,7 @@ import tempfile
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rig.boards import BOARDS, GATES
 from rig.commands.output import print_results
@@ -26,6 +27,8 @@ from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
 
 _COEFFICIENTS = "coefficients"
+_SIZES = ("gates", "rods", "length", "diameter", "drop", "repeats")
+"""Answers that a draft takes as they are."""
 _MANY_INCLINES = "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"
 """Where the coefficients are to be measured, if no inclines are given."""
 _CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
@@ -66,7 +69,7 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
         say(f"What have you got?\n{_CHOICE.replace('`', '')}")
     word = _ask(arguments, "scene", "What do you drop?", "object", SCENES)
     scene: Scene = next(name for name in SCENES if name == word)
-    answers = {"rods": "1", "length": "", "incline": ""}
+    answers: dict[str, Any] = {"rods": "1", "length": "", "incline": ""}
     lines = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
     rows = (map(str.strip, line.split("|")) for line in lines if not line.startswith("#"))
     for scenes, option, question, usual in rows:
@@ -76,28 +79,18 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
         default = _MANY_INCLINES if many else usual
         words = {"board": (*BOARDS, "other"), "aim": (usual, _COEFFICIENTS)}.get(option, ())
         answers[option] = _ask(arguments, option, question, default, words)
-    most = {"gates": GATES, "rods": 1000, "repeats": 1000}
-    counts = {option: _count(option, answers[option], limit) for option, limit in most.items()}
-    return answers["board"], Draft(
-        title=arguments.title or path.stem.replace("-", " ").replace("_", " "),
-        scene=scene,
-        gates=counts["gates"],
-        rods=counts["rods"],
-        length=answers["length"],
-        diameter=answers["diameter"],
-        drop=answers["drop"],
-        inclines=answers["incline"],
-        repeats=counts["repeats"],
-    )
+    for option, limit in {"gates": GATES, "rods": 1000, "repeats": 1000}.items():
+        answers[option] = _count(option, answers[option], limit)
+    title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
+    inclines, sizes = answers["incline"], {name: answers[name] for name in _SIZES}
+    return answers["board"], Draft(title=title, scene=scene, inclines=inclines, **sizes)
 
 
 def _can_ask(arguments: Namespace) -> bool:
     return not arguments.yes and sys.stdin.isatty()
 
 
-def _ask(
-    arguments: Namespace, option: str, words: str, usual: str, accepted: Sequence[str] = ()
-) -> str:
+def _ask(arguments: Namespace, option: str, words: str, usual: str, accepted: Sequence[str]) -> str:
     """Return the answer of the command line or of the user, or the default.
 
     `accepted` is empty where any answer is.

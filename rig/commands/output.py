@@ -9,7 +9,6 @@ import sys
 from contextlib import contextmanager
 from shutil import get_terminal_size
 from textwrap import wrap
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rig.command_help import runnable
@@ -21,8 +20,10 @@ if TYPE_CHECKING:
 
     from rig.analysis.session import Analysis
     from rig.results import SessionResults
+    from rig.selftest.findings import Finding
 
 VOID = 3
+GO_ON = "  then press Enter (Ctrl-C stops; the same command continues) "
 
 
 def say(line: str) -> None:
@@ -51,7 +52,7 @@ def show(lines: Iterable[str]) -> None:
         return
     width = get_terminal_size().columns
     for line in lines:
-        for part in _broken(line, width):
+        for part in _break_sentence(line, width):
             print(tint(part))
 
 
@@ -65,7 +66,7 @@ def has_colours() -> bool:
     return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
-def _broken(line: str, width: int) -> list[str]:
+def _break_sentence(line: str, width: int) -> list[str]:
     """Break a sentence at words, what goes on indented; tables stay as they are."""
     words = line.lstrip()
     if len(line) <= width or _GAP in words:
@@ -74,13 +75,9 @@ def _broken(line: str, width: int) -> list[str]:
     return wrap(line, width, subsequent_indent=f"{indent}  ", break_on_hyphens=False)
 
 
-def progress(label: str) -> Callable[[int, int], None]:
+def progress(done: int, of: int, label: str = "analysing run") -> None:
     """Count up on one line of a terminal; silent elsewhere."""
-
-    def show(done: int, of: int) -> None:
-        stage("" if done == of else f"{label} {done}/{of}")
-
-    return show
+    stage("" if done == of else f"{label} {done}/{of}")
 
 
 def stage(label: str) -> None:
@@ -88,7 +85,7 @@ def stage(label: str) -> None:
 
     Parameters
     ----------
-    what
+    label
         Empty to clear the line.
     """
     if sys.stderr.isatty():
@@ -96,12 +93,26 @@ def stage(label: str) -> None:
             print(f"\r\x1b[K{label}", end="", file=sys.stderr, flush=True)
 
 
-def print_found(data: Mapping[str, Any], text: Callable[[], str], *, as_json: bool) -> None:
-    """Print what was found, as JSON or as text."""
+def print_data(data: Mapping[str, Any], lines: Iterable[str], *, as_json: bool) -> None:
+    """Print a result as JSON, or as lines of text."""
     if as_json:
         print_json(data)
     else:
-        show(text().splitlines())
+        show(lines)
+
+
+def print_findings(
+    key: str, findings: Iterable[Finding], write: Callable[[Finding], str], *, as_json: bool
+) -> list[Finding]:
+    """Print each finding as soon as it is made, or all of them as JSON; return them."""
+    checks = []
+    for finding in findings:
+        checks.append(finding)
+        if not as_json:
+            print(write(finding), flush=True)
+    if as_json:
+        print_json({key: [finding.json() for finding in checks]})
+    return checks
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -109,12 +120,10 @@ def print_json(data: Mapping[str, Any]) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
 
 
-def print_results(
-    outcome: SessionResults, *, as_json: bool, members: Mapping[str, Any] = MappingProxyType({})
-) -> int:
+def print_results(outcome: SessionResults, *, as_json: bool, **members: object) -> int:
     """Print an analysis, as JSON with more members; the exit code says whether a run is void."""
     if as_json:
-        print_json({**outcome.json(), **members})
+        print_json(outcome.json() | members)
     else:
         if outcome.simulated:
             print("SIMULATED DATA")
@@ -126,7 +135,12 @@ def print_results(
         if not outcome.blind:
             show(summary_table(outcome.analysis.summary).splitlines())
         show([*void_lines(outcome.analysis), *outcome.analysis.damage, *remarks(outcome)])
-    void = any(run.verdict == "void" for run in outcome.analysis.runs) or outcome.analysis.damaged
+    return exit_code(outcome.analysis)
+
+
+def exit_code(analysis: Analysis) -> int:
+    """Return the exit code of a command whose result rests on all runs."""
+    void = analysis.damaged or any(run.verdict == "void" for run in analysis.runs)
     return VOID if void else 0
 
 

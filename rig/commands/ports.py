@@ -21,14 +21,17 @@ from rig.usb.listing import SerialPort, serial_ports
 def main(arguments: Namespace) -> int:
     """List the ports, and ask who is there where that is wanted."""
     ports = serial_ports()
+    listed = {port.path for port in ports}
     asked: dict[str, dict[str, Any]] = {}
     if arguments.identify is not None:
         chosen = arguments.identify or [port.path for port in ports if port.candidate]
         asked = {path: _identify(path) for path in chosen}
+    why = "not a serial port of this computer"
+    ports += [SerialPort(path, skipped=why) for path in asked if path not in listed]
     if arguments.json:
-        print_json({"ports": [_fields(port, asked) for port in _all(ports, asked)]})
+        print_json({"ports": [_fields(port, asked) for port in ports]})
         return 0
-    for port in _all(ports, asked):
+    for port in ports:
         print(_line(port, asked.get(port.path)))
     identities = (answer["identity"] for answer in asked.values() if answer["identity"])
     ids = Counter(identity["unique_id"] for identity in identities)
@@ -51,13 +54,6 @@ def _identify(path: str) -> dict[str, Any]:
     except DeviceError as error:
         return {"identity": None, "trouble": str(error)}
     return {"identity": identity.json(), "trouble": None}
-
-
-def _all(ports: list[SerialPort], asked: Mapping[str, object]) -> list[SerialPort]:
-    """Add the ports that were named and are no serial ports of this computer."""
-    listed = {port.path for port in ports}
-    why = "not a serial port of this computer"
-    return [*ports, *(SerialPort(path, skipped=why) for path in asked if path not in listed)]
 
 
 def _fields(port: SerialPort, asked: Mapping[str, dict[str, Any]]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from rig.analysis.distributions import COVERAGE_95
-from rig.commands.output import print_found, say
+from rig.commands.output import print_data, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.measurands import SEPARATION, SPEED, Measurand
@@ -36,36 +36,30 @@ def main(arguments: Namespace) -> int:
         raise make_error(InputError, "predict_nothing")
     protocol = reader.read(arguments.protocol)
     lines = predictions(protocol)
-    print_found(
-        {"predictions": [line.json() for line in lines]},
-        lambda: table(protocol, lines),
-        as_json=arguments.json,
-    )
+    data = {"predictions": [line.json() for line in lines]}
+    print_data(data, _write_table(protocol, lines), as_json=arguments.json)
     return 0
 
 
-def table(protocol: Protocol, lines: list[PredictedIncline]) -> str:
+def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]:
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     apart, end = SEPARATION, SPEED
     columns: dict[str, Callable[[PredictedIncline], str]] = {
-        "incline (°)": lambda line: degrees(line.incline_deg),
-        "strikes": lambda line: line.impact_chain or "",
-        "α": lambda line: fixed(line.alpha, 4),
-        f"{apart.symbol} ± U ({apart.unit})": lambda line: _written(
-            line.separation_m, line.separation_u_m, apart
-        ),
-        f"{end.symbol} ± U ({end.unit})": lambda line: _written(
-            line.speed_m_s, line.speed_u_m_s, end
-        ),
-        "t (s)": lambda line: fixed(line.fall_time_s, 5),
-        "model": lambda line: line.model,
+        f"speed ({end.unit})": lambda line: fixed(line.speed_m_s, 4)
     }
-    if not protocol.two_chains:
-        del columns[f"{apart.symbol} ± U ({apart.unit})"]
-    if protocol.surface is None:
-        columns = {f"speed ({end.unit})": lambda line: fixed(line.speed_m_s, 4)} | {
-            name: columns[name] for name in ("t (s)", "model")
+    if protocol.surface is not None:
+        columns = {
+            "incline (°)": lambda line: degrees(line.incline_deg),
+            "strikes": lambda line: line.impact_chain or "",
+            "α": lambda line: fixed(line.alpha, 4),
         }
+        if protocol.two_chains:
+            heading = f"{apart.symbol} ± U ({apart.unit})"
+            columns[heading] = lambda line: _number(line.separation_m, line.separation_u_m, apart)
+        heading = f"{end.symbol} ± U ({end.unit})"
+        columns[heading] = lambda line: _number(line.speed_m_s, line.speed_u_m_s, end)
+    columns["t (s)"] = lambda line: fixed(line.fall_time_s, 5)
+    columns["model"] = lambda line: line.model
     cells = {name: [tell(line) for line in lines] for name, tell in columns.items()}
     rows = [[name, *(text or "–" for text in texts)] for name, texts in cells.items() if any(texts)]
     notes = group_notes(lines)
@@ -73,10 +67,10 @@ def table(protocol: Protocol, lines: list[PredictedIncline]) -> str:
         free = dict.fromkeys(fixed(line.free_fall_speed_m_s, 4) for line in lines)
         notes.insert(0, f"free fall: {end.symbol} = {' or '.join(free)} {end.unit}")
     words = {place for place, row in enumerate(rows) if row[0] in {"strikes", "model"}}
-    return "\n".join([*text_table([*zip(*rows, strict=True)], left=words), *notes])
+    return [*text_table([*zip(*rows, strict=True)], left=words), *notes]
 
 
-def _written(value: float | None, u: float | None, row: Measurand) -> str:
+def _number(value: float | None, u: float | None, row: Measurand) -> str:
     """Write a prediction with what its own numbers leave open."""
     if value is None or u is None:
         return fixed(value and value * row.scale, row.decimals + 1)

@@ -14,6 +14,6 @@ DIFFERENT = 1
 def main(arguments: Namespace) -> int:
     """Replay a session and say whether everything comes out the same."""
     with Session.open(arguments.session, readonly=True) as session:
-        outcome = replay(session, progress("analysing run"))
+        outcome = replay(session, progress)
     print("\n".join(outcome.lines))
     return DIFFERENT if outcome.differences else 0

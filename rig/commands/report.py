@@ -45,7 +45,7 @@ def main(arguments: Namespace) -> int:
             raise InputError(f"--pdf {arguments.pdf} is the page's own file", "name another one")
     with Session.open(arguments.session, readonly=True) as session:
         fresh, estimate = arguments.fresh, arguments.estimate
-        outcome = results(session, progress("analysing run"), fresh=fresh, with_joint_fit=estimate)
+        outcome = results(session, progress, fresh=fresh, with_joint_fit=estimate)
         # The page has the file's name; how simulated chains moved lies beside the file.
         content = session.path.name, arguments.bars, estimate, film_digest(session.path)
         report = recall(

@@ -7,7 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from rig.commands.narration import narrator
-from rig.commands.output import goes_on, print_results
+from rig.commands.output import GO_ON, goes_on, print_results
 from rig.recorder.interrupts import Interrupts
 from rig.report.finding import finding
 from rig.report.templates import sentence
@@ -37,4 +37,4 @@ def main(arguments: Namespace) -> int:
 
 
 def _ask(request: str) -> None:
-    ask(f"{request}\n  then press Enter (Ctrl-C stops; the same command continues) ")
+    ask(f"{request}\n{GO_ON}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from contextlib import closing, nullcontext
 
-from rig.commands.output import print_json, say
+from rig.commands.output import print_findings, say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
 from rig.protocol import reader
@@ -28,15 +28,12 @@ def main(arguments: Namespace) -> int:
         say("releases will be driven: keep clear of them")
     for note in note_early_boards(arguments.port, arguments.judge):
         say(note)
-    findings = []
     judge_port = closing(open_port(arguments.judge)) if arguments.judge else nullcontext()
     with closing(open_port(arguments.port)) as port, judge_port as judge:
-        for finding in selftest(port, port_clock(port), options, judge):
-            findings.append(finding)
-            if not arguments.json:
-                print(finding.line, flush=True)
-    if arguments.json:
-        print_json({"checks": [finding.json() for finding in findings]})
+        checks = selftest(port, port_clock(port), options, judge)
+        findings = print_findings(
+            "checks", checks, lambda finding: finding.line, as_json=arguments.json
+        )
     failures = sum(finding.verdict is Verdict.FAILED for finding in findings)
     for advice in remedies(finding.reason for finding in findings if finding.reason):
         say(f"do: {advice}")

@@ -16,7 +16,7 @@ from rig.usb.listing import sole_port
 
 def main(arguments: Namespace) -> int:
     """Write the user's systemd unit that keeps a daemon running at the board's port."""
-    rig, port = arguments.name, _lasting(arguments.port or sole_port())
+    rig, port = arguments.name, _lasting_name(arguments.port or sole_port())
     template = "chainrig@.service" if rig else "chainrig.service"
     text = shipped(f"packaging/{template}").read_text("utf-8")
     values = {
@@ -36,7 +36,7 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def _lasting(port: str) -> str:
+def _lasting_name(port: str) -> str:
     """Return the name of a port that it has again after its board was plugged in elsewhere."""
     links = Path("/dev/serial/by-id").glob("*")
     return next((str(link) for link in links if link.resolve() == Path(port).resolve()), port)

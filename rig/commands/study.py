@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from rig.commands.output import print_found
+from rig.commands.output import print_data
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
 
@@ -33,7 +33,7 @@ def carry_out(
         if folder is not None:
             _write(folder, findings.name or name, findings)
     lines = [*(["SIMULATED DATA"] if findings.simulated else []), *findings.lines]
-    print_found(findings.record, lambda: "\n".join(lines), as_json=arguments.json)
+    print_data(findings.record, lines, as_json=arguments.json)
     return int(findings.failed)
 
 

@@ -33,7 +33,7 @@ def main(arguments: Namespace) -> int:
     _check_output(output)
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
-    if _drawn(output):
+    if _is_picture(output):
         _check_drawable(layout)
     with goes_on("nothing was written"):
         swept = _compute(layout, arguments.jobs, arguments.cluster)
@@ -68,7 +68,7 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
     facts = provenance(protocol, layout)
-    if _drawn(output):
+    if _is_picture(output):
         from rig.report.sweep import sweep_figure  # noqa: PLC0415 - it needs matplotlib
 
         write_figure(output, sweep_figure(facts, layout, swept))
@@ -80,7 +80,7 @@ def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> No
             write_csv(stream, facts, layout, swept)
 
 
-def _drawn(output: Path) -> bool:
+def _is_picture(output: Path) -> bool:
     return output.suffix.removeprefix(".") in KINDS
 
 
@@ -91,7 +91,7 @@ def _check_output(output: Path) -> None:
         kinds = ", ".join(_KINDS)
         raise make_error(InputError, "no_kind_of_sweep", path=output, ending=ending, kinds=kinds)
     check_place(output)
-    if _drawn(output):
+    if _is_picture(output):
         import_module("matplotlib")
 
 

@@ -33,7 +33,7 @@ def _check_session(path: str, key: str | None) -> Iterator[str]:
     examined = examine(path)
     yield from describe(examined)
     with Session.open(path, readonly=True) as session:
-        analysis = results(session, progress("analysing run"), fresh=True).analysis
+        analysis = results(session, progress, fresh=True).analysis
         yield from describe_history(session, examined, analysis)
 
 

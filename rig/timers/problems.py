@@ -14,7 +14,7 @@ def refusal(place: str, code: str, /, **values: object) -> InputError:
     """Return the refusal of an option or of a whole file, with the remedy of its code."""
     reason = make_reason(code, **values)
     error = InputError(f"{place}: {reason.text}", *remedies([reason]))
-    error.reason = reason
+    error.reasons = (reason,)
     return error
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import ttest_ind
 
 from rig.analysis.averages import difference
+from rig.analysis.quantities import BUDGET, COMMON
 from rig.analysis.result import Measured
 
 
@@ -47,3 +48,7 @@ def test_intervals_hold_the_true_difference(scatter):
         found = difference(runs(sets[0], 1.0), runs(sets[1], 1.0))
         held += abs(found.value) <= found.expanded
     assert 0.92 <= held / 400 <= 0.99
+
+
+def test_common_lines_are_added_in_the_order_of_the_table():
+    assert tuple(filter(COMMON.__contains__, BUDGET)) == COMMON

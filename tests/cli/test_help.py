@@ -78,9 +78,6 @@ def test_examples_are_commands(line):
         assert _parser().parse(words).module
 
 
-RUN = ["run", PROTOCOLS / "picket-fence.yaml"]
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -98,7 +95,10 @@ RUN = ["run", PROTOCOLS / "picket-fence.yaml"]
             ["import", "/dev/zero", "--protocol", "p", "--session", "s"],
             "/dev/zero: cannot read this file: it is a device",
         ),
-        ([*RUN, "--session", "s", "--port", "sim://?pace=-1"], "'-1' is not a whole number from 0"),
+        (
+            ["run", PROTOCOLS / "picket-fence.yaml", "--session", "s", "--port", "sim://?pace=-1"],
+            "'-1' is not a whole number from 0",
+        ),
     ],
 )
 def test_a_mistake_is_named(call, words, said):

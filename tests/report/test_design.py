@@ -1,6 +1,6 @@
 """What a layout of gates is said to tell."""
 
-from rig.commands.design import design_text
+from rig.commands.design import design_lines
 
 
 def test_uncertainties_are_plain_numbers():
@@ -17,6 +17,6 @@ def test_uncertainties_are_plain_numbers():
             {"name": "alpha A", "u": 0.01, "identified": True},
         ],
     }
-    text = design_text({"runs": 4, "scatter": "stated", "current": layout})
-    assert [line.split()[-1] for line in text.splitlines()[4:7]] == ["1234", "26", "0.000046"]
-    assert "α of A" in text
+    lines = design_lines({"runs": 4, "scatter": "stated", "current": layout})
+    assert [line.split()[-1] for line in lines[4:7]] == ["1234", "26", "0.000046"]
+    assert "α of A" in "\n".join(lines)

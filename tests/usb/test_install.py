@@ -38,17 +38,15 @@ def test_the_unit_starts_a_daemon_at_the_board(units, capsys, words, service, co
         assert complaints_of(unit) == []
 
 
-def test_a_port_is_named_so_that_it_stays(tmp_path, monkeypatch):
-    from rig.commands import service_install
-
+def test_a_port_is_named_so_that_it_stays(units, tmp_path, monkeypatch, capsys):
     link, device = tmp_path / "usb-Pico", tmp_path / "ttyACM0"
-    device.touch()
     link.symlink_to(device)
     monkeypatch.setattr(
-        service_install, "Path", lambda path: tmp_path if "by-id" in path else Path(path)
+        "rig.commands.service_install.Path",
+        lambda path: tmp_path if "by-id" in path else Path(path),
     )
-    assert service_install._lasting(str(device)) == str(link)
-    assert service_install._lasting("/dev/ttyS9") == "/dev/ttyS9"
+    assert main(["service", "install", "--port", str(device)]) == 0
+    assert f".service: {link}\n" in capsys.readouterr().err
 
 
 def test_without_a_board_there_is_no_unit(units, monkeypatch, capsys):
