@@ -17,7 +17,9 @@ from rig.link.transcript import Direction, Incoming, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.reasons import Reason, make_error, sentences
+from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts, StoppedError
+from rig.recorder.published import PublishedState
 from rig.records import ClockSample, Drop, Pulse
 from rig.session.schema import RunState
 
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from rig.protocol.protocol import Protocol
-    from rig.recorder.feed import StateFeed
     from rig.recorder.sink import NullSink
     from rig.session.store import Session
 
@@ -34,6 +35,13 @@ ARM_TIMEOUT_MS = 10_000
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
 _ARMED_S = 0.1  # at most, while armed: the device disarms itself when the host is silent
 _REFERENCE_S = 10.0  # between two questions for the latest pulse of the reference
+
+
+def arm_order(protocol: Protocol, label: int, timeout_ms: int, record_ms: int) -> Arm:
+    """Return the request for a protocol's gates and release; see `Arm` for the rest."""
+    gates, release = protocol.gates, protocol.release
+    mask, pulse_us = gates.mask if gates else 0, round(release.pulse * 1e6)
+    return Arm(label, mask, 1 << release.channel, pulse_us, timeout_ms, record_ms)
 
 
 class Recorder:
@@ -78,7 +86,7 @@ class Recorder:
         self.session = session
         self.url = url
         self.interrupts = Interrupts() if interrupts is None else interrupts
-        self._feed = feed
+        self._feed = feed or StateFeed(PublishedState())
         self._halted = halted
         self._meet = meet
         self._port: Port | None = None
@@ -184,8 +192,8 @@ class Recorder:
             rest_s = (until - self.clock.now_ns()) * 1e-9
             if rest_s <= 0.0:
                 break
-            longest = _PING_S * self._uneven.uniform(0.5, 1.5)
-            self.clock.sleep(min(rest_s, longest if self.armed is None else _ARMED_S))
+            longest_s = self.ping_gap_s()
+            self.clock.sleep(min(rest_s, longest_s if self.armed is None else _ARMED_S))
             self.ping() if self.armed is None else self.look()
         with self.interrupts.held():
             self.session.commit()
@@ -194,6 +202,10 @@ class Recorder:
         """Ask what the device is doing, and let it know that somebody is there."""
         with self.interrupts.held(), self._unless(self.interrupts.check, self._go_on):
             self.device.status()
+
+    def ping_gap_s(self) -> float:
+        """Return the time to the next clock sample, s: another one each time."""
+        return _PING_S * self._uneven.uniform(0.5, 1.5)
 
     def ping(self) -> None:
         """Take one clock sample, now and then one of the 1 Hz reference; not while armed."""
@@ -234,15 +246,8 @@ class Recorder:
         DeviceRefusedError
             A gate is blocked, or the device cannot do what the protocol asks.
         """
-        gates, release = protocol.gates, protocol.release
-        order = Arm(
-            label=pack_label(run, attempt),
-            gates=gates.mask if gates else 0,
-            release=1 << release.channel,
-            pulse_us=round(release.pulse * 1e6),
-            timeout_ms=ARM_TIMEOUT_MS,
-            record_ms=record_ms(protocol),
-        )
+        label = pack_label(run, attempt)
+        order = arm_order(protocol, label, ARM_TIMEOUT_MS, record_ms(protocol))
         with self.interrupts.held():
             try:
                 with self._unless(self.interrupts.check, self._go_on):
@@ -323,8 +328,7 @@ class Recorder:
             self.session.commit()
             if state is RunState.INTERRUPTED:
                 log.info("run %d, attempt %d: interrupted: %s", run, attempt, sentences(reasons))
-            if self._feed is not None:
-                self._feed.state(run, attempt, state, reasons)
+            self._feed.state(run, attempt, state, reasons)
 
     @contextmanager
     def _unless(self, *checks: Callable[[], None]) -> Iterator[None]:
@@ -348,8 +352,7 @@ class Recorder:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
         log.info("run %d, attempt %d: recorded, %d edges", drop.run, drop.attempt, len(drop.edges))
-        if self._feed is not None:
-            self._feed.show_drop(drop)
+        self._feed.show_drop(drop)
         self._acknowledge(drop)
         return drop
 
@@ -370,5 +373,4 @@ class Recorder:
             self.session.add_timing(record)
         if isinstance(record, Incoming) and isinstance(record.message, Disarmed):
             self.lapsed = record.message.reason
-        if self._feed is not None:
-            self._feed.know(record)
+        self._feed.know(record)
