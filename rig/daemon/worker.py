@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from rig.daemon.lease import ControlError, Lease
 from rig.daemon.rpc import error_to_data, in_words
 from rig.daemon.stopper import Stopper
-from rig.errors import InputError, RigError, SessionError
+from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
 from rig.reasons import Reason, make_error, make_reason, remedies
@@ -90,7 +90,7 @@ class Worker:
         self.controller = Controller(
             url, published=published, halted=self._is_halted, keep_port=True
         )
-        self._stopper = Stopper(self.controller.stop_past)
+        self._stopper = Stopper(self._abort_past)
         self._thread = threading.Thread(target=self._run, name="rig worker")
 
     # ------------------------------------------------------------------ from other threads
@@ -171,6 +171,17 @@ class Worker:
         """Wait for the end."""
         self._thread.join()
         self._stopper.end()
+
+    def _abort_past(self) -> bool:
+        """Send ABORT past the worker's own thread; `False` when nobody can hear it."""
+        recorder = self.controller.recorder
+        if recorder is None or is_simulated(self._url):  # a simulated board lives in one thread
+            return False
+        try:
+            recorder.device.abort_past()
+        except (DeviceError, OSError, TypeError):  # closed meanwhile, in whatever moment
+            return False
+        return True
 
     # ------------------------------------------------------------------ the thread
 

@@ -456,17 +456,6 @@ class Controller:
             if armed is not None:
                 recorder.state(*armed, RunState.INTERRUPTED, (why,))
 
-    def stop_past(self) -> bool:
-        """Send ABORT from another thread than the controller's; `False` when nobody can hear it."""
-        recorder = self.recorder
-        if recorder is None or is_simulated(self.url):  # a simulated board lives in one thread
-            return False
-        try:
-            recorder.device.abort_past()
-        except (DeviceError, OSError, TypeError):  # closed meanwhile, in whatever moment
-            return False
-        return True
-
     def close(self) -> None:
         """Close session and port."""
         self._keep_port = False

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Self
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.messages import Arm, Disarmed, DisarmReason, Identity, Phase, pack_label, unpack_label
+from rig.link.messages import Arm, DisarmReason, Identity, Phase, pack_label, unpack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Direction, Incoming, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.reasons import Reason, make_error, sentences
@@ -26,6 +25,7 @@ from rig.session.schema import RunState
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from rig.link.transcript import Direction, Record
     from rig.protocol.protocol import Protocol
     from rig.recorder.sink import NullSink
     from rig.session.store import Session
@@ -69,8 +69,6 @@ class Recorder:
     ----------
     armed
         Run and attempt of the drop that waits for `fire`.
-    lapsed
-        Why the device disarmed itself since `arm`, as far as it has said so.
     """
 
     def __init__(
@@ -93,7 +91,6 @@ class Recorder:
         self._device: Device | None = None
         self._uneven = random.Random(0)
         self.armed: tuple[int, int] | None = None
-        self.lapsed: DisarmReason | None = None
         self._sample: ClockSample | None = None  # the latest
         self._host: HostWatch | None = None
         self._reference_ns = 0  # when to ask for the next pulse
@@ -182,6 +179,11 @@ class Recorder:
             raise make_error(DeviceError, "no_connection")
         return self._device
 
+    @property
+    def lapsed(self) -> DisarmReason | None:
+        """Why the device disarmed itself since it was armed, as far as it has said so."""
+        return self._device.transcript.disarmed if self._device else None
+
     def wait(self, seconds: float) -> None:
         """Let time pass and use it to compare clocks, at uneven intervals.
 
@@ -255,7 +257,7 @@ class Recorder:
             except (StoppedError, KeyboardInterrupt):
                 self.abort()  # the device may have heard what it did not answer
                 raise
-            self.armed, self.lapsed = (run, attempt), None
+            self.armed = run, attempt
             self.state(run, attempt, RunState.ARMED)
             return token
 
@@ -371,6 +373,4 @@ class Recorder:
     def _note(self, record: Record) -> None:
         if isinstance(record, ClockSample | Pulse):
             self.session.add_timing(record)
-        if isinstance(record, Incoming) and isinstance(record.message, Disarmed):
-            self.lapsed = record.message.reason
         self._feed.know(record)

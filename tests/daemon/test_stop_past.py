@@ -2,16 +2,31 @@
 
 import sqlite3
 from contextlib import closing, suppress
+from pathlib import Path
 from types import SimpleNamespace
 
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.errors import DeviceTimeoutError
-from rig.link.frames import Decoder
-from rig.link.messages import CODES, Abort, Done, Phase
+from rig.link.frames import Decoder, Frame, encode
+from rig.link.messages import (
+    CODES,
+    Abort,
+    Armed,
+    Disarmed,
+    DisarmReason,
+    Done,
+    Phase,
+    pack,
+    pack_label,
+)
+from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
+from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.waiting import PATIENCE_S, until
+
+BALL = Path(__file__).parents[2] / "protocols/falling-ball.yaml"
 
 
 def frames(session, direction):
@@ -71,3 +86,22 @@ def test_a_stop_between_the_look_and_the_answer_is_kept(monkeypatch):
     worker._attend()
     assert stopped == ["a second client"]
     assert late[0].done()
+
+
+def test_a_board_that_disarms_itself_as_soon_as_it_is_armed_is_heard(tmp_path, monkeypatch):
+    controller = Controller("sim://")
+    controller.open_session(str(BALL), str(tmp_path / "a.session"), 1)
+    code, payload = pack(Disarmed(pack_label(1, 1), DisarmReason.STOPPED))
+    port = controller.recorder._port
+    read, decoder = port.read, Decoder()
+
+    def read_both(size):
+        data = read(size)
+        armed = any(frame.type == CODES[Armed] for frame in decoder.feed(data))
+        return data + encode(Frame(code, 1, 0, payload)) if armed else data
+
+    monkeypatch.setattr(port, "read", read_both)
+    controller.arm(1, 1)
+    controller.notice()
+    assert controller.session.latest_state(1).state is RunState.INTERRUPTED
+    controller.close()
