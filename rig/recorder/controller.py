@@ -229,10 +229,8 @@ class Controller:
         url = self._line_url
         if not is_simulated(url):
             url = self._locator.path if port is not None else self._locator.look()
-        recorder = Recorder(
-            sink, url, self.interrupts, feed=StateFeed(self.published), halted=self._halted,
-            meet=self._locator.meet,
-        )  # fmt: skip
+        feed, meet = StateFeed(self.published), self._locator.meet
+        recorder = Recorder(sink, url, self.interrupts, feed=feed, halted=self._halted, meet=meet)
         identity = recorder.connect(port)
         self.published.set(
             port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path}

@@ -124,9 +124,8 @@ class Recorder:
                 self._host = HostWatch() if isinstance(self.clock, SystemClock) else None
                 self._reference_ns = self.clock.now_ns()
                 self._device = Device(
-                    self._port, self.clock, self._log, on_record=self._note,
-                    give_way=self._give_way,
-                )  # fmt: skip
+                    self._port, self.clock, self._log, self._note, give_way=self._give_way
+                )
                 identity = self._device.connect(BOOT_WAIT_S if port is None else 0.0)
                 record = identity.json() | {"port": told(self.url)} | self._meet(identity)
                 self.session.add_identity(record, self.clock.now_ns())
