@@ -404,11 +404,11 @@ def _effect_failed(flow: Flow, event: EffectFailure) -> Outcome:
 
 
 def _not_armed(flow: Flow, event: EffectFailure) -> Outcome:
-    refusals = flow.not_armed + 1
-    if event.reason not in _PASSING or (not flow.attended and refusals >= LOOKS):
-        return flow.to(flow.home, event.trouble), (GiveUp(),)
-    if flow.attended:  # who has been asked, and arms again when all is well
-        return flow.to(flow.home, event.trouble), ()
+    refusals, passes = flow.not_armed + 1, event.reason in _PASSING
+    if not passes or flow.attended or refusals >= LOOKS:
+        # Who attends has been asked, and arms again when all is well.
+        give_up = () if passes and flow.attended else (GiveUp(),)
+        return flow.to(flow.home, event.trouble), give_up
     pause = event.detail / 1000 if event.reason is RefusalReason.COOLING else LOOK_S
     return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
 

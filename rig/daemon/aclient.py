@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -43,13 +44,7 @@ class AsyncClient:
             As for `rig.daemon.client.Line`, which says what is raised.
         """
         client = cls()
-
-        def notify(method: str, params: dict[str, Any]) -> None:
-            client._soon(client._follow, method, params)
-
-        def end() -> None:
-            client._soon(client._end)
-
+        notify, end = partial(client._soon, client._follow), partial(client._soon, client._end)
         line = client._loop.run_in_executor(None, Line, path, name, notify, end)
         try:
             client._line = await asyncio.shield(line)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -58,18 +59,15 @@ def connect(
         if socket is not None:
             raise
         return Controller(url, interrupts)  # what a killed daemon left, or one of another version
-    try:
+    with ExitStack() as unless_in_control:
+        unless_in_control.callback(client.close)
         # A board that was plugged in again may have another path than the daemon was told.
         if not any(_is_same(client.daemon.get(name, ""), url) for name in ("port", "path")):
             if socket is None:
-                client.close()
                 return Controller(url, interrupts)
-            wrong = make_error(DeviceError, "daemon_port", port=client.daemon["port"], wanted=url)
-            raise wrong  # noqa: TRY301 - it is closed below
+            raise make_error(DeviceError, "daemon_port", port=client.daemon["port"], wanted=url)
         client.take_control()
-    except BaseException:
-        client.close()
-        raise
+        unless_in_control.pop_all()
     say(f"through the daemon, process {client.daemon['pid']}, which owns {url}")
     return client
 

@@ -16,21 +16,6 @@ if TYPE_CHECKING:
     _Message: TypeAlias = rpc.Request | rpc.RpcError
 
 
-class Turns:
-    """Has answers begin one by one, and what comes in be read between any two of them.
-
-    Many that wait would else be worked on in a row, and a stop that came meanwhile wait for all.
-    """
-
-    def __init__(self) -> None:
-        self._guard = asyncio.Lock()
-
-    async def come(self) -> None:
-        """Wait for the turn to begin an answer."""
-        async with self._guard:
-            await asyncio.sleep(0)
-
-
 class Connection:
     """One client.
 
@@ -43,7 +28,9 @@ class Connection:
     heard
         Called with each line it sends.
     turns
-        Among all clients.
+        Of all clients: answers begin one by one, and what comes in is read between any two of
+        them. Many that wait would else be worked on in a row, and a stop that came meanwhile
+        wait for all.
 
     Attributes
     ----------
@@ -63,7 +50,7 @@ class Connection:
         writer: asyncio.StreamWriter,
         do: Callable[[Connection, rpc.Request], Awaitable[Any]],
         heard: Callable[[Connection], None],
-        turns: Turns,
+        turns: asyncio.Lock,
     ) -> None:
         self.name = ""
         self.subscribed = self.behind = self.spoke = False
@@ -73,6 +60,7 @@ class Connection:
         self._heard = heard
         self._turns = turns
         self._urgent: set[asyncio.Task[None]] = set()
+        self._waiting: asyncio.Queue[tuple[_Message, _Replies]] = asyncio.Queue(rpc.BATCH_LIMIT)
 
     def send(self, line: bytes) -> None:
         """Send one message, some time."""
@@ -98,10 +86,9 @@ class Connection:
         """Answer until the client goes."""
         # One request is answered after the other. A stop and the sign of life go past the one
         # that is being worked on, so lines are read all the time.
-        waiting: asyncio.Queue[tuple[_Message, _Replies]] = asyncio.Queue(rpc.BATCH_LIMIT)
-        answering = asyncio.get_running_loop().create_task(self._answer_all(waiting))
+        answering = asyncio.get_running_loop().create_task(self._answer_all())
         try:
-            await self._read(waiting)
+            await self._read()
         except (ConnectionError, ValueError, asyncio.IncompleteReadError):
             pass  # gone, or a line without an end
         finally:
@@ -109,7 +96,7 @@ class Connection:
             for task in self._urgent:
                 task.cancel()
 
-    async def _read(self, waiting: asyncio.Queue[tuple[_Message, _Replies]]) -> None:
+    async def _read(self) -> None:
         while line := await self._reader.readline():
             self.spoke = True
             self._heard(self)
@@ -118,33 +105,29 @@ class Connection:
             messages = rpc.read_line(line)
             replies = _Replies(self.send, messages)
             for message in messages if isinstance(messages, list) else [messages]:
-                self._take(message, replies, waiting)
+                self._take(message, replies)
             await asyncio.sleep(0)  # many lines are there already: others' are read between them
 
-    def _take(
-        self,
-        message: _Message,
-        replies: _Replies,
-        waiting: asyncio.Queue[tuple[_Message, _Replies]],
-    ) -> None:
+    def _take(self, message: _Message, replies: _Replies) -> None:
         """Have one message answered in its turn, or at once where it overtakes."""
         method = message.method if isinstance(message, rpc.Request) else ""
         if method in {"stop", "renew"} and self.name and len(self._urgent) < 8:
             task = asyncio.get_running_loop().create_task(self._answer(message, replies))
             self._urgent.add(task)
             task.add_done_callback(self._urgent.discard)
-        elif waiting.full():
+        elif self._waiting.full():
             # Refused, not kept back: a stop behind it must be read.
             busy = make_error(rpc.BusyError, "requests_full", requests=rpc.BATCH_LIMIT)
             silent = isinstance(message, rpc.RpcError) or message.silent
             replies.add(None if silent else rpc.failure(message.id, busy))
         else:
-            waiting.put_nowait((message, replies))
+            self._waiting.put_nowait((message, replies))
 
-    async def _answer_all(self, waiting: asyncio.Queue[tuple[_Message, _Replies]]) -> None:
+    async def _answer_all(self) -> None:
         while True:
-            message, replies = await waiting.get()
-            await self._turns.come()
+            message, replies = await self._waiting.get()
+            async with self._turns:
+                await asyncio.sleep(0)
             await self._answer(message, replies)
             await self._writer.drain()
             if not self.name:

@@ -55,9 +55,9 @@ class Lease:
             Another client has it.
         """
         with self._guard:
-            if self._holder not in {None, client} and self._now() < self._until:
-                raise make_error(ControlError, "control_held", holder=self._name)
             if self._holder not in {None, client}:
+                if self._now() < self._until:
+                    raise make_error(ControlError, "control_held", holder=self._name)
                 self._overtaken[self._holder] = self._until - LEASE_S
             self._silences.pop(client, None)
             self._holder, self._name, self._until = client, name, self._now() + LEASE_S

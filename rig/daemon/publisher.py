@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.daemon import rpc
@@ -80,11 +81,7 @@ class Publisher:
     async def run(self) -> None:
         """Send what changes, until cancelled."""
         loop = asyncio.get_running_loop()
-
-        def wake() -> None:
-            loop.call_soon_threadsafe(self._dirty.set)
-
-        self.published.changed = wake
+        self.published.changed = partial(loop.call_soon_threadsafe, self._dirty.set)
         self._dirty.set()
         while True:
             if not any(connection.behind for connection in self.connections):
@@ -94,4 +91,4 @@ class Publisher:
             await asyncio.sleep(_CHANGES_S)
 
     def _watch(self) -> None:
-        self.published.watched = any(one.subscribed for one in self.connections)
+        self.published.watched = any(client.subscribed for client in self.connections)

@@ -55,7 +55,7 @@ _KINDS: dict[str, type[RigError]] = {
     kind.__name__: kind
     for kind in (
         RigError, InputError, SessionError, DeviceError, DeviceTimeoutError, BusyError,
-        ControlError, StoppedError, VersionError,
+        DeviceRefusedError, ControlError, StoppedError, VersionError,
     )
 }  # fmt: skip
 
@@ -146,9 +146,8 @@ def in_words(error: Exception) -> RigError:
 def error_to_data(error: RigError) -> dict[str, Any]:
     """Write an error as API.md says; an unknown kind becomes the nearest listed one above it."""
     refused = error if isinstance(error, DeviceRefusedError) else None
-    listed = (kind.__name__ for kind in type(error).__mro__ if kind.__name__ in _KINDS)
     return {
-        "kind": "DeviceRefusedError" if refused else next(listed),
+        "kind": next(kind.__name__ for kind in type(error).__mro__ if kind in _KINDS.values()),
         "message": error.message,
         "hint": error.hint,
         "exit_code": error.exit_code,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rig import __version__
 from rig.daemon import rpc
 from rig.daemon.admission import HELLO_S
-from rig.daemon.connection import Connection, Turns
+from rig.daemon.connection import Connection
 from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import Door, listen
 from rig.daemon.publisher import Publisher
@@ -79,7 +79,7 @@ class Server:
         self._worker = Worker(url, self.published, self._lease)
         self._service = Service(self._token, self._worker, self._lease, self.publisher)
         self._admission = self._service.admission
-        self._turns = Turns()
+        self._turns = asyncio.Lock()
         self._idle_s = idle_s
         self._onlookers = onlookers
         self._left_at = 0.0  # when the last client went
@@ -128,10 +128,7 @@ class Server:
         for task in tasks:
             task.add_done_callback(self._on_end)
 
-        def died(error: BaseException) -> None:
-            loop.call_soon_threadsafe(self._fail, error)
-
-        self._worker.died = died
+        self._worker.died = lambda error: loop.call_soon_threadsafe(self._fail, error)
         ready()  # said before whatever the worker has to say
         self._worker.start()
         try:

@@ -108,21 +108,19 @@ def reach(path: Path) -> tuple[socket.socket, str]:
     try:
         check_folder(path.parent)
         if not path.exists() and tcp.exists():
-            told = json.loads(tcp.read_text("ascii"))
-            address = "127.0.0.1", told["port"]
-            line, token = socket.create_connection(address, _REACH_S), told["token"]
+            place = json.loads(tcp.read_text("ascii"))
+            address = "127.0.0.1", place["port"]
+            line, token = socket.create_connection(address, _REACH_S), place["token"]
         else:
             line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             # More may want to be let in than the kernel keeps waiting.
             line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _PATIENCE)
             line.connect(str(path))
-    except (BlockingIOError, TimeoutError) as error:
-        if line is not None:
-            line.close()
-        raise make_error(BusyError, "daemon_busy", path=path, patience_s=_REACH_S) from error
     except (OSError, ValueError) as error:
         if line is not None:
             line.close()
+        if isinstance(error, BlockingIOError | TimeoutError):
+            raise make_error(BusyError, "daemon_busy", path=path, patience_s=_REACH_S) from error
         raise make_error(DeviceError, "no_daemon", path=path, text=error) from error
     if peer_uid(line) not in {None, os.getuid()}:
         line.close()

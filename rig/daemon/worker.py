@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import math
 import queue
-import random
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -22,7 +21,7 @@ from typing import Any, NamedTuple
 from rig.daemon.lease import ControlError, Lease
 from rig.daemon.rpc import error_to_data, in_words
 from rig.daemon.stopper import Stopper
-from rig.errors import InputError, RigError, SessionError
+from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
 from rig.reasons import Reason, make_error, make_reason, remedies
@@ -34,7 +33,6 @@ log = logging.getLogger(__name__)
 _ARMED_S = 0.08  # between two requests while armed: the device gives the host 250 ms
 _WATCHED_S = 0.15  # between two looks at the gates
 _ALONE_S = 1.0  # when nobody looks: often enough to see that the cable is out
-_PING_S = 0.37  # mean distance of clock samples while a session is open
 _COMMIT_S = 5.0  # so much of the idle talk may be lost with the power
 _STATISTICS_S = 1.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S, _GROWTH = 0.25, 5.0, 1.6
@@ -83,17 +81,16 @@ class Worker:
         self._at_work = False  # for a client
         self._ending = False
         self._due_s = math.inf  # not begun
-        self._uneven = random.Random()
         self._ping_s = 0.0  # until the next clock sample
         self._pause_s = _FIRST_PAUSE_S
         self._trouble: RigError | None = None
         self._trouble_session: object = None  # that was open then
         self._begun: dict[str, float] = {}  # when each duty was done last
-        self.died: Callable[[BaseException], None] = lambda _: None
+        self.died: Callable[[BaseException], object] = lambda _: None
         self.controller = Controller(
             url, published=published, halted=self._is_halted, keep_port=True
         )
-        self._stopper = Stopper(self.controller.stop_past)
+        self._stopper = Stopper(self._abort_past)
         self._thread = threading.Thread(target=self._run, name="rig worker")
 
     # ------------------------------------------------------------------ from other threads
@@ -174,6 +171,17 @@ class Worker:
         """Wait for the end."""
         self._thread.join()
         self._stopper.end()
+
+    def _abort_past(self) -> bool:
+        """Send ABORT past the worker's own thread; `False` when nobody can hear it."""
+        recorder = self.controller.recorder
+        if recorder is None or is_simulated(self._url):  # a simulated board lives in one thread
+            return False
+        try:
+            recorder.device.abort_past()
+        except (DeviceError, OSError, TypeError):  # closed meanwhile, in whatever moment
+            return False
+        return True
 
     # ------------------------------------------------------------------ the thread
 
@@ -325,13 +333,12 @@ class Worker:
                 self._trying(duty)
 
     def _ping(self) -> None:
-        self._ping_s = _PING_S * self._uneven.uniform(0.5, 1.5)
-        if self.controller.recorder is not None:
-            self.controller.recorder.ping()
+        if (recorder := self.controller.recorder) is not None:
+            self._ping_s = recorder.ping_gap_s()
+            recorder.ping()
 
     def _statistics(self) -> None:
-        recorder = self.controller.recorder
-        if recorder is None:
+        if (recorder := self.controller.recorder) is None:
             return
         pending = self.controller.session.pending if self.controller.recording else 0
         self.published.set(

@@ -50,15 +50,13 @@ class Port(Protocol):
         """Close the port."""
 
 
-def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
+def open_port(url: str) -> Port:
     """Open a port for this program alone.
 
     Parameters
     ----------
     url
         A device path or a pyserial URL.
-    baudrate
-        Line rate in bit/s.
 
     Returns
     -------
@@ -79,7 +77,7 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
             # Pyserial 3.5 starts its RFC 2217 reader in a way Python has given up since.
             warnings.filterwarnings("ignore", r"set(Daemon|Name)\(\)", DeprecationWarning)
             port: Any = serial.serial_for_url(  # a subclass of SerialBase
-                url, baudrate=baudrate, timeout=READ_TIMEOUT_S, exclusive=True
+                url, baudrate=BAUDRATE, timeout=READ_TIMEOUT_S, exclusive=True
             )
     except RigError:
         raise  # a simulated port knows better what is wrong
@@ -89,7 +87,7 @@ def open_port(url: str, baudrate: int = BAUDRATE) -> Port:
             raise make_error(DeviceError, "port_unreachable", port=url, text=text) from error
         # Of what it cannot set up, pyserial keeps the cause only behind its own words.
         below = error.__context__.args[:1] if error.__context__ else ()
-        number = error.errno or next((one for one in below if isinstance(one, int)), 0)
+        number = error.errno or next((code for code in below if isinstance(code, int)), 0)
         text = _PLAIN.get(number, str(error))
         raise make_error(
             DeviceError, _CODES.get(number, "port_failed"), port=url, text=text

@@ -21,7 +21,7 @@ from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts, StoppedError
-from rig.recorder.opening import describe_session, latest_board, open_for
+from rig.recorder.opening import describe_session, latest_board, latest_states, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import Recorder
 from rig.recorder.sink import NullSink
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from rig.session.store import Session
 
 log = logging.getLogger(__name__)
-_OPEN = (RunState.ARMED, RunState.FIRED)
 _VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
 
 
@@ -230,10 +229,8 @@ class Controller:
         url = self._line_url
         if not is_simulated(url):
             url = self._locator.path if port is not None else self._locator.look()
-        recorder = Recorder(
-            sink, url, self.interrupts, feed=StateFeed(self.published), halted=self._halted,
-            meet=self._locator.meet,
-        )  # fmt: skip
+        feed, meet = StateFeed(self.published), self._locator.meet
+        recorder = Recorder(sink, url, self.interrupts, feed=feed, halted=self._halted, meet=meet)
         identity = recorder.connect(port)
         self.published.set(
             port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path}
@@ -268,20 +265,22 @@ class Controller:
         if held is not None and held[0] == TEST_RUN:
             release_test.forget(recorder)
             held = None
-        entries = self.session.states()
         if held is not None:
-            if (*held, RunState.FIRED) not in ((e.run, e.attempt, e.state) for e in entries):
+            if held not in self.session.fired_ns():
                 run, attempt = held
                 raise make_error(DeviceError, "drop_of_another_session", run=run, attempt=attempt)
             recorder.fetch(*held)
             self._lost.pop(held, None)
-        for entry in {entry.run: entry for entry in entries}.values():
-            if entry.state not in _OPEN or (entry.run, entry.attempt) == held:
-                continue
-            if self.session.drop(entry.run, entry.attempt) is None:
-                why = (make_reason("connection_ended"),)
-                recorder.state(entry.run, entry.attempt, RunState.INTERRUPTED, why)
+        for run, attempt in self._without_drop(RunState.ARMED, RunState.FIRED):
+            why = (make_reason("connection_ended"),)
+            recorder.state(run, attempt, RunState.INTERRUPTED, why)
         return held
+
+    def _without_drop(self, *states: RunState) -> list[tuple[int, int]]:
+        """List the attempts that are logged last in one of these states, with no drop stored."""
+        latest = latest_states(self.session).values()
+        jobs = [(entry.run, entry.attempt) for entry in latest if entry.state in states]
+        return [job for job in jobs if self.session.drop(*job) is None]
 
     # ------------------------------------------------------------------ drops
 
@@ -296,12 +295,7 @@ class Controller:
         if self._session is not None:
             if not self._session.rescued:
                 self._session.commit()
-            latest = {entry.run: entry for entry in self._session.states()}
-            if any(
-                entry.state is RunState.FIRED
-                and self._session.drop(entry.run, entry.attempt) is None
-                for entry in latest.values()
-            ):
+            if self._without_drop(RunState.FIRED):
                 return True  # on a board that may be away at the moment
             if self._session.rescued:
                 return False  # nor can it be asked, since nothing of that could be logged
@@ -333,16 +327,14 @@ class Controller:
         DeviceRefusedError
             As for `Recorder.arm`.
         """
-        recorder = self._require_recorder()
-        if self._protocol is None or recorder.armed or self.due:
-            raise make_error(InputError, "not_now", act="arm")
+        recorder, protocol = self._require_rest("arm")
         last = self.session.latest_state(run)
         planned = self.published.has_run(run)
         if not planned or attempt != (last.attempt if last else 0) + 1:
             raise make_error(InputError, "not_next", run=run, attempt=attempt)
         self.session.require_presence()
         self._unarmed = None
-        return recorder.arm(run, attempt, self._protocol)
+        return recorder.arm(run, attempt, protocol)
 
     def notice(self) -> None:
         """Log that the device has disarmed itself, when it has."""
@@ -413,11 +405,9 @@ class Controller:
         InputError
             No session is open, or a drop is under way.
         """
-        recorder = self._require_recorder()
-        if self._protocol is None or recorder.armed or self.due:
-            raise make_error(InputError, "not_now", act="test the release")
+        recorder, protocol = self._require_rest("test the release")
         self.published.set(release_test=None)
-        result = release_test.drive(recorder, self._protocol, self._halted)
+        result = release_test.drive(recorder, protocol, self._halted)
         self.published.set(release_test=result)
         return result
 
@@ -464,17 +454,6 @@ class Controller:
             if armed is not None:
                 recorder.state(*armed, RunState.INTERRUPTED, (why,))
 
-    def stop_past(self) -> bool:
-        """Send ABORT from another thread than the controller's; `False` when nobody can hear it."""
-        recorder = self.recorder
-        if recorder is None or is_simulated(self.url):  # a simulated board lives in one thread
-            return False
-        try:
-            recorder.device.abort_past()
-        except (DeviceError, OSError, TypeError):  # closed meanwhile, in whatever moment
-            return False
-        return True
-
     def close(self) -> None:
         """Close session and port."""
         self._keep_port = False
@@ -487,3 +466,9 @@ class Controller:
         if self.recorder is None:
             raise make_error(DeviceError, "no_connection")
         return self.recorder
+
+    def _require_rest(self, act: str) -> tuple[Recorder, Protocol]:
+        recorder, protocol = self._require_recorder(), self._protocol
+        if protocol is None or recorder.armed or self.due:
+            raise make_error(InputError, "not_now", act=act)
+        return recorder, protocol

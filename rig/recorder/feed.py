@@ -15,10 +15,8 @@ from rig.reasons import Reason, published_reasons
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rig.recorder.published import PublishedState
-    from rig.records import Drop, Edge
+    from rig.records import Drop
 
 _PHASES = {
     wire.Phase.IDLE: "idle",
@@ -87,8 +85,10 @@ class StateFeed:
         self._label = wire.pack_label(*drop.job)
         self._fire_tick = drop.fire_tick
         self._next = drop.certificate.events if drop.certificate else len(drop.edges)
-        shown: Sequence[Edge] = () if self._blind else drop.edges
-        self._published.replace_edges((e.tick, e.channel, int(e.blocked)) for e in shown)
+        rows = () if self._blind else drop.edges
+        self._published.replace_edges(
+            (tick, channel, int(blocked)) for tick, channel, blocked in rows
+        )
         self._drop("recorded")
         self._published.set(phase="idle")
         self._label = 0
@@ -119,12 +119,10 @@ class StateFeed:
         state = self._state
         if frame.first > self._next and events:
             state = events[0][1]  # it is not known when the gates changed
-        found = edges(events, state, ALL_GATES, self._fire_tick)
+        rows = edges(events, state, ALL_GATES, self._fire_tick)
         self._state = events[-1][1] if events else state
         self._next = frame.first + len(events)
         if not self._blind:
-            self._published.edges(
-                [(tick, channel, int(blocked)) for tick, channel, blocked in found]
-            )
+            self._published.edges((tick, channel, int(blocked)) for tick, channel, blocked in rows)
         self._published.set(gates={"blocked": self._state})
         self._drop("fired")

@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
-from rig.reasons import make_error, published_reasons
+from rig.reasons import Reason, make_error, published_reasons
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.protocol.protocol import Protocol
-    from rig.session.reading import Reader
+    from rig.session.reading import Reader, StateEntry
+
+
+_PLANNED: tuple[int, str, tuple[Reason, ...]] = (0, "planned", ())
+"""Attempt, state and reasons of a run that the log does not name."""
 
 
 def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
@@ -51,23 +55,29 @@ def latest_board(session: Reader) -> dict[str, str]:
     return {name: str(value) for name, value in boards[-1].items()} if boards else {}
 
 
+def latest_states(session: Reader) -> dict[int, StateEntry]:
+    """Return where each run stands that the log names."""
+    return {entry.run: entry for entry in session.states()}
+
+
 def describe_session(
     session: Reader, protocol: Protocol
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Describe a session and its plan as the sections ``session`` and ``runs`` of the state do."""
-    latest = {entry.run: entry for entry in session.states()}
+    latest = latest_states(session)
     plan = []
     for run in runs(protocol):
         entry = latest.get(run.number)
+        attempt, state, reasons = (entry.attempt, entry.state, entry.reasons) if entry else _PLANNED
         plan.append(
             {
                 "run": run.number,
                 "incline_deg": run.incline_deg,
                 "impact": run.impact,
                 "free": run.free,
-                "attempt": entry.attempt if entry else 0,
-                "state": str(entry.state) if entry else "planned",
-                **published_reasons(entry.reasons if entry else ()),
+                "attempt": attempt,
+                "state": str(state),
+                **published_reasons(reasons),
             }
         )
     about = {

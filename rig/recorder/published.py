@@ -53,7 +53,7 @@ class PublishedState:
     """
 
     def __init__(self) -> None:
-        self.changed: Callable[[], None] = lambda: None
+        self.changed: Callable[[], object] = lambda: None
         self.watched = False
         self._guard = threading.Lock()
         self._sections = dict(_FIRST)

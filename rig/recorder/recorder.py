@@ -10,22 +10,23 @@ from typing import TYPE_CHECKING, Self
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.messages import Arm, Disarmed, DisarmReason, Identity, Phase, pack_label, unpack_label
+from rig.link.messages import Arm, DisarmReason, Identity, Phase, pack_label, unpack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Direction, Incoming, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.reasons import Reason, make_error, sentences
+from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts, StoppedError
+from rig.recorder.published import PublishedState
 from rig.records import ClockSample, Drop, Pulse
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from rig.link.transcript import Direction, Record
     from rig.protocol.protocol import Protocol
-    from rig.recorder.feed import StateFeed
     from rig.recorder.sink import NullSink
     from rig.session.store import Session
 
@@ -34,6 +35,13 @@ ARM_TIMEOUT_MS = 10_000
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
 _ARMED_S = 0.1  # at most, while armed: the device disarms itself when the host is silent
 _REFERENCE_S = 10.0  # between two questions for the latest pulse of the reference
+
+
+def arm_order(protocol: Protocol, label: int, timeout_ms: int, record_ms: int) -> Arm:
+    """Return the request for a protocol's gates and release; see `Arm` for the rest."""
+    gates, release = protocol.gates, protocol.release
+    mask, pulse_us = gates.mask if gates else 0, round(release.pulse * 1e6)
+    return Arm(label, mask, 1 << release.channel, pulse_us, timeout_ms, record_ms)
 
 
 class Recorder:
@@ -61,8 +69,6 @@ class Recorder:
     ----------
     armed
         Run and attempt of the drop that waits for `fire`.
-    lapsed
-        Why the device disarmed itself since `arm`, as far as it has said so.
     """
 
     def __init__(
@@ -78,14 +84,13 @@ class Recorder:
         self.session = session
         self.url = url
         self.interrupts = Interrupts() if interrupts is None else interrupts
-        self._feed = feed
+        self._feed = feed or StateFeed(PublishedState())
         self._halted = halted
         self._meet = meet
         self._port: Port | None = None
         self._device: Device | None = None
         self._uneven = random.Random(0)
         self.armed: tuple[int, int] | None = None
-        self.lapsed: DisarmReason | None = None
         self._sample: ClockSample | None = None  # the latest
         self._host: HostWatch | None = None
         self._reference_ns = 0  # when to ask for the next pulse
@@ -119,9 +124,8 @@ class Recorder:
                 self._host = HostWatch() if isinstance(self.clock, SystemClock) else None
                 self._reference_ns = self.clock.now_ns()
                 self._device = Device(
-                    self._port, self.clock, self._log, on_record=self._note,
-                    give_way=self._give_way,
-                )  # fmt: skip
+                    self._port, self.clock, self._log, self._note, give_way=self._give_way
+                )
                 identity = self._device.connect(BOOT_WAIT_S if port is None else 0.0)
                 record = identity.json() | {"port": told(self.url)} | self._meet(identity)
                 self.session.add_identity(record, self.clock.now_ns())
@@ -174,6 +178,11 @@ class Recorder:
             raise make_error(DeviceError, "no_connection")
         return self._device
 
+    @property
+    def lapsed(self) -> DisarmReason | None:
+        """Why the device disarmed itself since it was armed, as far as it has said so."""
+        return self._device.transcript.disarmed if self._device else None
+
     def wait(self, seconds: float) -> None:
         """Let time pass and use it to compare clocks, at uneven intervals.
 
@@ -184,8 +193,8 @@ class Recorder:
             rest_s = (until - self.clock.now_ns()) * 1e-9
             if rest_s <= 0.0:
                 break
-            longest = _PING_S * self._uneven.uniform(0.5, 1.5)
-            self.clock.sleep(min(rest_s, longest if self.armed is None else _ARMED_S))
+            longest_s = self.ping_gap_s()
+            self.clock.sleep(min(rest_s, longest_s if self.armed is None else _ARMED_S))
             self.ping() if self.armed is None else self.look()
         with self.interrupts.held():
             self.session.commit()
@@ -194,6 +203,10 @@ class Recorder:
         """Ask what the device is doing, and let it know that somebody is there."""
         with self.interrupts.held(), self._unless(self.interrupts.check, self._go_on):
             self.device.status()
+
+    def ping_gap_s(self) -> float:
+        """Return the time to the next clock sample, s: another one each time."""
+        return _PING_S * self._uneven.uniform(0.5, 1.5)
 
     def ping(self) -> None:
         """Take one clock sample, now and then one of the 1 Hz reference; not while armed."""
@@ -234,15 +247,8 @@ class Recorder:
         DeviceRefusedError
             A gate is blocked, or the device cannot do what the protocol asks.
         """
-        gates, release = protocol.gates, protocol.release
-        order = Arm(
-            label=pack_label(run, attempt),
-            gates=gates.mask if gates else 0,
-            release=1 << release.channel,
-            pulse_us=round(release.pulse * 1e6),
-            timeout_ms=ARM_TIMEOUT_MS,
-            record_ms=record_ms(protocol),
-        )
+        label = pack_label(run, attempt)
+        order = arm_order(protocol, label, ARM_TIMEOUT_MS, record_ms(protocol))
         with self.interrupts.held():
             try:
                 with self._unless(self.interrupts.check, self._go_on):
@@ -250,7 +256,7 @@ class Recorder:
             except (StoppedError, KeyboardInterrupt):
                 self.abort()  # the device may have heard what it did not answer
                 raise
-            self.armed, self.lapsed = (run, attempt), None
+            self.armed = run, attempt
             self.state(run, attempt, RunState.ARMED)
             return token
 
@@ -323,8 +329,7 @@ class Recorder:
             self.session.commit()
             if state is RunState.INTERRUPTED:
                 log.info("run %d, attempt %d: interrupted: %s", run, attempt, sentences(reasons))
-            if self._feed is not None:
-                self._feed.state(run, attempt, state, reasons)
+            self._feed.state(run, attempt, state, reasons)
 
     @contextmanager
     def _unless(self, *checks: Callable[[], None]) -> Iterator[None]:
@@ -348,8 +353,7 @@ class Recorder:
         self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
         self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
         log.info("run %d, attempt %d: recorded, %d edges", drop.run, drop.attempt, len(drop.edges))
-        if self._feed is not None:
-            self._feed.show_drop(drop)
+        self._feed.show_drop(drop)
         self._acknowledge(drop)
         return drop
 
@@ -368,7 +372,4 @@ class Recorder:
     def _note(self, record: Record) -> None:
         if isinstance(record, ClockSample | Pulse):
             self.session.add_timing(record)
-        if isinstance(record, Incoming) and isinstance(record.message, Disarmed):
-            self.lapsed = record.message.reason
-        if self._feed is not None:
-            self._feed.know(record)
+        self._feed.know(record)

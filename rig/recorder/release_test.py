@@ -6,9 +6,10 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError
-from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
+from rig.link.messages import TEST_RUN, Phase, pack_label
 from rig.reasons import make_error
 from rig.recorder.interrupts import StoppedError
+from rig.recorder.recorder import arm_order
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,18 +46,10 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
     StoppedError
         It was stopped; the release is off.
     """
-    device, release = recorder.device, protocol.release
-    pulse_ms = round(release.pulse * 1e3)
+    device, pulse_s = recorder.device, protocol.release.pulse
     with recorder.interrupts.held():
-        order = Arm(
-            label=_LABEL,
-            gates=protocol.gates.mask if protocol.gates else 0,
-            release=1 << release.channel,
-            pulse_us=round(release.pulse * 1e6),
-            timeout_ms=_TIMEOUT_MS,
-            record_ms=pulse_ms + _AFTER_MS,
-        )
-        token = device.arm(order)
+        record_ms = round(pulse_s * 1e3) + _AFTER_MS
+        token = device.arm(arm_order(protocol, _LABEL, _TIMEOUT_MS, record_ms))
         try:
             recorder.interrupts.check()
             _insist(not halted())
@@ -71,7 +64,7 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
     _insist(not halted())
     sensed = drop.certificate.release_sense if drop.certificate else None
     return {
-        "pulse_s": release.pulse,
+        "pulse_s": pulse_s,
         "release_sense_s": None if sensed is None else sensed / drop.tick_hz,
         "edges": len(drop.edges),
         "gates": sorted({edge.channel for edge in drop.edges}),

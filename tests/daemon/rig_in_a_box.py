@@ -4,7 +4,6 @@ All parts are the real ones; only threads, sockets and the computer's clock are 
 wrong does so at a chosen moment: when so many bytes have been written, or so many rows kept.
 """
 
-import random
 import sqlite3
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -218,7 +217,6 @@ class Box:
         """Start a daemon where there is none, and go on with the session."""
         if self.worker is None:
             self.worker = Worker("a port", PublishedState(), self.lease)
-            self.worker._uneven = random.Random(0)  # the same states every time
         with suppress(RigError):
             self.lease.take("A", "A")
         names = str(self.protocol), str(self.session)

@@ -2,26 +2,23 @@
 
 import sqlite3
 from contextlib import closing, suppress
+from pathlib import Path
 from types import SimpleNamespace
 
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.errors import DeviceTimeoutError
-from rig.link.frames import Decoder
-from rig.link.messages import CODES, Abort, Done, Phase
+from rig.link.frames import Decoder, Frame, encode
+from rig.link.messages import CODES, Abort, Disarmed, DisarmReason, Done, Phase, pack
+from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
+from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.waiting import PATIENCE_S, until
 
 
 def frames(session, direction):
-    decoder = Decoder()
-    return [
-        frame
-        for chunk in session.byte_log()
-        if chunk.direction == direction
-        for frame in decoder.feed(chunk.data)
-    ]
+    return Decoder().feed(b"".join(data for _, way, data in session.byte_log() if way == direction))
 
 
 def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
@@ -37,12 +34,12 @@ def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
         with suppress(DeviceTimeoutError):
             two.stop("under a disk that does not answer")
 
-        def told():
+        def trouble():
             state = two.call("subscribe")["state"]
             seen.append((state["error"] or {}).get("message", ""))
             return "not known meanwhile" in seen[-1] and state["phase"] == "trouble"
 
-        until(told, lambda: seen[-5:])
+        until(trouble, lambda: seen[-5:])
         other.execute("ROLLBACK")
     until(lambda: two.call("subscribe")["state"]["error"] is None)
     one.stop("and again, with a disk that does")
@@ -71,3 +68,16 @@ def test_a_stop_between_the_look_and_the_answer_is_kept(monkeypatch):
     worker._attend()
     assert stopped == ["a second client"]
     assert late[0].done()
+
+
+def test_a_board_that_disarms_itself_as_soon_as_it_is_armed_is_heard(tmp_path, monkeypatch):
+    controller = Controller("sim://")
+    ball = Path(__file__).parents[2] / "protocols/falling-ball.yaml"
+    controller.open_session(str(ball), str(tmp_path / "a.session"), 1)
+    device, (code, payload) = controller.recorder.device, pack(Disarmed(1, DisarmReason.STOPPED))
+    line = encode(Frame(code, 1, 0, payload))  # read together with ARMED
+    monkeypatch.setattr(device, "arm", lambda _: len(device._feed("rx", 0, line)))
+    controller.arm(1, 1)
+    controller.notice()
+    assert controller.session.latest_state(1).state is RunState.INTERRUPTED
+    controller.close()
