@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.boards import MEGA, PICO, UNO
 from rig.errors import DeviceError
-from rig.reasons import make_error
+from rig.reasons import make_error, make_reason, remedies
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,7 +39,7 @@ class Known:
     product: str = ""
 
 
-_NO_HUB = "use no hub"  # as the firmware has it in the product text of an early Pico
+_NO_HUB = "use no hub"  # in the product text that the firmware gives an RP2040 B0 or B1
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
 _MEGAS = "2341:0010 2341:0042 2341:0210 2341:0242 2a03:0010 2a03:0042"
@@ -201,10 +201,8 @@ def port_at(path: str, ports: Iterable[SerialPort] | None = None) -> SerialPort 
 
 
 def note_early_boards(*paths: str | None) -> list[str]:
-    """Return a note for each port with a board that wants no hub, by its text at USB.
-
-    An early Pico's chip has a fault in its USB part that shows behind a hub.
-    """
-    ports = [port_at(path) for path in paths if path]
-    products = [port.product for port in ports if port and port.product]
-    return [f"note: {product}" for product in products if _NO_HUB in product]
+    """Return a note for each port with a Pico whose chip may not be found behind a hub."""
+    ports = [port for path in paths if path and (port := port_at(path))]
+    early = [port.path for port in ports if _NO_HUB in (port.product or "")]
+    reasons = [make_reason("early_pico", port=path) for path in early]
+    return [f"note: {reason}; {remedy}" for reason in reasons for remedy in remedies([reason])]
