@@ -103,17 +103,16 @@ def _describe(info: ListPortInfo) -> SerialPort:
     """Say what a port is and whether it may be a board's."""
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
     kinds = [kind for kind in KNOWN if numbers in kind.numbers.split()]
-    boards = [kind for kind in kinds if kind.board]
-    if info.vid is None or info.pid is None:
-        skipped = "no USB device"
-    elif not kinds:
-        skipped = "no board's USB numbers: name it with --port if it is one"
-    elif not boards:
-        skipped = "a chip that boards and other instruments have: name it with --port"
-    elif not any((info.product or "").startswith(board.product) for board in boards):
-        skipped = "a board with another program: name it with --port if it is one of this rig"
-    else:
-        skipped = ""
+    boards = [kind.product for kind in kinds if kind.board]
+    reasons = {
+        "no USB device": None in {info.vid, info.pid},
+        "no board's USB numbers: name it with --port if it is one": not kinds,
+        "a chip that boards and other instruments have: name it with --port": not boards,
+        "a board with another program: name it with --port if it is one of this rig": (
+            not (info.product or "").startswith(tuple(boards))
+        ),
+    }
+    skipped = next((reason for reason, applies in reasons.items() if applies), "")
     texts = info.serial_number, info.manufacturer, info.product
     names = tuple(kind.name for kind in kinds)
     return SerialPort(info.device, info.vid, info.pid, *texts, names, skipped)
