@@ -15,7 +15,7 @@ from rig.reasons import make_error
 def main(arguments: Namespace) -> int:
     """Flash a board and say what it is now."""
     board, port = arguments.board, arguments.port
-    if board not in TARGETS:
+    if TARGETS[board] is DRIVE:
         if arguments.avrdude is not None:
             raise make_error(InputError, "avrdude_for_pico", board=DRIVE.board.name)
         identity = flash_drive(arguments.drive, port, arguments.hex, say)

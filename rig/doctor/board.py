@@ -190,13 +190,10 @@ def mains_ripple(times_s: Sequence[float]) -> int | None:
         The lowest of 50, 60, 100 and 120 Hz with which the edges keep step: the length of their
         mean phasor is above 0.8, where edges at random times would give 1/√n.
     """
-    if len(times_s) < _ENOUGH:
-        return None
-    for hz in _MAINS_HZ:
-        mean = sum(cmath.exp(1j * tau * hz * t) for t in times_s) / len(times_s)
-        if abs(mean) > _IN_STEP:
-            return hz
-    return None
+    count = len(times_s)
+    phasors = {hz: sum(cmath.exp(1j * tau * hz * t) for t in times_s) for hz in _MAINS_HZ}
+    in_step = (hz for hz, phasor in phasors.items() if abs(phasor) > _IN_STEP * count)
+    return next(in_step, None) if count >= _ENOUGH else None
 
 
 BOARD_CHECKS: Mapping[str, Callable[[BoardFacts], str]] = {

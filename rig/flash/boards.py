@@ -42,12 +42,12 @@ class Target:
 
 
 TARGETS = {
+    "pico": Target(PICO, "rp2040.uf2", 2 << 20),
     "mega": Target(MEGA, "atmega2560.hex", 0x3E000, "-p m2560 -c wiring -b 115200"),
     "uno": Target(UNO, "atmega328p.hex", 0x7E00, "-p m328p -c arduino -b 115200"),
     "nano-old": Target(UNO, "atmega328p.hex", 0x7800, "-p m328p -c arduino -b 57600"),
 }
 """By the word for ``--board``. All boot loaders' rates are those of the makers' own tools. A
 Nano is an Uno on a smaller board; those sold before 2018, and many since, have another loader."""
-
-DRIVE = Target(PICO, "rp2040.uf2", 2 << 20)
+DRIVE = TARGETS["pico"]
 """The Pico, which shows a drive that its firmware is copied to."""

@@ -21,7 +21,8 @@ _USB = Path("/sys/bus/usb/devices")
 _BOOT = ["2e8a", "0003"]  # USB vendor and product of the RP2040's boot program
 _OCTAL = re.compile(r"\\([0-7]{3})")
 _LOOK_S = 0.2
-_MOUNT_S = 5.0
+MOUNT_S = 5.0
+"""In which a desktop mounts the drive of a Pico that goes over to wait."""
 _RESTART_S = 10.0
 
 
@@ -47,13 +48,6 @@ def looks(seconds: float) -> Iterator[None]:
     while time.monotonic() < end:
         time.sleep(_LOOK_S)
         yield
-
-
-def wait_for_drive() -> None:
-    """Give a desktop some time to mount the drive of a Pico that goes over to wait."""
-    for _ in looks(_MOUNT_S):
-        if waiting_drives():
-            return
 
 
 def choose_drive(folder: str | None) -> Path:

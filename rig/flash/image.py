@@ -12,12 +12,11 @@ from pathlib import Path
 
 from rig.errors import InputError, Problem
 from rig.files import read_input
-from rig.flash.boards import DRIVE, FIRMWARE, TARGETS, Target
+from rig.flash.boards import FIRMWARE, TARGETS, Target
 from rig.flash.uf2 import read_blocks
 from rig.reasons import make_error
 
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START = range(6)
-_TARGETS: tuple[Target, ...] = (*TARGETS.values(), DRIVE)
 _ERASED = b"\xff"
 _VERSION = re.compile(rb"(%s [0-9][\w.+-]*)\0" % FIRMWARE.encode())
 
@@ -61,9 +60,9 @@ def read_image(file: str | Path | None, target: Target) -> Image:
         data = read_input(path)
     except OSError as error:
         raise make_error(InputError, "image_unreadable", path=path, text=error) from None
-    flash = read_blocks(data, path) if target is DRIVE else _flash(data, path)
+    flash = (_flash if target.avrdude else read_blocks)(data, path)
     versions = set(_VERSION.findall(flash))
-    boards = {each.board for each in _TARGETS if each.board.name.encode() + b"\0" in flash}
+    boards = {each.board for each in TARGETS.values() if each.board.name.encode() + b"\0" in flash}
     if len(versions) != 1 or len(boards) != 1:
         raise make_error(InputError, "image_foreign", path=path)
     if boards != {target.board}:
@@ -75,10 +74,8 @@ def read_image(file: str | Path | None, target: Target) -> Image:
 
 def shipped_firmware(board: str) -> str:
     """Say which firmware comes with this program for a board of that name; empty for none."""
-    for target in _TARGETS:
-        if target.board.name == board:
-            return read_image(None, target).firmware
-    return ""
+    targets = (target for target in TARGETS.values() if target.board.name == board)
+    return next((read_image(None, target).firmware for target in targets), "")
 
 
 def _flash(data: bytes, path: Path) -> bytes:

@@ -122,7 +122,7 @@ def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
                 return  # it has older firmware
             raise
     say(f"the {DRIVE.board.name} at {path} waits for firmware")
-    drives.wait_for_drive()
+    any(drives.waiting_drives() for _ in drives.looks(drives.MOUNT_S))
 
 
 def identify(port: str, target: Target, firmware: str) -> Identity:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -11,6 +12,7 @@ from rig.link.exchange import Answer, Exchange
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.gatewatch import GateStates, watch_gates
 from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
+from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming
 from rig.selftest.findings import (
     CheckFailedError,
@@ -22,17 +24,16 @@ from rig.selftest.findings import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rig.clock.host import Clock
     from rig.link.port import Port
 
-Check: TypeAlias = "Callable[[BoardUnderTest], str | None]"
+Check: TypeAlias = Callable[["BoardUnderTest"], str | None]
 """What a check finds, in words; or it raises why it ended."""
 LABEL = pack_label(TEST_RUN, 1)
 OTHER_LABEL = pack_label(TEST_RUN, 2)
 RECORD_MS = 60
 PULSE_US = 50_000
+_OF_DROPS = (wire.Fire, wire.Abort, wire.Read, wire.Acknowledge)
 _TRIES = 3
 _ANSWER_S = 0.3
 _END_S = 1.0  # at most, from the end of a recording to its certificate
@@ -49,6 +50,9 @@ class RawRequest(NamedTuple):
 
     code: int
     payload: bytes = b""
+
+
+Request: TypeAlias = wire.HostMessage | RawRequest
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +77,7 @@ class SelftestOptions:
     gates: int | None = None
 
 
-def name_request(request: wire.HostMessage | RawRequest) -> str:
+def name_request(request: Request) -> str:
     """Name a request for a message."""
     if not isinstance(request, RawRequest):
         return type(request).__name__
@@ -128,19 +132,23 @@ class BoardUnderTest(Exchange):
         self._seq = self._seq % 255 + 1
         return self._seq
 
-    def send(self, request: wire.HostMessage | RawRequest, seq: int) -> None:
+    def send(self, request: Request, seq: int) -> None:
         """Send a request once, be it a message or not."""
         code, payload = request if isinstance(request, RawRequest) else wire.pack(request)
         self.write(encode(Frame(code, seq, 0, payload)))
 
-    def ask(self, request: wire.HostMessage | RawRequest, seq: int = 0) -> wire.Message:
+    def ask(self, request: Request, seq: int = 0) -> wire.Message:
         """Send a request, a few times if need be, and give its answer.
 
         Raises
         ------
         CheckFailedError
             None came.
+        NotPossibleError
+            It is about drops, of which the board holds somebody's.
         """
+        if isinstance(request, _OF_DROPS):
+            self.need_idle()
         if isinstance(request, wire.Arm) and request.release and not self.options.release:
             self._may_release = True
         fail_if(isinstance(request, wire.Fire) and self._may_release, "fire_withheld")
@@ -161,7 +169,7 @@ class BoardUnderTest(Exchange):
 
     def refuse(
         self,
-        request: wire.HostMessage | RawRequest,
+        request: Request,
         reason: RefusalReason,
         detail: int | None = None,
         name: str = "",
@@ -206,9 +214,7 @@ class BoardUnderTest(Exchange):
         order = self.order(**changes)
         answer = self.ask(order)
         match answer:
-            case wire.Refused(reason=RefusalReason.COOLING, detail=ms) if (
-                order.release and ms < _REST_MS
-            ):
+            case wire.Refused(RefusalReason.COOLING, ms) if order.release and ms < _REST_MS:
                 self.clock.sleep(1.02e-3 * ms)
                 answer = self.ask(order)
         return self.read_token(answer)
@@ -224,10 +230,9 @@ class BoardUnderTest(Exchange):
         match answer:
             case wire.Armed(token=token):
                 return token
-            case wire.Refused(reason=RefusalReason.STOPPED):
-                raise NotPossibleError("refused_stopped")
-            case wire.Refused(reason=RefusalReason.COOLING, detail=rest_ms):
-                raise NotPossibleError("refused_cooling", rest_s=rest_ms / 1000)
+            case wire.Refused(RefusalReason.STOPPED | RefusalReason.COOLING, detail):
+                (reason,) = DeviceRefusedError(answer.reason, detail).reasons
+                raise NotPossibleError(reason.code, **reason.values)
         raise wrong_answer("Arm", "Armed", answer)
 
     def fire(self, token: int) -> wire.Fired:
@@ -254,10 +259,11 @@ class BoardUnderTest(Exchange):
                     raise wrong_answer("a drop", "DropCertificate2", certificate)
         raise CheckFailedError("no_certificate")
 
-    def acknowledge(self, recorded: RecordedDrop) -> None:
-        """Let the board forget a drop."""
+    def acknowledge(self, recorded: RecordedDrop) -> RecordedDrop:
+        """Let the board forget a drop, and give it."""
         certificate = recorded.certificate
         self.answer(wire.Acknowledge(certificate.label, certificate.crc32), wire.Done)
+        return recorded
 
     # -- rest
 

@@ -89,8 +89,7 @@ def arm_while_cooling(board: BoardUnderTest) -> str:
     """See that a release rests after its pulse. Drives release 0."""
     need(board.options.release, "leave to drive release 0: --release")
     pulse = {"release": 1, "pulse_us": PULSE_US}
-    board.fire(board.arm(**pulse))
-    board.acknowledge(board.collect_drop())
+    board.acknowledge(board.drop(**pulse))
     # It must rest for 150 ms, of which a slow line takes some.
     refused = board.refuse(board.order(**pulse), RefusalReason.COOLING)
     if not 0 < refused.detail <= 3 * PULSE_US // 1000 + 1:
@@ -128,8 +127,7 @@ def measure_sync_edges(board: BoardUnderTest) -> str:
 def _sync_edge(board: BoardUnderTest, gate: int) -> int:
     """Fire once; give the ticks from FIRE to the edge."""
     mask = 1 << gate
-    recorded = board.drop(gates=mask)
-    board.acknowledge(recorded)
+    recorded = board.acknowledge(board.drop(gates=mask))
     states = [event.state for event in recorded.events]
     broken = states != [mask] or recorded.certificate.glitches
     fail_if(broken, "sync_edges", gate=gate, events=len(states))

@@ -149,9 +149,7 @@ class JudgeBoard(BoardUnderTest):
 
 
 def _finish(board: BoardUnderTest) -> RecordedDrop:
-    recorded = board.collect_drop(1000)
-    board.acknowledge(recorded)
-    return recorded
+    return board.acknowledge(board.collect_drop(1000))
 
 
 def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:

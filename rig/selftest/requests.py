@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from rig.boards import GATES, RELEASES
@@ -10,7 +11,7 @@ from rig.link.client import BOOT_WAIT_S
 from rig.link.frames import DELIMITER
 from rig.link.gatewatch import name_gates
 from rig.link.messages import PROTOCOL_VERSION, Phase, RefusalReason
-from rig.selftest.board import LABEL, PULSE_US, BoardUnderTest, RawRequest
+from rig.selftest.board import LABEL, PULSE_US, BoardUnderTest, RawRequest, Request
 from rig.selftest.findings import NotPossibleError, fail_if, insist, need, wrong_answer
 
 BAD_ORDERS: tuple[dict[str, int], ...] = (
@@ -25,8 +26,34 @@ BAD_ORDERS: tuple[dict[str, int], ...] = (
 )
 """Each makes an ARM that pulses a release one that no device may accept."""
 
-_UNKNOWN_CODES = (0x55, 0x00, 0x82, 0xFF)
-"""Types that are no requests."""
+
+def _other_lengths() -> Iterator[RawRequest]:
+    """Give every request with a byte too many, and with one too few."""
+    order = wire.Arm(1, 1, 0, 0, 1, 1)  # of the right length it would be accepted
+    orders = order, wire.Fire(1), wire.Read(1, 0, 1), wire.Acknowledge(1, 0)
+    examples: dict[type[wire.Message], wire.Message] = {type(each): each for each in orders}
+    for code, kind in wire.TABLE.items():
+        if code < 0x80 and kind is not wire.Flash:  # not every board knows it
+            _, payload = wire.pack(examples.get(kind) or kind())
+            yield RawRequest(code, payload + b"\1")
+            if payload:
+                yield RawRequest(code, payload[:-1])
+
+
+REFUSALS: dict[str, list[tuple[Request, int | None]]] = {
+    "VERSION": [(wire.Identify(n), PROTOCOL_VERSION) for n in (0, PROTOCOL_VERSION + 1)],
+    "UNKNOWN_MESSAGE": [(RawRequest(code), code) for code in (0x55, 0x00, 0x82, 0xFF)],
+    "BAD_PARAMETER by length": [(request, 0) for request in _other_lengths()],
+    "NOT_ARMED": [(wire.Fire(1), None)],
+    "NO_SUCH_DROP": [(wire.Read(LABEL, 0, 1), None), (wire.Acknowledge(LABEL, 0), None)],
+}
+"""What a board that is idle refuses, with the detail where one is due; a name is the reason's."""
+
+
+def refuse_row(name: str, board: BoardUnderTest) -> None:
+    """See that a board refuses the requests of a row of `REFUSALS`."""
+    for request, detail in REFUSALS[name]:
+        board.refuse(request, RefusalReason[name.removesuffix(" by length")], detail)
 
 
 def identify(board: BoardUnderTest) -> str:
@@ -50,38 +77,12 @@ def identify(board: BoardUnderTest) -> str:
     return f"{identity.board}, {identity.firmware}, id {identity.unique_id.hex()}"
 
 
-def ask_other_versions(board: BoardUnderTest) -> None:
-    """See that clients of other versions are turned away."""
-    for version in (0, PROTOCOL_VERSION + 1):
-        board.refuse(wire.Identify(version), RefusalReason.VERSION, PROTOCOL_VERSION)
-
-
 def ask_every_message(board: BoardUnderTest) -> None:
     """See that each request gets its own kind of answer; those about drops have their own tests."""
     board.answer(wire.Ping(), wire.Pong)
     board.state()
     board.answer(wire.Reference(), wire.ReferencePulse)
-    board.need_idle()  # ABORT would let a held drop be discarded
     board.abort()
-
-
-def send_unknown_messages(board: BoardUnderTest) -> None:
-    """See that types that are no requests are refused."""
-    for code in _UNKNOWN_CODES:
-        board.refuse(RawRequest(code), RefusalReason.UNKNOWN_MESSAGE, code)
-
-
-def send_other_lengths(board: BoardUnderTest) -> None:
-    """See that every request with a byte too many, or one too few, is refused."""
-    order = wire.Arm(1, 1, 0, 0, 1, 1)  # of the right length it would be accepted
-    orders = order, wire.Fire(1), wire.Read(1, 0, 1), wire.Acknowledge(1, 0)
-    examples: dict[type[wire.Message], wire.Message] = {type(each): each for each in orders}
-    for code, kind in wire.TABLE.items():
-        if code < 0x80 and kind is not wire.Flash:  # not every board knows it
-            _, payload = wire.pack(examples.get(kind) or kind())
-            for other in (payload + b"\1", payload[:-1]):
-                if other != payload:  # nothing is one byte less than nothing
-                    board.refuse(RawRequest(code, other), RefusalReason.BAD_PARAMETER, 0)
 
 
 def look_at_gates(board: BoardUnderTest) -> str:
@@ -124,12 +125,6 @@ def arm_and_abort(board: BoardUnderTest) -> None:
     board.refuse(wire.Fire(token), RefusalReason.NOT_ARMED)
 
 
-def fire_unarmed(board: BoardUnderTest) -> None:
-    """See that FIRE alone does nothing."""
-    board.need_idle()
-    board.refuse(wire.Fire(1), RefusalReason.NOT_ARMED)
-
-
 def send_wrong_tokens(board: BoardUnderTest) -> None:
     """See that a token which is not the latest does not fire."""
     old = board.arm()
@@ -157,10 +152,3 @@ def send_bad_orders(board: BoardUnderTest) -> str:
     board.refuse(wire.Fire(token ^ 1), RefusalReason.WRONG_TOKEN)
     board.insist_state("a refused order", phase=Phase.ARMED)
     return f"{len(variants)} orders"
-
-
-def read_no_drop(board: BoardUnderTest) -> None:
-    """See that nothing is read or acknowledged while nothing is held."""
-    board.need_idle()
-    board.refuse(wire.Read(LABEL, 0, 1), RefusalReason.NO_SUCH_DROP)
-    board.refuse(wire.Acknowledge(LABEL, 0), RefusalReason.NO_SUCH_DROP)

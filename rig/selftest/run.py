@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
@@ -22,15 +23,15 @@ if TYPE_CHECKING:
 
 CHECKS: dict[str, Check] = {
     "handshake": requests.identify,
-    "VERSION": requests.ask_other_versions,
+    "VERSION": partial(requests.refuse_row, "VERSION"),
     "every message": requests.ask_every_message,
-    "UNKNOWN_MESSAGE": requests.send_unknown_messages,
-    "BAD_PARAMETER by length": requests.send_other_lengths,
+    "UNKNOWN_MESSAGE": partial(requests.refuse_row, "UNKNOWN_MESSAGE"),
+    "BAD_PARAMETER by length": partial(requests.refuse_row, "BAD_PARAMETER by length"),
     "round trips": line_checks.measure_round_trips,
     "gates": requests.look_at_gates,
     "GATE_BLOCKED": requests.arm_blocked_gate,
-    "NOT_ARMED": requests.fire_unarmed,
-    "NO_SUCH_DROP": requests.read_no_drop,
+    "NOT_ARMED": partial(requests.refuse_row, "NOT_ARMED"),
+    "NO_SUCH_DROP": partial(requests.refuse_row, "NO_SUCH_DROP"),
     "BAD_PARAMETER": requests.send_bad_orders,
     "ARM and ABORT": requests.arm_and_abort,
     "WRONG_TOKEN": requests.send_wrong_tokens,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.boards import MEGA, PICO, UNO
 from rig.errors import DeviceError
-from rig.reasons import make_error
+from rig.reasons import make_error, make_reason, remedies
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,7 +39,7 @@ class Known:
     product: str = ""
 
 
-_NO_HUB = "use no hub"  # as the firmware has it in the product text of an early Pico
+_NO_HUB = "use no hub"  # in the product text that the firmware gives an RP2040 B0 or B1
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
 _MEGAS = "2341:0010 2341:0042 2341:0210 2341:0242 2a03:0010 2a03:0042"
@@ -103,17 +103,16 @@ def _describe(info: ListPortInfo) -> SerialPort:
     """Say what a port is and whether it may be a board's."""
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
     kinds = [kind for kind in KNOWN if numbers in kind.numbers.split()]
-    boards = [kind for kind in kinds if kind.board]
-    if info.vid is None or info.pid is None:
-        skipped = "no USB device"
-    elif not kinds:
-        skipped = "no board's USB numbers: name it with --port if it is one"
-    elif not boards:
-        skipped = "a chip that boards and other instruments have: name it with --port"
-    elif not any((info.product or "").startswith(board.product) for board in boards):
-        skipped = "a board with another program: name it with --port if it is one of this rig"
-    else:
-        skipped = ""
+    boards = [kind.product for kind in kinds if kind.board]
+    reasons = {
+        "no USB device": None in {info.vid, info.pid},
+        "no board's USB numbers: name it with --port if it is one": not kinds,
+        "a chip that boards and other instruments have: name it with --port": not boards,
+        "a board with another program: name it with --port if it is one of this rig": (
+            not (info.product or "").startswith(tuple(boards))
+        ),
+    }
+    skipped = next((reason for reason, applies in reasons.items() if applies), "")
     texts = info.serial_number, info.manufacturer, info.product
     names = tuple(kind.name for kind in kinds)
     return SerialPort(info.device, info.vid, info.pid, *texts, names, skipped)
@@ -201,10 +200,8 @@ def port_at(path: str, ports: Iterable[SerialPort] | None = None) -> SerialPort 
 
 
 def note_early_boards(*paths: str | None) -> list[str]:
-    """Return a note for each port with a board that wants no hub, by its text at USB.
-
-    An early Pico's chip has a fault in its USB part that shows behind a hub.
-    """
-    ports = [port_at(path) for path in paths if path]
-    products = [port.product for port in ports if port and port.product]
-    return [f"note: {product}" for product in products if _NO_HUB in product]
+    """Return a note for each port with a Pico whose chip may not be found behind a hub."""
+    ports = [port for path in paths if path and (port := port_at(path))]
+    early = [port.path for port in ports if _NO_HUB in (port.product or "")]
+    reasons = [make_reason("early_pico", port=path) for path in early]
+    return [f"note: {reason}; {remedy}" for reason in reasons for remedy in remedies([reason])]

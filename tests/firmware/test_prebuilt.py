@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from rig.flash.boards import DRIVE, TARGETS
+from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
 from tests.firmware.toolchain import FIRMWARE, need
 
 SOURCES = ("core", "avr", "atmega2560", "atmega328p", "rp2040", "Makefile", "size.py")
-EACH = pytest.mark.parametrize("target", [*TARGETS.values(), DRIVE], ids=[*TARGETS, "pico"])
+EACH = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
 COMPILERS = {"avr-gcc": "PREBUILT_WITH", "arm-none-eabi-gcc": "PICO_PREBUILT_WITH"}
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from firmware.pictures import BOARDS, draw
 from firmware.pins import read_pins
-from rig.flash.boards import DRIVE, TARGETS
+from rig.flash.boards import TARGETS
 from tests.firmware.toolchain import FIRMWARE
 
 README = (FIRMWARE / "README.md").read_text(encoding="utf-8")
@@ -74,7 +74,7 @@ def test_the_gates_are_as_many_as_the_firmware_says(board):
     text = (FIRMWARE / board / "board.h").read_text()
     said = int(re.search(r"#define BOARD_GATES (\d+)", text)[1])
     assert len(read_pins(board).gates) == said
-    assert read_pins(board).board in {target.board.name for target in (*TARGETS.values(), DRIVE)}
+    assert read_pins(board).board in {target.board.name for target in TARGETS.values()}
 
 
 @EACH

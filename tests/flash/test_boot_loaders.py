@@ -56,9 +56,7 @@ def wiring_of(board: str) -> Wiring:
     return next(w for word, w in BOARDS.items() if FLASHED[word] is FLASHED[board])
 
 
-@pytest.mark.parametrize(
-    ("board", "power"), [("mega", True), ("uno", False), ("nano-old", True)], ids=TARGETS
-)
+@pytest.mark.parametrize(("board", "power"), [("mega", True), ("uno", False), ("nano-old", True)])
 def test_a_board_cut_off_in_mid_flash_is_flashed_again_and_its_drops_outlive_the_boot_loader(
     board, power, bought, flash
 ):

@@ -152,7 +152,12 @@ def test_an_early_pico_is_named_and_fails_nothing(plugged, capsys, command, revi
     port, product = "sim://?protocol=protocols/picket-fence.yaml", f"chainrig on a Pico{revision}"
     plugged(info(port, 0x2E8A, 0x000A, "e66", product))
     assert main([command, "--port", port, "--json"]) == 0
-    note = f"note: {product}\n" if revision else ""
+    note = (
+        f"note: {port} is an early Pico (RP2040 B0 or B1): behind a hub the computer may not find "
+        "it (erratum E5); plug it straight into the computer, not into a hub\n"
+        if revision
+        else ""
+    )
     assert capsys.readouterr().err.removesuffix("nothing to do\n") == note
 
 
