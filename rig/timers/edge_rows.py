@@ -41,18 +41,21 @@ def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[
     """Read drops in the import format, and note faults at their places."""
     runs: dict[int, list[Edge]] = {}
     last: dict[tuple[int, int], int] = {}
-    plain = ((n, line) for n, line in lines if line.strip() and not REMARK.match(line))
-    number, line = next(plain, (1, ""))
-    if tuple(text.lower() for text in split_cells(line, ",")) != HEADER:
-        problems.refuse(number, 1, "wrong_header", header=",".join(HEADER))
-    for number, line in plain:
-        row = Row(number, split_cells(line, ","), line)
+    plain = (
+        Row(number, split_cells(line, ","), line)
+        for number, line in lines
+        if line.strip() and not REMARK.match(line)
+    )
+    heading = next(plain, Row(1, []))
+    if tuple(map(str.lower, heading.texts)) != HEADER:
+        problems.refuse(heading.line, 1, "wrong_header", header=",".join(HEADER))
+    for row in plain:
         cells = _read_cells(row, problems)
         if None in cells:
             continue
         run, channel, tick, state = cells
         edges = runs.setdefault(run, [])
-        edge, place = Edge(tick, channel, bool(state)), (number, row.column(2), HEADER[2])
+        edge, place = Edge(tick, channel, bool(state)), (*row.place(2), HEADER[2])
         lasting_s = abs(tick - (edges or [edge])[0].tick) / TICK_HZ
         before = last.get((run, channel), tick)
         if lasting_s > _LONGEST_RUN_S:
@@ -83,7 +86,7 @@ def _read_cells(row: Row, problems: ProblemList) -> list[Any]:
     for n, (text, (form, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
         cells.append(read(text) if re.fullmatch(form, text) else None)
         if cells[-1] is None:
-            problems.reject(row.line, row.column(n), HEADER[n], text, accepted)
+            problems.reject(*row.place(n), HEADER[n], text, accepted)
     return cells
 
 

@@ -76,8 +76,7 @@ class EventList:
     def reject(self, row: Row, column: TimerColumn) -> None:
         """Note a cell whose value is not accepted."""
         text = row.texts[column.at] if column.at < len(row.texts) else ""
-        place = row.line, row.column(column.at), column.role
-        self.problems.reject(*place, text, roles()[column.role][1])
+        self.problems.reject(*row.place(column.at), column.role, text, roles()[column.role][1])
 
 
 def read_passages(
@@ -109,7 +108,7 @@ def read_passages(
                 part = out.put(key[0], 0 if any(key) else signal.clock.at, event)
                 lasting_s = abs(tick - part[0].tick) / TICK_HZ
                 if signal.clock.power is not None and lasting_s > _DAY_S:
-                    place = row.line, row.column(signal.clock.at), signal.clock.role
+                    place = *row.place(signal.clock.at), signal.clock.role
                     values = {"lasting_s": lasting_s, "limit_s": _DAY_S}
                     out.problems.add(*place, "too_long", recording="the recording", **values)
         if not passages:

@@ -33,8 +33,6 @@ _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
 _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
-_EXACT = 2.0**53
-"""Ticks beyond which a float is not exact to the picosecond."""
 _REGULAR = 1.5
 """Longest over usual step below which samples are all as far apart."""
 _CHUNK = 4096
@@ -74,9 +72,8 @@ class SampleReader:
             self.out.rows += len(chunk)
             steps = np.diff(times[0], prepend=last[0] if len(last) else times[0, :1])
             for n in np.flatnonzero(steps < 0)[:1]:
-                row, at = chunk[n], self.clocks[0].at
-                place = row.line, row.column(at), "time"
-                self.out.problems.add(*place, "backwards", text=row.cell(at))
+                row, at = chunk[int(n)], self.clocks[0].at
+                self.out.problems.add(*row.place(at), "time", "backwards", text=row.cell(at))
             if not len(last) and len(chunk) > 1:
                 usual = float(np.median(steps[1:]))
                 self.period_s = usual / TICK_HZ if steps.max() < _REGULAR * usual else None
@@ -95,30 +92,22 @@ class SampleReader:
 
     def _read_ticks(self, rows: Sequence[Row], clock: TimerColumn) -> Array:
         """Return when samples were taken, ps from the origin; NaN where a trace ends."""
-        is_time, empty = clock.role == "time", "nan" if len(self.clocks) > 1 else ""
-        start, step = (0.0, 10.0 ** -(clock.power or 0)) if is_time else self.base
         if clock.at < 0:
-            numbers = self.out.rows + np.arange(len(rows), dtype=float)
+            ticks = [n * TICK_HZ for n in range(self.out.rows, self.out.rows + len(rows))]
         else:
-            numbers = _numbers([row.cell(clock.at) or empty for row in rows])
-        ticks = (start + step * numbers) * TICK_HZ
-        if np.nanmax(np.abs(ticks), initial=0.0) < _EXACT:
-            self.origin = self.origin or 0
-            return np.asarray(np.round(ticks - self.origin))
-        exact = [
-            self._read_cell(row, clock, partial(moment, power=clock.power or 0)) for row in rows
-        ]
-        if not is_time:
-            exact = [x if x is None else round(start * TICK_HZ + step * x) for x in exact]
+            read = partial(moment, power=clock.power or 0)
+            ticks = [self._read_cell(row, clock, read) for row in rows]
+        if clock.role != "time":
+            start, step = self.base
+            ticks = [x if x is None else round(start * TICK_HZ + step * x) for x in ticks]
         if self.origin is None:
-            self.origin = next((x for x in exact if x is not None), 0)
-        return np.array([np.nan if x is None else float(x - self.origin) for x in exact])
+            self.origin = next((x for x in ticks if x is not None), 0)
+        return np.array([x if x is None else x - self.origin for x in ticks], dtype=float)
 
     def _read_levels(self, rows: Sequence[Row], value: TimerColumn) -> Levels:
         numbers = _numbers([row.cell(value.at) for row in rows])
         if np.isinf(numbers).any() or (self.is_digital and not np.isin(numbers, (0.0, 1.0)).all()):
-            cells = [self._read_cell(row, value, _level_of) for row in rows]
-            numbers = np.array([np.nan if cell is None else cell for cell in cells])
+            numbers = np.array([self._read_cell(row, value, _level_of) for row in rows], float)
         return numbers.astype(np.float32)
 
     def _read_cell(self, row: Row, column: TimerColumn, read: Callable[[str], Any]) -> Any:

@@ -54,12 +54,15 @@ class Row(NamedTuple):
         is_missing = not text[:1].isdigit() and text[:5].casefold() in words()["missing"]
         return "" if is_missing else text
 
-    def column(self, at: int) -> int:
-        """Return the column, from 1, at which a cell begins; 1 where the row ends before it."""
-        if at >= len(self.texts) or not self.separator:
-            return max(0, self.raw.find(self.texts[at])) + 1 if at < len(self.texts) else 1
+    def place(self, at: int) -> tuple[int, int]:
+        """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
+        if at >= len(self.texts):
+            return self.line, 1
+        if not self.separator:
+            return self.line, max(0, self.raw.find(self.texts[at])) + 1
         before = sum(len(cell) + 1 for cell in self.raw.split(self.separator)[:at])
-        return before + len(self.raw[before:]) - len(self.raw[before:].lstrip(' "')) + 1
+        rest = self.raw[before:]
+        return self.line, before + len(rest) - len(rest.lstrip(' "')) + 1
 
 
 @dataclass(eq=False, slots=True)

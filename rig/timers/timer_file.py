@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
-from rig.timers.columns import VALUES, check_columns, columns_of, find_signals
+from rig.timers.columns import VALUES, columns_of, find_signals
 from rig.timers.events import EventList, TimerEvent, read_passages
 from rig.timers.lines import find_kind, is_cut, read_lines
 from rig.timers.moments import TICK_HZ
@@ -162,13 +162,7 @@ def _read_block(
     """Add what a block says: samples, or passages."""
     sample = list(itertools.islice(rows, _SAMPLE))
     rows = itertools.chain(sample, rows)
-    columns, heading = columns_of(block, sample, file.unit, problems)
-    unclear = [column for column in columns if "|" in column.role]
-    for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
-        roles = column.role.split("|")
-        file.ways, column.role = max(file.ways, len(roles)), roles[file.way % len(roles)]
-    check_columns(columns, heading, sample[0], problems)
-    problems.raise_if_any()
+    columns = columns_of(file, block, sample, problems)
     file.columns |= {column.name: column.meaning for column in columns}
     file.has_unit &= all(column.power is not None for column in columns)
     known, signals, out = {c.role for c in columns}, find_signals(columns), EventList(problems)

@@ -56,14 +56,13 @@ def read_video(path: str | Path) -> VideoTrack:
         scales[name] = _SCALES[name].get(unit, 0.0)
         if not scales[name]:
             accepted, text = "a unit of this column: s, ms; m, cm, mm", heading.cell(n)
-            problems.reject(heading.line, heading.column(n), text, unit, accepted)
+            problems.reject(*heading.place(n), text, unit, accepted)
     frames: list[list[float]] = []
     for row in rows:
         texts = {name: row.cell(n) for name, (n, _, _) in columns.items()}
         wrong = [name for name, text in texts.items() if text and not is_number(text)]
         for name in wrong:
-            place = row.line, row.column(columns[name][0]), name
-            problems.reject(*place, texts[name], "a number")
+            problems.reject(*row.place(columns[name][0]), name, texts[name], "a number")
         if not wrong and all(texts.values()):
             frames.append([scales[name] * float(text) for name, text in texts.items()])
     problems.raise_if_any()
