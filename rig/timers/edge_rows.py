@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.records import Drop, Edge
@@ -100,9 +99,7 @@ def make_drop(run: int, edges: list[Edge]) -> Drop:
     return Drop(run, 1, TICK_HZ, stamps, initial_state=clear)
 
 
-def edges_text(
-    drops: Iterable[Drop], hz: Callable[[Drop], float | Fraction] = attrgetter("tick_hz")
-) -> str:
+def edges_text(drops: Iterable[Drop], hz: Callable[[Drop], float]) -> str:
     """Write drops in the import format, of which the same edges are read again.
 
     Parameters
@@ -110,7 +107,7 @@ def edges_text(
     drops
         At most one a run: the format does not know of attempts.
     hz
-        Calibrated tick rate of a drop, Hz; by default its nominal rate.
+        Calibrated tick rate of a drop, Hz.
 
     Raises
     ------

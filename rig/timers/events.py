@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
-_DAY_S = 86400
+LONGEST_S = 86400
 """How long a recording may be: more means a wrong unit."""
 
 
@@ -107,9 +107,9 @@ def read_passages(
                 event = TimerEvent(tick, key[1], state, row.line)
                 part = out.put(key[0], 0 if any(key) else signal.clock.at, event)
                 lasting_s = abs(tick - part[0].tick) / TICK_HZ
-                if signal.clock.power is not None and lasting_s > _DAY_S:
+                if signal.clock.power is not None and lasting_s > LONGEST_S:
                     place = *row.place(signal.clock.at), signal.clock.role
-                    values = {"lasting_s": lasting_s, "limit_s": _DAY_S}
+                    values = {"lasting_s": lasting_s, "limit_s": LONGEST_S}
                     out.problems.add(*place, "too_long", recording="the recording", **values)
         if not passages:
             out.unread.append(row.line)

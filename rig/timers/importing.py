@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rig.errors import InputError
 from rig.reasons import make_reason
 from rig.timers.edge_rows import HEADER, is_own, read_edges
+from rig.timers.events import LONGEST_S
 from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, read_drops
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList, refusal
@@ -128,6 +129,12 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
         pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
         raise refusal(place, "inputs_unclear", **values, pairs=pairs)
+    # Parts that are a gate each may be of different days.
+    lasting_s = min(reading.lasting_s for reading in readings)
+    if lasting_s > LONGEST_S:
+        limit = {"lasting_s": lasting_s, "limit_s": LONGEST_S}
+        raise refusal(place, "too_long", recording="the recording", **limit)
+    readings = [reading for reading in readings if reading.lasting_s <= LONGEST_S]
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings

@@ -97,6 +97,11 @@ class FileReading(NamedTuple):
     lines: set[int]
 
     @property
+    def lasting_s(self) -> float:
+        """How long the longest run is."""
+        return max((drop.edges[-1].tick for drop in self.drops), default=0) / TICK_HZ
+
+    @property
     def is_whole(self) -> bool:
         """Whether beams are clear at the beginning, and in the end, as a protocol has them.
 

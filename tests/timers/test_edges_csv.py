@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -182,7 +183,7 @@ def test_fire_stamped_drops_use_the_calibrated_rate(tmp_path: Path) -> None:
     time = Fraction(path.read_text().splitlines()[1].split(",")[2])
     assert abs(time - Fraction(1_000_000) / Fraction(1_999_000.5)) < Fraction(1, 10**12)
     with pytest.raises(ValueError, match="two drops"):
-        edges_text([drop, drop])
+        edges_text([drop, drop], attrgetter("tick_hz"))
 
 
 @st.composite
@@ -205,7 +206,7 @@ def imported_drops(draw: st.DrawFn) -> list[Drop]:
 @given(imported_drops())
 def test_round_trip(tmp_path_factory: pytest.TempPathFactory, drops: list[Drop]) -> None:
     path = tmp_path_factory.mktemp("round") / "edges.csv"
-    path.write_text(edges_text(drops), "utf-8")
+    path.write_text(edges_text(drops, attrgetter("tick_hz")), "utf-8")
     assert read_edges(path) == drops
 
 

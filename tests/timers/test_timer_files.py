@@ -101,11 +101,6 @@ def test_faults_are_located(tmp_path, text, place):
     assert place in faults(tmp_path, text)
 
 
-def test_a_missing_file_is_said(tmp_path):
-    with pytest.raises(InputError, match="cannot read"):
-        read_ways(tmp_path / "none")
-
-
 def test_own_files_are_told_from_others(tmp_path):
     path = tmp_path / "f"
     for text, ours in [
