@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -84,14 +85,13 @@ def read_passages(
 ) -> None:
     """Read rows; each gives events, or says that nothing changes, or is unread."""
     run_at, gate_at = (
-        next((c.at for c in columns if c.role == role), None) for role in ("run", "gate")
+        next((c.at for c in columns if c.role == role), sys.maxsize) for role in ("run", "gate")
     )
     has_several = len(signals) > 1 and any(signal.value for signal in signals)
     last: dict[tuple[str, str], str] = {}
     for row in rows:
         out.rows += 1
-        run = row.cell(run_at) if run_at is not None else ""
-        label = row.cell(gate_at) if gate_at is not None else ""
+        run, label = row.cell(run_at), row.cell(gate_at)
         passages = list(_passages(row, signals, has_several))
         is_whole = has_several and len(passages) == len(signals)
         for signal, tick, state in passages:

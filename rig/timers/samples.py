@@ -19,13 +19,9 @@ from rig.timers.moments import TICK_HZ, moment
 from rig.timers.vocabulary import is_number, state_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rig.arrays import Array
     from rig.timers.columns import Signal, TimerColumn
     from rig.timers.table import Row
-
-    Levels = NDArray[np.float32]
 
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
@@ -63,32 +59,32 @@ class SampleReader:
 
     def read(self, rows: Iterator[Row]) -> Iterator[Reason]:
         """Add the changes of each input, and say how many volts there are."""
-        chunks: list[tuple[Array, Levels, Array]] = []
-        last = np.empty((0, 0))
+        columns: list[TimerColumn | None] = [*self.clocks, *self.values]
+        chunks: list[Array] = []
+        last, inputs = np.empty((0, 0)), slice(len(self.clocks), -1)
         while chunk := list(itertools.islice(rows, _CHUNK)):
-            times = np.array([self._read_ticks(chunk, clock) for clock in self.clocks])
-            levels = np.array([self._read_levels(chunk, value) for value in self.values])
-            lines = np.array([row.line for row in chunk])
-            self.out.rows += len(chunk)
-            steps = np.diff(times[0], prepend=last[0] if len(last) else times[0, :1])
+            ticks = (self._read_ticks(chunk, clock) for clock in self.clocks)
+            levels = (self._read_levels(chunk, value) for value in self.values)
+            data = np.array([*ticks, *levels, [row.line for row in chunk]])
+            before = last if last.size else data[:, :1]
+            steps = np.diff(data[0], prepend=before[0])
             for n in np.flatnonzero(steps < 0)[:1]:
                 row, at = chunk[int(n)], self.clocks[0].at
                 self.out.problems.add(*row.place(at), "time", "backwards", text=row.cell(at))
-            if not len(last) and len(chunk) > 1:
+            if not last.size and len(chunk) > 1:
                 usual = float(np.median(steps[1:]))
                 self.period_s = usual / TICK_HZ if steps.max() < _REGULAR * usual else None
-            last = times[:, -1]
+            last = data[:, -1:]
             if self.is_digital:
-                before = chunks[-1][1][:, -1:] if chunks else levels[:, :1] - 1
-                kept = np.any(np.diff(levels, prepend=before) != 0, axis=0)
-                times, levels, lines = times[:, kept], levels[:, kept], lines[kept]
-            chunks += [(times, levels, lines)] if lines.size else []
-        times, levels, lines = (np.concatenate(part, axis=-1) for part in zip(*chunks, strict=True))
+                is_change = np.any(np.diff(data[inputs], prepend=before[inputs]) != 0, axis=0)
+                is_change[0] |= not chunks
+                data = data[:, is_change]
+            chunks.append(data)
+            self.out.rows += len(chunk)
+        data = np.concatenate(chunks, axis=-1)
         for signal in self.signals:
-            trace = levels[self.values.index(signal.value or self.values[0])]
-            yield from self._find_changes(
-                signal, times[self.clocks.index(signal.clock)], trace, lines
-            )
+            times, trace = (data[columns.index(column)] for column in (signal.clock, signal.value))
+            yield from self._find_changes(signal, times, trace, data[-1])
 
     def _read_ticks(self, rows: Sequence[Row], clock: TimerColumn) -> Array:
         """Return when samples were taken, ps from the origin; NaN where a trace ends."""
@@ -104,11 +100,11 @@ class SampleReader:
             self.origin = next((x for x in ticks if x is not None), 0)
         return np.array([x if x is None else x - self.origin for x in ticks], dtype=float)
 
-    def _read_levels(self, rows: Sequence[Row], value: TimerColumn) -> Levels:
+    def _read_levels(self, rows: Sequence[Row], value: TimerColumn) -> Array:
         numbers = _numbers([row.cell(value.at) for row in rows])
         if np.isinf(numbers).any() or (self.is_digital and not np.isin(numbers, (0.0, 1.0)).all()):
-            numbers = np.array([self._read_cell(row, value, _level_of) for row in rows], float)
-        return numbers.astype(np.float32)
+            return np.array([self._read_cell(row, value, _level_of) for row in rows], float)
+        return numbers
 
     def _read_cell(self, row: Row, column: TimerColumn, read: Callable[[str], Any]) -> Any:
         value = read(row.cell(column.at))
@@ -118,11 +114,11 @@ class SampleReader:
         return value
 
     def _find_changes(
-        self, signal: Signal, times: Array, trace: Levels, lines: Array
+        self, signal: Signal, times: Array, trace: Array, lines: Array
     ) -> Iterator[Reason]:
         at = np.flatnonzero(np.isfinite(times) & np.isfinite(trace))
         # Where nothing of it can be read, its lowest and its highest are no numbers.
-        volts = trace[at] if at.size else np.full(1, np.nan, np.float32)
+        volts = trace[at] if at.size else np.full(1, np.nan)
         threshold = (0.5, 0.0) if self.is_digital else find_threshold(volts)
         if threshold is None:
             span = {"low": float(volts.min()), "high": float(volts.max())}
@@ -155,7 +151,7 @@ def _level_of(text: str) -> float | None:
 
 
 def _crossings(
-    times: Array, volts: Levels, threshold: tuple[float, float]
+    times: Array, volts: Array, threshold: tuple[float, float]
 ) -> Iterator[tuple[int, float, bool]]:
     """Yield the sample behind each crossing, its moment, and whether it rises."""
     is_high = volts > threshold[0]
@@ -167,7 +163,7 @@ def _crossings(
         yield int(n), float(times[n] - share * (times[n] - times[n - 1])), bool(is_high[n])
 
 
-def find_threshold(volts: Levels) -> tuple[float, float] | None:
+def find_threshold(volts: Array) -> tuple[float, float] | None:
     """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
     low, high = float(volts.min()), float(volts.max())
     for _ in range(50):  # two means, one for each level

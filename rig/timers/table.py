@@ -299,14 +299,12 @@ def find_time_base(block: RowBlock) -> tuple[float, float] | None:
     for above, below in itertools.pairwise([*rows, Row(0, [])]):
         for n, text in enumerate(above.texts):
             name, _, inside = _ASSIGNED.sub("\0", text[:60]).partition("\0")
-            role = next(
-                (r for r in ("rate", "start", "step") if r in vocabulary.roles_in(name)), ""
-            )
-            for place in (inside, above.cell(n + 1), below.cell(n)) if role else ():
-                match = _QUANTITY.fullmatch(place.strip())
-                if match and role not in stated:
+            roles = [r for r in ("rate", "start", "step") if r in vocabulary.roles_in(name)]
+            places = (inside, above.cell(n + 1), below.cell(n))
+            for role, place in itertools.product(roles[:1], places):
+                if match := _QUANTITY.fullmatch(place.strip()):
                     factor = {"k": 3, "m": 6, "g": 9}.get((match[2] or "").lower(), 0)
                     power = factor - POWERS.get(vocabulary.unit_of((match[3] or "").lower()), 0)
-                    stated[role] = float(match[1].replace(",", ".")) * 10.0**power
+                    stated.setdefault(role, float(match[1].replace(",", ".")) * 10.0**power)
     step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
     return (stated.get("start", 0.0), step) if step else None

@@ -120,21 +120,20 @@ def read_ways(path: str | Path, unit: str | None = None) -> list[TimerFile]:
     InputError
         Every fault of the file at its line and column, or what it is instead.
     """
-    files, faults, ways = list[TimerFile](), list[InputError](), 1
-    while (way := len(files) + len(faults)) < ways:
-        file = TimerFile(unit=unit, way=way)
+    files, faults, file = list[TimerFile](), list[InputError](), TimerFile(unit=unit)
+    while file.way < file.ways:
         try:
             _read(file, read_lines(path), ProblemList(str(path), _HINT))
             files.append(file)
         except InputError as error:
             faults.append(error)
-        ways = max(ways, file.ways)
+        file = TimerFile(unit=unit, way=file.way + 1, ways=file.ways)
     if not files:
         if faults[0].problems and (kind := find_kind(path)):
             ProblemList(str(path)).refuse(1, 1, "other_kind", kind=kind)
         raise faults[0]
-    for file in files:
-        file.notes += [make_reason("last_line_cut")] if is_cut(path) else []
+    for file in files if is_cut(path) else ():
+        file.notes.append(make_reason("last_line_cut"))
     return files
 
 
