@@ -166,8 +166,8 @@ def _choose(
     if is_stated and len(distinct) == 1:
         (reading,) = distinct.values()
         return reading, fit(reading.drops, True)
-    rough = [(fit(reading.drops, False).share, reading) for reading in distinct.values()]
-    rough.reverse()  # the most usual first
+    usual = reversed(distinct.values())  # the most usual first
+    rough = [(fit(reading.drops, False).share, reading) for reading in usual]
     rough.sort(key=lambda row: -row[0])
     near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
     # What the file says comes first: the contrary may be proposed, and is never taken.

@@ -187,10 +187,9 @@ class Table:
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
         texts = row.texts
-        if any(texts) and (_shape(texts) == self._usual or _is_data(texts)):
-            return True
+        is_usual = any(texts) and (_shape(texts) == self._usual or _is_data(texts))
         # One of data with a fault: some of it is a number, as in those above.
-        return 1 < len(texts) == block.width and any(map(is_number, texts))
+        return is_usual or (1 < len(texts) == block.width and any(map(is_number, texts)))
 
 
 def split_cells(line: str, separator: str) -> list[str]:

@@ -164,11 +164,11 @@ def _read_block(
     columns = columns_of(file, block, sample, problems)
     file.columns |= {column.name: column.meaning for column in columns}
     file.has_unit &= all(column.power is not None for column in columns)
-    known, signals, out = {c.role for c in columns}, find_signals(columns), EventList(problems)
+    roles, signals, out = {c.role for c in columns}, find_signals(columns), EventList(problems)
     unused = ", ".join(column.name for column in columns if column.role in {"other", "duration"})
-    if known & set(VALUES[0]):
+    if roles & set(VALUES[0]):
         base = find_time_base(block)
-        if base is None and "time" not in known:
+        if base is None and "time" not in roles:
             problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
         reader = SampleReader(signals, base or (0.0, 1.0), out)
         file.notes += reader.read(rows)
@@ -181,22 +181,19 @@ def _read_block(
     is_plain = not (file.is_sampled or file.is_wide)
     title = " ".join(block.headings[0].texts) if block.headings and not file.is_sampled else ""
     for (run, _), events in out.by_part.items():
-        if is_plain:
-            has_states = bool({"edge", "state", "cleared", "gate", "run"} & known)
-            _check_moments(events, "" if has_states else unused, problems, has_states)
-        pieces = [events] if "run" in known or not is_plain else _split(events, problems)
+        if is_plain and not {"edge", "state", "cleared", "gate", "run"} & roles:
+            _check_moments(events, unused, problems)
+        pieces = [events] if "run" in roles or not is_plain else _split(events, problems)
         file.parts += [FilePart(run or title, run, piece) for piece in pieces]
     file.rows += out.rows
     file.unread += out.unread
 
 
-def _check_moments(
-    events: Sequence[TimerEvent], unused: str, problems: ProblemList, has_states: bool
-) -> None:
+def _check_moments(events: Sequence[TimerEvent], unused: str, problems: ProblemList) -> None:
     """Refuse numbers that are no moments of a passage: durations, or samples of something else."""
     steps = [b.tick - a.tick for a, b in itertools.pairwise(events)]
     backwards = sum(step < 0 for step in steps)
-    if not has_states and backwards > 1 and backwards * 4 > len(events):
+    if backwards > 1 and backwards * 4 > len(events):
         numbers = "these numbers go up and down: they"
         problems.refuse(events[0].line, 1, "durations", numbers=numbers)
     if unused and len(steps) > 3 and max(steps) < 1.5 * min(steps):

@@ -68,10 +68,8 @@ def test_more_edges_than_the_object_makes_are_refused(look):
 
 
 def test_gates_of_different_days_are_no_drop(look):
-    content = "Gate 1\ntime,state\n2026-11-24 14:00:00.4,1\n2026-11-24 14:00:00.5,0\n"
-    content += "Gate 2\ntime,state\n2025-11-24 14:00:00.6,1\n2025-11-24 14:00:00.7,0\n"
-    done = look(content, "--map", "groups=gates")
-    assert done.code == 2
+    content = "Gate {0}\ntime,state\n202{0}-11-24 14:00:00.4,1\n202{0}-11-24 14:00:00.5,0\n"
+    done = look(content.format(5) + content.format(6), "--map", "groups=gates")
     assert "would last 31536000 s" in done.err
 
 
