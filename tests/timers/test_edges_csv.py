@@ -217,6 +217,7 @@ def test_any_content_gives_edges_or_located_faults(
     for head in (b"", HEADER.encode()):
         path.write_bytes(head + content)
         try:
-            assert read_edges(path)
+            outcome: object = read_edges(path)
         except InputError as error:
-            assert error.problems
+            outcome = error.problems
+        assert outcome

@@ -151,12 +151,11 @@ def test_what_is_written_is_read(tmp_path, separator, comma, runs, steps):
 )
 def test_any_file_is_read_or_refused_with_a_reason(tmp_path, content):
     try:
-        drops = read(tmp_path, content)
+        outcome = [drop.edges for drop in read(tmp_path, content)]
     except InputError as error:
-        drops = []
-        refused = str(error)
-    assert all(drop.edges for drop in drops)
-    assert drops or refused
+        outcome = [str(error)]
+    assert outcome
+    assert all(outcome)
 
 
 def test_stacked_runs_are_runs_of_their_own(tmp_path):
