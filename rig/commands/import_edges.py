@@ -24,7 +24,6 @@ from rig.reasons import make_reason, reasons_json
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.importing import FallMatch, Import, import_drops
-from rig.timers.lines import check_is_file
 from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
 
@@ -42,7 +41,6 @@ _COMPARED = 3
 
 def main(arguments: Namespace) -> int:
     """Make a session from a file, or say how it would be read; returns the exit code."""
-    check_is_file(arguments.events)
     protocol = reader.read(arguments.protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
     imported = import_with_protocol(protocol, arguments)

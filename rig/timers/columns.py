@@ -17,17 +17,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock, count_known, find_time_base
-from rig.timers.vocabulary import (
-    POWERS,
-    SYMBOLS,
-    find_label,
-    is_number,
-    normal,
-    words,
-)
+from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, is_number, normal, words
 
 if TYPE_CHECKING:
     from rig.timers.problems import ProblemList
+    from rig.timers.timer_file import TimerFile
 
 VALUES = (("level", "volts"), ("state", "cleared"), ("edge",), ())
 """Roles that say what happened; of a table that has several, the first are read."""
@@ -113,25 +107,24 @@ def _find_role(facts: set[str]) -> str:
 
 
 def columns_of(
-    block: RowBlock,
-    rows: Sequence[Row],
-    unit: str | None,
-    problems: ProblemList,
-) -> tuple[list[TimerColumn], Row | None]:
-    """Find out what the columns of a block are; their heading, too, unless they have none.
+    file: TimerFile, block: RowBlock, rows: Sequence[Row], problems: ProblemList
+) -> list[TimerColumn]:
+    """Find out what the columns of a block are, in the way in which the file is read.
 
     Parameters
     ----------
     rows
         The first ones.
-    unit
-        Of the times where the file does not say, a key of `POWERS`.
+
+    Raises
+    ------
+    InputError
+        Columns that may be several things, that are no times, or units that are none.
     """
     width = max(len(row.texts) for row in rows)
     if width > _MOST_COLUMNS:
         problems.refuse(rows[0].line, 1, "too_many_columns", columns=width, limit=_MOST_COLUMNS)
-    is_named = any(len(row.texts) > 1 or width == 1 for row in block.headings)
-    if not is_named or all(len(row.texts) != width for row in block.headings):
+    if all(len(row.texts) != width for row in block.headings):
         block.headings += block.above  # one without a heading has that of the block above
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
@@ -140,9 +133,9 @@ def columns_of(
         heading = _name_levels(len(facts), block) or heading
     if heading is None and _is_each_row_rising(rows, width):
         heading = Row(0, [f"moment {n}" for n in range(1, width + 1)])
-    is_rising = any({"rises", "fractions"} <= fact - {"levels"} for fact in facts.values())
+    is_rising = any({"rises", "fractions"} <= fact for fact in facts.values())
     for n, fact in facts.items():
-        is_bare = not (heading and heading.cell(n)) and (heading is None or not heading.line)
+        is_bare = heading is None or not (heading.line or heading.cell(n))
         fact.update({"bare"} if is_bare else (), {"single"} if len(facts) == 1 else ())
         fact.update({"rival"} if is_rising and "fractions" not in fact else ())
     columns = [_read_heading(block, heading, n, fact) for n, fact in facts.items()]
@@ -153,7 +146,7 @@ def columns_of(
             # Fractions are seconds, and so are small whole numbers.
             is_count = all(re.fullmatch(r"[+-]?[0-9]{1,30}", text) for text in cells[column.at])
             is_long = is_count and abs(int(cells[column.at][-1]) - int(cells[column.at][0])) > 100
-            column.power = POWERS[unit] if unit else None if is_long else 0
+            column.power = POWERS[file.unit] if file.unit else None if is_long else 0
     _name_traces(block, columns if heading is None else [])
     # Of columns that say the same times in other units, the finest is kept.
     times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
@@ -161,7 +154,12 @@ def columns_of(
     for column in times:
         if column.power != finest[column.gate, column.run, column.state]:
             column.role = "coarse"
-    return columns, heading
+    unclear = [column for column in columns if "|" in column.role]
+    for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
+        readings = column.role.split("|")
+        file.ways, column.role = max(file.ways, len(readings)), readings[file.way % len(readings)]
+    _check_columns(columns, heading, rows[0], problems)
+    return columns
 
 
 def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
@@ -193,28 +191,29 @@ def _name_traces(block: RowBlock, columns: Sequence[TimerColumn]) -> None:
             trace.gate = label
 
 
-def check_columns(
+def _check_columns(
     columns: Sequence[TimerColumn], heading: Row | None, first: Row, problems: ProblemList
 ) -> None:
-    """Note columns without a heading that may be something else, and units that are none."""
+    """Refuse columns without a heading that may be something else, and units that are none."""
     counts, above = Counter(column.role for column in columns), heading or first
     repeated = max(counts["state"], counts["edge"], counts["gate"]) > 1
     # Two traces of an oscilloscope stand beside each other, each with its times.
     is_open = repeated or counts["other"] or counts["time"] not in {1, counts["volts"] or 1}
     if heading is None and is_open:
-        place = first.column(columns[min(2, len(columns) - 1)].at)
-        problems.add(first.line, place, "", "no_heading", columns=len(columns))
+        place = first.place(columns[min(2, len(columns) - 1)].at)
+        problems.add(*place, "", "no_heading", columns=len(columns))
     for column in columns if heading else ():
-        place, unit = above.column(column.at), vocabulary.unit_of(column.name)
+        place, unit = above.place(column.at), vocabulary.unit_of(column.name)
         if column.role == "setting" or "|" in column.role:
             values = {"column": column.name, "readings": column.meaning}
-            problems.add(above.line, place, column.name, "ambiguous", **values)
+            problems.add(*place, column.name, "ambiguous", **values)
         elif column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
-            problems.reject(above.line, place, "time", unit, "a unit of time: s, ms, µs or ns")
+            problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
     if not counts.keys() & {"time", *VALUES[0]}:
         durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
         code = "durations" if durations else "no_time_column"
         problems.add(above.line, 1, "", code, numbers=durations)
+    problems.raise_if_any()
 
 
 def _find_heading(block: RowBlock, filled: Collection[int], width: int) -> Row | None:

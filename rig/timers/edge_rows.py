@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from rig.records import Drop, Edge
@@ -41,18 +40,21 @@ def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[
     """Read drops in the import format, and note faults at their places."""
     runs: dict[int, list[Edge]] = {}
     last: dict[tuple[int, int], int] = {}
-    plain = ((n, line) for n, line in lines if line.strip() and not REMARK.match(line))
-    number, line = next(plain, (1, ""))
-    if tuple(text.lower() for text in split_cells(line, ",")) != HEADER:
-        problems.refuse(number, 1, "wrong_header", header=",".join(HEADER))
-    for number, line in plain:
-        row = Row(number, split_cells(line, ","), line)
+    plain = (
+        Row(number, split_cells(line, ","), line)
+        for number, line in lines
+        if line.strip() and not REMARK.match(line)
+    )
+    heading = next(plain, Row(1, []))
+    if tuple(map(str.lower, heading.texts)) != HEADER:
+        problems.refuse(heading.line, 1, "wrong_header", header=",".join(HEADER))
+    for row in plain:
         cells = _read_cells(row, problems)
         if None in cells:
             continue
         run, channel, tick, state = cells
         edges = runs.setdefault(run, [])
-        edge, place = Edge(tick, channel, bool(state)), (number, row.column(2), HEADER[2])
+        edge, place = Edge(tick, channel, bool(state)), (*row.place(2), HEADER[2])
         lasting_s = abs(tick - (edges or [edge])[0].tick) / TICK_HZ
         before = last.get((run, channel), tick)
         if lasting_s > _LONGEST_RUN_S:
@@ -83,7 +85,7 @@ def _read_cells(row: Row, problems: ProblemList) -> list[Any]:
     for n, (text, (form, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
         cells.append(read(text) if re.fullmatch(form, text) else None)
         if cells[-1] is None:
-            problems.reject(row.line, row.column(n), HEADER[n], text, accepted)
+            problems.reject(*row.place(n), HEADER[n], text, accepted)
     return cells
 
 
@@ -97,9 +99,7 @@ def make_drop(run: int, edges: list[Edge]) -> Drop:
     return Drop(run, 1, TICK_HZ, stamps, initial_state=clear)
 
 
-def edges_text(
-    drops: Iterable[Drop], hz: Callable[[Drop], float | Fraction] = attrgetter("tick_hz")
-) -> str:
+def edges_text(drops: Iterable[Drop], hz: Callable[[Drop], float]) -> str:
     """Write drops in the import format, of which the same edges are read again.
 
     Parameters
@@ -107,7 +107,7 @@ def edges_text(
     drops
         At most one a run: the format does not know of attempts.
     hz
-        Calibrated tick rate of a drop, Hz; by default its nominal rate.
+        Calibrated tick rate of a drop, Hz.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
-_DAY_S = 86400
+LONGEST_S = 86400
 """How long a recording may be: more means a wrong unit."""
 
 
@@ -76,8 +77,7 @@ class EventList:
     def reject(self, row: Row, column: TimerColumn) -> None:
         """Note a cell whose value is not accepted."""
         text = row.texts[column.at] if column.at < len(row.texts) else ""
-        place = row.line, row.column(column.at), column.role
-        self.problems.reject(*place, text, roles()[column.role][1])
+        self.problems.reject(*row.place(column.at), column.role, text, roles()[column.role][1])
 
 
 def read_passages(
@@ -85,14 +85,13 @@ def read_passages(
 ) -> None:
     """Read rows; each gives events, or says that nothing changes, or is unread."""
     run_at, gate_at = (
-        next((c.at for c in columns if c.role == role), None) for role in ("run", "gate")
+        next((c.at for c in columns if c.role == role), sys.maxsize) for role in ("run", "gate")
     )
     has_several = len(signals) > 1 and any(signal.value for signal in signals)
     last: dict[tuple[str, str], str] = {}
     for row in rows:
         out.rows += 1
-        run = row.cell(run_at) if run_at is not None else ""
-        label = row.cell(gate_at) if gate_at is not None else ""
+        run, label = row.cell(run_at), row.cell(gate_at)
         passages = list(_passages(row, signals, has_several))
         is_whole = has_several and len(passages) == len(signals)
         for signal, tick, state in passages:
@@ -108,9 +107,9 @@ def read_passages(
                 event = TimerEvent(tick, key[1], state, row.line)
                 part = out.put(key[0], 0 if any(key) else signal.clock.at, event)
                 lasting_s = abs(tick - part[0].tick) / TICK_HZ
-                if signal.clock.power is not None and lasting_s > _DAY_S:
-                    place = row.line, row.column(signal.clock.at), signal.clock.role
-                    values = {"lasting_s": lasting_s, "limit_s": _DAY_S}
+                if signal.clock.power is not None and lasting_s > LONGEST_S:
+                    place = *row.place(signal.clock.at), signal.clock.role
+                    values = {"lasting_s": lasting_s, "limit_s": LONGEST_S}
                     out.problems.add(*place, "too_long", recording="the recording", **values)
         if not passages:
             out.unread.append(row.line)

@@ -17,13 +17,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rig.errors import InputError
 from rig.reasons import make_reason
 from rig.timers.edge_rows import HEADER, is_own, read_edges
-from rig.timers.layouts import (
-    SETTINGS,
-    FileReading,
-    find_layouts,
-    part_names,
-    read_drops,
-)
+from rig.timers.events import LONGEST_S
+from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, read_drops
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList, refusal
 from rig.timers.timer_file import TimerFile, read_ways
@@ -35,6 +30,8 @@ if TYPE_CHECKING:
 
     from rig.reasons import Reason
     from rig.records import Drop
+
+    Fit = Callable[[Sequence[Drop], bool], "FallMatch"]
 
 _GOOD = 0.75
 """Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
@@ -94,12 +91,7 @@ class Import:
     notes: list[Reason]
 
 
-def import_drops(
-    gates: Sequence[int],
-    bars: int,
-    options: Namespace,
-    fit: Callable[[Sequence[Drop], bool], FallMatch],
-) -> Import:
+def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) -> Import:
     """Read the drops of any timer's file.
 
     Parameters
@@ -120,8 +112,7 @@ def import_drops(
         of which no edge is made.
     """
     place = options.events
-    head = list(itertools.islice(read_lines(place), _HEAD))
-    if is_own(head):
+    if is_own(itertools.islice(read_lines(place), _HEAD)):
         drops = read_edges(enumerate(read_lines(place), 1), ProblemList(place))
         return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
     readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
@@ -138,21 +129,23 @@ def import_drops(
         pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
         raise refusal(place, "inputs_unclear", **values, pairs=pairs)
+    # Parts that are a gate each may be of different days.
+    lasting_s = min(reading.lasting_s for reading in readings)
+    if lasting_s > LONGEST_S:
+        limit = {"lasting_s": lasting_s, "limit_s": LONGEST_S}
+        raise refusal(place, "too_long", recording="the recording", **limit)
+    readings = [reading for reading in readings if reading.lasting_s <= LONGEST_S]
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings
         reading, match = _choose(readings, place, fit, is_stated="channels" in stated)
+        _refuse_excess(reading, bars, place, is_stated="groups" in stated)
     file, layout = reading.file, reading.layout
-    is_single = layout.groups == "passing" and not file.is_wide and bool(file.labels)
-    if is_single and "groups" not in stated:
-        raise refusal(place, "one_wire", option=str(layout))
-    if not options.as_read:
-        _refuse_excess(file, reading, bars, place)
-    notes = [*file.notes, _account(file, reading, options)]
+    notes = [*file.notes, _account(reading, options)]
     is_open = len([other for other in readings if other.layout.dark != "inverted"]) > 1
     if is_open or (match.share < _GOOD and not options.as_read):
         notes.append(make_reason("reading_chosen", option=str(layout), fit=match.text))
-    notes += [*match.doubts, *_assumptions(file, reading, gates)]
+    notes += [*match.doubts, *_assumptions(reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{layout.text}\n", "utf-8")
     lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
@@ -162,11 +155,7 @@ def import_drops(
 
 
 def _choose(
-    readings: Sequence[FileReading],
-    place: str,
-    fit: Callable[[Sequence[Drop], bool], FallMatch],
-    *,
-    is_stated: bool,
+    readings: Sequence[FileReading], place: str, fit: Fit, *, is_stated: bool
 ) -> tuple[FileReading, FallMatch]:
     """Return the reading that a fall of the protocol bears out, and how well.
 
@@ -177,8 +166,8 @@ def _choose(
     if is_stated and len(distinct) == 1:
         (reading,) = distinct.values()
         return reading, fit(reading.drops, True)
-    rough = [(fit(reading.drops, False).share, reading) for reading in distinct.values()]
-    rough.reverse()  # the most usual first
+    usual = reversed(distinct.values())  # the most usual first
+    rough = [(fit(reading.drops, False).share, reading) for reading in usual]
     rough.sort(key=lambda row: -row[0])
     near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
     # What the file says comes first: the contrary may be proposed, and is never taken.
@@ -200,8 +189,15 @@ def _choose(
     return reading, match
 
 
-def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str) -> None:
-    """Refuse what no drop does: the same again, more edges than bars, two changes at once."""
+def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bool) -> None:
+    """Refuse what no drop does: the same again, more edges than bars, two changes at once.
+
+    An input that has a name is no wire of all gates, unless the user stated so.
+    """
+    file, layout = reading.file, reading.layout
+    is_wire = layout.groups == "passing" and not file.is_wide and bool(file.labels)
+    if is_wire and not is_stated:
+        raise refusal(place, "one_wire", option=str(layout))
     alike: dict[object, int] = {}
     for drop in reading.drops:
         earlier = alike.setdefault(drop.edges, drop.run)
@@ -218,8 +214,9 @@ def _refuse_excess(file: TimerFile, reading: FileReading, bars: int, place: str)
         raise refusal(place, "at_once", line=line)
 
 
-def _account(file: TimerFile, reading: FileReading, options: Namespace) -> Reason:
+def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
+    file = reading.file
     lines = {event.line for part in file.parts for event in part.events}
     # A level that changes may be of an input that is no gate.
     unused = sorted({*file.unread, *(() if file.is_sampled else lines - reading.lines)})
@@ -234,9 +231,9 @@ def _account(file: TimerFile, reading: FileReading, options: Namespace) -> Reaso
     return make_reason("rows_left_out", **counts, **rest)
 
 
-def _assumptions(file: TimerFile, reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
+def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
     """Yield what is taken to be so, and what the file lacks."""
-    layout, channels = reading.layout, reading.layout.channels
+    file, layout, channels = reading.file, reading.layout, reading.layout.channels
     if layout.pause_s:
         drops = len(reading.drops)
         yield make_reason("several_drops", drops=drops, pause_s=layout.pause_s)
@@ -260,12 +257,13 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
         with saved.open(encoding="utf-8", errors="replace") as stream:
             text = stream.read(LONGEST_MAP).strip()
         stated = _read_map(text, options.map_file, file, gates, {})
-    settings = {"unit": None if file.has_unit else options.unit, "dark": options.dark}
-    stated |= {name: value for name, value in settings.items() if value is not None}
-    place, text = "--map", options.map
-    if text is None and options.channel is not None and len(file.labels) < 2:
-        place, text = "--channel", f"{next(iter(file.labels), 'input')}={options.channel}"
-    return stated if text is None else _read_map(text, place, file, gates, stated)
+    stated |= {"dark": options.dark} if options.dark else {}
+    if options.map is not None:
+        return _read_map(options.map, "--map", file, gates, stated)
+    if options.channel is not None and len(file.labels) < 2:
+        text = f"{next(iter(file.labels), 'input')}={options.channel}"
+        return _read_map(text, "--channel", file, gates, stated)
+    return stated
 
 
 def _read_map(
@@ -278,16 +276,13 @@ def _read_map(
         if not re.fullmatch(SETTINGS[name], value):
             raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
     stated = {**stated, **settings}
-    labels = {
-        "gates": part_names(file),
-        "passing": [f"gate {n}" for n in range(1, len(gates) + 1)],
-    }.get(stated.get("groups", ""), list(file.labels) or ["input"])
+    inputs = {name or "input": name for name in input_names(file, stated.get("groups"), gates)}
     channels = {label: channel for label, channel in pairs if label not in settings}
     for label, channel in channels.items():
-        if label not in labels:
-            raise refusal(place, "input_unknown", text=label, inputs=", ".join(labels))
+        if label not in inputs:
+            raise refusal(place, "input_unknown", text=label, inputs=", ".join(inputs))
         if channel not in map(str, gates):
             accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
             raise refusal(place, "not_accepted", text=f"{label}={channel}", accepted=accepted)
-    numbers = {"" if labels == ["input"] else x: int(n) for x, n in channels.items()}
+    numbers = {inputs[label]: int(channel) for label, channel in channels.items()}
     return {**stated, **({"channels": numbers} if numbers else {})}

@@ -97,6 +97,11 @@ class FileReading(NamedTuple):
     lines: set[int]
 
     @property
+    def lasting_s(self) -> float:
+        """How long the longest run is."""
+        return max((drop.edges[-1].tick for drop in self.drops), default=0) / TICK_HZ
+
+    @property
     def is_whole(self) -> bool:
         """Whether beams are clear at the beginning, and in the end, as a protocol has them.
 
@@ -133,7 +138,7 @@ def _cut(file: TimerFile, layout: FileLayout) -> Iterator[tuple[list[TimerEvent]
     has_gates, gates = layout.groups == "gates", list(layout.channels)
     by_row = file.is_wide and layout.groups in {"rows", "passing"}
     groups: dict[int, tuple[int, list[TimerEvent]]] = {}
-    for n, (name, part) in enumerate(zip(part_names(file), file.parts, strict=True)):
+    for n, (name, part) in enumerate(zip(_part_names(file), file.parts, strict=True)):
         number = 0 if has_gates else number_of(part.run) or 0
         for event in part.events:
             key = 0 if has_gates else event.line if by_row else n
@@ -152,7 +157,14 @@ def _cut(file: TimerFile, layout: FileLayout) -> Iterator[tuple[list[TimerEvent]
             yield run, number if len(cuts) == 2 else 0
 
 
-def part_names(file: TimerFile) -> list[str]:
+def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> list[str]:
+    """Name the inputs of a file whose parts are grouped so; an empty text where it names none."""
+    if groups == "passing":
+        return [f"gate {n}" for n in range(1, len(gates) + 1)]
+    return _part_names(file) if groups == "gates" else [*file.labels] or [""]
+
+
+def _part_names(file: TimerFile) -> list[str]:
     """Name the parts of a file that stand one below, or beside, the other."""
     labels = [{event.label for event in part.events} for part in file.parts]
     inputs = [min(own) for own in labels if len(own) == 1]
@@ -194,7 +206,7 @@ def find_layouts(
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
     groups, parts = ["runs"], len(file.parts)
-    if parts > 1 and set(part_names(file)) == set(file.labels):
+    if parts > 1 and set(_part_names(file)) == set(file.labels):
         groups.insert(0, "gates")
     elif 1 < parts == len(gates) and not (file.labels or any(part.run for part in file.parts)):
         groups.append("gates")
@@ -227,14 +239,14 @@ def _pauses(file: TimerFile, power: int, groups: str) -> list[float]:
 
 def _channels(file: TimerFile, gates: Sequence[int], groups: str) -> list[dict[str, int]]:
     """Return which gate each input may be; by its number if all are told apart by it."""
-    labels = part_names(file) if groups == "gates" else list(file.labels)
+    labels = input_names(file, groups, gates)
     if groups == "passing":
-        return [{f"gate {n}": channel for n, channel in enumerate(gates, 1)}]
+        return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if by_number and (len(set(by_number.values())) == len(labels) or len(labels) == 1):
         return [by_number]
     if len(labels) < 2:
-        return [{"".join(labels): channel} for channel in gates]
+        return [{labels[0]: channel} for channel in gates]
     first = {e.label: e.tick for part in file.parts for e in reversed(part.events)}
     passed = sorted(labels, key=lambda label: first.get(label, 0))
     # In order of their numbers, or as they are passed first; and the reverse.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from rig.files import require_file
@@ -25,36 +26,22 @@ def read_lines(path: str | Path) -> Iterator[str]:
     Raises
     ------
     InputError
-        A file that cannot be read, is far too large, or is not text.
+        A file that cannot be read (so a pipe: a file is read more than once), is far too large,
+        or is not text.
     """
     problems = ProblemList(str(path))
-    check_is_file(path)
-    size = Path(path).stat().st_size
-    if size > MAX_BYTES:
-        problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
     try:
+        require_file(path)
+        size = Path(path).stat().st_size
+        if size > MAX_BYTES:
+            problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
         encoding = _find_encoding(Path(path), problems)
         with Path(path).open(encoding=encoding, errors="replace") as stream:
-            number = 0
-            while line := stream.readline(LONGEST_LINE):
-                number += 1
+            read_line = partial(stream.readline, LONGEST_LINE)
+            for number, line in enumerate(iter(read_line, ""), 1):
                 if len(line) == LONGEST_LINE:
                     problems.refuse(number, 1, "not_text")
                 yield line.rstrip("\n")
-    except OSError as error:
-        raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
-
-
-def check_is_file(path: str | Path) -> None:
-    """Refuse what is no file, and a pipe too: a file is read more than once.
-
-    Raises
-    ------
-    InputError
-        It is none, or not there.
-    """
-    try:
-        require_file(path)
     except OSError as error:
         raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from datetime import date
 from decimal import ROUND_HALF_EVEN, Context
 from typing import TYPE_CHECKING
 
-from rig.timers.vocabulary import CLOCK, POWERS, TIMED, unit_of
+from rig.timers.vocabulary import CLOCK, POWERS, TIMED, is_number, unit_of
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
 TICK_HZ = 10**12
 LONGEST_PS = 10**24
-_DECIMAL = re.compile(r"[+-]?(?=\.?[0-9])[0-9]{0,30}(?:\.[0-9]{0,60})?(?:[eE][+-]?[0-9]{1,2})?")
 _EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
 
 
@@ -56,7 +54,7 @@ def picoseconds(text: str, power: int = 0) -> int | None:
 
     No time that a drop can have is as long as 30,000 years.
     """
-    if not _DECIMAL.fullmatch(text):
+    if not is_number(text):
         return None
     number = _EXACT.scaleb(_EXACT.create_decimal(text), 12 + power)
     return int(_EXACT.to_integral_value(number)) if abs(number) < LONGEST_PS else None

@@ -33,15 +33,14 @@ class ProblemList:
         self.file = file
         self.hint = hint
         self._problems: list[Problem] = []
-        self._more = 0
+        self._count = 0
 
     def add(self, line: int, column: int, key: str, code: str, /, **values: object) -> None:
         """Note a fault: its place, a code of `rig.wordings` and the values of its sentence."""
-        if len(self._problems) == MAX_PROBLEMS:
-            self._more += 1
-            return
-        reason = make_reason(code, **values)
-        self._problems.append(Problem(self.file, line, column, key, reason.text, reason=reason))
+        self._count += 1
+        if self._count <= MAX_PROBLEMS:
+            reason = make_reason(code, **values)
+            self._problems.append(Problem(self.file, line, column, key, reason.text, reason=reason))
 
     def reject(self, line: int, column: int, key: str, text: str, accepted: str) -> None:
         """Note a value that is not what is accepted there."""
@@ -61,10 +60,9 @@ class ProblemList:
         InputError
             With all noted problems and a line that counts those left out.
         """
-        if not self._problems:
-            return
-        message = "\n".join(map(str, self._problems))
-        if self._more:
-            message += f"\n{self.file}: and {self._more} more problems"
-        hint = "; ".join(remedies(problem.reason for problem in self._problems))
-        raise InputError(message, hint or self.hint, problems=self._problems)
+        if self._problems:
+            message = "\n".join(map(str, self._problems))
+            if more := self._count - len(self._problems):
+                message += f"\n{self.file}: and {more} more problems"
+            hint = "; ".join(remedies(problem.reason for problem in self._problems))
+            raise InputError(message, hint or self.hint, problems=self._problems)

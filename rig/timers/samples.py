@@ -19,13 +19,9 @@ from rig.timers.moments import TICK_HZ, moment
 from rig.timers.vocabulary import is_number, state_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from rig.arrays import Array
     from rig.timers.columns import Signal, TimerColumn
     from rig.timers.table import Row
-
-    Levels = NDArray[np.float32]
 
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
@@ -33,8 +29,6 @@ _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
 _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
-_EXACT = 2.0**53
-"""Ticks beyond which a float is not exact to the picosecond."""
 _REGULAR = 1.5
 """Longest over usual step below which samples are all as far apart."""
 _CHUNK = 4096
@@ -65,61 +59,52 @@ class SampleReader:
 
     def read(self, rows: Iterator[Row]) -> Iterator[Reason]:
         """Add the changes of each input, and say how many volts there are."""
-        chunks: list[tuple[Array, Levels, Array]] = []
-        last = np.empty((0, 0))
+        columns: list[TimerColumn | None] = [*self.clocks, *self.values]
+        chunks: list[Array] = []
+        last, inputs = np.empty((0, 0)), slice(len(self.clocks), -1)
         while chunk := list(itertools.islice(rows, _CHUNK)):
-            times = np.array([self._read_ticks(chunk, clock) for clock in self.clocks])
-            levels = np.array([self._read_levels(chunk, value) for value in self.values])
-            lines = np.array([row.line for row in chunk])
-            self.out.rows += len(chunk)
-            steps = np.diff(times[0], prepend=last[0] if len(last) else times[0, :1])
+            ticks = (self._read_ticks(chunk, clock) for clock in self.clocks)
+            levels = (self._read_levels(chunk, value) for value in self.values)
+            data = np.array([*ticks, *levels, [row.line for row in chunk]])
+            before = last if last.size else data[:, :1]
+            steps = np.diff(data[0], prepend=before[0])
             for n in np.flatnonzero(steps < 0)[:1]:
-                row, at = chunk[n], self.clocks[0].at
-                place = row.line, row.column(at), "time"
-                self.out.problems.add(*place, "backwards", text=row.cell(at))
-            if not len(last) and len(chunk) > 1:
+                row, at = chunk[int(n)], self.clocks[0].at
+                self.out.problems.add(*row.place(at), "time", "backwards", text=row.cell(at))
+            if not last.size and len(chunk) > 1:
                 usual = float(np.median(steps[1:]))
                 self.period_s = usual / TICK_HZ if steps.max() < _REGULAR * usual else None
-            last = times[:, -1]
+            last = data[:, -1:]
             if self.is_digital:
-                before = chunks[-1][1][:, -1:] if chunks else levels[:, :1] - 1
-                kept = np.any(np.diff(levels, prepend=before) != 0, axis=0)
-                times, levels, lines = times[:, kept], levels[:, kept], lines[kept]
-            chunks += [(times, levels, lines)] if lines.size else []
-        times, levels, lines = (np.concatenate(part, axis=-1) for part in zip(*chunks, strict=True))
+                is_change = np.any(np.diff(data[inputs], prepend=before[inputs]) != 0, axis=0)
+                is_change[0] |= not chunks
+                data = data[:, is_change]
+            chunks.append(data)
+            self.out.rows += len(chunk)
+        data = np.concatenate(chunks, axis=-1)
         for signal in self.signals:
-            trace = levels[self.values.index(signal.value or self.values[0])]
-            yield from self._find_changes(
-                signal, times[self.clocks.index(signal.clock)], trace, lines
-            )
+            times, trace = (data[columns.index(column)] for column in (signal.clock, signal.value))
+            yield from self._find_changes(signal, times, trace, data[-1])
 
     def _read_ticks(self, rows: Sequence[Row], clock: TimerColumn) -> Array:
         """Return when samples were taken, ps from the origin; NaN where a trace ends."""
-        is_time, empty = clock.role == "time", "nan" if len(self.clocks) > 1 else ""
-        start, step = (0.0, 10.0 ** -(clock.power or 0)) if is_time else self.base
         if clock.at < 0:
-            numbers = self.out.rows + np.arange(len(rows), dtype=float)
+            ticks = [n * TICK_HZ for n in range(self.out.rows, self.out.rows + len(rows))]
         else:
-            numbers = _numbers([row.cell(clock.at) or empty for row in rows])
-        ticks = (start + step * numbers) * TICK_HZ
-        if np.nanmax(np.abs(ticks), initial=0.0) < _EXACT:
-            self.origin = self.origin or 0
-            return np.asarray(np.round(ticks - self.origin))
-        exact = [
-            self._read_cell(row, clock, partial(moment, power=clock.power or 0)) for row in rows
-        ]
-        if not is_time:
-            exact = [x if x is None else round(start * TICK_HZ + step * x) for x in exact]
+            read = partial(moment, power=clock.power or 0)
+            ticks = [self._read_cell(row, clock, read) for row in rows]
+        if clock.role != "time":
+            start, step = self.base
+            ticks = [x if x is None else round(start * TICK_HZ + step * x) for x in ticks]
         if self.origin is None:
-            self.origin = next((x for x in exact if x is not None), 0)
-        return np.array([np.nan if x is None else float(x - self.origin) for x in exact])
+            self.origin = next((x for x in ticks if x is not None), 0)
+        return np.array([x if x is None else x - self.origin for x in ticks], dtype=float)
 
-    def _read_levels(self, rows: Sequence[Row], value: TimerColumn) -> Levels:
+    def _read_levels(self, rows: Sequence[Row], value: TimerColumn) -> Array:
         numbers = _numbers([row.cell(value.at) for row in rows])
         if np.isinf(numbers).any() or (self.is_digital and not np.isin(numbers, (0.0, 1.0)).all()):
-            cells = [self._read_cell(row, value, _level_of) for row in rows]
-            numbers = np.array([np.nan if cell is None else cell for cell in cells])
-        return numbers.astype(np.float32)
+            return np.array([self._read_cell(row, value, _level_of) for row in rows], float)
+        return numbers
 
     def _read_cell(self, row: Row, column: TimerColumn, read: Callable[[str], Any]) -> Any:
         value = read(row.cell(column.at))
@@ -129,11 +114,11 @@ class SampleReader:
         return value
 
     def _find_changes(
-        self, signal: Signal, times: Array, trace: Levels, lines: Array
+        self, signal: Signal, times: Array, trace: Array, lines: Array
     ) -> Iterator[Reason]:
         at = np.flatnonzero(np.isfinite(times) & np.isfinite(trace))
         # Where nothing of it can be read, its lowest and its highest are no numbers.
-        volts = trace[at] if at.size else np.full(1, np.nan, np.float32)
+        volts = trace[at] if at.size else np.full(1, np.nan)
         threshold = (0.5, 0.0) if self.is_digital else find_threshold(volts)
         if threshold is None:
             span = {"low": float(volts.min()), "high": float(volts.max())}
@@ -166,7 +151,7 @@ def _level_of(text: str) -> float | None:
 
 
 def _crossings(
-    times: Array, volts: Levels, threshold: tuple[float, float]
+    times: Array, volts: Array, threshold: tuple[float, float]
 ) -> Iterator[tuple[int, float, bool]]:
     """Yield the sample behind each crossing, its moment, and whether it rises."""
     is_high = volts > threshold[0]
@@ -178,7 +163,7 @@ def _crossings(
         yield int(n), float(times[n] - share * (times[n] - times[n - 1])), bool(is_high[n])
 
 
-def find_threshold(volts: Levels) -> tuple[float, float] | None:
+def find_threshold(volts: Array) -> tuple[float, float] | None:
     """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
     low, high = float(volts.min()), float(volts.max())
     for _ in range(50):  # two means, one for each level

@@ -54,12 +54,15 @@ class Row(NamedTuple):
         is_missing = not text[:1].isdigit() and text[:5].casefold() in words()["missing"]
         return "" if is_missing else text
 
-    def column(self, at: int) -> int:
-        """Return the column, from 1, at which a cell begins; 1 where the row ends before it."""
-        if at >= len(self.texts) or not self.separator:
-            return max(0, self.raw.find(self.texts[at])) + 1 if at < len(self.texts) else 1
+    def place(self, at: int) -> tuple[int, int]:
+        """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
+        if at >= len(self.texts):
+            return self.line, 1
+        if not self.separator:
+            return self.line, max(0, self.raw.find(self.texts[at])) + 1
         before = sum(len(cell) + 1 for cell in self.raw.split(self.separator)[:at])
-        return before + len(self.raw[before:]) - len(self.raw[before:].lstrip(' "')) + 1
+        rest = self.raw[before:]
+        return self.line, before + len(rest) - len(rest.lstrip(' "')) + 1
 
 
 @dataclass(eq=False, slots=True)
@@ -184,10 +187,9 @@ class Table:
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
         texts = row.texts
-        if any(texts) and (_shape(texts) == self._usual or _is_data(texts)):
-            return True
+        is_usual = any(texts) and (_shape(texts) == self._usual or _is_data(texts))
         # One of data with a fault: some of it is a number, as in those above.
-        return 1 < len(texts) == block.width and any(map(is_number, texts))
+        return is_usual or (1 < len(texts) == block.width and any(map(is_number, texts)))
 
 
 def split_cells(line: str, separator: str) -> list[str]:
@@ -296,14 +298,12 @@ def find_time_base(block: RowBlock) -> tuple[float, float] | None:
     for above, below in itertools.pairwise([*rows, Row(0, [])]):
         for n, text in enumerate(above.texts):
             name, _, inside = _ASSIGNED.sub("\0", text[:60]).partition("\0")
-            role = next(
-                (r for r in ("rate", "start", "step") if r in vocabulary.roles_in(name)), ""
-            )
-            for place in (inside, above.cell(n + 1), below.cell(n)) if role else ():
-                match = _QUANTITY.fullmatch(place.strip())
-                if match and role not in stated:
+            roles = [r for r in ("rate", "start", "step") if r in vocabulary.roles_in(name)]
+            places = (inside, above.cell(n + 1), below.cell(n))
+            for role, place in itertools.product(roles[:1], places):
+                if match := _QUANTITY.fullmatch(place.strip()):
                     factor = {"k": 3, "m": 6, "g": 9}.get((match[2] or "").lower(), 0)
                     power = factor - POWERS.get(vocabulary.unit_of((match[3] or "").lower()), 0)
-                    stated[role] = float(match[1].replace(",", ".")) * 10.0**power
+                    stated.setdefault(role, float(match[1].replace(",", ".")) * 10.0**power)
     step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
     return (stated.get("start", 0.0), step) if step else None

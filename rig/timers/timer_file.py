@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
-from rig.timers.columns import VALUES, check_columns, columns_of, find_signals
+from rig.timers.columns import VALUES, columns_of, find_signals
 from rig.timers.events import EventList, TimerEvent, read_passages
 from rig.timers.lines import find_kind, is_cut, read_lines
 from rig.timers.moments import TICK_HZ
@@ -120,21 +120,20 @@ def read_ways(path: str | Path, unit: str | None = None) -> list[TimerFile]:
     InputError
         Every fault of the file at its line and column, or what it is instead.
     """
-    files, faults, ways = list[TimerFile](), list[InputError](), 1
-    while (way := len(files) + len(faults)) < ways:
-        file = TimerFile(unit=unit, way=way)
+    files, faults, file = list[TimerFile](), list[InputError](), TimerFile(unit=unit)
+    while file.way < file.ways:
         try:
             _read(file, read_lines(path), ProblemList(str(path), _HINT))
             files.append(file)
         except InputError as error:
             faults.append(error)
-        ways = max(ways, file.ways)
+        file = TimerFile(unit=unit, way=file.way + 1, ways=file.ways)
     if not files:
         if faults[0].problems and (kind := find_kind(path)):
             ProblemList(str(path)).refuse(1, 1, "other_kind", kind=kind)
         raise faults[0]
-    for file in files:
-        file.notes += [make_reason("last_line_cut")] if is_cut(path) else []
+    for file in files if is_cut(path) else ():
+        file.notes.append(make_reason("last_line_cut"))
     return files
 
 
@@ -162,20 +161,14 @@ def _read_block(
     """Add what a block says: samples, or passages."""
     sample = list(itertools.islice(rows, _SAMPLE))
     rows = itertools.chain(sample, rows)
-    columns, heading = columns_of(block, sample, file.unit, problems)
-    unclear = [column for column in columns if "|" in column.role]
-    for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
-        roles = column.role.split("|")
-        file.ways, column.role = max(file.ways, len(roles)), roles[file.way % len(roles)]
-    check_columns(columns, heading, sample[0], problems)
-    problems.raise_if_any()
+    columns = columns_of(file, block, sample, problems)
     file.columns |= {column.name: column.meaning for column in columns}
     file.has_unit &= all(column.power is not None for column in columns)
-    known, signals, out = {c.role for c in columns}, find_signals(columns), EventList(problems)
+    roles, signals, out = {c.role for c in columns}, find_signals(columns), EventList(problems)
     unused = ", ".join(column.name for column in columns if column.role in {"other", "duration"})
-    if known & set(VALUES[0]):
+    if roles & set(VALUES[0]):
         base = find_time_base(block)
-        if base is None and "time" not in known:
+        if base is None and "time" not in roles:
             problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
         reader = SampleReader(signals, base or (0.0, 1.0), out)
         file.notes += reader.read(rows)
@@ -188,22 +181,19 @@ def _read_block(
     is_plain = not (file.is_sampled or file.is_wide)
     title = " ".join(block.headings[0].texts) if block.headings and not file.is_sampled else ""
     for (run, _), events in out.by_part.items():
-        if is_plain:
-            has_states = bool({"edge", "state", "cleared", "gate", "run"} & known)
-            _check_moments(events, "" if has_states else unused, problems, has_states)
-        pieces = [events] if "run" in known or not is_plain else _split(events, problems)
+        if is_plain and not {"edge", "state", "cleared", "gate", "run"} & roles:
+            _check_moments(events, unused, problems)
+        pieces = [events] if "run" in roles or not is_plain else _split(events, problems)
         file.parts += [FilePart(run or title, run, piece) for piece in pieces]
     file.rows += out.rows
     file.unread += out.unread
 
 
-def _check_moments(
-    events: Sequence[TimerEvent], unused: str, problems: ProblemList, has_states: bool
-) -> None:
+def _check_moments(events: Sequence[TimerEvent], unused: str, problems: ProblemList) -> None:
     """Refuse numbers that are no moments of a passage: durations, or samples of something else."""
     steps = [b.tick - a.tick for a, b in itertools.pairwise(events)]
     backwards = sum(step < 0 for step in steps)
-    if not has_states and backwards > 1 and backwards * 4 > len(events):
+    if backwards > 1 and backwards * 4 > len(events):
         numbers = "these numbers go up and down: they"
         problems.refuse(events[0].line, 1, "durations", numbers=numbers)
     if unused and len(steps) > 3 and max(steps) < 1.5 * min(steps):

@@ -6,14 +6,16 @@ import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from rig.timers.vocabulary import POWERS
+
 if TYPE_CHECKING:
     from rig.timers.problems import ProblemList
 
 _SCALE = re.compile(r"\$timescale\s+(.{0,40}?)\s*(?:\$end|$)")
-_ACCEPTED = re.compile(r"(1|10|100)\s*([munp]?)s")
+_ACCEPTED = re.compile(r"(1|10|100)\s*([munp]?s)")
 _WIRE = re.compile(r"\$var\s+\w+\s+1\s+(\S+)\s+(\S+)")
 """A wire of one bit: ``$var wire 1 ! D0``."""
-_POWERS = {"": 0, "m": 3, "u": 6, "n": 9, "p": 12}
+_POWERS = POWERS | {"ps": 12}
 BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
 _LONGEST_HEAD = 1_000_000
 """Characters, before which the wires have to be listed."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 FEWEST = 6
 """Frames that tell an acceleration and how much they scatter."""
-_NAMES = {name: re.compile(rf"^{name}(?![A-Za-z])", re.IGNORECASE) for name in "txy"}
+_NAME = re.compile(r"([txy])(?![A-Za-z])", re.IGNORECASE)
 _UNIT = re.compile(r"[(\[/_]\s*([^\W\d_]+)")
 _LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _SCALES = {"t": {"": 1.0, "s": 1.0, "ms": 1e-3}, "x": _LENGTHS, "y": _LENGTHS}
@@ -56,14 +56,13 @@ def read_video(path: str | Path) -> VideoTrack:
         scales[name] = _SCALES[name].get(unit, 0.0)
         if not scales[name]:
             accepted, text = "a unit of this column: s, ms; m, cm, mm", heading.cell(n)
-            problems.reject(heading.line, heading.column(n), text, unit, accepted)
+            problems.reject(*heading.place(n), text, unit, accepted)
     frames: list[list[float]] = []
     for row in rows:
         texts = {name: row.cell(n) for name, (n, _, _) in columns.items()}
         wrong = [name for name, text in texts.items() if text and not is_number(text)]
         for name in wrong:
-            place = row.line, row.column(columns[name][0]), name
-            problems.reject(*place, texts[name], "a number")
+            problems.reject(*row.place(columns[name][0]), name, texts[name], "a number")
         if not wrong and all(texts.values()):
             frames.append([scales[name] * float(text) for name, text in texts.items()])
     problems.raise_if_any()
@@ -76,9 +75,8 @@ def read_video(path: str | Path) -> VideoTrack:
 def _find_columns(row: Row) -> dict[str, tuple[int, Row, str]]:
     """Return where t, x and y stand in a heading, and their units; nothing if one of them lacks."""
     columns = {}
-    for name, pattern in _NAMES.items():
-        for n, text in reversed(list(enumerate(row.texts))):
-            if pattern.search(text):
-                unit = _UNIT.search(text)
-                columns[name] = n, row, unit[1] if unit else ""
-    return columns if len(columns) == len(_NAMES) else {}
+    for n, text in reversed(list(enumerate(row.texts))):
+        if name := _NAME.match(text):
+            unit = _UNIT.search(text)
+            columns[name[1].lower()] = n, row, unit[1] if unit else ""
+    return dict(sorted(columns.items())) if len(columns) == len(_SCALES) else {}

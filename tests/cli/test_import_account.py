@@ -67,6 +67,12 @@ def test_more_edges_than_the_object_makes_are_refused(look):
     assert look(content, "--as-read").code == 0
 
 
+def test_gates_of_different_days_are_no_drop(look):
+    content = "Gate {0}\ntime,state\n202{0}-11-24 14:00:00.4,1\n202{0}-11-24 14:00:00.5,0\n"
+    done = look(content.format(5) + content.format(6), "--map", "groups=gates")
+    assert "would last 31536000 s" in done.err
+
+
 def test_two_wires_at_one_stamp_of_a_dump_are_refused(look):
     first, second = (f"#{round(time * 1e6)}\n" for time, _, _ in RUNS[0][1:3])
     content = shapes()["VCD"].content.decode()
