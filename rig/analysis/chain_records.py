@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 QUICK = 0.3e-3
 """Edges of one gate closer than this are no two sides of a rod: the receiver flickered, s."""
+SIDES = 2
+"""Edges of a rod, or of one stray pulse."""
 LONGEST = 64
 """Edges of one flicker from which on its middle says no more: a clean edge has 1, a rod in front of
 a receiver that flickers with the mains some ten. What is fitted takes time with each edge."""

@@ -202,15 +202,15 @@ class DropCase(NamedTuple):
             readings[aside] = reading
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()
-        early = judge_record(drop, audit, [*unlike, *doubts])
-        if early.verdict == "void" or reading.begun is None:
-            reasons = early.reasons
+        reasons = (*judge_record(drop, audit), *unlike, *doubts)
+        verdict = verdict_of(reasons)
+        if verdict == "void" or reading.begun is None:
             if reading.unlike and explain:
                 if reading.explained is None:
                     reading = replace(reading, explained=self._unlike_fall(reading, rough))
                     readings[aside] = reading
                 reasons = (*reasons, *(reading.explained or ()))
-            return DropResult(run, drop.attempt, early.verdict, reasons, audit), None
+            return DropResult(run, drop.attempt, verdict, reasons, audit), None
         begun = reading.begun
         fit = timed(self._model(records, begun), begun, scale.hz / reading.scale.hz)
         unmatched = unmatched_edges(fit)
@@ -228,7 +228,7 @@ class DropCase(NamedTuple):
         by_passages = last_passages(fit)
         end = judge(protocol, run, drop, audit, measured, fit, by_passages, unmatched)
         reasons = end.reasons
-        if not end.known and (explain or end.verdict != "void"):
+        if not end.known and (explain or verdict_of(end.reasons) != "void"):
             explainer = self._explainer(scale, end.suspects)
             if end.odd or explainer.asked(fit):
                 causes = [cause for cause in explainer.explain(fit) if cause.whole]

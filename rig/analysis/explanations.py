@@ -57,7 +57,7 @@ _TOLD = 3.0  # standard uncertainties: a smaller size may as well be none
 _LEFT = 12.5  # gain that another fault may still have beside one that explains everything: 5 σ
 
 
-NEITHER = Fault("", lambda _size, _u: {})
+NEITHER = Fault("")
 """No fault, but a fall that is not that of the equations."""
 
 

@@ -9,10 +9,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rig.analysis.annealing import LEAST
 from rig.analysis.chain_records import chain_records
 from rig.analysis.fit import Begun
 from rig.analysis.identify import identify
-from rig.analysis.verdict import SUPPORT, pattern_faults
+from rig.analysis.verdict import pattern_faults
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -64,6 +65,6 @@ def identified(
     identification = identify(protocol, records, scale.u, components, window)
     unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
     if unlike or fit is None:
-        poor = tuple(role for role, share in identification.shares.items() if share < SUPPORT)
+        poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
         return Identified(scale, unlike, poor)
     return Identified(scale, unlike, begun=Begun(fit.model.guesses, fit.matches, fit.x))

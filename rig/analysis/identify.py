@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, Pairing, SideFall, log_density
+from rig.analysis.chain_records import SIDES
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY, scaled
 from rig.analysis.fit import Fit, count_matched, settle
@@ -38,12 +39,10 @@ _CLEAR = 0.97
 """Share of all that could be matched with which no other start is tried."""
 _FAIR = 0.9
 """The same with which a reading is good."""
-_CALM = 2.0
-"""Scatter of edges above which a reading is none that ends the search."""
+RESTLESS = 2.0
+"""Scatter of the edges about a motion, relative to the assumed one, that is remarked."""
 _OTHER = 0.02
 """Share of a side's edges at another rod that makes a different reading."""
-_FEW = 2
-"""Edges that make none: a stray in place of a missed edge."""
 _CLOSE = 30.0
 """Log odds of annealed readings within which they are adjusted: what linear unknowns leave out."""
 
@@ -153,7 +152,7 @@ def well_read(reading: Reading) -> bool:
     matchable = sum(possible(record) for record in fit.model.records.values())
     many = reading.share >= LEAST and fit.matched >= _FAIR * matchable
     strain = float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
-    return many and fit.estimate.scatter < _CALM and strain < STRAY
+    return many and fit.estimate.scatter < RESTLESS and strain < STRAY
 
 
 def possible(record: ChainRecord) -> int:
@@ -178,7 +177,7 @@ def _read(fall: SideFall, window: Span, batches: int | None) -> list[Annealed]:
         if len(starts):
             readings = _ranked([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
-            if best.scatter < _CALM and best.matched >= max(least, _CLEAR * matchable):
+            if best.scatter < RESTLESS and best.matched >= max(least, _CLEAR * matchable):
                 break
     return readings
 
@@ -202,7 +201,7 @@ def _ranked(readings: Iterable[Weighed]) -> list[Weighed]:
 def _unlike(edges: Index, other_edges: Index) -> bool:
     """Whether two readings give really different rods to the same edges."""
     matched = int(np.count_nonzero((edges >= 0) | (other_edges >= 0)))
-    return bool(np.count_nonzero(edges != other_edges) > max(_FEW, _OTHER * matched))
+    return bool(np.count_nonzero(edges != other_edges) > max(SIDES, _OTHER * matched))
 
 
 def log_evidence(fit: Fit) -> float:

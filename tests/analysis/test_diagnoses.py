@@ -280,7 +280,7 @@ def test_odds_are_numbers_up_to_what_nobody_reads_any_more():
 
 def test_a_fall_that_is_not_the_equations_accuses_nothing():
     """What explains a drop as well as that it is no such fall is not named."""
-    length = Fault("chain_length", lambda s, u: {"name": "A", "size_m": s, "U95_m": u})
+    length = Fault("chain_length", {"name": "A"}, "size", "_m")
     named = Explanation(length, length.values(0.01, 1e-3), 50.0, whole=True)
     beyond = Explanation(NEITHER, {}, 49.0, whole=True)
     words = UNIFORM.vocabulary

@@ -11,7 +11,7 @@ import pytest
 from rig.analysis.drop import fit_drop
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
-from rig.analysis.verdict import _SURE, _pushed, pattern_faults
+from rig.analysis.verdict import _SURE, _air, pattern_faults
 from rig.errors import InputError
 from rig.model.chain import Chain
 from rig.protocol.protocol import Accept
@@ -390,6 +390,8 @@ def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
             unknowns={"drag": slice(0, 1)},
             kappa=lambda _x: -share * _SURE * u,
         ),
-        estimate=SimpleNamespace(x=None, covariance=np.array([[0.25]]), sd=np.array([4.0])),
+        estimate=SimpleNamespace(
+            x=np.zeros(1), covariance=np.array([[0.25]]), sd=np.array([4.0]), scatter=1.0
+        ),
     )
-    assert bool(_pushed(fit)) == pushed
+    assert bool(_air(fit)["air_accelerates"]) == pushed
