@@ -331,7 +331,7 @@ class Annealed(NamedTuple):
     guess
         The fall.
     edges
-        Of every expected edge, −1 for a missed one.
+        Of every expected edge, −1 for a missed one; a list, for there may be several sides.
     evidence
         Logarithm of its marginal likelihood, relative to that all edges are strays.
     scatter
@@ -339,14 +339,14 @@ class Annealed(NamedTuple):
     """
 
     guess: Guess
-    edges: Index
+    edges: list[Index]
     evidence: float
     scatter: float
 
     @property
     def matched(self) -> int:
         """Number of edges that belong to a rod."""
-        return int(np.count_nonzero(self.edges >= 0))
+        return int(np.count_nonzero(self.edges[0] >= 0))
 
 
 @dataclass(frozen=True)
@@ -533,7 +533,7 @@ class SideFall:
             x[CLOCK],
             x[PULL],
         )
-        return Annealed(guess, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
+        return Annealed(guess, [edges], evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self) -> Array:
         """Falls to begin with, the likeliest first.

@@ -18,7 +18,7 @@ from rig.analysis.explanations import Explainer, explained
 from rig.analysis.faults import Premise
 from rig.analysis.fit import Matched, timed
 from rig.analysis.gravity import free_gravity
-from rig.analysis.identified import identified
+from rig.analysis.identify import identify_drop
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
 from rig.analysis.result import GOOD, Audit, DropResult
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.fit import Begun, Fit
-    from rig.analysis.identified import Identified
+    from rig.analysis.identify import DropIdentity
     from rig.analysis.result import Deviation
     from rig.arrays import Array
     from rig.clock.calibration import TimeScale
@@ -69,7 +69,7 @@ class DropSummary:
     scale: TimeScale
     explained: bool
     result: DropResult
-    identified: Mapping[tuple[int, ...], Identified]
+    identified: Mapping[tuple[int, ...], DropIdentity]
     aside: tuple[int, ...] | None
     x: Array
     deviations: Mapping[str, Deviation | None]
@@ -148,7 +148,7 @@ class DropCase(NamedTuple):
 
     @one_thread
     def read(
-        self, readings: dict[tuple[int, ...], Identified] | None = None, *, explain: bool = True
+        self, readings: dict[tuple[int, ...], DropIdentity] | None = None, *, explain: bool = True
     ) -> tuple[DropResult, Fit | None]:
         """Read the drop, without the low gates that not all rods pass.
 
@@ -189,7 +189,7 @@ class DropCase(NamedTuple):
         return DropModel.of(self.protocol, records, begun.guesses, self.scale.u, self.components)
 
     def _read(
-        self, readings: dict[tuple[int, ...], Identified], *, explain: bool
+        self, readings: dict[tuple[int, ...], DropIdentity], *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
         """Read a drop whose rods strike where the protocol, from the contact point, has them."""
         protocol, run, drop, scale, components, aside = self
@@ -198,7 +198,7 @@ class DropCase(NamedTuple):
         audit = _blank_audit(drop, records)
         rough, reading = scale.coarse(), readings.get(aside)
         if reading is None or reading.scale != rough:
-            reading = identified(protocol, run, drop, rough, components, aside)
+            reading = identify_drop(protocol, run, drop, rough, components, aside)
             readings[aside] = reading
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()
@@ -249,7 +249,7 @@ class DropCase(NamedTuple):
         )
         return result, fit
 
-    def _unlike_fall(self, reading: Identified, scale: TimeScale) -> tuple[Reason, ...]:
+    def _unlike_fall(self, reading: DropIdentity, scale: TimeScale) -> tuple[Reason, ...]:
         """Seek what else than the protocol would explain edges that are like no fall."""
         assert self.protocol.gates is not None
         gates = self.protocol.gates.gates

@@ -23,7 +23,7 @@ from rig.analysis.chain_records import chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, faults
 from rig.analysis.fit import match, settle
-from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weighed, well_read
+from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weigh, well_read
 from rig.analysis.score_test import scores
 from rig.reasons import make_reason
 
@@ -142,7 +142,7 @@ class Explainer:
             stated = sum(self._read_alone(record) for record in records)
             explanations = [*self._voted([*self.sized, *self.discrete], stated)]
         else:
-            reading = weighed(fit)
+            reading = weigh(fit)
             stated, well = self._absolute(reading, self.setting.hz), well_read(reading)
             explanations = [*self._along(fit, stated, well), *self._voted(self.discrete, stated)]
             likelier = [cause for cause in explanations if cause.log_odds > 0.0]
@@ -199,7 +199,7 @@ class Explainer:
         wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
         x = fit.x.copy()
         model = fit.model.informed(wider, self.clock_u, x)
-        reading = weighed(settle(model, match(model, x), x=x))
+        reading = weigh(settle(model, match(model, x), x=x))
         log_odds = self._absolute(reading, self.setting.hz) - RARE - stated
         yield Explanation(NEITHER, {}, log_odds, whole=True)
 
@@ -311,7 +311,7 @@ class Explainer:
         if score is not None:
             largest = max(fault.sizes)
             x += float(np.clip(score.size, -largest, largest)) * np.append(score.follow, 1.0)
-        reading = weighed(settle(opened, match(opened, x), x=x))
+        reading = weigh(settle(opened, match(opened, x), x=x))
         estimate = reading.fit.estimate
         further, u = float(estimate.x[-1]), math.sqrt(estimate.covariance[-1, -1]) * estimate.sd[-1]
         if not _TOLD * u < abs(size + further) <= max(fault.sizes):

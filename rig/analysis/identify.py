@@ -17,24 +17,31 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, Pairing, SideFall, log_density
-from rig.analysis.chain_records import SIDES
+from rig.analysis.chain_records import SIDES, chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY, scaled
-from rig.analysis.fit import Fit, count_matched, settle
+from rig.analysis.fit import Begun, Fit, count_matched, settle
 from rig.protocol.gates import CLEARANCE_M
+from rig.reasons import Reason, make_reason
+from rig.vocabulary import ANY_SCENE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from rig.analysis.annealing import Annealed, Span
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.arrays import Index
-    from rig.protocol.protocol import Protocol
+    from rig.clock.calibration import TimeScale
+    from rig.protocol.protocol import Protocol, Run
+    from rig.records import Drop
+    from rig.vocabulary import Vocabulary
 
 
-Weighed = TypeVar("Weighed", "Annealed", "Reading")
+AnyReading = TypeVar("AnyReading", "Annealed", "Reading")
 
+LEAD = math.log(1000.0)
+"""Log odds of a reading against the likeliest really different one, below which neither counts."""
 _CLEAR = 0.97
 """Share of all that could be matched with which no other start is tried."""
 _FAIR = 0.9
@@ -63,10 +70,9 @@ class Reading:
     evidence: float
 
     @property
-    def share(self) -> float:
-        """Share of the expected edges that are matched."""
-        expected = sum(record.expected for record in self.fit.model.records.values())
-        return self.fit.matched / max(1, expected)
+    def edges(self) -> list[Index]:
+        """For each side the edge of every expected one, −1 for a missed one."""
+        return [np.concatenate(side) for side in self.fit.matches.values()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +98,53 @@ class Identification:
     log_odds: float = math.inf
     evidence: float = -math.inf
     other: Fit | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DropIdentity:
+    """Which rods a drop's edges are, found out once, at a round time scale.
+
+    The session's clock is known a little better with each further drop; which edge is which rod
+    stays.
+
+    Attributes
+    ----------
+    scale
+        At which.
+    unlike
+        Why they are not one fall of each chain, by role; empty where they are.
+    poor
+        Roles of chains of which too few edges are where one fall would put them.
+    begun
+        The fall, as it was adjusted; `None` where there is none.
+    explained
+        What else than the protocol would explain edges that are like no fall; `None` if not sought.
+    """
+
+    scale: TimeScale
+    unlike: Mapping[str, Reason]
+    poor: tuple[str, ...] = ()
+    begun: Begun | None = None
+    explained: tuple[Reason, ...] | None = None
+
+
+def identify_drop(
+    protocol: Protocol,
+    run: Run,
+    drop: Drop,
+    scale: TimeScale,
+    components: Components,
+    aside: Collection[int] = (),
+) -> DropIdentity:
+    """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`."""
+    window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
+    records = chain_records(protocol, run, drop, scale.hz, aside)
+    identification = identify(protocol, records, scale.u, components, window)
+    unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
+    if unlike or fit is None:
+        poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
+        return DropIdentity(scale, unlike, poor)
+    return DropIdentity(scale, unlike, begun=Begun(fit.model.guesses, fit.matches, fit.x))
 
 
 def identify(
@@ -129,12 +182,37 @@ def identify(
     return Identification(None, _shares(model, matched))
 
 
+def pattern_faults(
+    identification: Identification, words: Vocabulary = ANY_SCENE
+) -> dict[str, Reason]:
+    """Say why the edges are not one fall of each chain, by role; nothing where they are."""
+    reasons = {
+        role: make_reason("few_edges_fit", words, side=role, share=share)
+        for role, share in identification.shares.items()
+        if share < LEAST
+    }
+    if not reasons and identification.fit is None:
+        return dict.fromkeys(identification.shares, make_reason("no_fall", words))
+    if not reasons and identification.log_odds < LEAD:
+        return dict.fromkeys(identification.shares, _ambiguous(words, identification))
+    return reasons
+
+
+def _ambiguous(words: Vocabulary, identification: Identification) -> Reason:
+    """Say that two falls fit, and with which further gate only one of them would."""
+    odds = math.exp(identification.log_odds)
+    if identification.fit is None or identification.other is None:
+        return make_reason("two_falls", words, odds=odds)
+    side, height = deciding_gate(identification.fit, identification.other)
+    return make_reason("two_falls_gate", words, odds=odds, side=side, height_m=height)
+
+
 def read_quickly(
     protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
 ) -> Reading | None:
     """Read a drop like `identify`, but only near what is stated."""
     identification = identify(protocol, records, clock_u, components, batches=1)
-    return None if identification.fit is None else weighed(identification.fit)
+    return None if identification.fit is None else weigh(identification.fit)
 
 
 def most_votes(
@@ -150,7 +228,8 @@ def well_read(reading: Reading) -> bool:
     """Whether nearly all that could be is matched, with no more scatter or strain than usual."""
     fit = reading.fit
     matchable = sum(possible(record) for record in fit.model.records.values())
-    many = reading.share >= LEAST and fit.matched >= _FAIR * matchable
+    expected = sum(record.expected for record in fit.model.records.values())
+    many = fit.matched >= max(LEAST * max(1, expected), _FAIR * matchable)
     strain = float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
     return many and fit.estimate.scatter < RESTLESS and strain < STRAY
 
@@ -182,18 +261,11 @@ def _read(fall: SideFall, window: Span, batches: int | None) -> list[Annealed]:
     return readings
 
 
-def _edges(reading: Annealed | Reading) -> list[Index]:
-    """For each side the edge of every expected one."""
-    if isinstance(reading, Reading):
-        return [np.concatenate(side) for side in reading.fit.matches.values()]
-    return [reading.edges]
-
-
-def _ranked(readings: Iterable[Weighed]) -> list[Weighed]:
+def _ranked(readings: Iterable[AnyReading]) -> list[AnyReading]:
     """Order readings, the likeliest first, and leave out what is the same as a likelier one."""
-    ranked: list[Weighed] = []
+    ranked: list[AnyReading] = []
     for reading in sorted(readings, key=lambda candidate: -candidate.evidence):
-        if all(any(map(_unlike, _edges(reading), _edges(likelier))) for likelier in ranked):
+        if all(any(map(_unlike, reading.edges, likelier.edges)) for likelier in ranked):
             ranked.append(reading)
     return ranked
 
@@ -235,7 +307,7 @@ def held_back(fit: Fit) -> float:
     return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
 
 
-def adjusted(fit: Fit, role: str) -> Guess:
+def fitted_guess(fit: Fit, role: str) -> Guess:
     """Return where an adjustment has a chain begin, as a guess for a further one."""
     at, x = fit.model.unknowns, fit.x
     path = fit.model.trajectory(role, x)
@@ -262,11 +334,13 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
     for pair in close:
         sides = dict(zip(readings, pair, strict=True))
         begun = model.begun({role: side.guess for role, side in sides.items()})
-        matches = {role: model.pairings[role].numbered(side.edges) for role, side in sides.items()}
+        matches = {
+            role: model.pairings[role].numbered(side.edges[0]) for role, side in sides.items()
+        }
         fits = [settle(begun, matches)]
         if not fits[0].estimate.settled:  # once more, from where it has the chains
-            fits.append(settle(model.begun({role: adjusted(fits[0], role) for role in sides})))
-        tried.append(max(map(weighed, fits), key=lambda reading: reading.evidence))
+            fits.append(settle(model.begun({role: fitted_guess(fits[0], role) for role in sides})))
+        tried.append(max(map(weigh, fits), key=lambda reading: reading.evidence))
     best, *rest = _ranked(tried)
     shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:
@@ -281,9 +355,9 @@ def _shares(model: DropModel, matched: Mapping[str, int]) -> dict[str, float]:
     return {role: count / max(1, model.records[role].expected) for role, count in matched.items()}
 
 
-def weighed(fit: Fit) -> Reading:
+def weigh(fit: Fit) -> Reading:
     """Weigh a fit of all sides."""
-    releases = [adjusted(fit, role).release for role in fit.model.records]
+    releases = [fitted_guess(fit, role).release for role in fit.model.records]
     evidence = log_evidence(fit) + _simultaneous(fit.model.protocol, releases)
     return Reading(fit, evidence if math.isfinite(evidence) else -math.inf)
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rig.analysis.annealing import LEAST, MISSED
+from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import SIDES
 from rig.analysis.diagnoses import Diagnosis, diagnose
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY
-from rig.analysis.identify import RESTLESS, deciding_gate
+from rig.analysis.identify import RESTLESS
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import disagreements
 from rig.reasons import Reason, make_reason
-from rig.vocabulary import ANY_SCENE
 from rig.wordings import Severity
 
 if TYPE_CHECKING:
@@ -23,14 +22,10 @@ if TYPE_CHECKING:
     from rig.analysis.adjust import Estimate
     from rig.analysis.edge_classes import UnmatchedEdge
     from rig.analysis.fit import Fit
-    from rig.analysis.identify import Identification
     from rig.analysis.result import Audit, DropResult, Measured, Verdict
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Drop
-    from rig.vocabulary import Vocabulary
 
-LEAD = math.log(1000.0)
-"""Log odds of a reading against the likeliest really different one, below which neither counts."""
 LATE = 0.2
 """Share of stamps so close behind another that they may be late which a drop may have without
 remark. Sixteen gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
@@ -108,31 +103,6 @@ def _by_severity(reasons: Iterable[Reason]) -> tuple[list[Reason], list[Reason]]
     for reason in reasons:
         parts[reason.severity is not Severity.VOID].append(reason)
     return parts
-
-
-def pattern_faults(
-    identification: Identification, words: Vocabulary = ANY_SCENE
-) -> dict[str, Reason]:
-    """Say why the edges are not one fall of each chain, by role; nothing where they are."""
-    reasons = {
-        role: make_reason("few_edges_fit", words, side=role, share=share)
-        for role, share in identification.shares.items()
-        if share < LEAST
-    }
-    if not reasons and identification.fit is None:
-        return dict.fromkeys(identification.shares, make_reason("no_fall", words))
-    if not reasons and identification.log_odds < LEAD:
-        return dict.fromkeys(identification.shares, _ambiguous(words, identification))
-    return reasons
-
-
-def _ambiguous(words: Vocabulary, identification: Identification) -> Reason:
-    """Say that two falls fit, and with which further gate only one of them would."""
-    odds = math.exp(identification.log_odds)
-    if identification.fit is None or identification.other is None:
-        return make_reason("two_falls", words, odds=odds)
-    side, height = deciding_gate(identification.fit, identification.other)
-    return make_reason("two_falls_gate", words, odds=odds, side=side, height_m=height)
 
 
 def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:

@@ -17,8 +17,13 @@ import numpy as np
 
 from rig.analysis.annealing import EVER, MISSED
 from rig.analysis.components import stated
-from rig.analysis.identify import Identification, deciding_gate, identify
-from rig.analysis.verdict import LEAD, pattern_faults
+from rig.analysis.identify import (
+    LEAD,
+    Identification,
+    deciding_gate,
+    identify,
+    pattern_faults,
+)
 from rig.design.cases import CLOCK_U, perfect, predicted, with_beams, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from rig.analysis.drop import fit_drop
+from rig.analysis.identify import pattern_faults
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
-from rig.analysis.verdict import _SURE, _air, pattern_faults
+from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
 from rig.model.chain import Chain
 from rig.protocol.protocol import Accept
