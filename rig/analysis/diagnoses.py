@@ -35,7 +35,6 @@ FEW = 8
 FEW_GATES = 8
 """Gates of which any two may be exchanged where some see something else."""
 RIGHT = 0.8
-_SOME = 3  # edges expected of a gate that say too little when they are missing
 _BY_CHANCE = 1e-4  # probability below which a rod that nobody saw is none
 
 
@@ -82,8 +81,8 @@ def diagnose(fit: Fit) -> Diagnosis:
     for gate in alive:
         where = _values(protocol, gate.train)
         if gate.strange:
-            # Two edges may be missed by chance, and a gate without any bears on nothing.
-            code = "gate_disagrees" if gate.match.size > _SOME else "gate_disagrees_few"
+            # A rod may be missed by chance, and a gate without any bears on nothing.
+            code = "gate_disagrees" if gate.match.size >= 2 * SIDES else "gate_disagrees_few"
             reasons.append(make_reason(code, words, **where, share=gate.share))
         elif gate.off > STRAY:
             # By rods alike and evenly spaced an exchanged gate is fitted well, at a wrong height.

@@ -14,7 +14,7 @@ from rig.analysis.components import stated
 from rig.analysis.diagnoses import FEW_GATES, gates_too_low, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
-from rig.analysis.explanations import Explainer, explained
+from rig.analysis.explanations import Explainer, name_fault
 from rig.analysis.faults import Premise
 from rig.analysis.fit import Matched, timed
 from rig.analysis.gravity import free_gravity
@@ -232,7 +232,7 @@ class DropCase(NamedTuple):
             explainer = self._explainer(scale, end.suspects)
             if end.odd or explainer.asked(fit):
                 causes = [cause for cause in explainer.explain(fit) if cause.whole]
-                if why := explained(causes, protocol.vocabulary, end.accused):
+                if why := name_fault(causes, protocol.vocabulary, end.accused):
                     reasons = (*(one for one in reasons if one not in end.accused), *why)
         result = DropResult(
             run,
@@ -257,7 +257,7 @@ class DropCase(NamedTuple):
         if not strange and len(gates) <= FEW_GATES:
             strange = [*range(len(gates))]  # each may see nearly what another should
         causes = self._explainer(scale, strange).explain(None)
-        return tuple(explained(causes, self.protocol.vocabulary))
+        return tuple(name_fault(causes, self.protocol.vocabulary))
 
     def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
         assert self.components is not None

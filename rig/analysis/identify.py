@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, Pairing, SideFall, log_density
+from rig.analysis.annealing import (
+    LEAST,
+    MISSED,
+    PEAKS,
+    Guess,
+    Pairing,
+    SideFall,
+    log_density,
+)
 from rig.analysis.chain_records import SIDES, chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY, scaled
@@ -28,7 +36,7 @@ from rig.vocabulary import ANY_SCENE
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    from rig.analysis.annealing import Annealed, Span
+    from rig.analysis.annealing import Annealed
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.arrays import Index
@@ -48,8 +56,6 @@ _FAIR = 0.9
 """The same with which a reading is good."""
 RESTLESS = 2.0
 """Scatter of the edges about a motion, relative to the assumed one, that is remarked."""
-_OTHER = 0.02
-"""Share of a side's edges at another rod that makes a different reading."""
 _CLOSE = 30.0
 """Log odds of annealed readings within which they are adjusted: what linear unknowns leave out."""
 
@@ -137,9 +143,9 @@ def identify_drop(
     aside: Collection[int] = (),
 ) -> DropIdentity:
     """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`."""
-    window = (-math.inf if drop.fire_tick is None else 0.0, math.inf)
+    earliest = -math.inf if drop.fire_tick is None else 0.0
     records = chain_records(protocol, run, drop, scale.hz, aside)
-    identification = identify(protocol, records, scale.u, components, window)
+    identification = identify(protocol, records, scale.u, components, earliest)
     unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
     if unlike or fit is None:
         poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
@@ -152,7 +158,7 @@ def identify(
     records: Sequence[ChainRecord],
     clock_u: float,
     components: Components,
-    window: Span = EVER,
+    earliest: float = -math.inf,
     batches: int | None = None,
 ) -> Identification:
     """Find out which fall the edges are.
@@ -165,13 +171,13 @@ def identify(
         Relative standard uncertainty of the time scale.
     components
         How much everything scatters.
-    window
-        Within which chains were let go, s since the release fired.
+    earliest
+        When chains were let go at the earliest, s since the release fired.
     batches
         How many batches of starts are tried at most, the likeliest first.
     """
     model = DropModel.of(protocol, records, None, clock_u, components)
-    readings = {role: _read(model.side(role), window, batches) for role in model.records}
+    readings = {role: _read(model.side(role), earliest, batches) for role in model.records}
     # Likelier than that all edges are strays and every rod was missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
@@ -212,7 +218,8 @@ def read_quickly(
 ) -> Reading | None:
     """Read a drop like `identify`, but only near what is stated."""
     identification = identify(protocol, records, clock_u, components, batches=1)
-    return None if identification.fit is None else weigh(identification.fit)
+    fit = identification.fit
+    return None if fit is None else Reading(fit, identification.evidence)
 
 
 def most_votes(
@@ -246,13 +253,13 @@ def possible(record: ChainRecord) -> int:
     )
 
 
-def _read(fall: SideFall, window: Span, batches: int | None) -> list[Annealed]:
+def _read(fall: SideFall, earliest: float, batches: int | None) -> list[Annealed]:
     """Anneal from one batch of starts after another while none explains the edges."""
     readings: list[Annealed] = []
     least, matchable = LEAST * fall.record.expected, possible(fall.record)
     if not fall.pairing.times.size or matchable < least:
         return readings
-    for starts, _ in itertools.islice(fall.starts(window, least), batches):
+    for starts in itertools.islice(fall.starts(earliest, least), batches):
         if len(starts):
             readings = _ranked([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
@@ -271,9 +278,9 @@ def _ranked(readings: Iterable[AnyReading]) -> list[AnyReading]:
 
 
 def _unlike(edges: Index, other_edges: Index) -> bool:
-    """Whether two readings give really different rods to the same edges."""
+    """Whether two readings differ in more edges than may be strays or missed."""
     matched = int(np.count_nonzero((edges >= 0) | (other_edges >= 0)))
-    return bool(np.count_nonzero(edges != other_edges) > max(SIDES, _OTHER * matched))
+    return bool(np.count_nonzero(edges != other_edges) > max(SIDES, MISSED * matched))
 
 
 def log_evidence(fit: Fit) -> float:

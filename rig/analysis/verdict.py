@@ -12,7 +12,7 @@ from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY
 from rig.analysis.identify import RESTLESS
 from rig.analysis.inclines import other_incline
-from rig.analysis.last_passages import disagreements
+from rig.analysis.last_passages import APART, disagreements
 from rig.reasons import Reason, make_reason
 from rig.wordings import Severity
 
@@ -31,10 +31,6 @@ LATE = 0.2
 remark. Sixteen gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
 
 _SURE = 4.0  # standard uncertainties
-_BEYOND = 3.0  # prior standard uncertainties of κ
-
-GLITCHES = 0.02
-"""Pulses too short to be timed, relative to the edges, that a drop may have without remark."""
 
 
 def verdict_of(reasons: Iterable[Reason]) -> Verdict:
@@ -167,7 +163,8 @@ def _doubts(protocol: Protocol, drop: Drop, estimate: Estimate) -> Iterator[Reas
     device, edges = drop.certificate, max(1, len(drop.edges))
     if device is not None and device.late > LATE * edges:
         yield make_reason("late_stamps", edges=device.late)
-    if device is not None and device.glitches > GLITCHES * edges:
+    # A pulse too short to be timed may be an edge that left no trace.
+    if device is not None and device.glitches > MISSED * edges:
         yield make_reason("short_pulses", pulses=device.glitches)
 
 
@@ -186,7 +183,7 @@ def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
     # By the edges alone, without what the protocol makes of them.
     share = 1.0 / (1.0 - min(variance, 0.9))
     alone = {"kappa": kappa + (share - 1.0) * off, "U95": 2.0 * math.sqrt(share * variance) * sd}
-    blown = estimate.scatter > RESTLESS and abs(off) > _BEYOND * sd
+    blown = estimate.scatter > RESTLESS and abs(off) > APART * sd
     table: dict[str, tuple[bool, dict[str, float]]] = {
         "air": (model.protocol.drag is not None and abs(off) > STRAY * sd, alone),
         "air_implausible": (blown, {"kappa": kappa, "factor": estimate.scatter}),

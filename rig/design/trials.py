@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.annealing import EVER, MISSED
+from rig.analysis.annealing import MISSED
 from rig.analysis.components import stated
 from rig.analysis.identify import (
     LEAD,
@@ -43,7 +43,6 @@ DROPS = 20
 MARGIN = 2.0 * LEAD
 """Log odds that perfect edges must have: real ones are missed, and flicker."""
 _OFF = 2.0  # standard uncertainties that the drop may be off
-_WINDOW = (0.0, np.inf)
 _SEED = 1  # the same drops for every layout, and on every machine
 
 
@@ -83,7 +82,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     for run in islice(cycle(kinds.values()), drops):
         protocol_here = at_contact(protocol, run.incline_deg, run.impact)
         fallen = _fall(protocol_here, run, rng)
-        identification, wrong = read_drop(protocol_here, fallen, _WINDOW)
+        identification, wrong = read_drop(protocol_here, fallen, 0.0)
         read += not wrong
         failing.update(wrong)
         if wrong and not further_gate and identification.fit and identification.other:
@@ -135,7 +134,7 @@ def _fall(
 def read_drop(
     protocol: Protocol,
     fallen: Sequence[tuple[ChainRecord, Sequence[Index]]],
-    window: tuple[float, float] = EVER,
+    earliest: float = -math.inf,
 ) -> tuple[Identification, list[str]]:
     """Read a drop; with it return the sides of which no fall, or the wrong one, was found.
 
@@ -145,9 +144,11 @@ def read_drop(
         With heights counted from the contact point.
     fallen
         Each chain, and for each of its trains which edge every expected edge is, −1 if missed.
+    earliest
+        When chains were let go at the earliest, s.
     """
     records = [record for record, _ in fallen]
-    identification = identify(protocol, records, CLOCK_U, stated(protocol), window)
+    identification = identify(protocol, records, CLOCK_U, stated(protocol), earliest)
     unlike = list(pattern_faults(identification))
     if unlike or identification.fit is None:
         return identification, unlike or [record.role for record in records]
