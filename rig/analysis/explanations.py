@@ -197,11 +197,17 @@ class Explainer:
         """Evidence of a reading, as it can be compared with that of another premise.
 
         By itself it is of times, and edges came in ticks; and it is relative to a reading in which
-        all edges are strays and every rod was missed, of which others may have fewer.
+        all edges are strays and every rod was missed, of which others may have fewer. A rod that
+        leaves no trace at a gate is one thing, and not two: else one at an end that no gate saw by
+        chance would be taken for one that does not hang there.
         """
-        ticks = len(self.drop.edges) * math.log(self.setting.hz / hz)
-        expected = sum(record.expected for record in reading.fit.model.records.values())
-        return _freely(reading) + ticks + expected * math.log(MISSED)
+        fit, ticks = reading.fit, len(self.drop.edges) * math.log(self.setting.hz / hz)
+        missed = sum(
+            train.rods.size - np.setdiff1d(train.rods, train.rods[match >= 0]).size
+            for role, record in fit.model.records.items()
+            for train, match in zip(record.trains, fit.matches[role], strict=True)
+        )
+        return reading.evidence + ticks + missed * math.log(MISSED)
 
     def _scores(self, fit: Fit) -> tuple[list[Score], Array]:
         """Score each sized fault; and by how much it would be likelier than none, if not rare."""
@@ -336,19 +342,6 @@ class Explainer:
         log_odds = self._absolute(reading, hz) - CLEAR - stated
         complete = well_read(reading) and remaining < _LEFT
         return Explanation(fault, fault.values(size, u), log_odds, complete)
-
-
-def _freely(reading: Reading) -> float:
-    """Evidence of a reading where a rod that leaves no trace at a gate is one thing, and not two.
-
-    Else a rod at an end that no gate saw by chance would be taken for one that does not hang there.
-    """
-    unseen = sum(
-        len({*train.rods.tolist()} - {*train.rods[match >= 0].tolist()})
-        for role, record in reading.fit.model.records.items()
-        for train, match in zip(record.trains, reading.fit.matches[role], strict=True)
-    )
-    return reading.evidence - unseen * math.log(MISSED)
 
 
 def _occam(fault: Fault, u: float) -> float:
