@@ -38,19 +38,16 @@ if TYPE_CHECKING:
 
 
 Item = TypeVar("Item", bound=np.generic)
-Span = tuple[float, float]
 
-EVER: Span = (-np.inf, np.inf)
 MISSED = 0.02
 """Share of expected edges that leave no trace, as far as one can know beforehand."""
 STRAYS = 2.0
 """Edges of a gate that belong to no rod, 1/s."""
-ANY_ALPHA: Span = (-0.10, 0.60)
+ANY_ALPHA = (-0.10, 0.60)
 """Impact coefficients beyond both ends of what energy allows (½ and 0)."""
-RELEASE, START, CLOCK, PULL, DRAG, ALPHA, GROWTH = range(7)
+RELEASE, START, CLOCK, PULL, DRAG, ALPHA, GROWTH, UNKNOWNS = range(8)
 """Unknowns of a fall: when it begins, how high, the clock's rate, g, κ, α, and how much more the
-last impulses are."""
-UNKNOWNS = 7
+last impulses are; and how many these are."""
 PART = 6.0
 """Of the least distance of two rods: σ of the first step, in which no rod is hidden."""
 _BROADER = 2.0
@@ -155,9 +152,8 @@ class Pairing:
 
     Attributes
     ----------
-    times, burst, number
-        Of every observed edge, gate by gate, see `rig.analysis.chain_records.EdgeTrain`; and its
-        number in its train.
+    times, burst
+        Of every observed edge, gate by gate, see `rig.analysis.chain_records.EdgeTrain`.
     kind
         Of each: twice the number of its train, and one more where it darkens the beam.
     other
@@ -172,7 +168,6 @@ class Pairing:
 
     times: Array
     burst: Array
-    number: Index
     kind: Index
     other: Index
     kinds: Index
@@ -203,7 +198,6 @@ class Pairing:
         return cls(
             np.concatenate([np.zeros(0), *(train.times for train in trains)]),
             np.concatenate([np.zeros(0), *(train.burst for train in trains)]),
-            np.concatenate([none, *(np.arange(train.times.size) for train in trains)]),
             kind,
             partner,
             kinds,
@@ -216,9 +210,13 @@ class Pairing:
     def observed(self, matches: Sequence[Index]) -> tuple[Index, Index]:
         """Expected edges that are matched, and the observed edge of each."""
         match = np.concatenate(matches)
-        begins = np.repeat(self.begins, [match_of.size for match_of in matches])
         pick = np.flatnonzero(match >= 0)
-        return pick, (match + begins)[pick]
+        return pick, (match + self._first)[pick]
+
+    @cached_property
+    def _first(self) -> Index:
+        """Number of the first observed edge in the train of every expected one."""
+        return self.begins[self.kinds // 2]
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
@@ -320,7 +318,7 @@ class Pairing:
 
     def numbered(self, edge_of: Index) -> list[Index]:
         """Number edges in their trains, train by train."""
-        return split(np.where(edge_of >= 0, self.number[edge_of], -1), self.ends)
+        return split(np.where(edge_of >= 0, edge_of - self._first, -1), self.ends)
 
 
 class Annealed(NamedTuple):
@@ -331,7 +329,7 @@ class Annealed(NamedTuple):
     guess
         The fall.
     edges
-        Of every expected edge, −1 for a missed one.
+        Of every expected edge, −1 for a missed one; a list, for there may be several sides.
     evidence
         Logarithm of its marginal likelihood, relative to that all edges are strays.
     scatter
@@ -339,14 +337,14 @@ class Annealed(NamedTuple):
     """
 
     guess: Guess
-    edges: Index
+    edges: list[Index]
     evidence: float
     scatter: float
 
     @property
     def matched(self) -> int:
         """Number of edges that belong to a rod."""
-        return int(np.count_nonzero(self.edges >= 0))
+        return int(np.count_nonzero(self.edges[0] >= 0))
 
 
 @dataclass(frozen=True)
@@ -533,7 +531,7 @@ class SideFall:
             x[CLOCK],
             x[PULL],
         )
-        return Annealed(guess, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
+        return Annealed(guess, [edges], evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self) -> Array:
         """Falls to begin with, the likeliest first.
@@ -561,37 +559,35 @@ class SideFall:
                 grid = grid[order[unlikely[order] <= _FAR**2 + 1e-9]]
         return np.asarray(grid[((grid >= low) & (grid <= high)).all(axis=1)])
 
-    def starts(self, window: Span = EVER, least: float = 0.0) -> Iterator[tuple[Array, Index]]:
+    def starts(self, earliest: float, least: float) -> Iterator[Array]:
         """Yield falls where most edges agree, batch by batch of the grid.
 
         Parameters
         ----------
-        window
-            Within which chains were let go, s.
+        earliest
+            When chains were let go at the earliest, s.
         least
             Votes without which nothing begins.
 
         Yields
         ------
-        ndarray, ndarray
-            Falls, and how many edges vote for each.
+        ndarray
+            Falls, those first for which most edges vote.
         """
         nodes, size = self.nodes(), _BATCH
         while len(nodes):
             batch, nodes = nodes[:size], nodes[size:]
             size *= 2
-            falls, votes = self._voted(batch, window)
+            falls, votes = self._voted(batch, earliest)
             enough = (votes > 0) & (votes >= max(least, LEAST * votes.max(initial=0)))
             order = np.flatnonzero(enough)[np.argsort(-votes[enough], kind="stable")][: 4 * PEAKS]
-            if order.size:
-                order = order[self._unlike(falls[order])]
-            yield falls[order], votes[order]
+            yield falls[order[self._unlike(falls[order])] if order.size else order]
 
     def most_votes(self) -> int:
         """Count the edges that agree on one of the likeliest falls of the grid, at most."""
-        return int(self._voted(self.nodes()[:_BATCH], EVER)[1].max(initial=0))
+        return int(self._voted(self.nodes()[:_BATCH])[1].max(initial=0))
 
-    def _voted(self, nodes: Array, window: Span) -> tuple[Array, Index]:
+    def _voted(self, nodes: Array, earliest: float = -np.inf) -> tuple[Array, Index]:
         """Let every edge vote, for each node, for the releases from which it would be a rod's.
 
         Returns
@@ -607,8 +603,8 @@ class SideFall:
         # A record may last hours: a fall is where most of the edges are.
         until = np.searchsorted(times, times + _RECORD, side="right")
         first = int(np.argmax(until - np.arange(times.size)))
-        begin = max(float(times[first] - late.max()), window[0])
-        end = min(float(times[until[first] - 1] - early.min()), window[1])
+        begin = max(float(times[first] - late.max()), earliest)
+        end = float(times[until[first] - 1] - early.min())
         if end < begin:
             return nodes[:0], np.zeros(0, dtype=np.intp)
         # At the fastest passages votes are two steps wide.

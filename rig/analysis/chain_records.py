@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,17 +23,19 @@ from rig.predictions import air_shares
 from rig.protocol.contact import higher_contacts
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
     from rig.arrays import Array, Flags, Index
-    from rig.protocol.protocol import Gate, Protocol, RodChain, Run
+    from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
     from rig.records import Drop
 
 
 QUICK = 0.3e-3
 """Edges of one gate closer than this are no two sides of a rod: the receiver flickered, s."""
+SIDES = 2
+"""Edges of a rod, or of one stray pulse."""
 LONGEST = 64
 """Edges of one flicker from which on its middle says no more: a clean edge has 1, a rod in front of
 a receiver that flickers with the mains some ten. What is fitted takes time with each edge."""
@@ -170,7 +172,7 @@ class ChainRecord:
         Trains of gates that are left out: so low that not every rod passes them.
     """
 
-    role: Literal["impact", "free"]
+    role: Side
     chain: RodChain
     trains: tuple[EdgeTrain, ...]
     ratios: Array | None = None
@@ -276,51 +278,44 @@ def chain_records(
     aside
         Numbers of the gates that are left out, in the protocol's list.
     """
+    assert protocol.gates is not None
+    edges, shares = EdgeArrays.of(drop.edges, hz), air_shares(protocol)
+    sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
     records = []
-    shares = air_shares(protocol)
-    for role, chain, trains in edge_trains(protocol, run, EdgeArrays.of(drop.edges, hz)):
-        name = run.impact if role == "impact" else run.free
-        assert name is not None
-        air, more = np.array(shares[name]), unlike(chain.chain, shares[name])
-        record = ChainRecord(role, chain, trains, air=air[:1], unlike=more)
-        if role == "impact":
-            assert protocol.surface is not None
-            # γ is the same at every incline, and level ground always in the domain of Eq. 13.
-            gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain.chain, 0.0)]
-            try:
-                alpha = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
-            except DomainError:
-                alpha = 0.0
-            record = replace(
-                record,
-                trains=tuple(train for train in trains if train.gate not in aside),
-                aside=tuple(train for train in trains if train.gate in aside),
-                ratios=np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gammas)),
-                alpha=alpha,
-                # Behind the last leg nothing falls any more, but edges are asked for all the same.
-                air=np.append(air, air[-1]) if np.ptp(air) else air[:1],
-                incline_deg=run.incline_deg or 0.0,
-                condition=str(protocol.condition(run)),
-                higher=higher_contacts(protocol, run.incline_deg, chain),
-            )
+    for role, name in sides:
+        gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
+        if name is None or not gates:
+            continue
+        chain, air = protocol.chains[name], np.array(shares[name])
+        more, impacts = unlike(chain.chain, shares[name]), _impacts(protocol, run, role, chain)
+        higher, start = impacts.get("higher"), protocol.drop.value
+        trains = [edge_train(n, gate, chain, edges, start, higher) for n, gate in gates]
+        used, unused = (
+            tuple(train for train in trains if (train.gate in aside) == left_out)
+            for left_out in (False, True)
+        )
+        # Behind the last leg nothing falls any more, but edges are asked for all the same.
+        legs = np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1]
+        record = ChainRecord(role, chain, used, air=legs, unlike=more, aside=unused, **impacts)
         records.append(record)
     return records
 
 
-def edge_trains(
-    protocol: Protocol, run: Run, edges: EdgeArrays
-) -> Iterator[tuple[Literal["impact", "free"], RodChain, tuple[EdgeTrain, ...]]]:
-    """Sort edges by side: its role, the chain that hung there, and the train of each of its gates.
-
-    A side where nothing hung, or without gates, is left out.
-    """
-    assert protocol.gates is not None
-    start = protocol.drop.value
-    for role in ("impact", "free"):
-        name = run.impact if role == "impact" else run.free
-        gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
-        if name is not None and gates:
-            chain = protocol.chains[name]
-            higher = higher_contacts(protocol, run.incline_deg, chain) if role == "impact" else None
-            trains = (edge_train(n, gate, chain, edges, start, higher) for n, gate in gates)
-            yield role, chain, tuple(trains)
+def _impacts(protocol: Protocol, run: Run, role: Side, chain: RodChain) -> dict[str, Any]:
+    """Return what a chain's record has because it strikes; nothing where nothing is struck."""
+    if role == "free":
+        return {}
+    assert protocol.surface is not None
+    # γ is the same at every incline, and level ground always in the domain of Eq. 13.
+    gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain.chain, 0.0)]
+    try:
+        alpha = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
+    except DomainError:
+        alpha = 0.0
+    return {
+        "ratios": np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gammas)),
+        "alpha": alpha,
+        "incline_deg": run.incline_deg or 0.0,
+        "condition": str(protocol.condition(run)),
+        "higher": higher_contacts(protocol, run.incline_deg, chain),
+    }

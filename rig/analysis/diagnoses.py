@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rig.analysis.annealing import MISSED
+from rig.analysis.chain_records import SIDES
 from rig.analysis.distributions import most_by_chance
-from rig.analysis.equations import scaled
+from rig.analysis.equations import STRAY, scaled
 from rig.analysis.faults import gate_values
 from rig.reasons import Reason, make_reason
 from rig.wordings import Severity
@@ -33,17 +34,12 @@ too, where more than `FEW` are missing."""
 FEW = 8
 FEW_GATES = 8
 """Gates of which any two may be exchanged where some see something else."""
-IMPLAUSIBLE = 6.0
-"""Standard uncertainties beyond which a beam is not where the protocol says: by rods all alike and
-evenly spaced, an exchanged gate is fitted well at a wrong height."""
 RIGHT = 0.8
-_SOME = 3  # edges expected of a gate that say too little when they are missing
-_PAIR = 2  # edges of a rod
 _BY_CHANCE = 1e-4  # probability below which a rod that nobody saw is none
 
 
 class Diagnosis(NamedTuple):
-    """What is wrong with gates and chains.
+    """What is wrong with a drop, its gates and chains.
 
     Attributes
     ----------
@@ -54,55 +50,56 @@ class Diagnosis(NamedTuple):
     known
         Whether what is wrong explains all of it, and nothing else is to be sought: rods come to
         rest above gates, or one is missing.
+    accused
+        Those of the reasons that blame gates, chains or clock.
     """
 
     reasons: tuple[Reason, ...] = ()
     suspects: tuple[int, ...] = ()
     odd: bool = False
     known: bool = False
+    accused: tuple[Reason, ...] = ()
 
 
 def diagnose(fit: Fit) -> Diagnosis:
     """Look for gates that do not see the chains of the protocol."""
-    model = fit.model
-    gates, words = _gates(fit), model.protocol.vocabulary
-    doubts = silent(model.protocol, model.records.values())
-    if aside := [train for record in model.records.values() for train in record.aside]:
-        at = [_values(model.protocol, train) for train in aside]
+    protocol, records = fit.model.protocol, fit.model.records
+    gates, words = _gates(fit), protocol.vocabulary
+    doubts = silent(protocol, records.values())
+    if aside := [train for record in records.values() for train in record.aside]:
+        at = [_values(protocol, train) for train in aside]
         doubts.append(make_reason("low_gates_miss_rods", words, at=at))
-    reasons: list[Reason] = []
-    alive = [beam for beam in gates if beam.train.times.size]
-    absent = [
-        reason
-        for role, record in model.records.items()
-        for reason in _missing_rod(
-            model.protocol, record, [gate for gate in alive if gate.role == role]
-        )
+    alive = [gate for gate in gates if gate.train.times.size]
+    by_side = [
+        (record, [gate for gate in alive if gate.role == role]) for role, record in records.items()
     ]
-    if absent and not any(beam.strange for beam in alive):
+    strange = [gate.train.gate for gate in alive if gate.strange]
+    absent = [reason for side in by_side for reason in _missing_rod(protocol, *side)]
+    if absent and not strange:
         return Diagnosis((*absent, *doubts), known=True)
+    reasons: list[Reason] = []
     for gate in alive:
-        where = _values(model.protocol, gate.train)
+        where = _values(protocol, gate.train)
         if gate.strange:
-            # Two edges may be missed by chance, and a gate without any bears on nothing.
-            code = "gate_disagrees" if gate.match.size > _SOME else "gate_disagrees_few"
+            # A rod may be missed by chance, and a gate without any bears on nothing.
+            code = "gate_disagrees" if gate.match.size >= 2 * SIDES else "gate_disagrees_few"
             reasons.append(make_reason(code, words, **where, share=gate.share))
-        elif gate.off > IMPLAUSIBLE:
+        elif gate.off > STRAY:
+            # By rods alike and evenly spaced an exchanged gate is fitted well, at a wrong height.
             reasons.append(make_reason("gate_off", words, **where, deviations=gate.off))
     # An exchanged gate fits what it should not see rods away, or at another height.
-    displaced = [beam for beam in alive if beam.extra >= _PAIR and beam.unseen & beam.ends]
+    displaced = [gate for gate in alive if gate.extra >= SIDES and gate.unseen & gate.ends]
     displaced += [
-        beam for pair in combinations(alive, 2) if _counts_crossed(*pair) for beam in pair
+        gate for pair in combinations(alive, 2) if _counts_crossed(*pair) for gate in pair
     ]
-    off = [beam for beam in alive if beam.off > IMPLAUSIBLE]
-    suspects = dict.fromkeys(beam.train.gate for beam in [*displaced, *off])
-    strange = [beam.train.gate for beam in alive if beam.strange]
+    suspects = [*displaced, *(gate for gate in alive if gate.off > STRAY)]
     if strange and len(gates) <= FEW_GATES:
         # A side of few gates is read well as another fall where one of them is the other side's.
-        suspects = dict.fromkeys([*strange, *(beam.train.gate for beam in alive)])
-    odd = any(reason.severity is Severity.VOID for reason in reasons) or len(displaced) >= _PAIR
-    odd |= any(_other_ends([beam for beam in alive if beam.role == role]) for role in model.records)
-    return Diagnosis((*reasons, *doubts), tuple(suspects), odd)
+        suspects = sorted(alive, key=lambda gate: not gate.strange)
+    odd = any(reason.severity is Severity.VOID for reason in reasons) or len(displaced) >= SIDES
+    odd |= any(_other_ends(side) for _, side in by_side)
+    numbers = dict.fromkeys(gate.train.gate for gate in suspects)
+    return Diagnosis((*reasons, *doubts), tuple(numbers), odd)
 
 
 def _missing_rod(
@@ -189,11 +186,6 @@ class _Seen(NamedTuple):
         return {int(self.train.rods[0]), int(self.train.rods[-1])}
 
     @property
-    def beyond(self) -> int:
-        """How many edges came after that of the last rod."""
-        return self.train.times.size - 1 - int(self.match.max(initial=-1))
-
-    @property
     def strange(self) -> bool:
         """Whether it sees something else than its chain."""
         return self.share < STRANGE or (self.share < RIGHT and self.missing > FEW)
@@ -224,10 +216,10 @@ def _counts_crossed(one: _Seen, other: _Seen) -> bool:
     came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
     own = abs(came[0] - due[0]) + abs(came[1] - due[1])
     crossed = abs(came[0] - due[1]) + abs(came[1] - due[0])
-    if own - crossed < 2 * _PAIR:
+    if own - crossed < 2 * SIDES:
         return False
     fewer, more = sorted((one, other), key=lambda gate: gate.extra)
-    return bool(fewer.unseen & fewer.ends) and more.extra >= _PAIR
+    return bool(fewer.unseen & fewer.ends) and more.extra >= SIDES
 
 
 def gates_too_low(
@@ -282,4 +274,6 @@ def _other_ends(gates: list[_Seen]) -> bool:
         return False
     unseen = set.intersection(*(gate.unseen for gate in gates))
     ends = set.union(*(gate.ends for gate in gates))
-    return bool(unseen & ends) or all(gate.beyond >= _PAIR for gate in gates)
+    return bool(unseen & ends) or all(
+        gate.train.times.size - 1 - int(gate.match.max(initial=-1)) >= SIDES for gate in gates
+    )

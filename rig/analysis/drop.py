@@ -14,11 +14,11 @@ from rig.analysis.components import stated
 from rig.analysis.diagnoses import FEW_GATES, gates_too_low, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
-from rig.analysis.explanations import Explainer, explained
+from rig.analysis.explanations import Explainer, name_fault
 from rig.analysis.faults import Premise
 from rig.analysis.fit import Matched, timed
 from rig.analysis.gravity import free_gravity
-from rig.analysis.identified import identified
+from rig.analysis.identify import identify_drop
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
 from rig.analysis.result import GOOD, Audit, DropResult
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.fit import Begun, Fit
-    from rig.analysis.identified import Identified
+    from rig.analysis.identify import DropIdentity
     from rig.analysis.result import Deviation
     from rig.arrays import Array
     from rig.clock.calibration import TimeScale
@@ -69,7 +69,7 @@ class DropSummary:
     scale: TimeScale
     explained: bool
     result: DropResult
-    identified: Mapping[tuple[int, ...], Identified]
+    identified: Mapping[tuple[int, ...], DropIdentity]
     aside: tuple[int, ...] | None
     x: Array
     deviations: Mapping[str, Deviation | None]
@@ -148,7 +148,7 @@ class DropCase(NamedTuple):
 
     @one_thread
     def read(
-        self, readings: dict[tuple[int, ...], Identified] | None = None, *, explain: bool = True
+        self, readings: dict[tuple[int, ...], DropIdentity] | None = None, *, explain: bool = True
     ) -> tuple[DropResult, Fit | None]:
         """Read the drop, without the low gates that not all rods pass.
 
@@ -189,7 +189,7 @@ class DropCase(NamedTuple):
         return DropModel.of(self.protocol, records, begun.guesses, self.scale.u, self.components)
 
     def _read(
-        self, readings: dict[tuple[int, ...], Identified], *, explain: bool
+        self, readings: dict[tuple[int, ...], DropIdentity], *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
         """Read a drop whose rods strike where the protocol, from the contact point, has them."""
         protocol, run, drop, scale, components, aside = self
@@ -198,19 +198,19 @@ class DropCase(NamedTuple):
         audit = _blank_audit(drop, records)
         rough, reading = scale.coarse(), readings.get(aside)
         if reading is None or reading.scale != rough:
-            reading = identified(protocol, run, drop, rough, components, aside)
+            reading = identify_drop(protocol, run, drop, rough, components, aside)
             readings[aside] = reading
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()
-        early = judge_record(drop, audit, [*unlike, *doubts])
-        if early.verdict == "void" or reading.begun is None:
-            reasons = early.reasons
+        reasons = (*judge_record(drop, audit), *unlike, *doubts)
+        verdict = verdict_of(reasons)
+        if verdict == "void" or reading.begun is None:
             if reading.unlike and explain:
                 if reading.explained is None:
                     reading = replace(reading, explained=self._unlike_fall(reading, rough))
                     readings[aside] = reading
                 reasons = (*reasons, *(reading.explained or ()))
-            return DropResult(run, drop.attempt, early.verdict, reasons, audit), None
+            return DropResult(run, drop.attempt, verdict, reasons, audit), None
         begun = reading.begun
         fit = timed(self._model(records, begun), begun, scale.hz / reading.scale.hz)
         unmatched = unmatched_edges(fit)
@@ -228,11 +228,11 @@ class DropCase(NamedTuple):
         by_passages = last_passages(fit)
         end = judge(protocol, run, drop, audit, measured, fit, by_passages, unmatched)
         reasons = end.reasons
-        if not end.known and (explain or end.verdict != "void"):
+        if not end.known and (explain or verdict_of(end.reasons) != "void"):
             explainer = self._explainer(scale, end.suspects)
             if end.odd or explainer.asked(fit):
                 causes = [cause for cause in explainer.explain(fit) if cause.whole]
-                if why := explained(causes, protocol.vocabulary, end.accused):
+                if why := name_fault(causes, protocol.vocabulary, end.accused):
                     reasons = (*(one for one in reasons if one not in end.accused), *why)
         result = DropResult(
             run,
@@ -249,7 +249,7 @@ class DropCase(NamedTuple):
         )
         return result, fit
 
-    def _unlike_fall(self, reading: Identified, scale: TimeScale) -> tuple[Reason, ...]:
+    def _unlike_fall(self, reading: DropIdentity, scale: TimeScale) -> tuple[Reason, ...]:
         """Seek what else than the protocol would explain edges that are like no fall."""
         assert self.protocol.gates is not None
         gates = self.protocol.gates.gates
@@ -257,7 +257,7 @@ class DropCase(NamedTuple):
         if not strange and len(gates) <= FEW_GATES:
             strange = [*range(len(gates))]  # each may see nearly what another should
         causes = self._explainer(scale, strange).explain(None)
-        return tuple(explained(causes, self.protocol.vocabulary))
+        return tuple(name_fault(causes, self.protocol.vocabulary))
 
     def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
         assert self.components is not None

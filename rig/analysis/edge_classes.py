@@ -113,14 +113,8 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
                 back = later_passages(record, train, match, path, model.protocol.gravity.value)
                 unmatched += _surplus(gate.channel, train, match, hit, back)
         for train in record.aside:
-            rows = zip(
-                train.times.tolist(), train.blocked.tolist(), train.edge.tolist(), strict=True
-            )
-            channel = gates[train.gate].channel
-            unmatched += [
-                UnmatchedEdge("left out", channel, when, dark, None, edge, 0.0)
-                for when, dark, edge in rows
-            ]
+            channel, edges = gates[train.gate].channel, range(train.times.size)
+            unmatched += [_received("left out", channel, train, at, None, 0.0) for at in edges]
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
@@ -144,6 +138,14 @@ def _absent(
         yield UnmatchedEdge(kind, channel, when, blocks, rod, None, ABSENT)
 
 
+def _received(
+    kind: EdgeClass, channel: int, train: EdgeTrain, at: int, rod: int | None, cost: float = SURPLUS
+) -> UnmatchedEdge:
+    """Name one edge of a train, by its number there."""
+    when, blocked, edge = float(train.times[at]), bool(train.blocked[at]), int(train.edge[at])
+    return UnmatchedEdge(kind, channel, when, blocked, rod, edge, cost)
+
+
 def _surplus(
     channel: int, train: EdgeTrain, match: Index, hit: float, back: set[int]
 ) -> Iterator[UnmatchedEdge]:
@@ -153,17 +155,15 @@ def _surplus(
     # Edges that follow each other so quickly are of one flicker, and share its number.
     flicker = np.cumsum(np.diff(train.times, prepend=-np.inf) > QUICK)
     for at in np.flatnonzero(rods < 0).tolist():
-        when = float(train.times[at])
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
         kinds: dict[EdgeClass, bool] = {
             "chatter": bool(near.size),
             "string": bool(train.burst[at] > 0.0),
             "later passage": at in back,
-            "bounce": when > hit,
+            "bounce": bool(train.times[at] > hit),
         }
         kind = next((kind for kind, holds in kinds.items() if holds), UNEXPLAINED)
-        rod, edge = int(near[0]) if near.size else None, int(train.edge[at])
-        yield UnmatchedEdge(kind, channel, when, bool(train.blocked[at]), rod, edge, SURPLUS)
+        yield _received(kind, channel, train, at, int(near[0]) if near.size else None)
 
 
 def later_passages(

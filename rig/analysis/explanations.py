@@ -12,18 +12,21 @@ fall is not the equations'; only a fault that beats all of them clearly is named
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.analysis.air import prior_air
-from rig.analysis.annealing import MISSED
+from rig.analysis.annealing import LEAST, MISSED
 from rig.analysis.chain_records import chain_records
+from rig.analysis.diagnoses import RIGHT
 from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, faults
 from rig.analysis.fit import match, settle
-from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weighed, well_read
+from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weigh, well_read
+from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
 from rig.reasons import make_reason
 
@@ -43,21 +46,16 @@ if TYPE_CHECKING:
 
 
 CLEAR = math.log(100.0)
-"""Log odds by which a fault must beat every other one, and the protocol as it is, to be named."""
-RARE = math.log(100.0)
-"""How many drops of a kind there are to one with some fault: what each of them costs beforehand."""
+"""Log odds by which a fault must beat every other one, and the protocol as it is, to be named; and
+what each fault costs beforehand: there are so many drops to one with some fault."""
 _NAMED = 3  # faults told where none is clear
-_SOME = 0.6  # share of a side's expected edges without which nothing is tried
-_VOTED = 0.8  # share of all expected edges that must vote for a fall with a fault
 _MARGIN = 3  # edges by which votes may fall short of what an adjusted fall matches
 _TRIED = 4  # faults that are weighed: those that most edges ask for
-_APART = 2.0 * CLEAR  # log odds by which another fault may be less likely than its score has it
 _BEYOND = 10.0  # times what strings do to a chain together, in a fall that is not the equations'
-_TOLD = 3.0  # standard uncertainties: a smaller size may as well be none
 _LEFT = 12.5  # gain that another fault may still have beside one that explains everything: 5 σ
 
 
-NEITHER = Fault("", lambda _size, _u: {})
+NEITHER = Fault("")
 """No fault, but a fall that is not that of the equations."""
 
 
@@ -83,10 +81,11 @@ class Explanation:
     whole: bool
 
 
+@dataclass(frozen=True)
 class Explainer:
     """Reads one drop with one fault after another.
 
-    Parameters
+    Attributes
     ----------
     setting
         As stated.
@@ -100,32 +99,25 @@ class Explainer:
         Numbers of the gates of which any two may be exchanged.
     """
 
-    def __init__(
-        self,
-        setting: Premise,
-        drop: Drop,
-        clock_u: float,
-        components: Components,
-        suspects: Sequence[int],
-    ) -> None:
-        self.setting = setting
-        self.drop = drop
-        self.clock_u = clock_u
-        self.components = components
-        candidates = faults(setting.protocol, setting.run, suspects)
-        self.discrete = [fault for fault in candidates if fault.shift is None]
-        self.sized = [fault for fault in candidates if fault.shift is not None]
-        # A fault of one side leaves the other as it was.
-        self._votes: dict[Hashable, int] = {}
+    setting: Premise
+    drop: Drop
+    clock_u: float
+    components: Components
+    suspects: Sequence[int]
+    _votes: dict[Hashable, int] = field(default_factory=dict)
+    """By all that a side's votes depend on: a fault of one side leaves the other as it was."""
+
+    @cached_property
+    def _faults(self) -> tuple[list[Fault], list[Fault]]:
+        """Those with a size that is adjusted, and those without."""
+        kinds: tuple[list[Fault], list[Fault]] = [], []
+        for fault in faults(self.setting.protocol, self.setting.run, self.suspects):
+            kinds[fault.shift is None].append(fault)
+        return kinds
 
     def asked(self, fit: Fit) -> bool:
         """Whether an adjusted drop asks for some size of a fault."""
-        return any(gain > RARE for gain in self._gains(self._scores(fit)))
-
-    def _gains(self, by_fault: Sequence[Score]) -> list[float]:
-        """By how much each fault of some size would be likelier than none, if none were rare."""
-        pairs = zip(self.sized, by_fault, strict=True)
-        return [score.gain - _occam(fault, score.u) for fault, score in pairs]
+        return bool((self._scores(fit)[1] > CLEAR).any())
 
     def explain(self, fit: Fit | None) -> list[Explanation]:
         """Weigh all faults; the likeliest first, and only those likelier than none.
@@ -135,32 +127,29 @@ class Explainer:
         fit
             How the edges are read as the protocol is; `None` where they cannot be.
         """
+        sized, discrete = self._faults
         if fit is None:
             records = self._records(self.setting)
-            if any(possible(record) < _SOME * record.expected for record in records):
+            if any(possible(record) < LEAST * record.expected for record in records):
                 return []  # too few edges came for any fall
             stated = sum(self._read_alone(record) for record in records)
-            explanations = [*self._voted([*self.sized, *self.discrete], stated)]
+            explanations = [*self._voted([*sized, *discrete], stated)]
         else:
-            reading = weighed(fit)
+            reading = weigh(fit)
             stated, well = self._absolute(reading, self.setting.hz), well_read(reading)
-            explanations = [*self._along(fit, stated, well), *self._voted(self.discrete, stated)]
+            explanations = [*self._along(fit, stated, well), *self._voted(discrete, stated)]
             likelier = [cause for cause in explanations if cause.log_odds > 0.0]
             likeliest = max(likelier, key=lambda cause: cause.log_odds, default=None)
-            sized = likeliest is not None and likeliest.whole and likeliest.fault in self.sized
-            if not sized and (likelier or not well):
+            explained = likeliest and likeliest.whole and likeliest.fault.shift
+            if not explained and (likelier or not well):
                 # A rod at one end too many looks like a chain that hangs a rod's distance higher,
                 # which no score tells that begins a rod off.
-                explanations += self._voted(self.sized, stated)
+                explanations += self._voted(sized, stated)
             if any(cause.whole and cause.log_odds > CLEAR for cause in explanations):
                 explanations += self._beyond(fit, stated)
-        likelier = sorted(
-            (cause for cause in explanations if cause.log_odds > 0.0),
-            key=lambda cause: cause.log_odds,
-        )
-        best = {
-            id(cause.fault): cause for cause in likelier
-        }  # what was found in both ways counts once
+        explanations.sort(key=lambda cause: cause.log_odds)
+        # What was found in both ways counts once.
+        best = {id(cause.fault): cause for cause in explanations if cause.log_odds > 0.0}
         return sorted(best.values(), key=lambda cause: -cause.log_odds)
 
     def _read_alone(self, record: ChainRecord) -> float:
@@ -176,17 +165,18 @@ class Explainer:
         Where one fault explains a drop, another one gains that share of it by which it does the
         same: those that may be as likely are weighed too, however many these are.
         """
-        by_fault = self._scores(fit)
-        gains = np.array(self._gains(by_fault))
+        by_fault, gains = self._scores(fit)
         # Of a good reading the score tells beforehand which search would end in vain; air that
         # seems to push is what a fault may save besides.
         least = min(0.0, held_back(fit)) if well else -math.inf
         ranked = [int(n) for n in np.argsort(gains)[::-1] if gains[n] > least]
         likeliest, first = 0.0, max(gains.max(initial=0.0), 1.0)
         for rank, n in enumerate(ranked):
-            if rank >= _TRIED and likeliest * (1.0 - gains[n] / first) > _APART:
+            if (
+                rank >= _TRIED and likeliest * (1.0 - gains[n] / first) > 2.0 * CLEAR
+            ):  # it may be less likely than its score has it
                 return
-            explanation = self._open(self.sized[n], 0.0, fit.model, fit.x, stated, by_fault[n])
+            explanation = self._open(self._faults[0][n], 0.0, fit.model, fit.x, stated, by_fault[n])
             if explanation is not None:
                 likeliest = max(likeliest, explanation.log_odds)
                 yield explanation
@@ -199,24 +189,32 @@ class Explainer:
         wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
         x = fit.x.copy()
         model = fit.model.informed(wider, self.clock_u, x)
-        reading = weighed(settle(model, match(model, x), x=x))
-        log_odds = self._absolute(reading, self.setting.hz) - RARE - stated
+        reading = weigh(settle(model, match(model, x), x=x))
+        log_odds = self._absolute(reading, self.setting.hz) - CLEAR - stated
         yield Explanation(NEITHER, {}, log_odds, whole=True)
 
     def _absolute(self, reading: Reading, hz: float) -> float:
         """Evidence of a reading, as it can be compared with that of another premise.
 
         By itself it is of times, and edges came in ticks; and it is relative to a reading in which
-        all edges are strays and every rod was missed, of which others may have fewer.
+        all edges are strays and every rod was missed, of which others may have fewer. A rod that
+        leaves no trace at a gate is one thing, and not two: else one at an end that no gate saw by
+        chance would be taken for one that does not hang there.
         """
-        ticks = len(self.drop.edges) * math.log(self.setting.hz / hz)
-        expected = sum(record.expected for record in reading.fit.model.records.values())
-        return _freely(reading) + ticks + expected * math.log(MISSED)
-
-    def _scores(self, fit: Fit) -> list[Score]:
-        return scores(
-            fit, [fault.shift.direction(fit.model) for fault in self.sized if fault.shift]
+        fit, ticks = reading.fit, len(self.drop.edges) * math.log(self.setting.hz / hz)
+        missed = sum(
+            train.rods.size - np.setdiff1d(train.rods, train.rods[match >= 0]).size
+            for role, record in fit.model.records.items()
+            for train, match in zip(record.trains, fit.matches[role], strict=True)
         )
+        return reading.evidence + ticks + missed * math.log(MISSED)
+
+    def _scores(self, fit: Fit) -> tuple[list[Score], Array]:
+        """Score each sized fault; and by how much it would be likelier than none, if not rare."""
+        sized, _ = self._faults
+        by_fault = scores(fit, [fault.shift.direction(fit.model) for fault in sized if fault.shift])
+        pairs = zip(sized, by_fault, strict=True)
+        return by_fault, np.array([score.gain - _occam(fault, score.u) for fault, score in pairs])
 
     def _records(self, setting: Premise) -> list[ChainRecord]:
         return chain_records(setting.protocol, setting.run, self.drop, setting.hz, setting.aside)
@@ -230,7 +228,7 @@ class Explainer:
                 (*self._net(fault.premise(self.setting, size), least), size) for size in fault.sizes
             ]
             share, net, size = max(sized, key=lambda row: row[1])
-            if share >= _VOTED and net >= least:
+            if share >= RIGHT and net >= least:
                 candidates.append((net, fault, size))
         candidates.sort(key=lambda row: -row[0])
         enough = 0
@@ -311,11 +309,11 @@ class Explainer:
         if score is not None:
             largest = max(fault.sizes)
             x += float(np.clip(score.size, -largest, largest)) * np.append(score.follow, 1.0)
-        reading = weighed(settle(opened, match(opened, x), x=x))
+        reading = weigh(settle(opened, match(opened, x), x=x))
         estimate = reading.fit.estimate
         further, u = float(estimate.x[-1]), math.sqrt(estimate.covariance[-1, -1]) * estimate.sd[-1]
-        if not _TOLD * u < abs(size + further) <= max(fault.sizes):
-            return None  # it is better read for another reason than that
+        if not APART * u < abs(size + further) <= max(fault.sizes):
+            return None  # a smaller one may be none, and a larger one has another reason
         premise = fault.premise(self.setting, size + further)
         if not last and self._expects_others(premise, model):
             moved = DropModel.of(
@@ -340,23 +338,10 @@ class Explainer:
     def _explanation(
         self, fault: Fault, size: float, u: float, reading: Reading, hz: float, stated: float
     ) -> Explanation:
-        remaining = max((score.gain for score in self._scores(reading.fit)), default=0.0)
-        log_odds = self._absolute(reading, hz) - RARE - stated
+        remaining = max((score.gain for score in self._scores(reading.fit)[0]), default=0.0)
+        log_odds = self._absolute(reading, hz) - CLEAR - stated
         complete = well_read(reading) and remaining < _LEFT
         return Explanation(fault, fault.values(size, u), log_odds, complete)
-
-
-def _freely(reading: Reading) -> float:
-    """Evidence of a reading where a rod that leaves no trace at a gate is one thing, and not two.
-
-    Else a rod at an end that no gate saw by chance would be taken for one that does not hang there.
-    """
-    unseen = sum(
-        len({*train.rods.tolist()} - {*train.rods[match >= 0].tolist()})
-        for role, record in reading.fit.model.records.items()
-        for train, match in zip(record.trains, reading.fit.matches[role], strict=True)
-    )
-    return reading.evidence - unseen * math.log(MISSED)
 
 
 def _occam(fault: Fault, u: float) -> float:
@@ -368,15 +353,12 @@ def _occam(fault: Fault, u: float) -> float:
 def _key(setting: Premise, record: ChainRecord) -> tuple[Hashable, ...]:
     """Return what a side's reading depends on."""
     protocol = setting.protocol
-    levels = b"".join(train.levels.tobytes() for train in record.trains)
-    channels = tuple(train.edge.tobytes() for train in record.trains)
-    return (
-        record.role, levels, channels, setting.hz, protocol.drop.value, protocol.gravity.value,
-        prior_air(protocol)[0],
-    )  # fmt: skip
+    scene = setting.hz, protocol.drop.value, protocol.gravity.value, prior_air(protocol)[0]
+    edges = [part.tobytes() for train in record.trains for part in (train.levels, train.edge)]
+    return record.role, *scene, *edges
 
 
-def explained(
+def name_fault(
     causes: Sequence[Explanation], words: Vocabulary, accused: Sequence[Reason] = ()
 ) -> list[Reason]:
     """Name the fault that explains a drop clearly, or the likeliest ones.
@@ -390,10 +372,8 @@ def explained(
     """
     if not causes or causes[0].log_odds < CLEAR or causes[0].fault is NEITHER:
         return [*accused]
-    best, lead = (
-        causes[0],
-        causes[0].log_odds - max([0.0, *(cause.log_odds for cause in causes[1:])]),
-    )
+    best, *rivals = causes
+    lead = best.log_odds - max([0.0, *(cause.log_odds for cause in rivals)])
     if best.whole and lead > CLEAR:
         return [make_reason(best.fault.code, words, **best.values, log_odds=lead)]
     nameable = [cause for cause in causes if cause.fault is not NEITHER]

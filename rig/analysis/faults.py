@@ -7,7 +7,7 @@ A fault is a change of what a drop is read with, and the reason that names it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,7 +17,7 @@ from rig.analysis.unknowns import Unknown
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from rig.analysis.drop_model import DropModel
     from rig.arrays import Array
@@ -107,8 +107,11 @@ class Fault:
     ----------
     code
         Of the reason that names it.
-    values
-        Of that reason, given size and standard uncertainty.
+    where
+        Values of that reason whatever the size: which chain, gate or side.
+    symbol, unit, scale, offset
+        Under which the reason has the size, its unit as names end with it, by what the size is
+        multiplied for it, and what is added; no symbol where a fault has no size.
     sizes
         Tried at first; apart by no more than what a reading tolerates.
     shift
@@ -120,11 +123,24 @@ class Fault:
     """
 
     code: str
-    values: Callable[[float, float], dict[str, Any]]
+    where: Mapping[str, Any] = field(default_factory=dict)
+    symbol: str = ""
+    unit: str = ""
+    scale: float = 1
+    offset: float = 0
     sizes: tuple[float, ...] = (0.0,)
     shift: Shift | None = None
     exchange: Callable[[Premise, float], Premise] = lambda stated, _size: stated
     of_air: bool = False
+
+    def values(self, size: float, u: float) -> dict[str, Any]:
+        """Return the values of the reason that names it; no uncertainty of what is counted."""
+        values = dict(self.where)
+        if self.symbol:
+            values[f"{self.symbol}{self.unit}"] = self.offset + self.scale * size
+        if u:
+            values[f"U95{self.unit}"] = 2.0 * self.scale * u
+        return values
 
     def premise(self, stated: Premise, size: float) -> Premise:
         """Return what a drop is read with as it is with a fault of some size."""
@@ -160,20 +176,18 @@ def faults(protocol: Protocol, run: Run, suspect: Sequence[int]) -> list[Fault]:
     """
     gates = _placed(protocol).gates
     exchanges = [_exchange(gates, a, b) for a, b in combinations(suspect, 2)]
-    return [*_chain_faults(protocol, run), *_rig_faults(protocol), *_gate_faults(gates), *exchanges]
+    chains, rig = _chain_faults(protocol, run), _rig_faults(protocol)
+    return [*chains, *rig, *_gate_faults(gates), *exchanges]
 
 
 def _sized(
-    code: str,
-    values: Callable[[float, float], dict[str, Any]],
-    limit: float,
-    step: float,
-    shift: Shift,
+    code: str, shift: Shift, limit: float, step: float, *names: str, scale: float = 1, **where: Any
 ) -> Fault:
-    """A fault of any size up to a limit, tried in steps."""
+    """A fault of any size up to a limit, tried in steps; named as a length if not otherwise."""
     count = math.ceil(limit / step)
     sizes = tuple(step * n for n in range(-count, count + 1) if n)
-    return Fault(code, values, sizes, shift)
+    symbol, unit = names or ("size", "_m")
+    return Fault(code, where, symbol, unit, scale, sizes=sizes, shift=shift)
 
 
 def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
@@ -184,62 +198,42 @@ def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
         groups.append((frozenset(names.values()), ""))
     for group, name in groups:
         chain = protocol.chains[min(group)]
-        if chain.chain.rods > 1:  # one object has no length, and is no chain with rods missing
-            yield _length(group, name, chain.chain.heights[-1])
-            yield _rods(group, name, chain.chain.rods)
-        yield _thickness(group, name, _WIDER * min(chain.widths))
+        top, rods = chain.chain.heights[-1], chain.chain.rods
+        if rods > 1:  # one object has no length, and is no chain with rods missing
+            longer = Shift(chains=group, length=1.0)
+            yield _sized("chain_length", longer, 0.06, 0.015, scale=top, name=name)
+            yield Fault(
+                "rod_count",
+                {"name": name, "stated": rods},
+                "rods",
+                offset=rods,
+                sizes=tuple(n for n in range(-_MORE, _MORE + 1) if n and rods + n >= 2),
+                exchange=_with_chains(group, _with_more),
+            )
+        limit = _WIDER * min(chain.widths)
+        yield _sized("thickness", Shift(chains=group, width=1.0), limit, limit, name=name)
     for role, name in names.items():
         if upside_down(protocol.chains[name]) is not None:
-            yield _turned(name, role)
+            turned = _with_chains({name}, lambda chain, _: upside_down(chain) or chain)
+            yield Fault("upside_down", {"name": name, "side": role}, exchange=turned)
     if len(names) > 1 and protocol.unlike_chains:
         yield Fault(
             "chains_exchanged",
-            lambda _s, _u: {"impact": run.impact, "free": run.free},
+            {"impact": run.impact, "free": run.free},
             exchange=lambda stated, _: stated._replace(
                 run=replace(stated.run, impact=stated.run.free, free=stated.run.impact)
             ),
         )
 
 
-def _length(names: frozenset[str], name: str, top: float) -> Fault:
-    def values(share: float, u: float) -> dict[str, Any]:
-        return {"name": name, **_size(share * top, u * top)}
-
-    return _sized("chain_length", values, 0.06, 0.015, Shift(chains=names, length=1.0))
-
-
-def _thickness(names: frozenset[str], name: str, limit: float) -> Fault:
-    def values(metres: float, u: float) -> dict[str, Any]:
-        return {"name": name, **_size(metres, u)}
-
-    return _sized("thickness", values, limit, limit, Shift(chains=names, width=1.0))
-
-
-def _rods(names: frozenset[str], name: str, rods: int) -> Fault:
-    return Fault(
-        "rod_count",
-        lambda n, _: {"name": name, "rods": rods + round(n), "stated": rods},
-        tuple(float(n) for n in range(-_MORE, _MORE + 1) if n and rods + n >= 2),
-        exchange=_with_chains(names, _with_more),
-    )
-
-
-def _turned(name: str, role: str) -> Fault:
-    return Fault(
-        "upside_down",
-        lambda _s, _u: {"name": name, "side": role},
-        exchange=_with_chains({name}, lambda chain, _: upside_down(chain) or chain),
-    )
-
-
 def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
     """Faults of everything that both chains share."""
-    yield _sized("drop_height", _size, 60e-3, 10e-3, Shift(drop=1.0))
-    yield _sized("clock", _share, 0.05, 0.01, Shift(clock=1.0))
+    yield _sized("drop_height", Shift(drop=1.0), 60e-3, 10e-3)
+    yield _sized("clock", Shift(clock=1.0), 0.05, 0.01, "share", "")
     if protocol.drag is not None:
         yield Fault(
             "air",
-            lambda kappa, u: {"kappa": kappa, "U95": 2.0 * u},
+            symbol="kappa",
             exchange=lambda stated, _: stated._replace(
                 protocol=replace(stated.protocol, drag=None)
             ),
@@ -247,9 +241,10 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
         )
     if protocol.surface is not None:
         # From beam to beam nobody knows the contact point, and gravity is what is measured.
-        everywhere = (1.0,) * len(_placed(protocol).gates)
-        yield _sized("all_gates", _size, 40e-3, 10e-3, Shift(gates=everywhere))
-        yield _sized("gravity", _share, 0.10, 0.02, Shift(gravity=protocol.gravity.value))
+        gates = _placed(protocol).gates
+        yield _raised("all_gates", gates, gates)
+        gravity = Shift(gravity=protocol.gravity.value)
+        yield _sized("gravity", gravity, 0.10, 0.02, "share", "")
 
 
 def _gate_faults(gates: Sequence[Gate]) -> Iterator[Fault]:
@@ -257,21 +252,15 @@ def _gate_faults(gates: Sequence[Gate]) -> Iterator[Fault]:
     sides = [gate.side for gate in gates]
     for side in dict.fromkeys(sides):
         if 1 < sides.count(side) < len(sides):
-            yield _raised(gates, [gate for gate in gates if gate.side == side])
-    if len(gates) > 1:
-        yield from (_raised(gates, [gate]) for gate in gates)
+            post = [gate for gate in gates if gate.side == side]
+            yield _raised("post", gates, post, side=side)
+    for gate in gates if len(gates) > 1 else ():
+        yield _raised("gate_height", gates, [gate], **gate_values(gate))
 
 
-def _raised(gates: Sequence[Gate], wrong: Sequence[Gate]) -> Fault:
-    code, where = ("gate_height", gate_values(wrong[0]))
-    if len(wrong) > 1:
-        code, where = "post", {"side": wrong[0].side}
-
-    def values(metres: float, u: float) -> dict[str, Any]:
-        return {**where, **_size(metres, u)}
-
+def _raised(code: str, gates: Sequence[Gate], wrong: Collection[Gate], **where: Any) -> Fault:
     shift = Shift(gates=tuple(float(gate in wrong) for gate in gates))
-    return _sized(code, values, 40e-3, 10e-3, shift)
+    return _sized(code, shift, 40e-3, 10e-3, **where)
 
 
 def _placed(protocol: Protocol) -> Gates:
@@ -288,7 +277,7 @@ def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
         return stated._replace(protocol=replace(protocol, gates=placed))
 
     both = [gate_values(gates[a]), gate_values(gates[b])]
-    return Fault("gates_exchanged", lambda _s, _u: {"at": both}, exchange=exchange)
+    return Fault("gates_exchanged", {"at": both}, exchange=exchange)
 
 
 def gate_values(gate: Gate) -> dict[str, Any]:
@@ -339,11 +328,3 @@ def upside_down(chain: RodChain) -> RodChain | None:
     if alike and chain.widths[::-1] == chain.widths:
         return None
     return _with_rods(chain, range(len(heights))[::-1], turned)
-
-
-def _size(metres: float, u: float) -> dict[str, Any]:
-    return {"size_m": metres, "U95_m": 2.0 * u}
-
-
-def _share(share: float, u: float) -> dict[str, Any]:
-    return {"share": share, "U95": 2.0 * u}

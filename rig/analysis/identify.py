@@ -16,34 +16,46 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import EVER, LEAST, PEAKS, Guess, Pairing, SideFall, log_density
+from rig.analysis.annealing import (
+    LEAST,
+    MISSED,
+    PEAKS,
+    Guess,
+    Pairing,
+    SideFall,
+    log_density,
+)
+from rig.analysis.chain_records import SIDES, chain_records
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY, scaled
-from rig.analysis.fit import Fit, count_matched, settle
+from rig.analysis.fit import Begun, Fit, count_matched, settle
 from rig.protocol.gates import CLEARANCE_M
+from rig.reasons import Reason, make_reason
+from rig.vocabulary import ANY_SCENE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    from rig.analysis.annealing import Annealed, Span
+    from rig.analysis.annealing import Annealed
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.arrays import Index
-    from rig.protocol.protocol import Protocol
+    from rig.clock.calibration import TimeScale
+    from rig.protocol.protocol import Protocol, Run
+    from rig.records import Drop
+    from rig.vocabulary import Vocabulary
 
 
-Weighed = TypeVar("Weighed", "Annealed", "Reading")
+AnyReading = TypeVar("AnyReading", "Annealed", "Reading")
 
+LEAD = math.log(1000.0)
+"""Log odds of a reading against the likeliest really different one, below which neither counts."""
 _CLEAR = 0.97
 """Share of all that could be matched with which no other start is tried."""
 _FAIR = 0.9
 """The same with which a reading is good."""
-_CALM = 2.0
-"""Scatter of edges above which a reading is none that ends the search."""
-_OTHER = 0.02
-"""Share of a side's edges at another rod that makes a different reading."""
-_FEW = 2
-"""Edges that make none: a stray in place of a missed edge."""
+RESTLESS = 2.0
+"""Scatter of the edges about a motion, relative to the assumed one, that is remarked."""
 _CLOSE = 30.0
 """Log odds of annealed readings within which they are adjusted: what linear unknowns leave out."""
 
@@ -64,10 +76,9 @@ class Reading:
     evidence: float
 
     @property
-    def share(self) -> float:
-        """Share of the expected edges that are matched."""
-        expected = sum(record.expected for record in self.fit.model.records.values())
-        return self.fit.matched / max(1, expected)
+    def edges(self) -> list[Index]:
+        """For each side the edge of every expected one, −1 for a missed one."""
+        return [np.concatenate(side) for side in self.fit.matches.values()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +106,59 @@ class Identification:
     other: Fit | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class DropIdentity:
+    """Which rods a drop's edges are, found out once, at a round time scale.
+
+    The session's clock is known a little better with each further drop; which edge is which rod
+    stays.
+
+    Attributes
+    ----------
+    scale
+        At which.
+    unlike
+        Why they are not one fall of each chain, by role; empty where they are.
+    poor
+        Roles of chains of which too few edges are where one fall would put them.
+    begun
+        The fall, as it was adjusted; `None` where there is none.
+    explained
+        What else than the protocol would explain edges that are like no fall; `None` if not sought.
+    """
+
+    scale: TimeScale
+    unlike: Mapping[str, Reason]
+    poor: tuple[str, ...] = ()
+    begun: Begun | None = None
+    explained: tuple[Reason, ...] | None = None
+
+
+def identify_drop(
+    protocol: Protocol,
+    run: Run,
+    drop: Drop,
+    scale: TimeScale,
+    components: Components,
+    aside: Collection[int] = (),
+) -> DropIdentity:
+    """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`."""
+    earliest = -math.inf if drop.fire_tick is None else 0.0
+    records = chain_records(protocol, run, drop, scale.hz, aside)
+    identification = identify(protocol, records, scale.u, components, earliest)
+    unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
+    if unlike or fit is None:
+        poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
+        return DropIdentity(scale, unlike, poor)
+    return DropIdentity(scale, unlike, begun=Begun(fit.model.guesses, fit.matches, fit.x))
+
+
 def identify(
     protocol: Protocol,
     records: Sequence[ChainRecord],
     clock_u: float,
     components: Components,
-    window: Span = EVER,
+    earliest: float = -math.inf,
     batches: int | None = None,
 ) -> Identification:
     """Find out which fall the edges are.
@@ -113,13 +171,13 @@ def identify(
         Relative standard uncertainty of the time scale.
     components
         How much everything scatters.
-    window
-        Within which chains were let go, s since the release fired.
+    earliest
+        When chains were let go at the earliest, s since the release fired.
     batches
         How many batches of starts are tried at most, the likeliest first.
     """
     model = DropModel.of(protocol, records, None, clock_u, components)
-    readings = {role: _read(model.side(role), window, batches) for role in model.records}
+    readings = {role: _read(model.side(role), earliest, batches) for role in model.records}
     # Likelier than that all edges are strays and every rod was missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
@@ -130,12 +188,38 @@ def identify(
     return Identification(None, _shares(model, matched))
 
 
+def pattern_faults(
+    identification: Identification, words: Vocabulary = ANY_SCENE
+) -> dict[str, Reason]:
+    """Say why the edges are not one fall of each chain, by role; nothing where they are."""
+    reasons = {
+        role: make_reason("few_edges_fit", words, side=role, share=share)
+        for role, share in identification.shares.items()
+        if share < LEAST
+    }
+    if not reasons and identification.fit is None:
+        return dict.fromkeys(identification.shares, make_reason("no_fall", words))
+    if not reasons and identification.log_odds < LEAD:
+        return dict.fromkeys(identification.shares, _ambiguous(words, identification))
+    return reasons
+
+
+def _ambiguous(words: Vocabulary, identification: Identification) -> Reason:
+    """Say that two falls fit, and with which further gate only one of them would."""
+    odds = math.exp(identification.log_odds)
+    if identification.fit is None or identification.other is None:
+        return make_reason("two_falls", words, odds=odds)
+    side, height = deciding_gate(identification.fit, identification.other)
+    return make_reason("two_falls_gate", words, odds=odds, side=side, height_m=height)
+
+
 def read_quickly(
     protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
 ) -> Reading | None:
     """Read a drop like `identify`, but only near what is stated."""
     identification = identify(protocol, records, clock_u, components, batches=1)
-    return None if identification.fit is None else weighed(identification.fit)
+    fit = identification.fit
+    return None if fit is None else Reading(fit, identification.evidence)
 
 
 def most_votes(
@@ -151,9 +235,10 @@ def well_read(reading: Reading) -> bool:
     """Whether nearly all that could be is matched, with no more scatter or strain than usual."""
     fit = reading.fit
     matchable = sum(possible(record) for record in fit.model.records.values())
-    many = reading.share >= LEAST and fit.matched >= _FAIR * matchable
+    expected = sum(record.expected for record in fit.model.records.values())
+    many = fit.matched >= max(LEAST * max(1, expected), _FAIR * matchable)
     strain = float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
-    return many and fit.estimate.scatter < _CALM and strain < STRAY
+    return many and fit.estimate.scatter < RESTLESS and strain < STRAY
 
 
 def possible(record: ChainRecord) -> int:
@@ -168,41 +253,34 @@ def possible(record: ChainRecord) -> int:
     )
 
 
-def _read(fall: SideFall, window: Span, batches: int | None) -> list[Annealed]:
+def _read(fall: SideFall, earliest: float, batches: int | None) -> list[Annealed]:
     """Anneal from one batch of starts after another while none explains the edges."""
     readings: list[Annealed] = []
     least, matchable = LEAST * fall.record.expected, possible(fall.record)
     if not fall.pairing.times.size or matchable < least:
         return readings
-    for starts, _ in itertools.islice(fall.starts(window, least), batches):
+    for starts in itertools.islice(fall.starts(earliest, least), batches):
         if len(starts):
             readings = _ranked([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
-            if best.scatter < _CALM and best.matched >= max(least, _CLEAR * matchable):
+            if best.scatter < RESTLESS and best.matched >= max(least, _CLEAR * matchable):
                 break
     return readings
 
 
-def _edges(reading: Annealed | Reading) -> list[Index]:
-    """For each side the edge of every expected one."""
-    if isinstance(reading, Reading):
-        return [np.concatenate(side) for side in reading.fit.matches.values()]
-    return [reading.edges]
-
-
-def _ranked(readings: Iterable[Weighed]) -> list[Weighed]:
+def _ranked(readings: Iterable[AnyReading]) -> list[AnyReading]:
     """Order readings, the likeliest first, and leave out what is the same as a likelier one."""
-    ranked: list[Weighed] = []
+    ranked: list[AnyReading] = []
     for reading in sorted(readings, key=lambda candidate: -candidate.evidence):
-        if all(any(map(_unlike, _edges(reading), _edges(likelier))) for likelier in ranked):
+        if all(any(map(_unlike, reading.edges, likelier.edges)) for likelier in ranked):
             ranked.append(reading)
     return ranked
 
 
 def _unlike(edges: Index, other_edges: Index) -> bool:
-    """Whether two readings give really different rods to the same edges."""
+    """Whether two readings differ in more edges than may be strays or missed."""
     matched = int(np.count_nonzero((edges >= 0) | (other_edges >= 0)))
-    return bool(np.count_nonzero(edges != other_edges) > max(_FEW, _OTHER * matched))
+    return bool(np.count_nonzero(edges != other_edges) > max(SIDES, MISSED * matched))
 
 
 def log_evidence(fit: Fit) -> float:
@@ -236,7 +314,7 @@ def held_back(fit: Fit) -> float:
     return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
 
 
-def adjusted(fit: Fit, role: str) -> Guess:
+def fitted_guess(fit: Fit, role: str) -> Guess:
     """Return where an adjustment has a chain begin, as a guess for a further one."""
     at, x = fit.model.unknowns, fit.x
     path = fit.model.trajectory(role, x)
@@ -263,11 +341,13 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
     for pair in close:
         sides = dict(zip(readings, pair, strict=True))
         begun = model.begun({role: side.guess for role, side in sides.items()})
-        matches = {role: model.pairings[role].numbered(side.edges) for role, side in sides.items()}
+        matches = {
+            role: model.pairings[role].numbered(side.edges[0]) for role, side in sides.items()
+        }
         fits = [settle(begun, matches)]
         if not fits[0].estimate.settled:  # once more, from where it has the chains
-            fits.append(settle(model.begun({role: adjusted(fits[0], role) for role in sides})))
-        tried.append(max(map(weighed, fits), key=lambda reading: reading.evidence))
+            fits.append(settle(model.begun({role: fitted_guess(fits[0], role) for role in sides})))
+        tried.append(max(map(weigh, fits), key=lambda reading: reading.evidence))
     best, *rest = _ranked(tried)
     shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:
@@ -282,9 +362,9 @@ def _shares(model: DropModel, matched: Mapping[str, int]) -> dict[str, float]:
     return {role: count / max(1, model.records[role].expected) for role, count in matched.items()}
 
 
-def weighed(fit: Fit) -> Reading:
+def weigh(fit: Fit) -> Reading:
     """Weigh a fit of all sides."""
-    releases = [adjusted(fit, role).release for role in fit.model.records]
+    releases = [fitted_guess(fit, role).release for role in fit.model.records]
     evidence = log_evidence(fit) + _simultaneous(fit.model.protocol, releases)
     return Reading(fit, evidence if math.isfinite(evidence) else -math.inf)
 

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 _NEAR = 0.02
 """How far from the moment that is asked for a passage of the free chain may be, s."""
-_APART = 3.0  # standard uncertainties beyond which two opinions are not the same
+APART = 3.0
+"""Standard uncertainties beyond which two values are not the same: normal ones are in 1 of 370."""
 
 
 class _Passages(NamedTuple):
@@ -90,7 +91,7 @@ def disagreements(fitted: Mapping[str, Measured], direct: Mapping[str, Measured]
             continue
         adjusted, last = fitted[name], direct[name]
         # They share their last edges and so the errors of these: they are nearer than that.
-        if abs(adjusted.value - last.value) > _APART * math.hypot(adjusted.u, last.u):
+        if abs(adjusted.value - last.value) > APART * math.hypot(adjusted.u, last.u):
             unit = name.removeprefix(MEASURANDS[name].stem)
             values = {f"alone{unit}": last.value, f"whole{unit}": adjusted.value}
             values |= {"alone_U95": last.expanded, "whole_U95": adjusted.expanded}

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.annealing import EVER, MISSED
+from rig.analysis.annealing import MISSED
 from rig.analysis.components import stated
 from rig.analysis.identify import Identification, deciding_gate, identify
 from rig.analysis.verdict import LEAD, pattern_faults
@@ -37,7 +37,6 @@ DROPS = 20
 MARGIN = 2.0 * LEAD
 """Log odds that perfect edges must have: real ones are missed, and flicker."""
 _OFF = 2.0  # standard uncertainties that the drop may be off
-_WINDOW = (0.0, np.inf)
 _SEED = 1  # the same drops for every layout, and on every machine
 
 
@@ -77,7 +76,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
     for run in islice(cycle(kinds.values()), drops):
         protocol_here = at_contact(protocol, run.incline_deg, run.impact)
         fallen = _fall(protocol_here, run, rng)
-        identification, wrong = read_drop(protocol_here, fallen, _WINDOW)
+        identification, wrong = read_drop(protocol_here, fallen, 0.0)
         read += not wrong
         failing.update(wrong)
         if wrong and not further_gate and identification.fit and identification.other:

@@ -13,7 +13,7 @@ from rig.analysis.components import Components
 from rig.analysis.drop import fit_drop
 from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import match
-from rig.analysis.identify import Identification, adjusted, identify
+from rig.analysis.identify import Identification, fitted_guess, identify
 from rig.analysis.result import DropResult
 from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
@@ -94,7 +94,7 @@ class Case:
         """Where the best reading has each chain begin."""
         found = self.identify()
         assert found.fit is not None
-        return {role: adjusted(found.fit, role) for role in found.fit.model.records}
+        return {role: fitted_guess(found.fit, role) for role in found.fit.model.records}
 
     def model(self) -> tuple[DropModel, dict]:
         """The observation equations of this drop, and the matches that the first guess gives."""

@@ -10,7 +10,7 @@ from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.analysis.drop import fit_drop
-from rig.analysis.explanations import NEITHER, Explanation, explained
+from rig.analysis.explanations import NEITHER, Explanation, name_fault
 from rig.analysis.faults import Fault, faults, upside_down
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
@@ -280,15 +280,15 @@ def test_odds_are_numbers_up_to_what_nobody_reads_any_more():
 
 def test_a_fall_that_is_not_the_equations_accuses_nothing():
     """What explains a drop as well as that it is no such fall is not named."""
-    length = Fault("chain_length", lambda s, u: {"name": "A", "size_m": s, "U95_m": u})
+    length = Fault("chain_length", {"name": "A"}, "size", "_m")
     named = Explanation(length, length.values(0.01, 1e-3), 50.0, whole=True)
     beyond = Explanation(NEITHER, {}, 49.0, whole=True)
     words = UNIFORM.vocabulary
-    (clear,) = explained([named], words)
+    (clear,) = name_fault([named], words)
     assert clear.code == "chain_length"
-    (unclear,) = explained([named, beyond], words)
+    (unclear,) = name_fault([named, beyond], words)
     assert [one["code"] for one in unclear.values["candidates"]] == ["chain_length"]
     accused = (make_reason("gate_silent", words, channel=1, side="free", height_m=0.1),)
     for log_odds in (51.0, 500.0):
         first = replace(beyond, log_odds=log_odds)
-        assert explained([first, named], words, accused) == [*accused]
+        assert name_fault([first, named], words, accused) == [*accused]

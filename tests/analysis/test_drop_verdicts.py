@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from rig.analysis.drop import fit_drop
+from rig.analysis.identify import pattern_faults
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
-from rig.analysis.verdict import _SURE, _pushed, pattern_faults
+from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
 from rig.model.chain import Chain
 from rig.protocol.protocol import Accept
@@ -390,6 +391,6 @@ def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
             unknowns={"drag": slice(0, 1)},
             kappa=lambda _x: -share * _SURE * u,
         ),
-        estimate=SimpleNamespace(x=None, covariance=np.array([[0.25]]), sd=np.array([4.0])),
+        estimate=SimpleNamespace(x=[0.0], covariance=np.array([[0.25]]), sd=[4.0], scatter=1.0),
     )
-    assert bool(_pushed(fit)) == pushed
+    assert bool(_air(fit)["air_accelerates"]) == pushed

@@ -12,8 +12,7 @@ from bench.studies.coverage import COEFFICIENTS, draw_rigs
 from bench.studies.time_scales import time_scale
 from rig.analysis.annealing import MISSED, STRAYS
 from rig.analysis.drop import fit_drop
-from rig.analysis.identify import deciding_gate
-from rig.analysis.verdict import LEAD, pattern_faults
+from rig.analysis.identify import LEAD, deciding_gate, pattern_faults
 from rig.bench.falls import falls
 from rig.errors import InputError
 from rig.protocol import reader

@@ -10,8 +10,7 @@ from itertools import count
 import pytest
 from serial import SerialException
 
-from rig.analysis import identified
-from rig.analysis.identify import identify
+from rig.analysis import identify as reading
 from rig.reasons import Reason
 from rig.replay import replay
 from rig.runner import Operator, run_protocol
@@ -64,8 +63,8 @@ def test_a_protocol_is_carried_out_from_beginning_to_end(finished):
 
 
 def test_a_drop_is_read_once(run, monkeypatch, fence):
-    seen = []
-    monkeypatch.setattr(identified, "identify", lambda *given: seen.append(0) or identify(*given))
+    seen, identify = [], reading.identify
+    monkeypatch.setattr(reading, "identify", lambda *given: seen.append(0) or identify(*given))
     assert run(protocol=fence).code == 0
     assert len(seen) == 2
 

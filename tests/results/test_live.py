@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from rig.analysis import identified
+from rig.analysis import identify
 from rig.analysis.comparison import compare
 from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import FEWEST
@@ -107,7 +107,7 @@ def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monk
         hz, u = view.scales[job]
         young = TimeScale(hz * (1.0 + 3e-6), 20.0 * u)
         known[drop] = DropCase(view.protocol, view.plan[job.run], drop, young).summary()
-    monkeypatch.setattr(identified, "identify", None)
+    monkeypatch.setattr(identify, "identify", None)
     scales = {id(drop): view.scales[job] for job, drop in view.drops.items()}
     for before in (known, KnownDrops(view.protocol)):
         drops = list(view.drops.values())
