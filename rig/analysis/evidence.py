@@ -38,7 +38,8 @@ _LEAVES = {"departure", "stretch"}  # how far chains leave the equations
 _DOUBTED = 2.0
 """Times the share of the stated departures that is found is the least share of every other scale:
 once or thrice this moves no coverage by more than a point."""
-_INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
+_INNER = 40  # steps; the next round of the joint fit goes on from there
+_SETTLED = 1e-3  # relative change of variances, after which there is none
 _BINS = 64
 _MANY = 9  # rods that still fall: so many are as good as more
 
@@ -190,7 +191,9 @@ class Evidence:
             found = squares * share**2 + beforehand * (member @ kinds)
             degrees = counts * share + beforehand
             grown = kinds @ (found / total**2) / np.maximum(kinds @ (degrees / total), tiny)
-            variances = np.maximum(variances * grown, LEAST_SHARE**2 * stated)
+            before, variances = variances, np.maximum(variances * grown, LEAST_SHARE**2 * stated)
+            if (np.abs(variances - before) <= _SETTLED * before).all():
+                break
         for name, sizes, variance in zip(names, kinds, variances.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(degrees[sizes > 0.0].sum()))
