@@ -13,7 +13,7 @@ positive. Nothing becomes less than a share of what was stated.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,17 +29,17 @@ if TYPE_CHECKING:
     from rig.arrays import Array
 
 
-Size = TypeVar("Size", float, "Array")
-
 STATED_WEIGHT = 2.0
 """Members that a stated uncertainty counts for: a scale known to half of itself (GUM G.4.2)."""
-_MEMBERS = ("stretch", "gates", "rods", "beam", "hang", "swing")
+_KINDS = ("stretch", "gates", "rods", "beam", "hang", "swing")
+_IMPULSES = ("impulse", "impulse_floor", "bounce")
 _EDGES = ("jitter", "floor", "departure")
 _LEAVES = {"departure", "stretch"}  # how far chains leave the equations
 _DOUBTED = 2.0
 """Times the share of the stated departures that is found is the least share of every other scale:
 once or thrice this moves no coverage by more than a point."""
-_INNER = 40  # steps of sums over few bins; the next round of the joint fit goes on from there
+_INNER = 40  # steps; the next round of the joint fit goes on from there
+_SETTLED = 1e-3  # relative change of variances, after which there is none
 _BINS = 64
 _MANY = 9  # rods that still fall: so many are as good as more
 
@@ -65,10 +65,8 @@ class Evidence:
     def __init__(self, components: Components, stated: Components) -> None:
         self.components = components
         self.stated = stated
-        self.degrees: dict[str, float] = {}
-        self._squares = dict.fromkeys(_MEMBERS, 0.0)
-        self._determined = dict.fromkeys(_MEMBERS, 0.0)
-        self._impulses: list[Array] = []
+        self.degrees = {name: STATED_WEIGHT for name in (*_EDGES, *_KINDS) if getattr(stated, name)}
+        self._members: dict[tuple[str, ...], list[Array]] = {}
         self._edges: list[tuple[Array, Array, Array]] = []
 
     def common(self, kind: str, y: Array, v: Array, sd: Array) -> None:
@@ -81,23 +79,28 @@ class Evidence:
         y, v
             Estimates and variances in units of the prior uncertainties `sd`.
         """
-        if kind:
-            self._count(kind, y[sd > 0.0], v[sd > 0.0])
+        if kind and sd.any():
+            told = np.maximum(1.0 - v, np.finfo(float).eps)
+            sizes = (sd / getattr(self.components, kind)) ** 2
+            rows = np.stack([sizes, (y * sd / told) ** 2, sd**2 * v / told, np.ones_like(v)])
+            self._members.setdefault((kind,), []).append(rows[:, sd > 0.0])
 
     def drop(self, model: DropModel, y: Array, v: Array) -> None:
         """Count the unknowns of one drop, in units of their prior uncertainties."""
         at = model.unknowns
         for name, row in at.rows.items():
             # Once rods have struck, what a chain does else looks like its swing.
-            if row.shared == "drop" and row.scale and name in at and name != "impact swing":
-                self._count(row.scale, y[at[name]], v[at[name]])
+            if row.shared == "drop" and name != "impact swing":
+                self.common(row.scale, y[at[name]], v[at[name]], at.sd[at[name]])
         if "impulses" in at:
+            # Of the relative scatter each has its own share, for drops of different α differ.
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
-            # Back to α², for drops of different α have different units.
-            squares = (y[block] * model.unknowns.sd[block]) ** 2
-            size = np.full(squares.size, alpha**2)
+            size = np.full(v[block].size, alpha**2)
             single = size / above(model.records["impact"].chain.chain) ** 2
-            self._impulses.append(np.stack([size, single, squares, 1.0 - v[block]]))
+            # Those of neighbours go together, so that none is told by itself.
+            squares, kinds = (y[block] * at.sd[block]) ** 2, (size, np.ones_like(size), single)
+            rows = np.stack([*kinds, squares, np.zeros_like(size), 1.0 - v[block]])
+            self._members.setdefault(_IMPULSES, []).append(rows)
 
     def edges(self, residuals: Iterable[Residuals]) -> None:
         """Count what is left over of the edges that are no part of a flicker.
@@ -111,10 +114,6 @@ class Evidence:
             good &= row.sigma**2 <= 2.0 * usual
             self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.loose[good]))
 
-    def _count(self, kind: str, y: Array, v: Array) -> None:
-        self._squares[kind] += float(y @ y)
-        self._determined[kind] += float(np.sum(1.0 - v))
-
     def settled(self, parameters: float, struck: float = 0.0) -> Evidence:
         """Estimate the components.
 
@@ -126,40 +125,28 @@ class Evidence:
             How many of them only the edges after a first impact can have told.
         """
         new: dict[str, float] = {}
-        self._share(_EDGES, *self._binned(parameters, struck), new)
-        for kind in _MEMBERS:
-            self._settle(kind, new)
-        if self._impulses:
-            size, single, squares, counts = np.concatenate(self._impulses, axis=1)
-            kinds = np.stack([size, np.ones_like(size), single])
-            self._share(("impulse", "impulse_floor", "bounce"), kinds, squares, counts, new)
+        self._share(_EDGES, self._binned(parameters, struck), new)
+        for names, members in self._members.items():
+            self._share(names, np.concatenate(members, axis=1), new)
         # Where chains leave the equations, whatever else is found may be how they do that.
         parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
-        new["stretch"] = max(new["stretch"], _doubted(parted - LEAST_SHARE))
-        least = _doubted(max(parted, new["stretch"]) if self._determined["stretch"] else parted)
+        if "stretch" in new:
+            new["stretch"] = max(new["stretch"], _doubted(parted - LEAST_SHARE))
+        least = _doubted(max(parted, new.get("stretch", 0.0)))
         for name in new.keys() - _LEAVES:
             new[name] = max(new[name], least * getattr(self.stated, name))
         new["few"] = parted * self.stated.few
         self.components = replace(self.components, landed=least, **new)
         return self
 
-    def _settle(self, kind: str, new: dict[str, float]) -> None:
-        """Estimate the scale of a kind from its members."""
-        old, beforehand = getattr(self.components, kind), getattr(self.stated, kind)
-        if not beforehand:
-            return  # known exactly, so that nothing scatters
-        self.degrees[kind] = degrees = STATED_WEIGHT + self._determined[kind]
-        squares = STATED_WEIGHT * _member((beforehand / old) ** 2, 1.0) + self._squares[kind]
-        new[kind] = old * (squares / degrees) ** 0.5
-
-    def _binned(self, parameters: float, struck: float) -> tuple[Array, Array, Array]:
+    def _binned(self, parameters: float, struck: float) -> Array:
         """Sort edges by what scatters alike: at about the same speed, with as many rods falling.
 
         Returns
         -------
-        kinds, squares, counts
-            By how much each component counts in each bin, shape ``(3, bins)``; sums of squares,
-            and their degrees of freedom.
+        ndarray
+            By how much each component counts in each bin, three rows; sums of squares, nothing that
+            they are uncertain by, and their degrees of freedom; shape ``(6, bins)``.
         """
         parts = zip(*self._edges, strict=True)
         squares, speeds, loose = (np.concatenate(part) for part in parts)
@@ -180,50 +167,38 @@ class Evidence:
         total, behind = max(1, squares.size), max(1, int(after.sum()))
         taken = (parameters - struck) / total + late * struck / behind
         full = counts > 0
-        kinds = np.stack([middles, np.ones_like(middles), departed])[:, full]
-        degrees: Array = (np.maximum(0.5, 1.0 - taken) * counts)[full]
-        return kinds, sums[full], degrees
+        degrees = np.maximum(0.5, 1.0 - taken) * counts
+        kinds = middles, np.ones_like(middles), departed
+        return np.stack([*kinds, sums, np.zeros_like(sums), degrees])[:, full]
 
-    def _share(
-        self,
-        names: Sequence[str],
-        kinds: Array,
-        squares: Array,
-        counts: Array,
-        new: dict[str, float],
-    ) -> None:
+    def _share(self, names: Sequence[str], members: Array, new: dict[str, float]) -> None:
         """Estimate components that make up one variance.
 
-        Variances Σ kinds·a² are fitted to sums of squares with so many degrees of freedom: the
+        A member x ± e, of which they make the variance s² = Σ kinds·a², is found to be x·s²/(s² +
+        e²) with as large a share of a degree of freedom. Variances are fitted to these squares: the
         maximum of the χ² likelihood above the least a, by multiplicative steps.
         """
+        kinds, (squares, unsure, counts) = members[:-3], members[-3:]
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
         variances = np.array([getattr(self.components, name) ** 2 for name in names])
         # The stated member is spread over all sizes, so that it pulls no component alone.
-        share = STATED_WEIGHT / squares.size
-        squares, counts = squares + share * (_member(stated, variances) @ kinds), counts + share
-        least = LEAST_SHARE**2 * stated
+        beforehand = STATED_WEIGHT / squares.size
+        tiny = np.finfo(float).tiny
         for _ in range(_INNER):
-            for n, sizes in enumerate(kinds):
-                variances[n] = max(
-                    variances[n] * _explained(squares, counts, variances @ kinds, sizes), least[n]
-                )
+            total = variances @ kinds
+            share = total / (total + unsure)
+            member = 2.0 * stated * variances / (stated + variances + tiny)  # 0 of what is exact
+            found = squares * share**2 + beforehand * (member @ kinds)
+            degrees = counts * share + beforehand
+            grown = kinds @ (found / total**2) / np.maximum(kinds @ (degrees / total), tiny)
+            before, variances = variances, np.maximum(variances * grown, LEAST_SHARE**2 * stated)
+            if (np.abs(variances - before) <= _SETTLED * before).all():
+                break
         for name, sizes, variance in zip(names, kinds, variances.tolist(), strict=True):
             new[name] = variance**0.5
-            self.degrees[name] = max(STATED_WEIGHT, float(counts[sizes > 0.0].sum()))
+            self.degrees[name] = max(STATED_WEIGHT, float(degrees[sizes > 0.0].sum()))
 
 
 def _doubted(parted: float) -> float:
     """Share of what is stated that a scale has at least, for that by which chains are parted."""
     return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))
-
-
-def _member(stated: Size, size: Size) -> Size:
-    """Square of the member that a stated variance counts for, where so large a one was found."""
-    return 2.0 * stated * size / (stated + size + np.finfo(float).tiny)  # 0 of what is exact
-
-
-def _explained(squares: Array, counts: Array, total: Array, sizes: Array) -> float:
-    """How much larger a component is than it was thought to be, in the light of all sums."""
-    weight = sizes / total**2
-    return float(weight @ squares) / max(float(weight @ (counts * total)), np.finfo(float).tiny)
