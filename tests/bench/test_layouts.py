@@ -25,12 +25,12 @@ def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
     arguments = ["layouts", "-o", str(tmp_path), "--only", "3 rods: 2 + 2"]
     assert main([*arguments, "--drops", "1", "--jobs", "1", "--json"]) == 0
     one = json.loads(capsys.readouterr().out)
-    assert main([*arguments, "--drops", "1", "--more", "--jobs", "1", "--json"]) == 0
+    assert main([*arguments, "--drops", "2", "--jobs", "1", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    # A second rig is another one: what the first has left is still there.
+    # A second rig is another one, and the first is there too.
     for less, more in zip(one["layouts"], found["layouts"], strict=True):
         assert less["edges"] < more["edges"]
-        assert less["sums"]["errors"] < more["sums"]["errors"]
+        assert less["z_worst"] <= more["z_worst"]
     assert [one["disturbance"] for one in found["layouts"]] == [*DISTURBANCES]
     for one in found["layouts"]:
         assert (one["drops"], one["wrong_edges"]) == (2, 0)
@@ -38,7 +38,6 @@ def test_the_bench_keeps_table_map_and_page(tmp_path, capsys):
     quiet = found["layouts"][0]
     assert (quiet["void_share"], quiet["beyond"]) == (0.0, 0)
     assert quiet["error_rms"] < 1e-5
-    assert quiet["times_lstsq"] > 1.0  # one plain solution is part of any adjustment
     rows = list(csv.DictReader((tmp_path / "layouts.csv").read_text("utf-8").splitlines()))
     assert [row["chain"] for row in rows] == ["3 rods"] * 3
     assert "SIMULATED" in (tmp_path / "layouts.svg").read_text("utf-8")
