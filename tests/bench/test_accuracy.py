@@ -36,7 +36,6 @@ def test_falls_without_a_device_are_the_simulation_s():
 
 def test_a_rig_s_drops_are_judged_by_their_truth():
     found = summarize(without_device([(SINGLE, Asked(simulation(SOURCE), [1], [[1, 2, 3, 4]]))]))
-    assert found["verdicts"].keys() <= {"accepted", "marginal"}
     assert found["edges_matched"] > 1000
     assert found["edges_given_to_a_wrong_rod"] == 0
     assert 0.0 < found["quantities"]["speed_m_s"]["rms"] < 0.02
