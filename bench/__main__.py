@@ -106,7 +106,6 @@ _JOBS = _number("--jobs", "processes at a time")
 _SIDE_BY_SIDE = _number("--jobs", "side by side", 1)
 _PORT = _option("--port", default="sim://", help="simulation URL, with dials if wanted")
 _SEED = _option("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
-_REPEATS = _number("--repeats", "drops at each incline (default 4)", 4)
 _LAYOUT = _option("--only", metavar="TEXT", help='layouts such as "10 rods: 2 + 2"')
 _PROTOCOLS = _option(
     "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
@@ -114,19 +113,16 @@ _PROTOCOLS = _option(
 
 BENCHES = {
     "accuracy": Bench("studies.accuracy", "errors of Δz, V and skew, coverage, matches", (
-        _PAGE, _scene(), _PORT, _JOBS,
-        _number("--seeds", "sessions to simulate"),
+        _PAGE, _scene(), _PORT,
+        _number("--seeds", "sessions to simulate (default 5)", 5),
         _number("--repeats", "drops at each incline, not the protocol's"),
-        _switch("--doubled", "many short sessions, also with each dial of the simulation doubled"),
     )),
     "agreement": Bench("agreement", "how rarely a true model is refuted", (
         _PAGE, _scene(), _SIDE_BY_SIDE,
         _number("--sessions", "to simulate", 100),
         _option("--drops", type=_count, nargs="+", default=[1, 2, 4, 12], metavar="N",
                 help="at each incline"),
-        _switch("--more", "go on with the sessions of that folder"),
     )),
-    "board": Bench("board", "what a class costs that looks on", (_PAGE,)),
     "bulk": Bench("studies.bulk", "many falls in Python, numpy, numba and C; limits of speed", (
         _folder("folder for a page of the same", required=False),
         _number("--falls", "in a batch", 100_000),
@@ -153,11 +149,6 @@ BENCHES = {
         _number("--drops", "with each fault of each size on each layout"),
         _option("--clean", type=int, metavar="N", help="on each layout without a fault"),
     )),
-    "estimators": Bench("studies.estimators", "error against run time from edges to Δz and V", (
-        _FILES, _scene(), _PORT, _SEED, _REPEATS,
-        _number("--budget", "seconds that one Monte Carlo setting may take (default 120)", 120,
-                metavar="S"),
-    )),
     "faults": Bench("faults", "kill, pull and garble sessions; count what is lost", (
         _number("--share", "of the full counts", 100, metavar="PERCENT"),
         _number("--jobs", "rigs side by side", 6),
@@ -165,10 +156,6 @@ BENCHES = {
                 help="virtual, real firmware in an emulator, or that behind a boot loader"),
         _option("--kind", dest="kinds", nargs="+", metavar="KIND", choices=FAULTS,
                 help="only these"),
-    )),
-    "foretold": Bench("studies.foretold", "what rig design foretells, and what comes of it", (
-        _FILES, _REPEATS, _SEED,
-        _option("--only", metavar="TEXT", help="protocols with this in their names"),
     )),
     "hostile_files": Bench("hostile_files", "altered files through all commands", (
         _number("--sessions", "to alter", 2000),
@@ -178,8 +165,7 @@ BENCHES = {
     )),
     "layouts": Bench("studies.layouts", "which layouts of gates let drops be read", (
         _FILES, _LAYOUT, _JOBS,
-        _number("--drops", "on each layout with each disturbance"),
-        _switch("--more", "add to what is in that folder, each drop on a new rig"),
+        _number("--drops", "on each layout with each disturbance (default 12)", 12),
     )),
     "link": Bench("link", "edges a second, latency, an idle daemon's costs", (_PAGE,)),
     "mutation": Bench("mutation", "faults put into the software: who notices?", (
@@ -199,19 +185,13 @@ BENCHES = {
     )),
     "resolved": Bench("studies.resolved", "the resolved world by itself", (
         _folder("folder for what is made"), _PROTOCOLS,
-        _number("--falls", "of 25 rods with each step", 48),
     ), either=(
         _option("--film", type=float, metavar="DEG", help="draw one fall at this incline"),
-        _switch("--work", "error against run time of that world itself"),
         _switch("--published", "chains of other experiments in that world"),
     )),
     "soak": Bench("soak", "runs without end, and days on which nothing happens", (
         _number("--runs", "to record", 10_000),
         _option("--hours", type=float, default=24.0, metavar="H", help="of virtual time"),
-    )),
-    "states": Bench("states", "every state of a drop, with all that goes wrong", (
-        _option("--depths", type=_count, nargs=2, default=[5, 3], metavar="N",
-                help="steps from the beginning: undisturbed, and disturbed at each moment"),
     )),
     "stop": Bench("stop", "how long STOP takes to the wire, whatever is going on", (
         _number("--stops", "in each condition", 50),

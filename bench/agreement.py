@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from collections import defaultdict
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -36,11 +34,9 @@ _HEAD = """\
 `./run bench agreement`: simulated sessions by Eqs. 8 to 13, on rigs as wrong as their protocol
 states. p of χ² should be uniform (*KS*: Kolmogorov and Smirnov), and |Eₙ| above 1 in at most 5 %. ±
 is from rig to rig."""
-_COLUMNS = ("quantity", "drops", "seed", "chi2", "degrees", "p", "normalized_errors")
 
 
-@dataclass(frozen=True, slots=True)
-class SessionAgreement:
+class SessionAgreement(NamedTuple):
     """What a simulated session said of the model that made it.
 
     Attributes
@@ -66,18 +62,8 @@ class SessionAgreement:
     def row(self) -> dict[str, Any]:
         """Return a line of the table of sessions."""
         errors = " ".join(f"{error:.3f}" for error in self.normalized_errors)
-        values = {name: getattr(self, name) for name in _COLUMNS}
-        figures = {"chi2": f"{self.chi2:.4f}", "p": f"{self.p:.6f}"}
-        return values | figures | {"normalized_errors": errors}
-
-    @classmethod
-    def from_row(cls, row: dict[str, str]) -> SessionAgreement:
-        """Read a line of the table of sessions."""
-        return cls(
-            row["quantity"], int(row["drops"]), int(row["seed"]), float(row["chi2"]),
-            int(row["degrees"]), float(row["p"]),
-            tuple(map(float, row["normalized_errors"].split())),
-        )  # fmt: skip
+        figures = {"chi2": f"{self.chi2:.4f}", "p": f"{self.p:.6f}", "normalized_errors": errors}
+        return self._asdict() | figures
 
 
 @one_thread
@@ -150,27 +136,15 @@ def _table(agreements: Sequence[SessionAgreement]) -> list[str]:
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:
-    """Compare sessions of each number of drops with the model.
-
-    With ``--more`` it goes on with the sessions of the output folder's table.
-    """
-    agreements: list[SessionAgreement] = []
-    table = Path(arguments.output or "") / "agreement.csv"
-    if arguments.more and table.exists():
-        with table.open(encoding="utf-8", newline="") as file:
-            agreements = [SessionAgreement.from_row(row) for row in csv.DictReader(file)]
-    present = {(agreement.drops, agreement.seed) for agreement in agreements}
+    """Compare sessions of each number of drops with the model."""
     calls: list[tuple[Any, ...]] = []
     for drops in arguments.drops:
-        seeds = [drops * _SEEDS + n for n in range(1, arguments.sessions + 1)]
-        seeds = [seed for seed in seeds if (drops, seed) not in present]
+        seeds = range(drops * _SEEDS + 1, drops * _SEEDS + arguments.sessions + 1)
         parts = [seeds[n : n + _CHUNK] for n in range(0, len(seeds), _CHUNK)]
         calls += [(compare_sessions, Path(arguments.protocol), drops, part) for part in parts]
     for done, part in enumerate(results(calls, arguments.jobs), 1):
         agreements += part
         progress(done * _CHUNK, len(calls) * _CHUNK, "sessions")
-        yield _findings(agreements)
-    if not calls:
         yield _findings(agreements)
 
 

@@ -8,12 +8,12 @@ machine with nothing else to do, so the load is told too.
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import subprocess
 import sys
 import time
+from functools import partial
 from itertools import accumulate
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,21 +22,20 @@ from typing import TYPE_CHECKING, Any
 from bench.decoding import bytewise, checked, frames, speed, to_edges
 from bench.process_fixture import ProcessFixture, memory_bytes, processor_s
 from bench.pty_writer import PtyWriter
+from bench.streaming import fire, serve, spread
 from rig.bench.findings import Findings
 from rig.clock.host import SystemClock
 from rig.commands.output import say
-from rig.daemon.server import Server
 from rig.link.exchange import Exchange
-from rig.link.messages import EVENTS_PER_FRAME, Fired
+from rig.link.messages import EVENTS_PER_FRAME
 from rig.link.port import open_port
-from rig.link.transcript import Incoming
-from rig.recorder.feed import StateFeed
-from rig.session.schema import RunState
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterable, Iterator, Mapping
+
+    from rig.daemon.server import Server
 
 _HEAD = """\
 # Speed of the link
@@ -126,49 +125,37 @@ def delivered(count: int, every_s: float) -> tuple[float, list[float]]:
     float, list of float
         Edges a second over all, and the latency of each frame, s.
     """
+    wanted, terminal = count * EVENTS_PER_FRAME, PtyWriter(frames(count), every_s)
     with TemporaryDirectory(prefix="rig-") as folder:
-        return asyncio.run(_deliver(Path(folder), count, every_s))
-
-
-async def _deliver(folder: Path, count: int, every_s: float) -> tuple[float, list[float]]:
-    loop = asyncio.get_running_loop()
-    server, ready = Server("sim://", folder / "door" / "rig.sock"), asyncio.Event()
-    serving = loop.create_task(server.run(ready.set))
-    await ready.wait()
-    wanted = count * EVENTS_PER_FRAME
-    client = subprocess.Popen(
-        [sys.executable, "-c", _WATCH, str(server.path), str(wanted)], stdout=subprocess.PIPE
-    )
-    assert client.stdout is not None
-    await loop.run_in_executor(None, client.stdout.readline)
-    terminal = PtyWriter(frames(count), every_s)
-    await loop.run_in_executor(None, _read, folder, server, terminal, count)
-    seen = json.loads(await loop.run_in_executor(None, client.stdout.read))
-    client.wait()
-    client.stdout.close()
-    server.end()
-    await serving
+        seen = serve(Path(folder), partial(_record, Path(folder), terminal, count))
     times = terminal.sent()
     terminal.close()
     ends = [(number + 1) * EVENTS_PER_FRAME for number in range(count)]
     return wanted / (seen[-1][1] - times[0]), _latencies(times, ends, seen)
 
 
-def _read(folder: Path, server: Server, terminal: PtyWriter, count: int) -> None:
-    """Do what the worker does while a drop is recorded."""
-    with Session.create(
-        folder / "session", "protocol: 1\n", "bench", simulated=True, origin="bench"
-    ) as session:
-        view = StateFeed(server.published)
-        view.state(1, 1, RunState.ARMED, ())
-        view.know(Incoming(0, 1, Fired(0)))
-        port = open_port(terminal.path)
+def _record(
+    folder: Path, terminal: PtyWriter, count: int, server: Server
+) -> list[tuple[int, float]]:
+    """Do what the worker does while a drop is recorded; return when a client had how many edges."""
+    command = [sys.executable, "-c", _WATCH, str(server.path), str(count * EVENTS_PER_FRAME)]
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE) as client,
+        Session.create(
+            folder / "session", "protocol: 1\n", "bench", simulated=True, origin="bench"
+        ) as session,
+    ):
+        assert client.stdout is not None
+        client.stdout.readline()
+        view, port = fire(server), open_port(terminal.path)
         line = Exchange(port, SystemClock(), session.log_bytes, view.know, 1)
         terminal.start()
         while line.transcript.rx.good < count:
             line.receive()
         session.commit()
         port.close()
+        seen: list[tuple[int, float]] = json.loads(client.stdout.read())
+    return seen
 
 
 def idle() -> dict[str, float]:
@@ -210,12 +197,6 @@ def flood() -> tuple[float, float]:
     return max(rate for rate, _ in found), min(memory for _, memory in found)
 
 
-def _spread(latencies: list[float]) -> dict[str, float]:
-    latencies = sorted(latencies)
-    count = len(latencies)
-    return {"median": latencies[count // 2], "p99": latencies[count * 99 // 100]}
-
-
 def run(_arguments: Namespace) -> Iterator[Findings]:
     """Measure the way from the port to a client."""
     figures = link()
@@ -236,8 +217,8 @@ def link() -> dict[str, Any]:
     rates["recorded_and_delivered"], busy_mb = flood()
     every_s = EVENTS_PER_FRAME / _RATE
     latencies = {
-        "read_by_pyserial_alone": _spread(read_alone(_STEADY_FRAMES, every_s)[1]),
-        "recorded_and_delivered": _spread(delivered(_STEADY_FRAMES, every_s)[1]),
+        "read_by_pyserial_alone": spread(read_alone(_STEADY_FRAMES, every_s)[1]),
+        "recorded_and_delivered": spread(delivered(_STEADY_FRAMES, every_s)[1]),
     }
     say("idling …")
     return {

@@ -7,7 +7,6 @@ processor time, which other programs on the machine change little; lateness does
 
 from __future__ import annotations
 
-import asyncio
 import os
 import pty
 import re
@@ -17,25 +16,24 @@ import sys
 import termios
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self
 
 from bench.process_fixture import processor_s
+from bench.streaming import fire, serve, spread
 from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.daemon.client import Client
-from rig.daemon.server import Server
-from rig.link.messages import Fired
-from rig.link.transcript import Incoming
-from rig.recorder.feed import StateFeed
-from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Iterator, Sequence
+
+    from rig.daemon.server import Server
 
 _HEAD = """\
 # Speed of the terminal
@@ -120,18 +118,6 @@ class Terminal:
                     return  # it has left
 
 
-async def _measure(folder: Path, protocol: str) -> dict[str, Any]:
-    loop = asyncio.get_running_loop()
-    server, ready = Server("sim://", folder / "door" / "rig.sock"), asyncio.Event()
-    serving = loop.create_task(server.run(ready.set))
-    await ready.wait()
-    try:
-        return await loop.run_in_executor(None, _in_terminal, folder, protocol, server)
-    finally:
-        server.end()
-        await serving
-
-
 def _opened(folder: Path, protocol: str) -> dict[str, Any]:
     say("a whole session of the protocol …")
     session = folder / "whole.session"
@@ -191,9 +177,7 @@ def _share(terminal: Terminal, work: Callable[[], object]) -> float:
 
 def _feed(server: Server, sent: list[tuple[float, int]]) -> None:
     """Let a drop's edges come as a stream; note how many there were when, s (monotonic)."""
-    view = StateFeed(server.published)
-    view.state(1, 1, RunState.ARMED, ())
-    view.know(Incoming(0, 1, Fired(0)))
+    fire(server)
     begun, count = time.monotonic(), 0
     while (now := time.monotonic() - begun) < _LASTING_S:
         wanted = int(now * RATE)
@@ -214,12 +198,11 @@ def _lateness(
         for told in _COUNTED.findall(data):
             newer = next((when for when, count in sent if count > int(told)), at)
             late.append(max(0.0, at - newer))
-    late.sort()
     frames = len(late) / _LASTING_S
     return {
         "frames_per_s": frames,
         "cpu_per_frame_s": share / frames,
-        "lag_s": {"median": late[len(late) // 2], "p99": late[len(late) * 99 // 100]},
+        "lag_s": spread(late),
     }
 
 
@@ -227,7 +210,7 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     """Measure the first paint, a quiet screen, one with `RATE` edges a second, a long session."""
     with TemporaryDirectory(prefix="rig-") as name:
         folder, scene = Path(name), arguments.protocol
-        figures = asyncio.run(_measure(folder, scene)) | _opened(folder, scene)
+        figures = serve(folder, partial(_in_terminal, folder, scene)) | _opened(folder, scene)
     yield Findings(figures, text_table(_rows(figures), left={0, 1}), _HEAD, name="terminal")
 
 

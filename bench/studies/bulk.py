@@ -12,8 +12,8 @@ import os
 import shlex
 import shutil
 import subprocess
-import sys
-from dataclasses import dataclass, replace
+import venv
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bench.decoding import speed, to_edges
 from rig.bench import references
 from rig.bench.work import Answer, Method, WorkProblem, measure
 from rig.commands.bench_precision import Study
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
 
     from rig.bench.findings import Findings
 
+    Batch = Sequence[Any]  # a number a fall in an array for each of `INPUTS`
     Ends = Sequence[Any]  # Δz, V and t, an array each
 
 CHAIN = paper.UNIFORM
@@ -53,30 +53,23 @@ C_OPTIONS = {
 """Without errno a square root is one instruction, and a loop of them can be vectorised."""
 _SIZES = (1, 10, 100, 1000, 10_000, 100_000)
 _ROUNDS = 15
-_FRAMES = 1000  # of edges to decode
 _HEAD = """\
 # Many falls at once
 
 `./run bench bulk`: relative error and processor time of one fall, by how many are computed at once.
+`rig --help` and Python alone are both timed in an environment that has nothing else installed.
 
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Batch:
-    """Falls of `CHAIN`, no two alike but like those of a lab, a number a fall in each array."""
-
-    inputs: tuple[Any, ...]
-
-    @classmethod
-    def of(cls, count: int, seed: int = 1) -> Batch:
-        """Draw falls; the first is that of `INPUTS`."""
-        source = np.random.default_rng(seed)
-        ranges = (0.01, 0.4), (1.2, 1.5), (0.1, 0.3), (9.7, 9.9), (0.0, 0.1)
-        arrays = [source.uniform(low, high, count) for low, high in ranges]
-        for array, first in zip(arrays, INPUTS.values(), strict=True):
-            array[0] = first
-        return cls(tuple(arrays))
+def draw_falls(count: int, seed: int = 1) -> Batch:
+    """Draw falls of `CHAIN` as a lab has them, no two alike; the first is that of `INPUTS`."""
+    source = np.random.default_rng(seed)
+    ranges = (0.01, 0.4), (1.2, 1.5), (0.1, 0.3), (9.7, 9.9), (0.0, 0.1)
+    arrays = [source.uniform(low, high, count) for low, high in ranges]
+    for array, first in zip(arrays, INPUTS.values(), strict=True):
+        array[0] = first
+    return arrays
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:
@@ -123,15 +116,13 @@ def methods(folder: Path) -> dict[str, Callable[[Batch], Ends]]:
 
 def by_numpy(batch: Batch) -> Ends:
     """Compute all falls at once, as the program does."""
-    alpha, gamma, *rest = batch.inputs
+    alpha, gamma, *rest = batch
     return falls(CHAIN.masses, CHAIN.heights, given_impacts(alpha, gamma), *rest)
 
 
 def one_by_one(batch: Batch) -> Ends:
     """Compute fall after fall, as the program does with a single one."""
-    ends = [
-        fall(CHAIN, *inputs) for inputs in zip(*(a.tolist() for a in batch.inputs), strict=True)
-    ]
+    ends = [fall(CHAIN, *inputs) for inputs in zip(*(a.tolist() for a in batch), strict=True)]
     return [
         [end.separation_m for end in ends], [end.speed_m_s for end in ends],
         [end.time_s for end in ends],
@@ -140,7 +131,7 @@ def one_by_one(batch: Batch) -> Ends:
 
 def by_float32(batch: Batch) -> Ends:
     """Compute all falls at once in half as many bits."""
-    alpha, gamma, drop, gravity, start = (a.astype(np.float32) for a in batch.inputs)
+    alpha, gamma, drop, gravity, start = (a.astype(np.float32) for a in batch)
     ends: Ends = _loop(np.array(CHAIN.legs, np.float32), alpha, gamma, drop, gravity, start)
     return ends
 
@@ -158,7 +149,7 @@ def numba_loop() -> Callable[[Batch], Ends]:
             ends[0, n], ends[1, n], ends[2, n] = loop(legs, a[n], b[n], c[n], d[n], e[n])
         return ends
 
-    return lambda batch: every(legs, *batch.inputs)
+    return lambda batch: every(legs, *batch)
 
 
 def _loop(legs: Any, alpha: Any, gamma: Any, drop: Any, gravity: Any, start: Any) -> Any:
@@ -206,9 +197,9 @@ def c_loop(
     legs = [np.array(column) for column in zip(*CHAIN.legs, strict=True)]
 
     def loop(batch: Batch) -> Ends:
-        count = batch.inputs[0].size
+        count = batch[0].size
         ends = [np.empty(count) for _ in range(3)]
-        function(count, CHAIN.rods, *legs, *batch.inputs, *ends)
+        function(count, CHAIN.rods, *legs, *batch, *ends)
         return ends
 
     return loop
@@ -224,7 +215,7 @@ def _problem(contestants: dict[str, Callable[[Batch], Ends]], sizes: Sequence[in
         values = {name: float(end[0]) for name, end in zip(names, ends, strict=True)}
         return Answer(values, CHAIN.rods * int(size))
 
-    batches = {size: Batch.of(size) for size in sizes}
+    batches = {size: draw_falls(size) for size in sizes}
     title = f"{CHAIN.rods} rods, falls at once"
     return WorkProblem(
         "falls", title, {"drop": where[0], "gravity": where[1]},
@@ -255,7 +246,7 @@ def measure_limits(
     contestants: dict[str, Callable[[Batch], Ends]], count: int, rounds: int
 ) -> dict[str, float]:
     """Measure the limits that the project sets itself, as medians of ratios within a round."""
-    batch, roots = Batch.of(count), [float(k + 1) for k in range(CHAIN.rods)]
+    batch, roots = draw_falls(count), [float(k + 1) for k in range(CHAIN.rods)]
     single, rows = [*INPUTS.values()], np.ones((2, 8192))
     passes = 11 * (CHAIN.rods - 1) * count / rows[0].size
     works: dict[str, tuple[Callable[[], object], int]] = {
@@ -274,13 +265,16 @@ def measure_limits(
     def ratio(above: str, below: str) -> float:
         return median(turn[above] / turn[below] for turn in times)
 
-    starts = [(_command("-m", "rig", "--help"), _command("-c", "")) for _ in range(rounds)]
+    with TemporaryDirectory() as folder:
+        bare = bare_python(Path(folder))
+        starts = [(bare("-m", "rig", "--help"), bare("-c", "")) for _ in range(rounds)]
     found = {f"one fall over {CHAIN.rods} square roots (goal 10)": ratio("fall", "roots")}
     if "C" in works:
         found["numpy batch over the C loop with vectors (goal 1)"] = ratio("numpy", "C")
         found["of which array additions alone, over the C loop"] = passes * ratio("passes", "C")
-    found["edges decoded to objects, million/s (goal 1)"] = speed(to_edges, _FRAMES) / 1e6
-    found["rig --help over bare Python (goal 2.3)"] = median(a / b for a, b in starts)
+    found["rig --help over Python, without other packages (goal 2.3)"] = median(
+        command / nothing for command, nothing in starts
+    )
     return found
 
 
@@ -301,9 +295,19 @@ def _least(work: Callable[[], object], turns: int) -> float:
     return min(tries)
 
 
-def _command(*arguments: str) -> float:
-    """Processor time of a command of Python."""
-    before = getrusage(RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
-    after = getrusage(RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+def bare_python(folder: Path) -> Callable[..., float]:
+    """Make an environment without packages; return what times a command of its Python, s.
+
+    What is installed beside this program starts with every Python there, and so would flatter it.
+    """
+    venv.create(folder, with_pip=False)
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+
+    def time(*arguments: str) -> float:
+        before = getrusage(RUSAGE_CHILDREN)
+        command = [str(folder / "bin/python"), *arguments]
+        subprocess.run(command, stdout=subprocess.DEVNULL, check=True, env=environment)
+        after = getrusage(RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    return time

@@ -7,7 +7,6 @@ get the usual one of a teaching laboratory: twice the standard deviation of repe
 from __future__ import annotations
 
 import csv
-import json
 from collections import defaultdict
 from pathlib import Path
 from statistics import fmean, stdev
@@ -15,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bench.studies.baselines import TimerReading, line_fit, two_gate_timer
-from bench.studies.sessions import with_repeats
+from bench.studies.sessions import SESSION, SimulatedSession, with_device
 from rig.analysis.result import GOOD
 from rig.bench.falls import with_settings
 from rig.bench.findings import Findings
@@ -27,14 +26,11 @@ from rig.errors import InputError
 from rig.files import make_folder, replacing
 from rig.ports import truth_file
 from rig.ready import ready_protocol
-from rig.results import protocol_of, results
-from rig.runner import Operator, run_protocol
-from rig.session.store import Session
 from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping
 
     Row = Mapping[str, Any]
 
@@ -132,22 +128,18 @@ def _make(folder: Path, repeats: int, only: str) -> tuple[list[Row], list[Row]]:
         if only not in name:
             continue
         say(f"{name}: simulating and reading")
+        dials = {"dynamics": "resolved", "string_restitution": str(STRINGS[strings])}
+        url = with_settings("sim://", dials)
         with TemporaryDirectory() as place:
-            path = Path(place) / f"{name}.session"
-            source = with_repeats(str(ready_protocol(protocol)), repeats, Path(place))
-            dials = {"dynamics": "resolved", "string_restitution": str(STRINGS[strings])}
-            url = with_settings("sim://", dials)
-            run_protocol(source, url, str(path), Operator(lambda _: None), seed)
-            truth = truth_file(path).read_bytes()
-            drops = [json.loads(line) for line in truth.splitlines()]
-            with Session.open(path, readonly=True) as session:
-                rows = [*_entrants(name, session, drops)]
+            session = with_device(Path(place), str(ready_protocol(protocol)), url, seed, repeats)
+            path = Path(place) / SESSION
             files[f"sessions/{name}.eln"] = pack(derive_bundle(path.read_bytes()).files)
-        files[f"truth/{name}.jsonl"] = truth
+            files[f"truth/{name}.jsonl"] = truth_file(path).read_bytes()
+        readings += _entrants(name, session)
         truths += [
-            {"session": name, **{key: drop.get(key) for key in _columns()}} for drop in drops
+            {"session": name, **{key: fall.truth.get(key) for key in _columns()}}
+            for fall, _ in session.drops.values()
         ]
-        readings += rows
     tables = {
         "truth/truth.csv": csv_text(["session", *_columns()], truths),
         "readings.csv": csv_text(["entrant", *_KEY, "quantity", "value", "U95"], readings),
@@ -169,16 +161,12 @@ def _columns() -> list[str]:
     return [*_KEY[1:], *named]
 
 
-def _entrants(name: str, session: Session, truths: Sequence[Row]) -> Iterator[Row]:
+def _entrants(name: str, session: SimulatedSession) -> Iterator[Row]:
     """Yield what each entrant reads of each drop; ours states its own interval."""
-    protocol, outcome = protocol_of(session), results(session)
-    by_job = {(truth["run"], truth["attempt"]): truth for truth in truths}
+    protocol = session.protocol
     groups: dict[tuple[object, ...], list[dict[str, Any]]] = defaultdict(list)
-    drops = {(drop.run, drop.attempt): drop for drop in session.drops()}
-    for result in (*outcome.analysis.runs, *outcome.analysis.superseded):
-        job = (result.run.number, result.attempt)
-        drop, truth = drops[job], by_job[job]
-        hz = float(outcome.clock.scale(drop).hz)
+    for result, (_, drop, truth), scale in session.results():
+        job, hz = (drop.run, drop.attempt), float(scale.hz)
         simple: dict[str, TimerReading | None] = {}
         if protocol.two_chains:
             simple = {

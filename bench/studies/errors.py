@@ -40,16 +40,6 @@ class Errors:
         """Root of the mean squared error."""
         return math.sqrt(fmean(error**2 for error in self.errors))
 
-    def sizes(self) -> dict[str, float]:
-        """Rms, median size, bias and largest error."""
-        sizes = [*map(abs, self.errors)]
-        return {
-            "rms": self.rms,
-            "median": median(sizes),
-            "bias": fmean(self.errors),
-            "worst": max(sizes),
-        }
-
     def json(self) -> dict[str, float | int]:
         """Rms, bias, largest error, mean and median U95, and share of intervals with the truth.
 

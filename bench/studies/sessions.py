@@ -7,7 +7,6 @@ import re
 import time
 from itertools import islice
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from bench.studies.time_scales import time_scale
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
     from rig.bench.falls import Asked
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol
+
+SESSION = "simulated.session"
 
 
 class SimulatedSession(NamedTuple):
@@ -52,11 +53,15 @@ class SimulatedSession(NamedTuple):
             yield result, *self.drops[result.run.number, result.attempt]
 
 
-def with_device(protocol: str, url: str, seed: int, repeats: int | None = None) -> SimulatedSession:
+def with_device(
+    folder: Path, protocol: str, url: str, seed: int, repeats: int | None = None
+) -> SimulatedSession:
     """Run a session through device, line, daemon and file, and analyse it.
 
     Parameters
     ----------
+    folder
+        Where its file `SESSION` and the truth beside it are made.
     url
         The simulation, with dials if wanted.
     repeats
@@ -69,25 +74,24 @@ def with_device(protocol: str, url: str, seed: int, repeats: int | None = None) 
     """
     if not is_simulated(url):
         raise InputError(f"{url} is no simulation", "only a simulation knows the truth: sim://")
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "session"
-        source = with_repeats(protocol, repeats, Path(folder)) if repeats else protocol
-        begin = time.perf_counter()
-        run_protocol(source, url, str(path), Operator(lambda _: None), seed)
-        wall_s = time.perf_counter() - begin
-        lines = truth_file(path).read_text(encoding="utf-8").splitlines()
-        truths = {(truth["run"], truth["attempt"]): truth for truth in map(json.loads, lines)}
-        with Session.open(path, readonly=True) as session:
-            begin = time.process_time()
-            analysis, clock = detailed(session)
-            analysis_s = time.process_time() - begin
-            drops = {(drop.run, drop.attempt): drop for drop in session.drops()}
-            scene = protocol_of(session)
-    made = {
-        key: (SimulatedDrop(seed, drop, truths[key]), clock.scale(drop))
-        for key, drop in drops.items()
-    }
-    return SimulatedSession(scene, analysis, made, wall_s, analysis_s)
+    path = folder / SESSION
+    source = with_repeats(protocol, repeats, folder) if repeats else protocol
+    begin = time.perf_counter()
+    run_protocol(source, url, str(path), Operator(lambda _: None), seed)
+    wall_s = time.perf_counter() - begin
+    lines = truth_file(path).read_text(encoding="utf-8").splitlines()
+    truths = {(truth["run"], truth["attempt"]): truth for truth in map(json.loads, lines)}
+    with Session.open(path, readonly=True) as session:
+        begin = time.process_time()
+        analysis, clock = detailed(session)
+        analysis_s = time.process_time() - begin
+        drops = {
+            (drop.run, drop.attempt): (
+                SimulatedDrop(seed, drop, truths[drop.run, drop.attempt]), clock.scale(drop)
+            )
+            for drop in session.drops()
+        }  # fmt: skip
+        return SimulatedSession(protocol_of(session), analysis, drops, wall_s, analysis_s)
 
 
 def without_device(

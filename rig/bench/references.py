@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 Number: TypeAlias = float | Decimal
 Values: TypeAlias = dict[str, Decimal]
 DIGITS = 50
-_SPARE = (
-    30  # lost to the differences above; x³ of a leg short against the contact time is the worst
-)
-
+_SPARE = 30
+"""Lost to the differences above; x³ of a leg short against the contact time is the worst."""
 
 _MANY = decimal.Context(2 * DIGITS, Emin=decimal.MIN_EMIN, Emax=decimal.MAX_EMAX)
 # Digits that κ = 1e-15/m takes, and κd of a leg at whose end a speed is the terminal one to 87.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 DROPS = 16
 """Falls of one ensemble."""
 EACH = 4
-"""Falls of one rig and its chains: rods sit differently from chain to chain, as they do in labs."""
+"""Falls of one rig and its chains, a divisor of `DROPS`: rods sit differently on other chains."""
 INCLINES = tuple(5.0 * n for n in range(17))
 _SCENE = """
 protocol: 1
@@ -63,39 +63,36 @@ class Ensemble(NamedTuple):
     tracks: tuple[Mapping[str, Sequence[float]], ...]
 
 
-def uniform(drops: int = DROPS) -> list[Ensemble]:
-    """Let the chains of Fig. 3 fall so often at each of `INCLINES`."""
-    return _ensembles(f"rods: {paper.RODS}, diameter: 12.7 mm", 12.0, INCLINES, drops)
+def uniform() -> list[Ensemble]:
+    """Let the chains of Fig. 3 fall at each of `INCLINES`."""
+    return _ensembles(f"rods: {paper.RODS}, diameter: 12.7 mm", 12.0, INCLINES)
 
 
-def graded(drops: int = DROPS) -> Ensemble:
-    """Let the chain of Fig. 4 fall so often."""
+def graded() -> Ensemble:
+    """Let the chain of Fig. 4 fall."""
     groups = [f"{{count: 4, diameter: {1e3 * d:g} mm}}" for d in paper.GRADED_DIAMETERS[::4]]
     rods = f"rods: [{', '.join(groups)}], spacing: equal-gaps"
-    return _ensembles(rods, 21.0, (paper.MIDDLE_INCLINE,), drops)[0]
+    return _ensembles(rods, 21.0, (paper.MIDDLE_INCLINE,))[0]
 
 
-def _ensembles(rods: str, tilt: float, inclines: Sequence[float], drops: int) -> list[Ensemble]:
+def _ensembles(rods: str, tilt: float, inclines: Sequence[float]) -> list[Ensemble]:
     text = _SCENE.format(
         paper=paper,
         surface=paper.SURFACE,
         rods=rods,
         tilt=tilt,
         inclines=", ".join(f"{incline:g} deg" for incline in inclines),
-        repeats=drops,
+        repeats=DROPS,
     )
-    runs = [
-        [*range(first + 1, min(first + EACH, begin + drops) + 1)]
-        for begin in range(0, len(inclines) * drops, drops)
-        for first in range(begin, begin + drops, EACH)
-    ]
+    # Runs come in the plan's order: all of one incline, then all of the next.
+    numbers = range(1, len(inclines) * DROPS + 1, EACH)
+    runs = [[*range(first, first + EACH)] for first in numbers]
     with TemporaryDirectory() as folder:
         path = Path(folder) / "paper.yaml"
         path.write_text(text, encoding="utf-8")
         url = simulation(path, _HANGING)
         fallen = falls([Asked(url, range(1, len(runs) + 1), runs)])
-        # Runs come in the plan's order: all of one incline, then all of the next.
-        return [_ensemble([fall.truth for fall in islice(fallen, drops)]) for _ in inclines]
+        return [_ensemble([fall.truth for fall in islice(fallen, DROPS)]) for _ in inclines]
 
 
 def _ensemble(truths: Sequence[Mapping[str, Any]]) -> Ensemble:

@@ -19,13 +19,18 @@ needs_compiler = pytest.mark.skipif(
 
 @needs_compiler
 def test_all_loops_fall_as_the_model_does(tmp_path):
-    batch = bench.Batch.of(300)
+    batch = bench.draw_falls(300)
     methods = bench.methods(tmp_path)
     wanted = np.array(methods.pop("Python (rig)")(batch))
     for name, compute in methods.items():
         # A compiler may fuse a product and a sum into one rounding.
         rtol = 1e-5 if "32" in name else 2e-14
         np.testing.assert_allclose(compute(batch), wanted, rtol=rtol, atol=0.0, err_msg=name)
+
+
+def test_a_bare_python_knows_this_program_and_no_other(tmp_path):
+    alone = "import rig; from importlib.util import find_spec; assert not find_spec('numpy')"
+    assert bench.bare_python(tmp_path)("-c", alone) > 0.0
 
 
 def test_the_command_measures_limits(monkeypatch, capsys):
