@@ -106,6 +106,7 @@ _JOBS = _number("--jobs", "processes at a time")
 _SIDE_BY_SIDE = _number("--jobs", "side by side", 1)
 _PORT = _option("--port", default="sim://", help="simulation URL, with dials if wanted")
 _SEED = _option("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
+_REPEATS = _number("--repeats", "drops at each incline (default 4)", 4)
 _LAYOUT = _option("--only", metavar="TEXT", help='layouts such as "10 rods: 2 + 2"')
 _PROTOCOLS = _option(
     "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
@@ -149,6 +150,11 @@ BENCHES = {
         _number("--drops", "with each fault of each size on each layout"),
         _option("--clean", type=int, metavar="N", help="on each layout without a fault"),
     )),
+    "estimators": Bench("studies.estimators", "error against run time from edges to Δz and V", (
+        _FILES, _scene(), _PORT, _SEED, _REPEATS,
+        _number("--budget", "seconds that one Monte Carlo setting may take (default 120)", 120,
+                metavar="S"),
+    )),
     "faults": Bench("faults", "kill, pull and garble sessions; count what is lost", (
         _number("--share", "of the full counts", 100, metavar="PERCENT"),
         _number("--jobs", "rigs side by side", 6),
@@ -185,8 +191,10 @@ BENCHES = {
     )),
     "resolved": Bench("studies.resolved", "the resolved world by itself", (
         _folder("folder for what is made"), _PROTOCOLS,
+        _number("--falls", "of 25 rods with each step", 48),
     ), either=(
         _option("--film", type=float, metavar="DEG", help="draw one fall at this incline"),
+        _switch("--work", "error against run time of that world itself"),
         _switch("--published", "chains of other experiments in that world"),
     )),
     "soak": Bench("soak", "runs without end, and days on which nothing happens", (

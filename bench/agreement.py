@@ -142,6 +142,7 @@ def run(arguments: Namespace) -> Iterator[Findings]:
         seeds = range(drops * _SEEDS + 1, drops * _SEEDS + arguments.sessions + 1)
         parts = [seeds[n : n + _CHUNK] for n in range(0, len(seeds), _CHUNK)]
         calls += [(compare_sessions, Path(arguments.protocol), drops, part) for part in parts]
+    agreements: list[SessionAgreement] = []
     for done, part in enumerate(results(calls, arguments.jobs), 1):
         agreements += part
         progress(done * _CHUNK, len(calls) * _CHUNK, "sessions")

@@ -40,6 +40,10 @@ class Errors:
         """Root of the mean squared error."""
         return math.sqrt(fmean(error**2 for error in self.errors))
 
+    def sizes(self) -> dict[str, float]:
+        """Rms and median size."""
+        return {"rms": self.rms, "median": median(map(abs, self.errors))}
+
     def json(self) -> dict[str, float | int]:
         """Rms, bias, largest error, mean and median U95, and share of intervals with the truth.
 

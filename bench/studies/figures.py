@@ -1,22 +1,62 @@
-"""The map of layouts."""
+"""Pictures of what the studies of falls and their analysis found."""
 
 from __future__ import annotations
 
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from rig.bench.figures import INK, MUTED, PAPER, SECOND, canvas
+from rig.bench.figures import INK, MODEL, MUTED, PAPER, SECOND, canvas
 from rig.report.canvas import drawing_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from matplotlib.figure import Figure
 
+_ESTIMATOR_PANELS = (("separation_rms_m", 1e3, "rms error of Δz (mm)"),
+           ("speed_rms_m_s", 1e3, "rms error of V (mm/s)"))  # fmt: skip
 _ROW_IN = 0.17
 _LONGEST_LABEL = 24
 """Characters; more gates than that are only counted."""
 _VOID_DARKEST = 0.2
 """Share of void drops from which on a layout is drawn as dark as can be."""
 _SHADES = "Oranges"
+_STYLES = (("o", MUTED), ("s", INK), ("D", MODEL), ("*", SECOND), ("^", MUTED), ("v", INK))
+
+
+def estimators_figure(found: Sequence[Mapping[str, Any]]) -> str:
+    """Draw them; what takes no processor time is a line across.
+
+    Parameters
+    ----------
+    found
+        ``estimators`` of ``./run bench estimators --json``.
+
+    Returns
+    -------
+    str
+        SVG.
+    """
+    with canvas(3.2, 3.0) as drawing:
+        for axes, (field, scale, label) in zip(drawing.axes, _ESTIMATOR_PANELS, strict=True):
+            styles = iter(_STYLES)
+            for name, group in groupby(found, key=itemgetter("name")):
+                points = list(group)
+                values = [one[field] * scale for one in points]
+                if points[0]["seconds"] is None:
+                    axes.axhline(values[0], color=MUTED, linestyle=(0, (1, 2)), label=name)
+                    continue
+                marker, color = next(styles)
+                times = [one["seconds"] or 0.0 for one in points]
+                words = f"{name} (M = 10² …)" if points[0]["trials"] else name
+                axes.plot(times, values, marker=marker, color=color, linewidth=0.9, label=words)
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_ylabel(label)
+        drawing.axes[-1].set_xlabel("processor time per run (s)")
+        drawing.axes[0].legend(ncols=2)
+    return _stamped(drawing)
 
 
 def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
@@ -60,6 +100,10 @@ def layouts_figure(found: Sequence[Mapping[str, Any]]) -> str:
             for chain, gates, heights in rows
         ]
         drawing.axes[0].set_yticks(range(len(rows)), labels, fontsize=6.5)
-    # In a strip of its own, where it hides nothing and nothing hides it.
+    return _stamped(drawing)
+
+
+def _stamped(drawing: Figure) -> str:
+    """Say what it is in a strip of its own, where it hides nothing and nothing hides it; as SVG."""
     drawing.suptitle("SIMULATED DATA", x=0.995, ha="right", color=SECOND)
     return drawing_file(drawing, "svg").decode()

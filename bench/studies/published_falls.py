@@ -1,4 +1,4 @@
-"""What others published, as resolved falls.
+"""What others published, as resolved falls; run as a module, it prints JSON lines.
 
 Grewal, Johnson and Ruina (2011) dropped chains of tilted rods from 75 cm onto a table; how many
 rods is not known here, so there are several. Calkin and March (1989) let a folded chain fall with
@@ -9,6 +9,7 @@ guess of this world that might have been another.
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from functools import partial
@@ -16,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bench.studies.resolved_chain import BETA, GRAVITY, MU, paper_chain
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
 from sim.resolved.fall import fall
-from sim.resolved.scene import Board, Bounce, Chain, Rods, Strings
+from sim.resolved.scene import Chain, Rods, Strings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from sim.resolved.scene import Numbers
+    from sim.resolved.scene import Fall, Numbers
 
-GRAVITY, BETA, MU = 9.81, 0.5, 0.2
 FALLS = 16
 GREWAL_DROP, GREWAL_RODS = 0.75, (15, 20, 25)
 FOLDED_RODS = (20, 40, 80)
@@ -69,8 +70,9 @@ GUESSED_AT = (0, 30, 40, 60)
 def results() -> Iterator[dict[str, Any]]:
     """Let all of it fall."""
     for rods in GREWAL_RODS:
-        some = (paper_chain(0.0, n, rods=rods, drop=GREWAL_DROP) for n in range(FALLS))
-        ahead = [*map(_separation, some)]
+        some = [paper_chain(0.0, np.random.default_rng(n), rods=rods, drop=GREWAL_DROP)
+                for n in range(FALLS)]  # fmt: skip
+        ahead = [_separation(one, fall(one, after=0.0)) for one in some]
         yield _line("Grewal: ahead at strike (m)", f"{rods} rods", ahead)
     for rods in FOLDED_RODS:
         yield _line("Calkin and March: T/T_ff", f"{rods} rods", [folded_time(rods)])
@@ -85,7 +87,8 @@ def results() -> Iterator[dict[str, Any]]:
         yield _line("friction along the slope over μN", f"{incline}°", shares)
     for name, other in GUESSES.items():
         for incline in GUESSED_AT:
-            apart = [_separation(other(paper_chain(incline, n))) for n in range(FALLS)]
+            some = [other(paper_chain(incline, np.random.default_rng(n))) for n in range(FALLS)]
+            apart = [_separation(one, fall(one, after=0.0)) for one in some]
             yield _line("separation at strike (m)", f"{name}, {incline}°", apart)
 
 
@@ -94,34 +97,9 @@ def _line(what: str, of: str, values: Numbers | list[float]) -> dict[str, Any]:
     return {"what": what, "of": of, "mean": float(np.mean(values)), "sd": spread, "n": len(values)}
 
 
-def _separation(chain: Chain) -> float:
-    """Let a chain fall: how far a free one is behind as its top rod strikes, m."""
-    end, top = fall(chain, after=0.0), chain.start + float(chain.rods.heights[-1])
-    return top - 0.5 * chain.gravity * end.strike_s**2 - float(end.touched_height[-1])
-
-
-def paper_chain(incline_deg: float, seed: int, *, rods: int = 25, drop: float = 0.18) -> Chain:
-    """Hang the first rods of the paper's uniform chain, or more of them, a little differently.
-
-    Parameters
-    ----------
-    seed
-        Of tilts, directions and places.
-    drop
-        Of the bottom rod, m.
-    """
-    rng, alternating = np.random.default_rng(seed), (-1.0) ** np.arange(rods)
-    hung = Rods(
-        masses=np.full(rods, 5.8e-3),
-        heights=1.165 / 24 * np.arange(rods),
-        diameters=np.full(rods, 12.7e-3),
-        tilts=alternating * np.radians(12.0 + rng.normal(size=rods)),
-        yaws=np.radians(2.0 * rng.normal(size=rods)),
-        aside=0.5e-3 * rng.normal(size=rods),
-        length=0.102,
-    )
-    board = Board(math.radians(incline_deg), Bounce(BETA, 0.2e-3, MU))
-    return Chain(hung, Strings(), drop, GRAVITY, board, Bounce(0.5, 0.2e-3, 0.3))
+def _separation(chain: Chain, found: Fall) -> float:
+    top = chain.start + float(chain.rods.heights[-1])
+    return top - 0.5 * chain.gravity * found.strike_s**2 - float(found.touched_height[-1])
 
 
 def folded_time(count: int, step: float = 4e-6) -> float:
@@ -141,7 +119,7 @@ def folded_time(count: int, step: float = 4e-6) -> float:
 
 def _impulses(incline: float, seed: int) -> Numbers:
     """Impulse of each rod but the top one over Eq. 9's at the speed that the chain has then."""
-    chain = paper_chain(incline, seed)
+    chain = paper_chain(incline, np.random.default_rng(seed))
     found = fall(chain, after=0.0)
     alpha = alpha_inclined(BETA, MU, incline) if incline else alpha_level(BETA)
     mass = float(chain.rods.masses[0])
@@ -154,8 +132,13 @@ def _impulses(incline: float, seed: int) -> Numbers:
 
 def _friction(incline: float, seed: int) -> float:
     """Of the first rod's impact at 4.4 m/s, up the slope, over μ times the normal impulse."""
-    chain = paper_chain(incline, seed, rods=3, drop=1.0)
+    chain = paper_chain(incline, np.random.default_rng(seed), rods=3, drop=1.0)
     first = fall(chain, after=0.0).touched_s[0]
     given = fall(chain, until=first + 0.6e-3).board_impulse
     sin, cos = math.sin(math.radians(incline)), math.cos(math.radians(incline))
     return float(-(given[1] * cos - given[2] * sin) / (MU * (given[1] * sin + given[2] * cos)))
+
+
+if __name__ == "__main__":
+    for line in results():
+        print(json.dumps(line), flush=True)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.components import Components, stated
-from rig.commands.output import print_found, say
+from rig.commands.output import print_data, say
 from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
 from rig.design.rewriting import rewrite_heights

@@ -17,8 +17,13 @@ import numpy as np
 
 from rig.analysis.annealing import MISSED
 from rig.analysis.components import stated
-from rig.analysis.identify import Identification, deciding_gate, identify
-from rig.analysis.verdict import LEAD, pattern_faults
+from rig.analysis.identify import (
+    LEAD,
+    Identification,
+    deciding_gate,
+    identify,
+    pattern_faults,
+)
 from rig.design.cases import CLOCK_U, perfect, predicted, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
@@ -117,7 +122,7 @@ def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainR
 
 
 def read_drop(
-    protocol: Protocol, records: Sequence[ChainRecord], window: tuple[float, float] = EVER
+    protocol: Protocol, records: Sequence[ChainRecord], earliest: float = -math.inf
 ) -> tuple[Identification, list[str]]:
     """Read a drop; with it return the sides of which no fall, or the wrong one, was found.
 
@@ -127,8 +132,10 @@ def read_drop(
         With heights counted from the contact point.
     records
         Each chain, with edges numbered as `rig.design.cases.with_edges` has them.
+    earliest
+        When chains were let go at the earliest, s.
     """
-    identification = identify(protocol, records, CLOCK_U, stated(protocol), window)
+    identification = identify(protocol, records, CLOCK_U, stated(protocol), earliest)
     unlike = list(pattern_faults(identification))
     if unlike or identification.fit is None:
         return identification, unlike or [record.role for record in records]
