@@ -65,7 +65,7 @@ class Budgets:
         gains: dict[int, Array] = {}
         for drop in self.joint.drops if size else ():
             lines = _supposed(drop.model).line[drop.own]
-            for line in set(lines.tolist()):
+            for line in sorted(set(lines.tolist())):
                 gain = drop.gain[lines == line]
                 total = gains.setdefault(line, np.zeros((size, size)))
                 total[np.ix_(drop.here, drop.here)] += gain.T @ gain

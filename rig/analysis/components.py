@@ -71,6 +71,11 @@ class Components:
     landed: float = 1.0
     stretch: float = 1.0
 
+    def towards(self, other: Components, share: float) -> Components:
+        """Return what is a share of the way to others, by ratios; what is exact stays."""
+        pairs = ((name, getattr(self, name), getattr(other, name)) for name in self.__slots__)
+        return Components(**{n: a * (b / a) ** share if a else a for n, a, b in pairs})
+
     def departures(self, loose: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variance of how far rods are off their chain, m².
 

@@ -2,8 +2,10 @@
 
 A kind with prior uncertainty s and estimates x_i ± √v_i (posterior) has determined
 γ = Σ(1 − v_i/s²) of its members by the edges; s² = Σx_i²/γ is then where the evidence for s is
-largest (MacKay 1992). What was stated, S, is the scale of a half-Cauchy prior of s (Gelman 2006),
-by an EM step: two more members, whose square is the harmonic mean of S² and s². Where nothing is
+largest (MacKay 1992). An estimate and its v say what the edges alone know of a member, so that for
+any other s its x_i and v_i follow at once, and s is found in one round where round by round it
+would take dozens. What was stated, S, is the scale of a half-Cauchy prior of s (Gelman 2006), by an
+EM step: two more members, whose square is the harmonic mean of S² and s². Where nothing is
 determined, s stays as stated, and the less is, the nearer it stays; but what is stated much too
 large draws no scatter up that many members tell. Where several components make up one variance,
 each is multiplied by the share of Σx² that it explains (an EM step too), which keeps all of them
@@ -69,38 +71,39 @@ class Evidence:
         self._members: dict[tuple[str, ...], list[Array]] = {}
         self._edges: list[tuple[Array, Array, Array]] = []
 
-    def common(self, kind: str, y: Array, v: Array, sd: Array) -> None:
-        """Count a block of the session's unknowns.
+    def members(self, kind: str, y: Array, root: Array) -> None:
+        """Count a block of unknowns, in units of their prior uncertainties.
 
         Parameters
         ----------
         kind
-            Which scale its members tell; none of what is one number, which has no scatter.
-        y, v
-            Estimates and variances in units of the prior uncertainties `sd`.
+            Which scale they tell; none of what is one number, which has no scatter.
+        y, root
+            Estimates, and R of their covariance RRᵀ: of such sums of them as are independent.
         """
-        if kind and sd.any():
-            told = np.maximum(1.0 - v, np.finfo(float).eps)
-            sizes = (sd / getattr(self.components, kind)) ** 2
-            rows = np.stack([sizes, (y * sd / told) ** 2, sd**2 * v / told, np.ones_like(v)])
-            self._members.setdefault((kind,), []).append(rows[:, sd > 0.0])
+        if kind and y.size:
+            variances, sums = np.linalg.eigh(root @ root.T)
+            told = np.maximum(1.0 - variances, np.finfo(float).eps)
+            size = np.full(y.size, getattr(self.components, kind) ** -2)
+            rows = [size, ((y @ sums) / told) ** 2, variances / told, np.ones_like(y)]
+            self._members.setdefault((kind,), []).append(np.stack(rows))
 
-    def drop(self, model: DropModel, y: Array, v: Array) -> None:
-        """Count the unknowns of one drop, in units of their prior uncertainties."""
+    def drop(self, model: DropModel, y: Array, root: Array) -> None:
+        """Count a drop's own unknowns, likewise."""
         at = model.unknowns
         for name, row in at.rows.items():
             # Once rods have struck, what a chain does else looks like its swing.
-            if row.shared == "drop" and name != "impact swing":
-                self.common(row.scale, y[at[name]], v[at[name]], at.sd[at[name]])
+            if row.shared == "drop" and name in at and name != "impact swing":
+                self.members(row.scale, y[at[name]], root[at[name]])
         if "impulses" in at:
-            # Of the relative scatter each has its own share, for drops of different α differ.
+            # Back to α², for drops of different α have different units.
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
-            size = np.full(v[block].size, alpha**2)
+            squares = (y[block] * at.sd[block]) ** 2
+            size = np.full(squares.size, alpha**2)
             single = size / above(model.records["impact"].chain.chain) ** 2
-            # Those of neighbours go together, so that none is told by itself.
-            squares, kinds = (y[block] * at.sd[block]) ** 2, (size, np.ones_like(size), single)
-            rows = np.stack([*kinds, squares, np.zeros_like(size), 1.0 - v[block]])
-            self._members.setdefault(_IMPULSES, []).append(rows)
+            told = 1.0 - np.sum(root[block] ** 2, axis=1)
+            rows = [size, np.ones_like(size), single, squares, np.zeros_like(size), told]
+            self._members.setdefault(_IMPULSES, []).append(np.stack(rows))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:
         """Count what is left over of the edges that are no part of a flicker.
@@ -188,9 +191,9 @@ class Evidence:
             total = variances @ kinds
             share = total / (total + unsure)
             member = 2.0 * stated * variances / (stated + variances + tiny)  # 0 of what is exact
-            found = squares * share**2 + beforehand * (member @ kinds)
+            estimates = squares * share**2 + beforehand * (member @ kinds)
             degrees = counts * share + beforehand
-            grown = kinds @ (found / total**2) / np.maximum(kinds @ (degrees / total), tiny)
+            grown = kinds @ (estimates / total**2) / np.maximum(kinds @ (degrees / total), tiny)
             before, variances = variances, np.maximum(variances * grown, LEAST_SHARE**2 * stated)
             if (np.abs(variances - before) <= _SETTLED * before).all():
                 break

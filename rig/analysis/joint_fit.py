@@ -41,9 +41,10 @@ FEWEST = 4
 """Drops that a session must have for a joint fit: one block of A, B, B, A."""
 IDENTIFIED = 0.5
 """Share of the prior variance that the edges must take away for an unknown to be found by them."""
-_PATIENT = 6  # rounds after which one back is no part of finding the way
 _ROUNDS = 60  # of which few drops need many, for they tell little of the scatter
-_REMATCH = 2  # rounds after which all edges are matched again: beams and rods are known by then
+_REMATCH = 2
+"""Rounds after which all edges are matched again, for beams and rods are known by then, and a step
+back is no part of finding the way."""
 _DONE = 0.02  # of a standard uncertainty
 _SHORTEST = 1e-6  # share of a step, less of which is none
 _STEADY = 0.02  # relative change of the components
@@ -198,7 +199,7 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
         variance = np.sum(inverse**2, axis=1)
         ahead = step / np.sqrt(variance)
         last, moved = moved, damping * float(np.abs(ahead).max())
-        if round_ > _PATIENT and ahead @ previous < 0.0:
+        if round_ > _REMATCH and ahead @ previous < 0.0:
             damping *= 0.5
         previous = ahead
         before = evidence.components
@@ -207,6 +208,8 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
             break
+        # What flips to and fro, as beside a least scale that is believed, is met half-way.
+        evidence.components = before.towards(evidence.components, damping)
     # Components are those that the solution was made with.
     good = tuple(
         replace(drop, matches=without_strays(drop.model, drop.x, drop.matches)) for drop in drops
@@ -266,22 +269,23 @@ def _weigh(
     new = Evidence(evidence.components, evidence.stated)
     remaining = np.sum(inverse**2, axis=1)
     for name, block in shared.blocks.items():
-        scale = shared.rows[name].scale
-        new.common(scale, scaled(x, sd)[block], remaining[block], sd[block])
+        places = np.arange(len(shared))[block]
+        places = places[sd[places] > 0.0]
+        new.members(shared.rows[name].scale, x[places] / sd[places], inverse[places])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
     struck = 0.0
     for drop in drops:
         model = drop.model
         # The variance of an own unknown: with the common ones known, and what these leave open.
         by_common = drop.gain @ inverse[drop.here]
-        variances = np.sum(drop.inverse**2, axis=1) + np.sum(by_common**2, axis=1)
+        root = np.zeros((drop.x.size, drop.own.size + x.size))
+        root[drop.own] = np.hstack([drop.inverse, by_common])
+        told = 1.0 - np.sum(root**2, axis=1)
         own_sd = model.unknowns.sd[drop.own]
-        variance = np.zeros(drop.x.size)
-        variance[drop.own] = variances
-        parameters += float(np.sum((1.0 - variances)[own_sd > 0.0]))
+        parameters += float(np.sum(told[drop.own][own_sd > 0.0]))
         if "impulses" in model.unknowns:
-            struck += float(np.sum(1.0 - variance[model.unknowns["impulses"]]))
-        new.drop(model, scaled(drop.x, model.unknowns.sd), variance)
+            struck += float(np.sum(told[model.unknowns["impulses"]]))
+        new.drop(model, scaled(drop.x, model.unknowns.sd), root)
     new.edges(residuals)
     return new.settled(parameters, struck)
 
