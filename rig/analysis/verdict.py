@@ -109,15 +109,16 @@ def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:
     """
     accept = protocol.accept
     chance = most_by_chance(audit.expected, min(MISSED, accept.missed_edges / 2.0))
-    for code, limit, tolerable, counts in (
-        ("edges_missed", accept.missed_edges, chance, ("missed", "expected")),
-        ("edges_unexplained", accept.unexplained_edges, SIDES, ("unexplained", "received")),
+    missed = {"missed": audit.missed, "expected": audit.expected}
+    stray = {"unexplained": audit.unexplained, "received": audit.received}
+    for code, few, limit, tolerable, counts in (
+        ("edges_missed", "edges_missed_few", accept.missed_edges, chance, missed),
+        ("edges_unexplained", "edges_unexplained_few", accept.unexplained_edges, SIDES, stray),
     ):
-        values = {name: getattr(audit, name) for name in counts}
-        count, total = values.values()
+        count, total = counts.values()
         if count > limit * total:
-            few = "" if count > tolerable else "_few"
-            yield make_reason(f"{code}{few}", protocol.vocabulary, **values, limit=limit)
+            why = code if count > tolerable else few
+            yield make_reason(why, protocol.vocabulary, **counts, limit=limit)
 
 
 def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple[Reason, ...]:

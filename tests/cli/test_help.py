@@ -92,7 +92,7 @@ def test_examples_are_commands(line):
         (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
         (["selftest", "--port", "/dev"], "/dev: it is a folder"),
         (
-            ["import", "/dev/zero", "--protocol", "p", "--session", "s"],
+            ["import", "/dev/zero", "--protocol", "falling-ball", "--session", "s"],
             "/dev/zero: cannot read this file: it is a device",
         ),
         (
