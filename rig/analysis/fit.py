@@ -126,7 +126,7 @@ def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
 
 def alone(drop: Matched) -> Fit:
     """Adjust a drop by itself from where it is, each edge staying the rod it is."""
-    estimate = adjust(drop.model, drop.matches, drop.x.copy())
+    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE)
     return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 
