@@ -33,7 +33,7 @@ GIVEN = {
     },
     "docs/first-board.md": {
         **dict.fromkeys(("30 µs", "1 ms", "100 µs", "1 µs"), "rig/selftest/judge.py"),
-        "200 ns": "late_ticks of firmware/rp2040/board.h",
+        "200 ns": "late_ticks of firmware/pico/board.h",
         "±60 ppm": "two crystals as sold", "300 µs": "STOP_TICKS in firmware/core/device.c",
         **dict.fromkeys(("75 ns", "0 ns"), "tests/selftest/test_judge.py"),
     },

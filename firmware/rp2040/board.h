@@ -39,7 +39,10 @@
 #define LED 25  /* on the board */
 #define SUPPLY 29 /* the supply before the regulator, through a divider of three */
 
-static const char board_type[] = "Raspberry Pi Pico";
+#ifndef BOARD_SUFFIX
+#define BOARD_SUFFIX ""
+#endif
+static const char board_type[] = "Raspberry Pi Pico" BOARD_SUFFIX;
 static const char board_channels[] =
     "GP0 GP1 GP2 GP3 GP4 GP5 GP6 GP7 GP8 GP9 GP10 GP11 GP12 GP13 GP14 GP15";
 

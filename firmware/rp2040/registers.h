@@ -23,17 +23,17 @@
 #define RESET_TIMER (1u << 21)
 #define RESET_USB (1u << 24)
 #define PSM_WDSEL 0x40010008u
+#define PSM_ALL_BUT_CLOCKS 0x1FFFCu
 
 /* 2.8.3 what its own program offers: where the list is; of each function two letters and a place */
 #define ROM_FUNCTIONS 0x14u
 
 /* 2.20.2 which chip it is */
 #define CHIP_ID 0x40000000u
-#define CHIP_REVISION(id) ((id) >> 28) /* 1: B0 and B1, 2: B2 */
+#define OLDER_THAN_B2 (REGISTER(CHIP_ID) >> 28 < 2) /* B0 or B1, of which E5 tells */
 
 /* 2.12.7 why the chip started */
 #define CHIP_RESET 0x40064008u
-#define CHIP_RESET_POWER (1u << 8)
 #define CHIP_RESET_PIN (1u << 16)
 
 /* 2.1.5 the bus: whose turn it is when several meet */
@@ -56,7 +56,6 @@
 #define PLL_USB 0x4002C000u
 
 /* 2.19 pins */
-#define PINS_STATUS(pin) (0x40014000u + 8u * (pin))
 #define PINS_CTRL(pin) (0x40014004u + 8u * (pin))
 #define FUNCTION_SIO 5u
 #define FUNCTION_PIO0 6u
@@ -78,6 +77,14 @@
 #define DMA_COUNT(channel) (0x50000008u + 0x40u * (channel))
 #define DMA_CTRL(channel) (0x5000000Cu + 0x40u * (channel))
 #define DMA_ABORT 0x50000444u
+#define DMA_FOR_EVER 0xFFFFFFFFu
+#define DMA_ON (1u << 0)
+#define DMA_FIRST (1u << 1)
+#define DMA_WORDS (2u << 2)
+#define DMA_TO_RING(bits) (1u << 5 | (bits) << 6 | 1u << 10)
+#define DMA_CHAIN_TO(channel) ((channel) << 11)
+#define DMA_PACED_BY_RX(machine) ((4u + (machine)) << 15)
+#define DMA_SILENT (1u << 21)
 
 /* 3 PIO */
 #define PIO_CTRL 0x50200000u
@@ -103,6 +110,7 @@
 #define WATCHDOG_LOAD 0x40058004u
 #define WATCHDOG_REASON 0x40058008u
 #define WATCHDOG_TICK 0x4005802Cu
+#define WATCHDOG_COUNTS 2u /* of a microsecond: it counts twice as fast as it says (E1) */
 
 /* 4.9 ADC */
 #define ADC_CS 0x4004C000u

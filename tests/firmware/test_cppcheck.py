@@ -12,7 +12,8 @@ AVR = ["--platform=avr8", "--library=avr", "-D__GNUC__", "-DF_CPU=16000000UL", "
 BOARDS = {
     "atmega2560": [*AVR, "-D__AVR_ATmega2560__", "-Iavr", "avr", "atmega2560"],
     "atmega328p": [*AVR, "-D__AVR_ATmega328P__", "-Iavr", "avr", "atmega328p"],
-    "rp2040": ["--platform=unix32", "rp2040"],
+    "rp2040": ["--platform=unix32", "-Ipico", "pico", "rp2040"],
+    "rp2350": ["--platform=unix32", "-Ipico", "pico", "rp2350"],
     "host": ["--platform=unix64", "-DBOARD_STREAMS=1", "host"],
 }
 

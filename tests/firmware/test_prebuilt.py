@@ -11,7 +11,9 @@ from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
 from tests.firmware.toolchain import FIRMWARE, need
 
-SOURCES = ("core", "avr", "atmega2560", "atmega328p", "rp2040", "Makefile", "size.py")
+SOURCES = (
+    "core", "avr", "atmega2560", "atmega328p", "pico", "rp2040", "rp2350", "Makefile", "size.py",
+)  # fmt: skip
 EACH = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
 COMPILERS = {"avr-gcc": "PREBUILT_WITH", "arm-none-eabi-gcc": "PICO_PREBUILT_WITH"}
 

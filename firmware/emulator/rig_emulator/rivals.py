@@ -90,15 +90,15 @@ def compile_for_pico(folder: Path) -> Path:
     DeviceError
         When the compiler is not there or does not like it.
     """
-    own = SOURCES.parents[1] / "rp2040"
+    own, common = SOURCES.parents[1] / "rp2040", SOURCES.parents[1] / "pico"
     elf, flash, image = (folder / f"pico.{kind}" for kind in ("elf", "bin", "uf2"))
-    sources = [SOURCES / _PICO, own / "clocks.c", own / "boot2.S", own / "start.S"]
+    sources = [SOURCES / _PICO, common / "clocks.c", *own.glob("*.[cS]")]
     options = ["-O2", "-std=gnu11", "-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding", "-nostdlib"]
-    places = [f"-I{own}", f"-T{own}/image.ld", "-o", str(elf)]
+    places = [f"-I{own}", f"-I{common}", f"-T{own}/image.ld", "-o", str(elf)]
     commands = (
         ["arm-none-eabi-gcc", *options, *places, *map(str, sources), "-lgcc"],
         ["arm-none-eabi-objcopy", "-O", "binary", str(elf), str(flash)],
-        [sys.executable, str(own / "image.py"), str(flash), str(image)],
+        [sys.executable, str(common / "image.py"), "rp2040", str(flash), str(image)],
     )
     try:
         for command in commands:

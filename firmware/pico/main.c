@@ -2,10 +2,10 @@
 #include "board.h"
 #include "bytes.h"
 #include "capture.h"
+#include "chip.h"
 #include "clocks.h"
 #include "device.h"
 #include "events.h"
-#include "flash_number.h"
 #include "name.h"
 #include "receive.h"
 #include "registers.h"
@@ -14,10 +14,7 @@
 
 #define WATCHDOG_US 120000u
 #define WATCHDOG_ON (1u << 30)
-#define ALL_BUT_CLOCKS 0x1FFFCu /* what a watchdog resets */
 #define NAP_US 40u              /* between two turns of the loop with nothing to do */
-
-#define START_USB_BOOT ('U' | 'B' << 8)
 
 #define BOOT_POWER 1
 #define BOOT_PIN 2
@@ -62,10 +59,10 @@ void board_led(bool on)
 
 void board_kick(void)
 {
-    REGISTER(WATCHDOG_LOAD) = 2 * WATCHDOG_US; /* the chip counts twice as fast as it says */
+    REGISTER(WATCHDOG_LOAD) = WATCHDOG_COUNTS * WATCHDOG_US;
 }
 
-/* The number of the flash chip, which no other one has. */
+/* A number that no other board has: that of the flash chip, or of the processor. */
 void board_name(uint8_t to[])
 {
     uint8_t n;
@@ -78,17 +75,10 @@ void board_rename(const uint8_t unused[])
     (void)unused;
 }
 
-/* The chip's own program shows a drive to copy firmware to. It restarts the chip, and so all pins are
- * inputs that are pulled down. */
 void board_boot(void)
 {
-    const uint16_t *function = (const uint16_t *)(uintptr_t)*(volatile uint16_t *)ROM_FUNCTIONS;
-    if (!usb_taken())
-        return;
-    while (*function && *function != START_USB_BOOT)
-        function += 2;
-    if (*function)
-        ((void (*)(uint32_t, uint32_t))(uintptr_t)(function[1] | 1u))(1u << LED, 0);
+    if (usb_taken())
+        chip_boot();
 }
 
 /* -- the start */
@@ -132,7 +122,7 @@ static void start_supply(void)
 
 static void start_watchdog(void)
 {
-    REGISTER(PSM_WDSEL) = ALL_BUT_CLOCKS;
+    REGISTER(PSM_WDSEL) = PSM_ALL_BUT_CLOCKS;
     board_kick();
     TO_SET(WATCHDOG_CTRL) = WATCHDOG_ON;
 }
@@ -164,7 +154,7 @@ int main(void)
     start_pins();
     blocks_start(RESET_PIO0 | RESET_DMA | RESET_BUSCTRL);
     start_supply();
-    flash_number(record + 2);
+    chip_number(record + 2);
     name_seal(record);
     usb_start(record + 2);
     REGISTER(TIMER_INTE) = 1;

@@ -1,6 +1,9 @@
-#include "flash_number.h"
+#include "chip.h"
 
+#include "board.h"
 #include "registers.h"
+
+#define START_USB_BOOT ('U' | 'B' << 8)
 
 #define READ_NUMBER 0x4B
 #define BEFORE 5 /* bytes: the command and four that say nothing */
@@ -20,7 +23,7 @@ static uint8_t exchange(uint8_t byte)
     return (uint8_t)REGISTER(SSI_DR0);
 }
 
-void flash_number(uint8_t number[8])
+void chip_number(uint8_t number[8])
 {
     uint8_t n;
     REGISTER(SSI_SSIENR) = 0;
@@ -32,4 +35,18 @@ void flash_number(uint8_t number[8])
     for (n = 0; n < 8; n++)
         number[n] = exchange(0);
     REGISTER(QSPI_SELECT) = DRIVE_HIGH;
+}
+
+void chip_ticks(uint32_t crystal_mhz)
+{
+    REGISTER(WATCHDOG_TICK) = 1u << 9 | crystal_mhz;
+}
+
+void chip_boot(void)
+{
+    const uint16_t *function = (const uint16_t *)(uintptr_t)*(volatile uint16_t *)ROM_FUNCTIONS;
+    while (*function && *function != START_USB_BOOT)
+        function += 2;
+    if (*function)
+        ((void (*)(uint32_t, uint32_t))(uintptr_t)(function[1] | 1u))(1u << LED, 0);
 }

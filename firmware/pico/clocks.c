@@ -1,6 +1,7 @@
 #include "clocks.h"
 
 #include "board.h"
+#include "chip.h"
 #include "registers.h"
 
 #define CRYSTAL_MHZ 12u
@@ -57,6 +58,6 @@ void clocks_start(void)
         ;
     REGISTER(CLK_USB_CTRL) = CLK_ENABLE; /* the other one */
     REGISTER(CLK_ADC_CTRL) = CLK_ENABLE;
-    REGISTER(WATCHDOG_TICK) = 1u << 9 | CRYSTAL_MHZ;
+    chip_ticks(CRYSTAL_MHZ);
     blocks_start(RESET_TIMER);
 }

@@ -35,7 +35,6 @@
 #define SIE_PULL_UP (1u << 16)
 
 #define UNPLUGGED_US 20000u /* for so long that every hub and host sees it */
-#define OLDER_THAN_B2 (CHIP_REVISION(REGISTER(CHIP_ID)) < 2)
 
 /* Requests: type and code. */
 #define GET_STATUS 0x8000

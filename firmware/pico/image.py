@@ -1,6 +1,6 @@
-"""Make the file that is copied to a Pico: ``image.py FIRMWARE.bin FIRMWARE.uf2``.
+"""Make the file that is copied to a Pico: ``image.py rp2040 FIRMWARE.bin FIRMWARE.uf2``.
 
-The chip's boot program calls the first 256 bytes of flash only if the last four of them are the
+An RP2040's boot program calls the first 256 bytes of flash only if the last four of them are the
 CRC-32 of the others (data sheet, 2.8.1.3.1); UF2 is 256 bytes of flash in blocks of 512, each with
 its address (github.com/microsoft/uf2).
 """
@@ -18,7 +18,8 @@ PIECE = 256
 _MAGIC = (0x0A324655, 0x9E5D5157)
 _END = 0x0AB16F30
 _WITH_FAMILY = 0x2000
-_RP2040 = 0xE48BFF56
+FAMILIES = {"rp2040": 0xE48BFF56, "rp2350": 0xE48BFF59}
+"""Of chips; the second one's for secure code of its Arm processors."""
 
 
 def boot_check(code: bytes) -> int:
@@ -44,17 +45,19 @@ def checked(flash: bytes) -> bytes:
     return flash[:BOOT] + struct.pack("<I", boot_check(flash[:BOOT])) + flash[PIECE:]
 
 
-def uf2(flash: bytes) -> bytes:
+def uf2(flash: bytes, family: int) -> bytes:
     """Write what is to be in flash, from its beginning, as blocks of UF2."""
     pieces = [flash[at : at + PIECE] for at in range(0, len(flash), PIECE)]
     blocks = []
     for n, piece in enumerate(pieces):
         head = struct.pack(
-            "<8I", *_MAGIC, _WITH_FAMILY, FLASH + n * PIECE, PIECE, n, len(pieces), _RP2040
+            "<8I", *_MAGIC, _WITH_FAMILY, FLASH + n * PIECE, PIECE, n, len(pieces), family
         )
         blocks.append(head + piece.ljust(476, b"\0") + struct.pack("<I", _END))
     return b"".join(blocks)
 
 
 if __name__ == "__main__":
-    Path(sys.argv[2]).write_bytes(uf2(checked(Path(sys.argv[1]).read_bytes())))
+    chip, firmware, image = sys.argv[1:]
+    content = Path(firmware).read_bytes()
+    Path(image).write_bytes(uf2(checked(content) if chip == "rp2040" else content, FAMILIES[chip]))

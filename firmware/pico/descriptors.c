@@ -1,8 +1,9 @@
 #include "descriptors.h"
 
+#include "board.h"
 #include "registers.h"
 
-/* The maker's number for a CDC port of the RP2040. */
+/* The maker's number for a CDC port of the RP2040; other chips of this firmware use it too. */
 #define VENDOR 0x2E8A
 #define PRODUCT 0x000A
 
@@ -51,7 +52,7 @@ const uint8_t *descriptor(uint8_t type, uint8_t index, const uint8_t number[8], 
     /* The oldest chips may not be seen behind a hub (RP2040-E5). */
     const char *const texts[] = {
         0, "chainrig",
-        CHIP_REVISION(REGISTER(CHIP_ID)) < 2 ? "chainrig on a Pico B1 (use no hub)" : "chainrig on a Pico"};
+        OLDER_THAN_B2 ? "chainrig on a Pico B1 (use no hub)" : "chainrig on a Pico" BOARD_SUFFIX};
     uint8_t n;
     if (type == DEVICE) {
         *size = sizeof device;

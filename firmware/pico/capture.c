@@ -16,15 +16,7 @@
 #define OTHERS_ROOM (1u << OTHERS_RING_BITS >> 3)
 
 #define SHIFT_LEFT_AND_JOIN (1u << 31) /* one FIFO of eight words, to the processor */
-#define DMA_ON (1u << 0)
-#define DMA_FIRST (1u << 1)
-#define DMA_WORDS (2u << 2)
-#define DMA_TO_RING(bits) (1u << 5 | (bits) << 6 | 1u << 10)
-#define DMA_CHAIN_TO(channel) ((channel) << 11)
-#define DMA_PACED_BY_RX(machine) ((4u + (machine)) << 15)
-#define DMA_SILENT (1u << 21)
-#define FOR_EVER 0xFFFFFFFFu
-#define WORN (FOR_EVER / 2)
+#define WORN (DMA_FOR_EVER / 2)
 
 struct stamp {
     uint32_t states; /* before in the upper half, now in the lower */
@@ -65,7 +57,7 @@ static void ring_start(uint32_t machine)
     struct ring *ring = &rings[machine];
     REGISTER(DMA_READ(machine)) = PIO_RX(machine);
     REGISTER(DMA_WRITE(machine)) = (uint32_t)ring->words;
-    REGISTER(DMA_COUNT(machine)) = FOR_EVER;
+    REGISTER(DMA_COUNT(machine)) = DMA_FOR_EVER;
     ring->read = ring->written = 0;
     REGISTER(DMA_CTRL(machine)) = DMA_ON | DMA_FIRST | DMA_WORDS | DMA_TO_RING(ring->bits) |
                                   DMA_CHAIN_TO(machine) | DMA_PACED_BY_RX(machine) | DMA_SILENT;
@@ -78,7 +70,7 @@ static void ring_renew(uint32_t machine)
     REGISTER(DMA_ABORT) = 1u << machine;
     while (REGISTER(DMA_ABORT) & 1u << machine)
         ;
-    slipped = ~REGISTER(DMA_COUNT(machine)) != rings[machine].written;
+    slipped = DMA_FOR_EVER - REGISTER(DMA_COUNT(machine)) != rings[machine].written;
     ring_start(machine);
     rings[machine].broken |= slipped;
 }
@@ -89,7 +81,7 @@ static uint32_t stamps_waiting(uint32_t machine)
 {
     struct ring *ring = &rings[machine];
     uint32_t lost_word = PIO_LOST_WORD << machine;
-    uint32_t written = ~REGISTER(DMA_COUNT(machine));
+    uint32_t written = DMA_FOR_EVER - REGISTER(DMA_COUNT(machine));
     bool rests = written == ring->written && REGISTER(PIO_FSTAT) & PIO_RX_EMPTY << machine;
     ring->written = written;
     if (REGISTER(PIO_FDEBUG) & lost_word) {
