@@ -1,4 +1,4 @@
-"""Make the file that is copied to a Pico: ``image.py rp2040 FIRMWARE.bin FIRMWARE.uf2``.
+"""Make the file that is copied to a Pico: ``image.py FAMILY FIRMWARE.bin FIRMWARE.uf2``.
 
 An RP2040's boot program calls the first 256 bytes of flash only if the last four of them are the
 CRC-32 of the others (data sheet, 2.8.1.3.1); UF2 is 256 bytes of flash in blocks of 512, each with
@@ -15,11 +15,10 @@ FLASH = 0x10000000
 BOOT = 252
 """Bytes that the boot program checks."""
 PIECE = 256
-_MAGIC = (0x0A324655, 0x9E5D5157)
+_BEGIN = (0x0A324655, 0x9E5D5157, 0x2000)
+"""What a block begins with, and that it says for which family of chips it is."""
 _END = 0x0AB16F30
-_WITH_FAMILY = 0x2000
-FAMILIES = {"rp2040": 0xE48BFF56, "rp2350": 0xE48BFF59}
-"""Of chips; the second one's for secure code of its Arm processors."""
+_RP2040 = 0xE48BFF56
 
 
 def boot_check(code: bytes) -> int:
@@ -33,31 +32,20 @@ def boot_check(code: bytes) -> int:
 
 
 def checked(flash: bytes) -> bytes:
-    """Put the check in its place.
-
-    Raises
-    ------
-    ValueError
-        When something else is there.
-    """
-    if any(flash[BOOT:PIECE]):
-        raise ValueError("the boot code is longer than 252 bytes")
+    """Put the check in its place, which is empty (image.ld)."""
     return flash[:BOOT] + struct.pack("<I", boot_check(flash[:BOOT])) + flash[PIECE:]
 
 
 def uf2(flash: bytes, family: int) -> bytes:
     """Write what is to be in flash, from its beginning, as blocks of UF2."""
-    pieces = [flash[at : at + PIECE] for at in range(0, len(flash), PIECE)]
-    blocks = []
-    for n, piece in enumerate(pieces):
-        head = struct.pack(
-            "<8I", *_MAGIC, _WITH_FAMILY, FLASH + n * PIECE, PIECE, n, len(pieces), family
-        )
-        blocks.append(head + piece.ljust(476, b"\0") + struct.pack("<I", _END))
-    return b"".join(blocks)
+    count, blocks = -(-len(flash) // PIECE), b""
+    for n in range(count):
+        at = n * PIECE
+        head = struct.pack("<8I", *_BEGIN, FLASH + at, PIECE, n, count, family)
+        blocks += head + flash[at : at + PIECE].ljust(476, b"\0") + struct.pack("<I", _END)
+    return blocks
 
 
 if __name__ == "__main__":
-    chip, firmware, image = sys.argv[1:]
-    content = Path(firmware).read_bytes()
-    Path(image).write_bytes(uf2(checked(content) if chip == "rp2040" else content, FAMILIES[chip]))
+    family, flash = int(sys.argv[1], 16), Path(sys.argv[2]).read_bytes()
+    Path(sys.argv[3]).write_bytes(uf2(checked(flash) if family == _RP2040 else flash, family))

@@ -98,7 +98,7 @@ def compile_for_pico(folder: Path) -> Path:
     commands = (
         ["arm-none-eabi-gcc", *options, *places, *map(str, sources), "-lgcc"],
         ["arm-none-eabi-objcopy", "-O", "binary", str(elf), str(flash)],
-        [sys.executable, str(common / "image.py"), "rp2040", str(flash), str(image)],
+        [sys.executable, str(common / "image.py"), "0xE48BFF56", str(flash), str(image)],
     )
     try:
         for command in commands:
