@@ -14,7 +14,7 @@ from rig.analysis.equations import Linearization
 from rig.analysis.square_root import EquationRows
 from rig.bench import references
 from rig.bench.solvers import SOLVERS, Legs, folding, in_air, lasting_impacts, solve
-from rig.bench.work import Answer, Method, WorkProblem, direct
+from rig.bench.work import Answer, Method, WorkProblem, direct, end_values
 from rig.errors import RigError
 from rig.model import continuum, paper
 from rig.model.chain import Chain
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
-
-    from rig.model.fall import Fall
 
     Array = NDArray[np.float64]
 
@@ -54,11 +52,6 @@ def problems(*, quick: bool = False) -> Iterator[WorkProblem]:
     yield fall_time()
 
 
-def _end(fall: Fall, evaluations: int) -> Answer:
-    values = {"separation": fall.separation_m, "speed": fall.speed_m_s, "time": fall.time_s}
-    return Answer(values, evaluations)
-
-
 def _by_solvers(legs: Legs, tolerances: tuple[float, ...] = _TOLERANCES) -> Iterator[Method]:
     for solver in SOLVERS:
         yield Method(solver, tolerances, "rtol {:.0e}", partial(solve, legs, solver))
@@ -78,7 +71,7 @@ def _air() -> WorkProblem:
         "legs in closed form as textbooks have them, heights subtracted",
         [
             direct("closed legs (rig)",
-                   lambda: _end(drag_fall(chain, gains, kappas, *_PLACE), rods)),
+                   lambda: Answer(end_values(drag_fall(chain, gains, kappas, *_PLACE)), rods)),
             *_by_solvers(legs),
         ],
     )  # fmt: skip
@@ -92,7 +85,7 @@ def _fold() -> WorkProblem:
 
     def gauss(nodes: float) -> Answer:
         end = continuum.end(chain, nodes=int(nodes))
-        return _end(end, end.evaluations)
+        return Answer(end_values(end), end.evaluations)
 
     return WorkProblem(
         "fold", "a continuous chain",
@@ -109,14 +102,17 @@ def contact(contact_s: float) -> WorkProblem:
     rods = CONTACT_RODS
     chain = Chain((1.0,) * rods, paper.UNIFORM.heights[:rods])
     gains = kicks(chain, [_IMPACT.alpha] * rods, _IMPACT.gamma)
+
+    def at_once() -> Answer:
+        return Answer(end_values(fall(chain, _IMPACT.alpha, _IMPACT.gamma, *_PLACE)), rods)
+
     return WorkProblem(
         f"contact-{contact_s:.0e}", f"{rods} rods, impacts that last {contact_s:.0e} s",
         {"contact_s": contact_s},
         partial(references.lasting_impacts, chain.heights, gains, *_PLACE),
         "series of the exponential integral, leg by leg",
         [
-            direct("impacts at once (rig)",
-                   lambda: _end(fall(chain, _IMPACT.alpha, _IMPACT.gamma, *_PLACE), rods)),
+            direct("impacts at once (rig)", at_once),
             *_by_solvers(
                 lasting_impacts(chain.heights, gains, *_PLACE, contact_s), _TOLERANCES[1:11:2]
             ),

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rig.bench.references import Number, Values
+    from rig.model.fall import Fall
 
 EPSILON = 2.0**-52
 SLACK = 4.0
@@ -46,6 +47,11 @@ class Answer(NamedTuple):
     values: Mapping[str, float]
     evaluations: int
     note: str = ""
+
+
+def end_values(fall: Fall) -> dict[str, float]:
+    """Return the quantities of a fall's end."""
+    return {"separation": fall.separation_m, "speed": fall.speed_m_s, "time": fall.time_s}
 
 
 class Method(NamedTuple):
