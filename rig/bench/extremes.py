@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bench.references import exact_coefficients, exact_fall, many_digits
 from rig.bench.work import Answer, end_values
+from rig.model import paper
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 from rig.model.drag import drag_fall
 from rig.model.fall import fall, kicks
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
     from rig.bench.references import Number, Values
 
 PAPER: dict[str, float] = {
-    "restitution": 0.5, "friction": 0.2, "incline": 40.0, "inertia": UNIFORM_ROD_INERTIA,
-    "length": 1.165, "drop": 0.18, "gravity": 9.81,
+    "restitution": paper.BARE.restitution.value, "friction": paper.BARE.friction.value,
+    "incline": paper.MIDDLE_INCLINE, "inertia": UNIFORM_ROD_INERTIA,
+    "length": paper.LENGTH, "drop": paper.DROP, "gravity": paper.GRAVITY,
 }  # fmt: skip
 
 
@@ -44,7 +46,7 @@ class Extreme(NamedTuple):
 
     name: str
     inputs: Mapping[str, float] = PAPER
-    masses: tuple[float, ...] = (1.0,) * 25
+    masses: tuple[float, ...] = paper.UNIFORM.masses
     even_air: bool = True
 
     @property
@@ -134,7 +136,7 @@ def alone() -> Iterator[Extreme]:
     """Yield every end of every quantity by itself, and the paper's scene."""
     yield Extreme("as in the paper")
     yield from (_scene({quantity: end}) for quantity, ends in ALONE.items() for end in ends)
-    yield Extreme("mass 1e-300, top rod only", masses=(*(1.0,) * 24, 1e-300))
+    yield Extreme("mass 1e-300, top rod only", masses=(*paper.UNIFORM.masses[1:], 1e-300))
 
 
 def pairs() -> Iterator[Extreme]:
@@ -148,7 +150,7 @@ def pairs() -> Iterator[Extreme]:
 def _scene(ends: Mapping[str, float]) -> Extreme:
     """Drive quantities of the paper's scene to ends."""
     further = dict(ends)
-    rods, decades = int(further.pop("rods", 25)), further.pop("mass decades", 0.0)
+    rods, decades = int(further.pop("rods", paper.RODS)), further.pop("mass decades", 0.0)
     # Both ends inside the floats' own 616 decades.
     middle = 0.5 * decades if abs(decades) > 300 else 0.0
     inputs = dict(PAPER)

@@ -136,19 +136,19 @@ def beam_fit(band: float) -> WorkProblem:
     def answer(p: Array, evaluations: int) -> Answer:
         return Answer(dict(zip(start, p.tolist(), strict=True)), evaluations)
 
-    def by_qr(slopes: Array, left: Array) -> Any:
+    def by_qr(slopes: Array, residuals: Array) -> Any:
         q, r = linalg.qr(slopes, mode="economic")
-        return linalg.solve_triangular(r, q.T @ left)
+        return linalg.solve_triangular(r, q.T @ residuals)
 
-    def by_cholesky(slopes: Array, left: Array) -> Any:
-        return linalg.cho_solve(linalg.cho_factor(slopes.T @ slopes), slopes.T @ left)
+    def by_cholesky(slopes: Array, residuals: Array) -> Any:
+        return linalg.cho_solve(linalg.cho_factor(slopes.T @ slopes), slopes.T @ residuals)
 
     def steps(solve_linear: Any, count: float) -> Answer:
         p = begin
         try:
             for _ in range(int(count)):
-                seen, slopes = _passages(beams, p)
-                p = p + solve_linear(slopes, times - seen)
+                passages, slopes = _passages(beams, p)
+                p = p + solve_linear(slopes, times - passages)
         except linalg.LinAlgError as error:
             raise RigError(str(error)) from None
         return answer(p, int(count))
@@ -159,15 +159,15 @@ def beam_fit(band: float) -> WorkProblem:
         def about(p: Array, _: float) -> Linearization:
             nonlocal evaluations
             evaluations += 1
-            seen, slopes = _passages(beams, p)
-            left = (seen - times) / sigma
-            chi2 = float(left @ left)
-            rows = EquationRows(slopes / sigma, left, np.arange(3))
+            passages, slopes = _passages(beams, p)
+            residuals = (passages - times) / sigma
+            chi2 = float(residuals @ residuals)
+            rows = EquationRows(slopes / sigma, residuals, np.arange(3))
             return Linearization({"": rows}, chi2, _BEAMS, chi2)
 
         return answer(least_squares(about, np.full(3, 1e6), begin, done=done).x, evaluations)
 
-    def left(p: Array) -> Array:
+    def residuals(p: Array) -> Array:
         return _passages(beams, p)[0] - times
 
     def slopes(p: Array) -> Array:
@@ -175,7 +175,7 @@ def beam_fit(band: float) -> WorkProblem:
 
     def by_scipy(method: Any, tolerance: float) -> Answer:
         run = optimize.least_squares(
-            left, begin, slopes, method=method, xtol=tolerance, ftol=tolerance, gtol=tolerance,
+            residuals, begin, slopes, method=method, xtol=tolerance, ftol=tolerance, gtol=tolerance,
             x_scale="jac",
         )  # fmt: skip
         return answer(run.x, run.nfev)
@@ -216,19 +216,17 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
     def printed() -> float:
         return math.acosh(math.exp(kappa * distance)) / math.sqrt(kappa * gravity)
 
-    def left(time: float) -> float:
+    def excess(time: float) -> float:
         return fallen(time, gravity, kappa) - distance
 
     def by_scipy(finder: Any, *where: object, **accuracy: float) -> Answer:
-        run = finder(left, *where, **accuracy, full_output=True)[1]
+        run = finder(excess, *where, **accuracy, full_output=True)[1]
         return Answer({"time": run.root}, run.function_calls)
 
     def bracketed(finder: Any, tolerance: float) -> Answer:
         return by_scipy(finder, 0.0, latest, xtol=tolerance, rtol=1e-15)
 
-    def newton(tolerance: float) -> Answer:
-        slope = partial(falling_speed, gravity=gravity, kappa=kappa)
-        return by_scipy(optimize.newton, latest, slope, tol=tolerance)
+    slope = partial(falling_speed, gravity=gravity, kappa=kappa)
 
     return WorkProblem(
         "fall-time", "the time to fall 1.345 m in air",
@@ -242,7 +240,8 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
                 Method(finder.__name__, _TOLERANCES, "xtol {:.0e}", partial(bracketed, finder))
                 for finder in (optimize.brentq, optimize.bisect, optimize.toms748)
             ),
-            Method("newton", _TOLERANCES, "tol {:.0e}", newton),
+            Method("newton", _TOLERANCES, "tol {:.0e}",
+                   lambda tolerance: by_scipy(optimize.newton, latest, slope, tol=tolerance)),
         ],
         "closed form (rig)", "as printed",
     )  # fmt: skip

@@ -209,12 +209,12 @@ def continuum(
         b, d = (1 + a) / power, 2 * g * above / power
         c = 2 * g * h + d
 
-        def fallen(z: mpmath.mpf) -> mpmath.mpf:
+        def time_to(z: mpmath.mpf) -> mpmath.mpf:
             v = ((z + r) / above) ** power
             primitive = v**b / b * mp.hyp2f1(mp.mpf(1) / 2, b, b + 1, v * d / c)
             return -above / power / mp.sqrt(c) * primitive
 
-        time = mp.sqrt(2 * h / g) + fallen(mp.mpf(0)) - fallen(z0)
+        time = mp.sqrt(2 * h / g) + time_to(mp.mpf(0)) - time_to(z0)
         braces = h * above ** (2 * a) + (above**power - r**power) / power
         speed = mp.sqrt(2 * g * braces / r ** (2 * a))
         return _decimals(separation=h + z0 - g * time**2 / 2, speed=speed, time=time)
@@ -243,13 +243,13 @@ def beam_fit(digits: int = DIGITS, **numbers: Number) -> Values:
         beams = [*zip(values[:count], values[count:], strict=True)]
         p, step = mp.matrix([0, 0, 10]), mp.matrix([1, 1, 1])
         while mp.norm(step) > mp.mpf(10) ** -(digits + 5) * mp.norm(p):
-            rows, left = [], []
+            rows, residuals = [], []
             for height, passage in beams:
                 root = mp.sqrt(p[1] ** 2 + 2 * p[2] * (p[0] + height))
                 time = (root - p[1]) / p[2]
                 rows.append([1 / root, -time / root, -(time**2) / (2 * root)])
-                left.append(passage - time)
-            step = mp.lu_solve(mp.matrix(rows), mp.matrix(left))
+                residuals.append(passage - time)
+            step = mp.lu_solve(mp.matrix(rows), mp.matrix(residuals))
             p += step
         return _decimals(rise=p[0], speed=p[1], gravity=p[2])
 

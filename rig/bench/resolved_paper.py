@@ -75,8 +75,8 @@ def _ensembles(rods: str, tilt: float, inclines: Sequence[float]) -> list[Ensemb
         path = Path(folder) / "paper.yaml"
         path.write_text(text, encoding="utf-8")
         url = simulation(path, _HANGING)
-        fallen = falls([Asked(url, range(1, len(runs) + 1), runs)])
-        return [[fall.truth for fall in islice(fallen, DROPS)] for _ in inclines]
+        drops = falls([Asked(url, range(1, len(runs) + 1), runs)])
+        return [[drop.truth for drop in islice(drops, DROPS)] for _ in inclines]
 
 
 def figure_3(ensembles: Sequence[Ensemble]) -> Columns:
