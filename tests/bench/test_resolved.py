@@ -13,18 +13,17 @@ from rig.report.film import film_figure
 from tests.report.test_figures import FILM
 
 
-def ensemble(incline: float) -> list[dict[str, object]]:
+def ensemble(incline: float):
     times = [n / 960 for n in range(20)]
     track = {
         "times_s": times,
         "impact_top_m": [0.1 - 5.0 * t for t in times],
         "free_top_m": [0.2 - 4.0 * t for t in times],
     }
-    names = "separation_strike_m", "speed_strike_m_s", "contact_height_m"
-    ends = [(0.1, 6.9, 0.01), (0.12, 7.1, 0.02)]
+    names = ("separation_strike_m", "speed_strike_m_s", "contact_height_m")
     return [
-        {"incline_deg": incline, "track": track, **dict(zip(names, end, strict=True))}
-        for end in ends
+        {"incline_deg": incline, "track": track, **dict.fromkeys(names, number)}
+        for number in (0.1, 0.12)
     ]
 
 
