@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bench.references import exact_coefficients, exact_fall, many_digits
-from rig.bench.work import Answer
+from rig.bench.work import Answer, end_values
+from rig.model import paper
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 from rig.model.drag import drag_fall
 from rig.model.fall import fall, kicks
@@ -17,13 +18,14 @@ from rig.model.surface import Surface
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from rig.bench.references import Number, Values
 
 PAPER: dict[str, float] = {
-    "restitution": 0.5, "friction": 0.2, "incline": 40.0, "inertia": UNIFORM_ROD_INERTIA,
-    "length": 1.165, "drop": 0.18, "gravity": 9.81,
+    "restitution": paper.BARE.restitution.value, "friction": paper.BARE.friction.value,
+    "incline": paper.MIDDLE_INCLINE, "inertia": UNIFORM_ROD_INERTIA,
+    "length": paper.LENGTH, "drop": paper.DROP, "gravity": paper.GRAVITY,
 }  # fmt: skip
 
 
@@ -44,7 +46,7 @@ class Extreme(NamedTuple):
 
     name: str
     inputs: Mapping[str, float] = PAPER
-    masses: tuple[float, ...] = (1.0,) * 25
+    masses: tuple[float, ...] = paper.UNIFORM.masses
     even_air: bool = True
 
     @property
@@ -74,8 +76,7 @@ class Extreme(NamedTuple):
             end = drag_fall(chain, gains, kappas, *where)
         else:
             end = fall(chain, impact.alpha, impact.gamma, *where)
-        values = {"alpha": impact.alpha, "gamma": impact.gamma, "separation": end.separation_m}
-        values |= {"speed": end.speed_m_s, "time": end.time_s}
+        values = {"alpha": impact.alpha, "gamma": impact.gamma, **end_values(end)}
         return Answer(values, chain.rods, "; ".join(impact.notes))
 
     def printed(self) -> Answer:
@@ -85,17 +86,13 @@ class Extreme(NamedTuple):
 
     def exact(self, inputs: Mapping[str, Number], *, as_float: bool = False) -> Values:
         """Return the true values of inputs near to these, or those of the equations as printed."""
-        coefficients = exact_coefficients(
-            inputs["restitution"], inputs["friction"], inputs["incline"], inputs["inertia"],
-            inputs.get("inertia_z"), as_float=as_float,
-        )  # fmt: skip
+        coefficients = exact_coefficients(inputs, as_float=as_float)
         coefficients |= {name: Decimal(inputs[name]) for name in coefficients if name in inputs}
         with many_digits():  # heights and drags are what floats make of them, but for the nudge
-            nudges = {
-                name: Decimal(x) / Decimal(self.inputs[name] or 1) for name, x in inputs.items()
-            }
-            heights = [Decimal(height) * nudges["length"] for height in self.chain.heights]
-            kappas = [Decimal(kappa) * nudges["kappa"] for kappa in self.kappas]
+            heights, kappas = (
+                [Decimal(inputs[name]) / Decimal(self.inputs[name]) * Decimal(x) for x in floats]
+                for name, floats in (("length", self.chain.heights), ("kappa", self.kappas))
+            )
         alphas, gammas = ([coefficients[name]] * len(heights) for name in ("alpha", "gamma"))
         where = inputs["drop"], inputs["gravity"], inputs.get("speed", 0.0)
         return coefficients | exact_fall(
@@ -138,37 +135,47 @@ _APART = ({"alpha", "incline"}, {"alpha", "friction"}, {"air", "unequal air"})
 def alone() -> Iterator[Extreme]:
     """Yield every end of every quantity by itself, and the paper's scene."""
     yield Extreme("as in the paper")
-    yield from (_drive(Extreme(""), name, end) for name, ends in ALONE.items() for end in ends)
-    yield Extreme("mass 1e-300, top rod only", masses=(*(1.0,) * 24, 1e-300))
+    yield from (_scene({quantity: end}) for quantity, ends in ALONE.items() for end in ends)
+    yield Extreme("mass 1e-300, top rod only", masses=(*paper.UNIFORM.masses[1:], 1e-300))
 
 
 def pairs() -> Iterator[Extreme]:
     """Yield every two ends of two quantities."""
-    for (name, ends), (other, other_ends) in combinations(TOGETHER.items(), 2):
-        if {name, other} not in _APART:
-            for end, other_end in product(ends, other_ends):
-                yield _drive(_drive(Extreme(""), name, end), other, other_end)
+    for quantities in combinations(TOGETHER, 2):
+        if {*quantities} not in _APART:
+            for ends in product(*map(TOGETHER.__getitem__, quantities)):
+                yield _scene(dict(zip(quantities, ends, strict=True)))
 
 
-def _drive(scene: Extreme, name: str, end: float) -> Extreme:
-    """Drive one quantity of a scene to an end."""
-    changes: dict[str, Any] = {"name": f"{scene.name} + {name} {end:.11g}".removeprefix(" + ")}
-    inputs = dict(scene.inputs)
-    if name == "rods":
-        changes["masses"] = (1.0,) * int(end)
-    elif name == "mass decades":
-        # Both ends inside the floats' own 616 decades.
-        middle, last = (0.5 * end if abs(end) > 300 else 0.0), len(scene.masses) - 1
-        changes["masses"] = tuple(10.0 ** (end * k / last - middle) for k in range(last + 1))
-    elif name == "pole":
-        cos, sin = math.cos(math.radians(10.0)), math.sin(math.radians(10.0))
-        free_rod = gamma_finite(inputs["inertia"])
-        singular = (cos**2 + free_rod * sin**2) / ((free_rod - 1.0) * sin * cos)
-        inputs |= {"incline": 10.0, "friction": singular * (1.0 - end)}
-    elif name.endswith("air"):
-        inputs["kappa"] = end
-        changes["even_air"] = name == "air"
-    else:
-        further = {"alpha": {"gamma": 4.0 / 3.0}, "length": {"drop": end / 8}}
-        inputs |= {name: end, **further.get(name, {})}
-    return scene._replace(inputs=inputs, **changes)
+def _scene(ends: Mapping[str, float]) -> Extreme:
+    """Drive quantities of the paper's scene to ends."""
+    further = dict(ends)
+    rods, decades = int(further.pop("rods", paper.RODS)), further.pop("mass decades", 0.0)
+    # Both ends inside the floats' own 616 decades.
+    middle = 0.5 * decades if abs(decades) > 300 else 0.0
+    inputs = dict(PAPER)
+    for quantity, end in further.items():
+        inputs |= _INPUTS[quantity](end) if quantity in _INPUTS else {quantity: end}
+    return Extreme(
+        " + ".join(f"{quantity} {end:.11g}" for quantity, end in ends.items()),
+        inputs,
+        tuple(10.0 ** (decades * k / (rods - 1) - middle) for k in range(rods)),
+        "unequal air" not in ends,
+    )
+
+
+def _near_pole(distance: float) -> dict[str, float]:
+    cos, sin = math.cos(math.radians(10.0)), math.sin(math.radians(10.0))
+    free_rod = gamma_finite(PAPER["inertia"])
+    singular = (cos**2 + free_rod * sin**2) / ((free_rod - 1.0) * sin * cos)
+    return {"incline": 10.0, "friction": singular * (1.0 - distance)}
+
+
+_INPUTS: dict[str, Callable[[float], dict[str, float]]] = {
+    "alpha": lambda alpha: {"alpha": alpha, "gamma": 4.0 / 3.0},
+    "pole": _near_pole,
+    "length": lambda length: {"length": length, "drop": length / 8},
+    "air": lambda kappa: {"kappa": kappa},
+    "unequal air": lambda kappa: {"kappa": kappa},
+}
+"""Inputs that a quantity changes, where they are not that quantity alone."""

@@ -109,10 +109,10 @@ def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
             ("the equations computed as printed", "naive_error", MUTED, "x"),
             ("this program", "error", MODEL, "o"),
         ):
-            known = [row for row in rows if getattr(row, field) is not None]
+            numbers = [row for row in rows if getattr(row, field) is not None]
             panel.plot(
-                [min(row.expected, 5.0) for row in known],
-                [min(max(getattr(row, field), FLOOR), 10.0) for row in known],
+                [min(row.expected, 5.0) for row in numbers],
+                [min(max(getattr(row, field), FLOOR), 10.0) for row in numbers],
                 linestyle="none", marker=marker, color=color, markersize=3.5, label=label,
             )  # fmt: skip
         panel.axline((1e-16, 1e-16), (1.0, 1.0), color=INK, linewidth=0.8, label="error = κ·ε")

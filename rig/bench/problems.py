@@ -14,7 +14,7 @@ from rig.analysis.equations import Linearization
 from rig.analysis.square_root import EquationRows
 from rig.bench import references
 from rig.bench.solvers import SOLVERS, Legs, folding, in_air, lasting_impacts, solve
-from rig.bench.work import Answer, Method, WorkProblem, direct
+from rig.bench.work import Answer, Method, WorkProblem, direct, end_values
 from rig.errors import RigError
 from rig.model import continuum, paper
 from rig.model.chain import Chain
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
-
-    from rig.model.fall import Fall
 
     Array = NDArray[np.float64]
 
@@ -54,11 +52,6 @@ def problems(*, quick: bool = False) -> Iterator[WorkProblem]:
     yield fall_time()
 
 
-def _end(fall: Fall, evaluations: int) -> Answer:
-    values = {"separation": fall.separation_m, "speed": fall.speed_m_s, "time": fall.time_s}
-    return Answer(values, evaluations)
-
-
 def _by_solvers(legs: Legs, tolerances: tuple[float, ...] = _TOLERANCES) -> Iterator[Method]:
     for solver in SOLVERS:
         yield Method(solver, tolerances, "rtol {:.0e}", partial(solve, legs, solver))
@@ -78,7 +71,7 @@ def _air() -> WorkProblem:
         "legs in closed form as textbooks have them, heights subtracted",
         [
             direct("closed legs (rig)",
-                   lambda: _end(drag_fall(chain, gains, kappas, *_PLACE), rods)),
+                   lambda: Answer(end_values(drag_fall(chain, gains, kappas, *_PLACE)), rods)),
             *_by_solvers(legs),
         ],
     )  # fmt: skip
@@ -92,7 +85,7 @@ def _fold() -> WorkProblem:
 
     def gauss(nodes: float) -> Answer:
         end = continuum.end(chain, nodes=int(nodes))
-        return _end(end, end.evaluations)
+        return Answer(end_values(end), end.evaluations)
 
     return WorkProblem(
         "fold", "a continuous chain",
@@ -109,14 +102,17 @@ def contact(contact_s: float) -> WorkProblem:
     rods = CONTACT_RODS
     chain = Chain((1.0,) * rods, paper.UNIFORM.heights[:rods])
     gains = kicks(chain, [_IMPACT.alpha] * rods, _IMPACT.gamma)
+
+    def at_once() -> Answer:
+        return Answer(end_values(fall(chain, _IMPACT.alpha, _IMPACT.gamma, *_PLACE)), rods)
+
     return WorkProblem(
         f"contact-{contact_s:.0e}", f"{rods} rods, impacts that last {contact_s:.0e} s",
         {"contact_s": contact_s},
         partial(references.lasting_impacts, chain.heights, gains, *_PLACE),
         "series of the exponential integral, leg by leg",
         [
-            direct("impacts at once (rig)",
-                   lambda: _end(fall(chain, _IMPACT.alpha, _IMPACT.gamma, *_PLACE), rods)),
+            direct("impacts at once (rig)", at_once),
             *_by_solvers(
                 lasting_impacts(chain.heights, gains, *_PLACE, contact_s), _TOLERANCES[1:11:2]
             ),
@@ -140,19 +136,19 @@ def beam_fit(band: float) -> WorkProblem:
     def answer(p: Array, evaluations: int) -> Answer:
         return Answer(dict(zip(start, p.tolist(), strict=True)), evaluations)
 
-    def by_qr(slopes: Array, left: Array) -> Any:
+    def by_qr(slopes: Array, residuals: Array) -> Any:
         q, r = linalg.qr(slopes, mode="economic")
-        return linalg.solve_triangular(r, q.T @ left)
+        return linalg.solve_triangular(r, q.T @ residuals)
 
-    def by_cholesky(slopes: Array, left: Array) -> Any:
-        return linalg.cho_solve(linalg.cho_factor(slopes.T @ slopes), slopes.T @ left)
+    def by_cholesky(slopes: Array, residuals: Array) -> Any:
+        return linalg.cho_solve(linalg.cho_factor(slopes.T @ slopes), slopes.T @ residuals)
 
     def steps(solve_linear: Any, count: float) -> Answer:
         p = begin
         try:
             for _ in range(int(count)):
-                seen, slopes = _passages(beams, p)
-                p = p + solve_linear(slopes, times - seen)
+                passages, slopes = _passages(beams, p)
+                p = p + solve_linear(slopes, times - passages)
         except linalg.LinAlgError as error:
             raise RigError(str(error)) from None
         return answer(p, int(count))
@@ -163,15 +159,15 @@ def beam_fit(band: float) -> WorkProblem:
         def about(p: Array, _: float) -> Linearization:
             nonlocal evaluations
             evaluations += 1
-            seen, slopes = _passages(beams, p)
-            left = (seen - times) / sigma
-            chi2 = float(left @ left)
-            rows = EquationRows(slopes / sigma, left, np.arange(3))
+            passages, slopes = _passages(beams, p)
+            residuals = (passages - times) / sigma
+            chi2 = float(residuals @ residuals)
+            rows = EquationRows(slopes / sigma, residuals, np.arange(3))
             return Linearization({"": rows}, chi2, _BEAMS, chi2)
 
         return answer(least_squares(about, np.full(3, 1e6), begin, done=done).x, evaluations)
 
-    def left(p: Array) -> Array:
+    def residuals(p: Array) -> Array:
         return _passages(beams, p)[0] - times
 
     def slopes(p: Array) -> Array:
@@ -179,7 +175,7 @@ def beam_fit(band: float) -> WorkProblem:
 
     def by_scipy(method: Any, tolerance: float) -> Answer:
         run = optimize.least_squares(
-            left, begin, slopes, method=method, xtol=tolerance, ftol=tolerance, gtol=tolerance,
+            residuals, begin, slopes, method=method, xtol=tolerance, ftol=tolerance, gtol=tolerance,
             x_scale="jac",
         )  # fmt: skip
         return answer(run.x, run.nfev)
@@ -220,19 +216,17 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
     def printed() -> float:
         return math.acosh(math.exp(kappa * distance)) / math.sqrt(kappa * gravity)
 
-    def left(time: float) -> float:
+    def excess(time: float) -> float:
         return fallen(time, gravity, kappa) - distance
 
     def by_scipy(finder: Any, *where: object, **accuracy: float) -> Answer:
-        run = finder(left, *where, **accuracy, full_output=True)[1]
+        run = finder(excess, *where, **accuracy, full_output=True)[1]
         return Answer({"time": run.root}, run.function_calls)
 
     def bracketed(finder: Any, tolerance: float) -> Answer:
         return by_scipy(finder, 0.0, latest, xtol=tolerance, rtol=1e-15)
 
-    def newton(tolerance: float) -> Answer:
-        slope = partial(falling_speed, gravity=gravity, kappa=kappa)
-        return by_scipy(optimize.newton, latest, slope, tol=tolerance)
+    slope = partial(falling_speed, gravity=gravity, kappa=kappa)
 
     return WorkProblem(
         "fall-time", "the time to fall 1.345 m in air",
@@ -246,7 +240,8 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
                 Method(finder.__name__, _TOLERANCES, "xtol {:.0e}", partial(bracketed, finder))
                 for finder in (optimize.brentq, optimize.bisect, optimize.toms748)
             ),
-            Method("newton", _TOLERANCES, "tol {:.0e}", newton),
+            Method("newton", _TOLERANCES, "tol {:.0e}",
+                   lambda tolerance: by_scipy(optimize.newton, latest, slope, tol=tolerance)),
         ],
         "closed form (rig)", "as printed",
     )  # fmt: skip

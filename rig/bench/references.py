@@ -86,15 +86,14 @@ def exact_fall(
         air = [Decimal(kappa) for kappa in kappas] or [Decimal(0)] * len(masses)
         exact = [Decimal(mass) for mass in masses]
         # From the top: a light end would be lost in the sum of a chain over many decades.
-        above = [*accumulate(reversed(exact[1:]))][::-1]
+        above = [*[*accumulate(reversed(exact[1:]))][::-1], Decimal("inf")]
+        columns = (map(Decimal, column) for column in (heights, alphas, gammas))
         time, speed, before = Decimal(0), start, -Decimal(drop)
-        for n, (m, height) in enumerate(zip(exact, map(Decimal, heights), strict=True)):
-            arrival, duration = _leg(height - before, speed, g, air[n])
+        for m, rest, kappa, height, alpha, gamma in zip(exact, above, air, *columns, strict=True):
+            arrival, duration = _leg(height - before, speed, g, kappa)
             time += duration
-            speed = arrival
-            if n < len(above):
-                pull = Decimal(alphas[n]) * m * arrival / (1 + Decimal(gammas[n]) * m / above[n])
-                speed += pull / above[n]
+            # Nothing is left for the top rod to pull on, as if all the world's mass were above it.
+            speed = arrival + alpha * m * arrival / (1 + gamma * m / rest) / rest
             before = height
         top = Decimal(drop) + Decimal(heights[-1])
         separation = top - _way(time, start, g, air[0])
@@ -126,14 +125,12 @@ def _way(time: Decimal, start: Decimal, g: Decimal, kappa: Decimal) -> Decimal:
     return (((1 + share) * grown + (1 - share) / grown) / 2).ln() / kappa
 
 
-def exact_coefficients(
-    restitution: Number, friction: Number, incline_deg: Number, inertia: Number,
-    inertia_z: Number | None = None, *, as_float: bool = False,
-) -> Values:  # fmt: skip
+def exact_coefficients(inputs: Mapping[str, Number], *, as_float: bool = False) -> Values:
     """Return ``alpha`` by Eqs. 12 and 13, ``gamma`` by Eq. 10; `as_float` as in `exact_fall`."""
     with mp.workdps(15 if as_float else DIGITS + _SPARE):
-        beta, mu, xi, degrees = map(mp.mpf, (restitution, friction, inertia, incline_deg))
-        xi_z = xi if inertia_z is None else mp.mpf(inertia_z)
+        names = ("restitution", "friction", "inertia", "incline")
+        beta, mu, xi, degrees = (mp.mpf(inputs[name]) for name in names)
+        xi_z = mp.mpf(inputs.get("inertia_z", inputs["inertia"]))
         theta = degrees * mp.pi / 180
         # Eq. 12 has no vertical part at a wall.
         cos, sin = mp.cos(theta) if degrees != 90 else mp.mpf(0), mp.sin(theta)
@@ -212,12 +209,12 @@ def continuum(
         b, d = (1 + a) / power, 2 * g * above / power
         c = 2 * g * h + d
 
-        def fallen(z: mpmath.mpf) -> mpmath.mpf:
+        def time_to(z: mpmath.mpf) -> mpmath.mpf:
             v = ((z + r) / above) ** power
             primitive = v**b / b * mp.hyp2f1(mp.mpf(1) / 2, b, b + 1, v * d / c)
             return -above / power / mp.sqrt(c) * primitive
 
-        time = mp.sqrt(2 * h / g) + fallen(mp.mpf(0)) - fallen(z0)
+        time = mp.sqrt(2 * h / g) + time_to(mp.mpf(0)) - time_to(z0)
         braces = h * above ** (2 * a) + (above**power - r**power) / power
         speed = mp.sqrt(2 * g * braces / r ** (2 * a))
         return _decimals(separation=h + z0 - g * time**2 / 2, speed=speed, time=time)
@@ -246,13 +243,13 @@ def beam_fit(digits: int = DIGITS, **numbers: Number) -> Values:
         beams = [*zip(values[:count], values[count:], strict=True)]
         p, step = mp.matrix([0, 0, 10]), mp.matrix([1, 1, 1])
         while mp.norm(step) > mp.mpf(10) ** -(digits + 5) * mp.norm(p):
-            rows, left = [], []
+            rows, residuals = [], []
             for height, passage in beams:
                 root = mp.sqrt(p[1] ** 2 + 2 * p[2] * (p[0] + height))
                 time = (root - p[1]) / p[2]
                 rows.append([1 / root, -time / root, -(time**2) / (2 * root)])
-                left.append(passage - time)
-            step = mp.lu_solve(mp.matrix(rows), mp.matrix(left))
+                residuals.append(passage - time)
+            step = mp.lu_solve(mp.matrix(rows), mp.matrix(residuals))
             p += step
         return _decimals(rise=p[0], speed=p[1], gravity=p[2])
 

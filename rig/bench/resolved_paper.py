@@ -6,7 +6,7 @@ from itertools import islice
 from pathlib import Path
 from statistics import fmean, stdev
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     Columns = dict[str, list[float]]
+    Ensemble = Sequence[Mapping[str, Any]]
 
 DROPS = 16
 """Falls of one ensemble."""
@@ -41,26 +42,9 @@ _HANGING = {
     "aside_sd": "0.5 mm", "swing_sd": "0.01 m/s",
 }  # fmt: skip
 """Chains hang as they would, let go together and seen by a perfect rig."""
-
-
-class Ensemble(NamedTuple):
-    """Falls that differ only in how their chains hang.
-
-    Attributes
-    ----------
-    incline_deg
-        Of the surface.
-    separations, speeds, heights
-        Δz and V at the strike, and the height of the contact, of each fall; m and m/s.
-    tracks
-        Times and heights of both top rods.
-    """
-
-    incline_deg: float
-    separations: tuple[float, ...]
-    speeds: tuple[float, ...]
-    heights: tuple[float, ...]
-    tracks: tuple[Mapping[str, Sequence[float]], ...]
+_SEPARATION, _SPEED = "separation_strike_m", "speed_strike_m_s"
+"""Of the truth of a fall: Δz and V at the strike. An ensemble is truths of falls that differ only
+in how their chains hang."""
 
 
 def uniform() -> list[Ensemble]:
@@ -91,34 +75,31 @@ def _ensembles(rods: str, tilt: float, inclines: Sequence[float]) -> list[Ensemb
         path = Path(folder) / "paper.yaml"
         path.write_text(text, encoding="utf-8")
         url = simulation(path, _HANGING)
-        fallen = falls([Asked(url, range(1, len(runs) + 1), runs)])
-        return [_ensemble([fall.truth for fall in islice(fallen, DROPS)]) for _ in inclines]
-
-
-def _ensemble(truths: Sequence[Mapping[str, Any]]) -> Ensemble:
-    names = ("separation_strike_m", "speed_strike_m_s", "contact_height_m", "track")
-    columns = (tuple(truth[name] for truth in truths) for name in names)
-    return Ensemble(truths[0]["incline_deg"], *columns)
+        drops = falls([Asked(url, range(1, len(runs) + 1), runs)])
+        return [[drop.truth for drop in islice(drops, DROPS)] for _ in inclines]
 
 
 def figure_3(ensembles: Sequence[Ensemble]) -> Columns:
     """Means and standard deviations against inclination, as columns for the figure."""
+
+    def over(statistic: Callable[[Iterable[float]], float], key: str) -> list[float]:
+        return [statistic([truth[key] for truth in ensemble]) for ensemble in ensembles]
+
     return {
-        "incline_deg": [ensemble.incline_deg for ensemble in ensembles],
-        SEPARATION.name: [fmean(ensemble.separations) for ensemble in ensembles],
-        SEPARATION.key("sd"): [stdev(ensemble.separations) for ensemble in ensembles],
-        SPEED.name: [fmean(ensemble.speeds) for ensemble in ensembles],
-        SPEED.key("sd"): [stdev(ensemble.speeds) for ensemble in ensembles],
-        "contact_height_m": [fmean(ensemble.heights) for ensemble in ensembles],
-        "falls": [float(len(ensemble.separations)) for ensemble in ensembles],
+        "incline_deg": over(fmean, "incline_deg"),
+        SEPARATION.name: over(fmean, _SEPARATION),
+        SEPARATION.key("sd"): over(stdev, _SEPARATION),
+        SPEED.name: over(fmean, _SPEED),
+        SPEED.key("sd"): over(stdev, _SPEED),
+        "contact_height_m": over(fmean, "contact_height_m"),
+        "falls": [float(len(ensemble)) for ensemble in ensembles],
     }
 
 
 def figure_4(ensemble: Ensemble) -> Columns:
     """Height of the top rod against V², striking and free, of the fall nearest to the mean Δz."""
-    middle = fmean(ensemble.separations)
-    nearest = min(range(len(ensemble.tracks)), key=lambda n: abs(ensemble.separations[n] - middle))
-    track = ensemble.tracks[nearest]
+    middle = fmean(truth[_SEPARATION] for truth in ensemble)
+    track = min(ensemble, key=lambda truth: abs(truth[_SEPARATION] - middle))["track"]
     times = np.asarray(track["times_s"])
     columns: Columns = {"time_s": times[1:-1].tolist()}
     for name, key in (("", "impact_top_m"), ("free_", "free_top_m")):

@@ -13,11 +13,11 @@ import sys
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import process_time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.bench.figures import scenes_figure
 from rig.bench.findings import Findings
+from rig.bench.work import processor_time
 from rig.errors import RigError
 from rig.predictions import predictions
 from rig.protocol.reader import parse
@@ -41,10 +41,10 @@ PARTS = {
 """Modules and calls that only a scene with this part may need; no prediction has figures."""
 _PROBE = "from rig.bench.scene_probe import main; main()"
 _PROBES = 3
-_ROOT = Path(__file__).parents[2]
 _CALLS = 20
 
-_LEVEL, _INCLINED = "restitution: 0.50", "restitution: 0.50, friction: 0.20"
+_LEVEL = "surface: {restitution: 0.50}\ndrop: 180 mm\n"
+_INCLINED = "surface: {restitution: 0.50, friction: 0.20}\ndrop: 180 mm\n"
 _UNSURE = "surface: {restitution: 0.50 ± 0.05, friction: 0.20 ± 0.02}\ndrop: 180 mm ± 2 mm\n"
 _TWO, _AIR = "  B: {like: A}\n", "drag: {terminal_speed: 25 m/s}\n"
 _PLAN = "plan: {incline: 40 deg}\n"
@@ -85,7 +85,7 @@ class Cost(NamedTuple):
     """
 
     scene: str
-    modules: tuple[str, ...]
+    modules: list[str]
     least_bytes: int
     most_bytes: int
     calls: dict[str, int]
@@ -98,13 +98,12 @@ class Cost(NamedTuple):
 def ladder() -> dict[str, str]:
     """Return the paper's chain, from free fall to the whole experiment, as protocols by name."""
     chain = _CHAIN.format("")
-    level, inclined = (f"surface: {{{keys}}}\ndrop: 180 mm\n" for keys in (_LEVEL, _INCLINED))
     two = chain + _TWO + _UNSURE
     return {
         "free fall": chain,
         "α given, level": _CHAIN.format(", alpha: 0.25, gamma: 1") + "surface: {}\ndrop: 180 mm\n",
-        "level surface": chain + level,
-        "inclined": chain + inclined + _PLAN,
+        "level surface": chain + _LEVEL,
+        "inclined": chain + _INCLINED + _PLAN,
         "± on β, μ, drop": chain + _UNSURE + _PLAN,
         "second chain": two + _PLAN,
         "six inclines": two + _PLANS,
@@ -128,9 +127,11 @@ def run(arguments: Namespace) -> Iterator[Findings]:
         "rig predict,\nof the whole": [cost.shares["command"] for cost in costs],
         "calls,\nof the whole": [cost.shares["calls"] for cost in costs],
     }
+    rows = [_row(cost) for cost in costs]
+    table = text_table([[*rows[0]], *([*row.values()] for row in rows)], left={0}, rule=True)
     yield Findings(
         {"python": sys.version.split()[0], "scenes": [cost._asdict() for cost in costs]},
-        [*_lines(costs)], _HEAD, [_row(cost) for cost in costs], scenes_figure(names, panels),
+        [*table, *_remarks(costs)], _HEAD, rows, scenes_figure(names, panels),
         failed=any(cost.gained for cost in costs),
     )  # fmt: skip
 
@@ -177,48 +178,41 @@ def measure(texts: Mapping[str, str], rounds: int) -> list[Cost]:
 
 def _count(file: Path) -> dict[str, Any]:
     reports = [json.loads(_probe("count", file)) for _ in range(_PROBES)]
-    held = [report.pop("bytes") for report in reports]
+    sizes = [report.pop("bytes") for report in reports]
     report = reports[0]
     if reports.count(report) < _PROBES:
         raise RigError(f"{file.name}: two equal runs do not count the same")
-    sizes = {"least_bytes": min(held), "most_bytes": max(held)}
-    return {"modules": tuple(report["modules"]), **sizes, "calls": report["calls"]}
+    return {**report, "least_bytes": min(sizes), "most_bytes": max(sizes)}
 
 
 def _probe(task: str, file: Path) -> str:
     """Have a fresh Python process look at a scene, and return what it prints."""
-    search = os.pathsep.join([str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", _PROBE, task, str(file)],
         capture_output=True, encoding="utf-8", check=False,
-        env={**os.environ, "PYTHONPATH": search, "PYTHONHASHSEED": "0", "PYTHONUTF8": "1"},
+        env={**os.environ, "PYTHONHASHSEED": "0", "PYTHONUTF8": "1"},
     )  # fmt: skip
-    if done.returncode:
-        raise RigError("a scene could not be measured", done.stderr.strip())
-    return done.stdout
+    if process.returncode:
+        raise RigError("a scene could not be measured", process.stderr.strip())
+    return process.stdout
 
 
 def _times(file: Path, protocol: Protocol) -> tuple[float, float]:
     """Return the processor time of ``rig predict`` and of the prediction alone, s."""
     command_s = float(_probe("time", file))
     predictions(protocol)  # a first call is slow
-    begin = process_time()
-    for _ in range(_CALLS):
-        predictions(protocol)
-    return command_s, (process_time() - begin) / _CALLS
+    return command_s, processor_time(lambda: predictions(protocol), _CALLS)[1]
 
 
 def _gained(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str, ...]:
     """List what was loaded or called for parts that the scene does not have."""
-    surface = protocol.surface is not None
     from_surface = any(rods.chain.alpha is None for rods in protocol.chains.values())
-    tilted = surface and from_surface and max(protocol.plan.inclines) > 0.0
-    present = {
-        "surface": surface, "inclined surface": tilted, "air": protocol.drag is not None,
-        "gates": protocol.gates is not None, "figures": False,
+    present: dict[str, object] = {
+        "surface": protocol.surface, "air": protocol.drag, "gates": protocol.gates,
+        "inclined surface": protocol.surface and from_surface and max(protocol.plan.inclines) > 0.0,
     }  # fmt: skip
     used = {*counted["modules"], *(name for name, calls in counted["calls"].items() if calls)}
-    absent = [part for part in PARTS if not present[part]]
+    absent = [part for part in PARTS if not present.get(part)]
     return tuple(f"{name} ({part})" for part in absent for name in sorted(PARTS[part] & used))
 
 
@@ -237,10 +231,8 @@ def _row(cost: Cost) -> dict[str, str]:
     }  # fmt: skip
 
 
-def _lines(costs: Sequence[Cost]) -> Iterator[str]:
-    """Lay the costs out as text, then what each scene leaves out that the whole has."""
-    rows = [_row(cost) for cost in costs]
-    yield from text_table([[*rows[0]], *([*row.values()] for row in rows)], left={0}, rule=True)
+def _remarks(costs: Sequence[Cost]) -> Iterator[str]:
+    """Say what each scene leaves out that the whole has, and what one gained."""
     whole = next(cost for cost in costs if cost.scene == "whole")
     yield from ("", "× is over the whole; left out of the whole:")
     for cost in costs:

@@ -35,6 +35,8 @@ LONGEST_S = 5.0
 HEIGHT, SPEED, SEPARATION, GAINED, PULL = range(5)
 """Places in a state: height of the bottom rod, m, downward speed, Δz, the speed gained, and what
 lasting impacts still pull."""
+_TINY = 2.0**-300
+"""Of a state, whose square does not count beside it."""
 
 
 class Legs(NamedTuple):
@@ -45,11 +47,10 @@ class Legs(NamedTuple):
     start
         State at release.
     heights, gains
-        Of each rod above the bottom rod, m, and what its impact adds: ΔV/V, or to the pull.
-    slope, jacobian
-        At a state.
-    at_once
-        Whether impacts change the speed, and not the pull.
+        Of each rod above the bottom rod, m, and what its impact adds: ΔV/V, or to the pull where
+        the state has one.
+    slope
+        At a state, analytic: it is also taken at complex ones.
     begin_s
         Time of `start`.
     """
@@ -58,16 +59,12 @@ class Legs(NamedTuple):
     heights: Sequence[float]
     gains: Sequence[float]
     slope: Callable[[Array], Array]
-    jacobian: Callable[[Array], Array]
-    at_once: bool = True
     begin_s: float = 0.0
 
-    def strike(self, leg: int, state: Array) -> None:
-        """Let the rod strike that ends a leg."""
-        if self.at_once:
-            state[[SPEED, GAINED]] += state[SPEED] * self.gains[leg]
-        else:
-            state[PULL] += self.gains[leg]
+    def jacobian(self, _: float, y: Array) -> Array:
+        """Return the slope's derivatives at a state, to a rounding: by tiny imaginary steps."""
+        steps = 1j * _TINY * np.eye(len(y))
+        return np.column_stack([self.slope(y + step).imag for step in steps]) / _TINY
 
 
 def in_air(
@@ -76,17 +73,10 @@ def in_air(
     """Return a fall of both chains in the same air: v' = g − κv²."""
 
     def slope(y: Array) -> Array:
-        v, u = y[SPEED], y[GAINED]
+        _, v, _, u = y
         return np.array([-v, gravity - kappa * v * v, u, -kappa * u * (2.0 * v - u)])
 
-    def jacobian(y: Array) -> Array:
-        rates, v, u = np.zeros((4, 4)), y[SPEED], y[GAINED]
-        rates[HEIGHT, SPEED], rates[SEPARATION, GAINED] = -1.0, 1.0
-        rates[[SPEED, GAINED], SPEED] = -2.0 * kappa * v, -2.0 * kappa * u
-        rates[GAINED, GAINED] = -2.0 * kappa * (v - u)
-        return rates
-
-    return Legs([drop, 0.0, 0.0, 0.0], heights, gains, slope, jacobian)
+    return Legs([drop, 0.0, 0.0, 0.0], heights, gains, slope)
 
 
 def lasting_impacts(
@@ -102,16 +92,7 @@ def lasting_impacts(
         pull = y[PULL] * y[SPEED] / contact_s
         return np.array([-y[SPEED], gravity + pull, y[GAINED], pull, -y[PULL] / contact_s])
 
-    def jacobian(y: Array) -> Array:
-        rates = np.zeros((5, 5))
-        rates[HEIGHT, SPEED], rates[SEPARATION, GAINED] = -1.0, 1.0
-        rates[[SPEED, GAINED], SPEED] = y[PULL] / contact_s
-        rates[[SPEED, GAINED], PULL] = y[SPEED] / contact_s
-        rates[PULL, PULL] = -1.0 / contact_s
-        return rates
-
-    start, pulls = [drop, 0.0, 0.0, 0.0, 0.0], [math.log1p(gain) for gain in gains]
-    return Legs(start, heights, pulls, slope, jacobian, at_once=False)
+    return Legs([drop, 0.0, 0.0, 0.0, 0.0], heights, [math.log1p(gain) for gain in gains], slope)
 
 
 def folding(length: float, reach: float, alpha: float, drop: float, gravity: float) -> Legs:
@@ -128,15 +109,7 @@ def folding(length: float, reach: float, alpha: float, drop: float, gravity: flo
         pull = alpha * y[SPEED] * y[SPEED] / (y[HEIGHT] + reach)
         return np.array([-y[SPEED], gravity + pull, y[GAINED], pull])
 
-    def jacobian(y: Array) -> Array:
-        rates, above, v = np.zeros((4, 4)), y[HEIGHT] + reach, y[SPEED]
-        rates[HEIGHT, SPEED], rates[SEPARATION, GAINED] = -1.0, 1.0
-        rates[[SPEED, GAINED], HEIGHT] = -alpha * v * v / above**2
-        rates[[SPEED, GAINED], SPEED] = 2.0 * alpha * v / above
-        return rates
-
-    start = [length, speed, 0.0, 0.0]
-    return Legs(start, [0.0], [0.0], slope, jacobian, begin_s=speed / gravity)
+    return Legs([length, speed, 0.0, 0.0], [0.0], [0.0], slope, begin_s=speed / gravity)
 
 
 def solve(legs: Legs, solver: Solver, rtol: float) -> Answer:
@@ -149,28 +122,32 @@ def solve(legs: Legs, solver: Solver, rtol: float) -> Answer:
     """
     state, time, arrival = np.array(legs.start), legs.begin_s, 0.0
     evaluations = 0
-    for leg, height in enumerate(legs.heights):
+    implicit: dict[str, Any] = {"jac": legs.jacobian} if solver in IMPLICIT else {}
 
-        def slope(_: float, y: Array) -> Array:
-            nonlocal evaluations
-            evaluations += 1
-            if evaluations > BUDGET:
-                raise RigError(f"more than {BUDGET} evaluations, and the chain is not down yet")
-            return legs.slope(y)
+    def slope(_: float, y: Array) -> Array:
+        nonlocal evaluations
+        evaluations += 1
+        if evaluations > BUDGET:
+            raise RigError(f"more than {BUDGET} evaluations, and the chain is not down yet")
+        return legs.slope(y)
+
+    for height, gain in zip(legs.heights, legs.gains, strict=True):
 
         def landing(_: float, y: Array, height: float = height) -> float:
             return float(y[HEIGHT] + height)
 
         landing.terminal, landing.direction = True, -1.0  # type: ignore[attr-defined]  # SciPy's
-        implicit: dict[str, Any] = {"jac": lambda _, y: legs.jacobian(y)}
         run = solve_ivp(
             slope, (time, time + LONGEST_S), state, method=solver, events=landing,
-            rtol=rtol, atol=ABSOLUTE * rtol, **(implicit if solver in IMPLICIT else {}),
+            rtol=rtol, atol=ABSOLUTE * rtol, **implicit,
         )  # fmt: skip
         if run.status != 1:
             raise RigError(f"{solver}: {run.message}")
         state, time = run.y[:, -1].copy(), float(run.t[-1])
         arrival = float(state[SPEED])
-        legs.strike(leg, state)
+        if len(state) > PULL:
+            state[PULL] += gain
+        else:
+            state[[SPEED, GAINED]] += arrival * gain
     values = {"separation": float(state[SEPARATION]), "speed": arrival, "time": time}
     return Answer(values, evaluations)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 import statistics
 from decimal import Decimal
+from functools import partial
 from time import process_time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from rig.errors import RigError
 
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from rig.bench.references import Number, Values
+    from rig.model.fall import Fall
 
+T = TypeVar("T")
 EPSILON = 2.0**-52
 SLACK = 4.0
 """Roundings of one leg that may count, in ε; those of n legs add up as √n."""
@@ -46,6 +49,11 @@ class Answer(NamedTuple):
     values: Mapping[str, float]
     evaluations: int
     note: str = ""
+
+
+def end_values(fall: Fall) -> dict[str, float]:
+    """Return the quantities of a fall's end."""
+    return {"separation": fall.separation_m, "speed": fall.speed_m_s, "time": fall.time_s}
 
 
 class Method(NamedTuple):
@@ -156,12 +164,12 @@ class LeftOut(NamedTuple):
 class _Trial(NamedTuple):
     """A setting that works, with its times so far."""
 
-    method: Method
-    value: float
-    answer: Answer
+    solve: Callable[[], Answer]
     turns: int
     calls: int
     times: list[float]
+    point: Callable[..., Point]
+    """From what its times come to."""
 
 
 def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], list[LeftOut]]:
@@ -174,46 +182,40 @@ def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], 
     """
     trials: list[_Trial] = []
     left_out: list[LeftOut] = []
+    exact = problem.exact(**problem.inputs)
     for method in problem.methods:
         for value in method.values[:6:3] if quick else method.values:
+            names = (problem.name, method.name, method.text.format(value))
+            solve = partial(method.solve, value)
             try:
-                answer, took = _timed(method, value)
-                if took < _SHARE_S:  # a first call also loads and compiles
-                    answer, took = _timed(method, value)
+                answer, seconds = processor_time(solve)
+                if seconds < _SHARE_S:  # a first call also loads and compiles
+                    answer, seconds = processor_time(solve)
             except RigError as error:
-                setting = method.text.format(value)
-                left_out.append(LeftOut(problem.name, method.name, setting, error.message))
+                left_out.append(LeftOut(*names, error.message))
                 break  # what follows is dearer still
-            turns = 2 if quick else min(_TURNS, max(_FEWEST, round(_SHARE_S / took)))
-            calls = max(1, round(_CALLS_S / took))
-            trials.append(_Trial(method, value, answer, turns, calls, []))
+            errors = {name: relative_error(x, exact[name]) for name, x in answer.values.items()}
+            worst = max(errors.values())
+            point = partial(Point, *names, value, worst, errors, answer.evaluations)
+            turns = 2 if quick else min(_TURNS, max(_FEWEST, round(_SHARE_S / seconds)))
+            trials.append(_Trial(solve, turns, max(1, round(_CALLS_S / seconds)), [], point))
     for turn in range(_TURNS):
         for trial in trials:
             if turn < trial.turns:
-                trial.times.append(_timed(trial.method, trial.value, trial.calls)[1])
-    exact = problem.exact(**problem.inputs)
-    return [_point(problem, exact, trial) for trial in trials], left_out
+                trial.times.append(processor_time(trial.solve, trial.calls)[1])
+    points = []
+    for trial in trials:
+        lower, middle, upper = statistics.quantiles(trial.times, n=4, method="inclusive")
+        points.append(trial.point(middle, lower, upper, trial.turns))
+    return points, left_out
 
 
-def _timed(method: Method, value: float, calls: int = 1) -> tuple[Answer, float]:
-    """Return an answer and its processor time, s."""
+def processor_time(compute: Callable[[], T], calls: int = 1) -> tuple[T, float]:
+    """Return what the last of so many calls gives, and the processor time of a call, s."""
     begin = process_time()
     for _ in range(calls):
-        answer = method.solve(value)
-    return answer, max((process_time() - begin) / calls, 1e-9)
-
-
-def _point(problem: WorkProblem, exact: Values, trial: _Trial) -> Point:
-    errors = {
-        quantity: relative_error(value, exact[quantity])
-        for quantity, value in trial.answer.values.items()
-    }
-    lower, middle, upper = statistics.quantiles(trial.times, n=4, method="inclusive")
-    return Point(
-        problem.name, trial.method.name, trial.method.text.format(trial.value), trial.value,
-        max(errors.values()), errors, trial.answer.evaluations, middle, lower, upper,
-        len(trial.times),
-    )  # fmt: skip
+        result = compute()
+    return result, max((process_time() - begin) / calls, 1e-9)
 
 
 def relative_error(value: float, exact: Decimal) -> float:

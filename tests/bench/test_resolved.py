@@ -8,20 +8,23 @@ from bench.__main__ import main
 from bench.studies import resolved as bench_resolved
 from rig import cli
 from rig.bench import resolved_paper
-from rig.bench.resolved_paper import Ensemble
 from rig.report.canvas import figure_file
 from rig.report.film import film_figure
 from tests.report.test_figures import FILM
 
 
-def ensemble(incline: float) -> Ensemble:
+def ensemble(incline: float):
     times = [n / 960 for n in range(20)]
     track = {
         "times_s": times,
         "impact_top_m": [0.1 - 5.0 * t for t in times],
         "free_top_m": [0.2 - 4.0 * t for t in times],
     }
-    return Ensemble(incline, (0.1, 0.12), (6.9, 7.1), (0.01, 0.02), (track, track))
+    names = ("separation_strike_m", "speed_strike_m_s", "contact_height_m")
+    return [
+        {"incline_deg": incline, "track": track, **dict.fromkeys(names, number)}
+        for number in (0.1, 0.12)
+    ]
 
 
 @pytest.mark.parametrize("number", [3, 4])
