@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, fall, free_fall, kicks
+from rig.model.fall import Fall, fall, free_leg, kicks
 from rig.model.impact import MU, impact_on, stated_coefficients, with_coefficients
 from rig.units import Quantity
 
@@ -84,15 +84,16 @@ def predict(
     Uncertainties are first order: each input is moved by ± its standard uncertainty, or, where
     that would leave what is possible, by less and to one side; the slope counts either way.
     """
-    start, pull = initial_speed.value, gravity.value
+    start, pull, height = initial_speed.value, gravity.value, max(0.0, drop.value + chain.length)
     if kappas:
         from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
 
-        free = drag_leg(drop.value + chain.length, start, pull, kappas[0])
+        free = drag_leg(height, start, pull, kappas[0])
     else:
-        free = free_fall(chain, drop.value, pull, start)
+        free = free_leg(height, start, pull)
     air = ", drag" if kappas else ""
     try:
+        _check_order(chain, drop.value)
         impact = impact_on(surface, chain, incline_deg)
     except DomainError as error:
         return Prediction(incline_deg, f"discrete{air}", free[0], False, (error.message,))
@@ -145,6 +146,15 @@ def predict(
         **{name: getattr(centre, key) for name, key in _ENDS.items()},
         **uncertainties,
     )
+
+
+def _check_order(chain: Chain, drop_m: float) -> None:
+    """Make sure that rods touch the surface after the release, and from the bottom up."""
+    if min([drop_m, *(gap for gap, _ in chain.legs)]) < 0.0:
+        raise DomainError(
+            "a rod touches the surface before the release or before a lower rod",
+            "release the chain higher, or make the surface less steep",
+        )
 
 
 def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quantity:
