@@ -220,8 +220,8 @@ def test_the_models_curves_end_at_the_prediction_where_rods_touch_higher_than_th
     protocol = parse(BOARD_GRADED.text + air)
     (curve,) = estimate(protocol, dropped(protocol, first(1, protocol, (40.0,)))).json()["curves"]
     expected = predict_incline(protocol, 40.0, "A", "B")
-    assert curve["speed2_m2_s2_model"][-1] == pytest.approx(expected.speed**2)
-    assert curve["separation_m_model"][-1] == pytest.approx(expected.separation, rel=1e-3)
+    assert curve["speed2_m2_s2_model"][-1] == pytest.approx(expected.speed_m_s**2)
+    assert curve["separation_m_model"][-1] == pytest.approx(expected.separation_m, rel=1e-3)
 
 
 def test_inclines_outside_the_model_tell_no_coefficient():

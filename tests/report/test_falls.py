@@ -33,5 +33,5 @@ def test_points_of_a_perfect_separation_lie_on_the_models_line(protocol, run):
     free_fall, model, *_ = speeds.panels[0].series
     assert free_fall.y[-1] == model.y[-1] == 0.0
     stated = predict_incline(protocol, drop.run.incline_deg, "A", "B")
-    assert model.x[-1] == pytest.approx(stated.speed**2)
-    assert free_fall.x[-1] == pytest.approx(stated.free_fall_speed**2)
+    assert model.x[-1] == pytest.approx(stated.speed_m_s**2)
+    assert free_fall.x[-1] == pytest.approx(stated.free_fall_speed_m_s**2)
