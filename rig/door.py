@@ -18,7 +18,8 @@ from rig.analysis.result import GOOD, DropResult, Measured, optional_package
 from rig.bundle.tables import column_unit, result_tables
 from rig.errors import InputError, SessionError
 from rig.measurands import MEASURANDS
-from rig.predictions import PredictedIncline, predictions
+from rig.model.prediction import PredictedIncline
+from rig.predictions import predictions
 from rig.protocol import reader
 from rig.ready import find_protocol
 from rig.report.numbers import with_unit

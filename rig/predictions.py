@@ -6,65 +6,18 @@ Mechanics that a scene does not have are not loaded.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
+from rig.model.prediction import PredictedIncline
 from rig.protocol.contact import as_struck, at_contact
 from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from rig.model.predict import Prediction
     from rig.protocol.protocol import Protocol, RodChain, Run
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PredictedIncline:
-    """What the model says of one incline; `None` is what the scene does not have or tell.
-
-    Attributes
-    ----------
-    incline_deg, impact_chain
-        What it is of; a chain is named where two are unlike.
-    model, alpha, gamma
-        What was computed, and the coefficients of Eq. 9.
-    separation_m, separation_u_m, speed_m_s, speed_u_m_s
-        Δz and V with their standard uncertainties.
-    fall_time_s, free_fall_speed_m_s
-        Until the top rod strikes; and how fast it would be without any impact.
-    in_domain, notes
-        Whether the model describes the case, and what there is to say.
-    struck
-        Whether the scene has a surface; without one nothing has an uncertainty.
-    """
-
-    incline_deg: float
-    impact_chain: str | None = None
-    model: str
-    alpha: float | None = None
-    gamma: float | None = None
-    separation_m: float | None = None
-    separation_u_m: float | None = None
-    speed_m_s: float | None = None
-    speed_u_m_s: float | None = None
-    fall_time_s: float | None = None
-    free_fall_speed_m_s: float
-    in_domain: bool
-    notes: list[str]
-    struck: bool = True
-
-    @property
-    def label(self) -> str:
-        """Its incline and, where chains are unlike, the one that strikes."""
-        return f"{self.incline_deg:g}°{f' {self.impact_chain}' if self.impact_chain else ''}"
-
-    def json(self) -> dict[str, Any]:
-        """As ``rig predict --json`` prints it, without what the scene does not have."""
-        absent = {"struck"} if self.struck else {"struck", "separation_u_m", "speed_u_m_s"}
-        absent |= set() if self.impact_chain else {"impact_chain"}
-        return {name: value for name, value in asdict(self).items() if name not in absent}
 
 
 def predictions(protocol: Protocol) -> list[PredictedIncline]:
@@ -78,26 +31,9 @@ def predictions(protocol: Protocol) -> list[PredictedIncline]:
     for incline in dict.fromkeys(protocol.plan.inclines):
         for struck in protocol.strikers:
             model = predict_incline(protocol, incline, struck, beside(protocol, struck))
-            lines.append(
-                PredictedIncline(
-                    incline_deg=incline,
-                    impact_chain=struck if protocol.unlike_chains else None,
-                    notes=list(model.notes),
-                    **{name: getattr(model, of_model) for name, of_model in _OF_MODEL.items()},
-                )
-            )
+            chain = struck if protocol.unlike_chains else None
+            lines.append(replace(model, impact_chain=chain))
     return lines
-
-
-_OF_MODEL = {name: name for name in ("model", "alpha", "gamma", "in_domain")} | {
-    "separation_m": "separation",
-    "separation_u_m": "separation_u",
-    "speed_m_s": "speed",
-    "speed_u_m_s": "speed_u",
-    "fall_time_s": "time",
-    "free_fall_speed_m_s": "free_fall_speed",
-}
-"""Attributes of a `PredictedIncline` and those of the model's prediction that they have."""
 
 
 def beside(protocol: Protocol, struck: str) -> str | None:
@@ -107,7 +43,7 @@ def beside(protocol: Protocol, struck: str) -> str | None:
 
 def predict_incline(
     protocol: Protocol, incline_deg: float, struck: str, free: str | None = None
-) -> Prediction:
+) -> PredictedIncline:
     """Predict the fall of a chain that strikes a surface, beside one that does not.
 
     Parameters
@@ -130,12 +66,12 @@ def predict_incline(
         kappas=kappas,
         drag_u=drag_u,
     )
-    if free is None or model.separation is None or model.time is None:
+    if free is None or model.separation_m is None or model.fall_time_s is None:
         return model
     # Top rods of unlike chains start at unlike heights.
     longer = protocol.chains[free].chain.length - protocol.chains[struck].chain.length
-    held = _held_back(protocol, kappas, air_of(protocol, free), model.time)
-    return replace(model, separation=model.separation + longer + held)
+    held = _held_back(protocol, kappas, air_of(protocol, free), model.fall_time_s)
+    return replace(model, separation_m=model.separation_m + longer + held)
 
 
 def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
@@ -144,13 +80,11 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
         row = GRAVITY if protocol.track is None else ACCELERATION
         return {row.name: protocol.gravity}
     model = predict_incline(protocol, run.incline_deg, run.impact, run.free)
-    values = {
-        SEPARATION.name: (model.separation if run.free is not None else None, model.separation_u),
-        SPEED.name: (model.speed, model.speed_u),
-        FALL_TIME.name: (model.time, model.time_u),
-    }
+    rows = (SEPARATION, SPEED, FALL_TIME) if run.free is not None else (SPEED, FALL_TIME)
     return {
-        name: Quantity(value, u or 0.0) for name, (value, u) in values.items() if value is not None
+        row.name: Quantity(value, getattr(model, row.key("u")) or 0.0)
+        for row in rows
+        if (value := getattr(model, row.name)) is not None
     }
 
 

@@ -22,6 +22,14 @@ SCENES = {
     "unlike, in air": UNLIKE + AIR,
     "single": (PROTOCOLS / "single-chain.yaml").read_text("utf-8"),
 }
+ON_BOARD = """protocol: 1
+chains: {{A: {{rods: 2, length: {length}, diameter: 13 mm}}}}
+surface: {{restitution: 0.5, friction: 0.2}}
+contact: {{datum: board}}
+gravity: 9.81 m/s^2
+drop: 20 mm
+plan: {{incline: [40 deg, 80 deg], repeats: 1, settle: 1 s}}
+"""
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -68,3 +76,13 @@ def test_air_holds_back():
     with_air, without = (predictions(reader.parse(text))[0] for text in (short() + AIR, short()))
     assert with_air.speed_m_s < without.speed_m_s
     assert with_air.fall_time_s > without.fall_time_s
+
+
+@pytest.mark.parametrize("air", ["", AIR])
+@pytest.mark.parametrize("length", ["600 mm", "15 mm"])
+def test_a_rod_that_touches_before_the_release_is_a_note_at_its_incline(length, air):
+    """A rod of 13 mm touches 8 mm above a board at 40°, and 37 mm at 80°."""
+    low, steep = predictions(reader.parse(ON_BOARD.format(length=length) + air))
+    assert low.speed_m_s > 0.0
+    assert steep.speed_m_s is None
+    assert "before the release" in steep.notes[0]

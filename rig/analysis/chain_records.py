@@ -18,7 +18,6 @@ from rig.analysis.trajectory import ONE
 from rig.errors import DomainError
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
-from rig.model.rods import rod_impacts
 from rig.predictions import air_shares
 from rig.protocol.contact import higher_contacts
 
@@ -307,13 +306,13 @@ def _impacts(protocol: Protocol, run: Run, role: Side, chain: RodChain) -> dict[
         return {}
     assert protocol.surface is not None
     # γ is the same at every incline, and level ground always in the domain of Eq. 13.
-    gammas = [impact.gamma for impact in rod_impacts(protocol.surface, chain.chain, 0.0)]
+    gamma = impact_on(protocol.surface, chain.chain, 0.0).gamma
     try:
         alpha = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
     except DomainError:
         alpha = 0.0
     return {
-        "ratios": np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gammas)),
+        "ratios": np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gamma)),
         "alpha": alpha,
         "incline_deg": run.incline_deg or 0.0,
         "condition": str(protocol.condition(run)),

@@ -41,7 +41,7 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
         for struck in protocol.strikers
         for incline in sorted(points)
     ]
-    in_domain = [pair for pair in predictions if pair[1].separation is not None]
+    in_domain = [pair for pair in predictions if pair[1].separation_m is not None]
     curves: dict[str, Any] = {
         "incline_deg": [pair.incline_deg for _, pair in in_domain],
         "segments": [
@@ -49,10 +49,10 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
             + (f", chain {struck}" if protocol.unlike_chains else "")
             for struck, pair in in_domain
         ],
-        "free_fall_speed_m_s": predictions[0][1].free_fall_speed,
+        "free_fall_speed_m_s": predictions[0][1].free_fall_speed_m_s,
     }
     for row in (SPEED, SEPARATION) if protocol.two_chains else (SPEED,):
-        sizes = [getattr(pair, f"{row.stem}_u") or 0.0 for _, pair in in_domain]
-        curves[row.name] = [getattr(pair, row.stem) for _, pair in in_domain]
+        sizes = [getattr(pair, row.key("u")) or 0.0 for _, pair in in_domain]
+        curves[row.name] = [getattr(pair, row.name) for _, pair in in_domain]
         curves[row.key("U95")] = [coverage_factor(math.inf) * u for u in sizes]
     return curves

@@ -305,9 +305,7 @@ def _with_rods(chain: RodChain, order: Sequence[int], heights: Sequence[float]) 
     def chosen(values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(values[n] for n in order)
 
-    rods = chain.chain
-    inertias = rods.inertias and chosen(rods.inertias)
-    hung = replace(rods, masses=chosen(rods.masses), heights=tuple(heights), inertias=inertias)
+    hung = replace(chain.chain, masses=chosen(chain.chain.masses), heights=tuple(heights))
     widths, diameters = chosen(chain.widths), chosen(chain.diameters)
     return replace(chain, chain=hung, widths=widths, diameters=diameters)
 

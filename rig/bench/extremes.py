@@ -56,7 +56,7 @@ class Extreme(NamedTuple):
         heights = tuple(inputs["length"] * k / last for k in range(last + 1))
         alpha = Quantity(inputs["alpha"]) if "alpha" in inputs else None
         further = inputs.get("inertia_z"), alpha, inputs.get("gamma")
-        return Chain(self.masses, heights, inputs["inertia"], None, *further)
+        return Chain(self.masses, heights, inputs["inertia"], *further)
 
     @property
     def kappas(self) -> list[float]:

@@ -11,7 +11,7 @@ from rig.commands.output import print_data, say
 from rig.errors import InputError
 from rig.files import check_place, write_atomic
 from rig.measurands import SEPARATION, SPEED, Measurand
-from rig.predictions import PredictedIncline, group_notes, predictions
+from rig.predictions import group_notes, predictions
 from rig.protocol import reader
 from rig.reasons import make_error
 from rig.report.numbers import degrees, fixed, plus_minus
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Mapping
 
+    from rig.model.prediction import PredictedIncline
     from rig.protocol.protocol import Protocol
 
 
@@ -43,9 +44,8 @@ def main(arguments: Namespace) -> int:
 
 def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]:
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
-    apart, end = SEPARATION, SPEED
     columns: dict[str, Callable[[PredictedIncline], str]] = {
-        f"speed ({end.unit})": lambda line: fixed(line.speed_m_s, 4)
+        f"speed ({SPEED.unit})": lambda line: fixed(line.speed_m_s, 4)
     }
     if protocol.surface is not None:
         columns = {
@@ -54,10 +54,12 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
             "α": lambda line: fixed(line.alpha, 4),
         }
         if protocol.two_chains:
-            heading = f"{apart.symbol} ± U ({apart.unit})"
-            columns[heading] = lambda line: _number(line.separation_m, line.separation_u_m, apart)
-        heading = f"{end.symbol} ± U ({end.unit})"
-        columns[heading] = lambda line: _number(line.speed_m_s, line.speed_u_m_s, end)
+            heading = f"{SEPARATION.symbol} ± U ({SEPARATION.unit})"
+            columns[heading] = lambda line: _number(
+                line.separation_m, line.separation_u_m, SEPARATION
+            )
+        heading = f"{SPEED.symbol} ± U ({SPEED.unit})"
+        columns[heading] = lambda line: _number(line.speed_m_s, line.speed_u_m_s, SPEED)
     columns["t (s)"] = lambda line: fixed(line.fall_time_s, 5)
     columns["model"] = lambda line: line.model
     cells = {name: [tell(line) for line in lines] for name, tell in columns.items()}
@@ -65,7 +67,7 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     notes = group_notes(lines)
     if protocol.surface is not None:
         free = dict.fromkeys(fixed(line.free_fall_speed_m_s, 4) for line in lines)
-        notes.insert(0, f"free fall: {end.symbol} = {' or '.join(free)} {end.unit}")
+        notes.insert(0, f"free fall: {SPEED.symbol} = {' or '.join(free)} {SPEED.unit}")
     words = {place for place, row in enumerate(rows) if row[0] in {"strikes", "model"}}
     return [*text_table([*zip(*rows, strict=True)], left=words), *notes]
 

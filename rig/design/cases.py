@@ -14,7 +14,7 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
 from rig.analysis.square_root import EquationRows
 from rig.analysis.unknowns import SharedUnknowns
-from rig.estimate.hypotheses import alphas
+from rig.estimate.hypotheses import model_alpha
 from rig.protocol.contact import at_contact
 from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
@@ -124,16 +124,14 @@ def predicted(protocol: Protocol, run: Run, components: Components) -> tuple[Dro
         With heights counted from the contact point.
     """
     records = chain_records(protocol, run, Drop(run.number, 1, 1, ()), 1.0)
-    each_rod = np.zeros(1)  # a free chain leaves α alone
+    alpha = 0.0  # a free chain leaves α alone
     if run.impact is not None:
-        each_rod, _ = alphas(protocol, protocol.chains[run.impact].chain, run.incline_deg, {})
-    guess = Guess(RELEASE_S, protocol.drop.value, float(each_rod.mean()))
+        chain = protocol.chains[run.impact].chain
+        alpha, _ = model_alpha(protocol, chain, run.incline_deg, {})
+    guess = Guess(RELEASE_S, protocol.drop.value, alpha)
     guesses: dict[str, Guess] = {record.role: guess for record in records}
     model = DropModel(protocol, records, guesses, CLOCK_U, components)
-    x = np.zeros(len(model.unknowns))
-    if "impulses" in model.unknowns:
-        x[model.unknowns["impulses"]] = each_rod - each_rod.mean()
-    return model, x
+    return model, np.zeros(len(model.unknowns))
 
 
 def perfect(model: DropModel, x: Array) -> list[ChainRecord]:

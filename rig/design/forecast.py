@@ -12,7 +12,7 @@ from rig.analysis.square_root import EquationRows, eliminate, square_root, trian
 from rig.analysis.summary import by_case
 from rig.design.cases import BEAM
 from rig.estimate.coefficients import KNOWN, coefficients_of, held_back
-from rig.estimate.hypotheses import alphas
+from rig.estimate.hypotheses import model_alpha
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -177,9 +177,9 @@ def _coefficients(protocol: Protocol, layout: GateLayout) -> tuple[dict[str, flo
     size, count = layout.size, len(values)
     behind, rows = size + np.arange(count), []
     for case, slopes, struck in tied:
-        _, by_value = alphas(protocol, *struck, values)
+        _, by_value = model_alpha(protocol, *struck, values)
         # α, the first of what is left, follows from the coefficients.
-        by_values = np.outer(slopes[:, 0], by_value.mean(axis=0))
+        by_values = np.outer(slopes[:, 0], by_value)
         observed = np.column_stack([slopes[:, 1:], by_values])
         rows.append(_of_all_runs(case, observed, np.append(layout.places(case), behind)))
     nothing = np.zeros(size + count)

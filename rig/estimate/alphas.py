@@ -120,9 +120,7 @@ def single_alphas(
     if problem is not None and outcome is not None:
         supposed = by_model(protocol, problem.parameters)
         values = outcome.values[: len(problem.parameters)]
-        model = {
-            case(form): float(supposed.alphas(form, values)[0].mean()) for form in problem.forms
-        }
+        model = {case(form): float(supposed.alphas(form, values)[0]) for form in problem.forms}
         if len(model) > len(problem.parameters) > len(problem.held) == 0:
             # With the contact where it is, so that both suppose the same but for α.
             open_ = fit(problem.forms, in_air(one_alpha(problem.forms, case)))

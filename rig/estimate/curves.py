@@ -14,16 +14,18 @@ from rig.analysis.fit import Fit
 from rig.analysis.joint_fit import JointFit, by_itself
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import Adjusted
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.measurands import SEPARATION
 from rig.model.fall import kicks
-from rig.model.motion import Motion
-from rig.model.rods import rod_impacts
-from rig.protocol.contact import as_struck, at_contact
+from rig.model.impact import impact_on
+from rig.predictions import air_of
+from rig.protocol.contact import at_contact, higher_contacts
 
 if TYPE_CHECKING:
     from rig.analysis.joint_step import JointDrop
+    from rig.analysis.trajectory import Trajectory
     from rig.arrays import Array
-    from rig.protocol.protocol import Protocol, Run
+    from rig.protocol.protocol import Protocol, Run, Side
 
 POINTS = 120
 
@@ -102,12 +104,12 @@ def drop_curves(
     heights = np.linspace(hanging - 1e-6, 0.0, POINTS)
     lasted = adjusted.hit - adjusted.release("impact")
     times = np.linspace(0.0, float(lasted.value), POINTS)
-    motion, separation = motion_by_model(protocol, run), None
+    struck, separation = model_fall(protocol, run, "impact"), None
     if "free" in drop.model.records:
-        moments = np.minimum(times, motion.end_s).tolist()
-        by_model = np.array([motion.at(moment).separation_m for moment in moments])
+        free, moments = model_fall(protocol, run, "free"), np.minimum(times, struck.time[-1])
+        by_model = free.heights(moments)[0] - struck.heights(moments)[0]
         separation = with_band(_separations(adjusted, times), by_model)
-    squares = with_band(_squares(adjusted, heights), _squares_by_model(motion, heights))
+    squares = with_band(_squares(adjusted, heights), struck.passages(heights)[1] ** 2)
     return DropCurves(run, heights, squares, times, separation)
 
 
@@ -131,25 +133,29 @@ def _separations(drop: Adjusted, times: Array) -> Dual:
     return free - struck
 
 
-def motion_by_model(protocol: Protocol, run: Run) -> Motion:
-    """Return the model's fall of a run that strikes."""
-    assert run.impact is not None
+def model_fall(protocol: Protocol, run: Run, role: Side) -> Trajectory:
+    """Return the model's fall of a chain's top rod in the stated air, from its release at time 0.
+
+    Its heights are above the contact point. Without a free chain, the one that strikes falls in its
+    place.
+
+    Raises
+    ------
+    DomainError
+        Where Eq. 13 has no finite solution at the run's incline.
+    """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
-    assert protocol.surface is not None
-    chain, drop = as_struck(protocol, run.incline_deg, run.impact)
-    impacts = rod_impacts(protocol.surface, chain, run.incline_deg)
-    gains = kicks(chain, [impact.alpha for impact in impacts], [impact.gamma for impact in impacts])
-    start = protocol.initial_speed.value
-    return Motion(chain, gains, drop.value, protocol.gravity.value, start)
-
-
-def _squares_by_model(motion: Motion, heights: Array) -> Array:
-    """V² by the model when the top rod is at some heights above the contact point."""
-    # Of the chain as it strikes: where rods differ, it is not as long as it hangs.
-    begin, fallen = motion.at(0.0), motion.chain.length - heights
-    before = np.array([-begin.height_m, *motion.chain.heights[:-1]])
-    after = np.array([begin.speed_m_s, *(hit.speed_after for hit in motion.hits[:-1])])
-    leg = np.maximum(np.searchsorted(before, fallen, side="left") - 1, 0)
-    gained = 2.0 * motion.gravity * (fallen - before[leg])
-    squares: Array = np.maximum(after[leg] ** 2 + gained, 0.0)
-    return squares
+    name = run.impact if role == "impact" else run.free or run.impact
+    assert name is not None
+    rods, gravity = protocol.chains[name], protocol.gravity.value
+    chain, kappas = rods.chain, air_of(protocol, name) or [0.0] * rods.chain.rods
+    start = protocol.drop.value + chain.length
+    if role == "free" or protocol.surface is None:
+        return free_trajectory(0.0, start, gravity, kappas[0])
+    impact = impact_on(protocol.surface, chain, run.incline_deg)
+    gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
+    # Of the top rod, as each touches: one that touches higher does so earlier.
+    touching = chain.length - np.array(chain.heights)
+    touching += higher_contacts(protocol, run.incline_deg, rods)
+    path = np.array(gains), np.ones(chain.rods), -touching
+    return struck_trajectory(0.0, start, gravity, *path, 1.0, np.array([*kappas, kappas[-1]]))

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rig.analysis.air import prior_air
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
 from rig.estimate.hypotheses import END, one_alpha, with_end_correction, with_nuisances
 from rig.estimate.hypothesis_fit import fit
-from rig.model.rods import rod_impacts
+from rig.model.impact import impact_on
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,7 +35,7 @@ class EndCorrection:
     chi2
         By hypothesis: ``open``, ``eq10`` and ``without``.
     gamma_eq10
-        γ by Eq. 10 where it is the same for all rods.
+        γ by Eq. 10 where it is the same for all chains.
     """
 
     scale: Measured
@@ -90,7 +88,7 @@ class EndCorrection:
             "p_without": self._p("without"),
             "p_eq10": self._p("eq10"),
         }
-        if (gamma := self.gamma_eq10) is not None:  # the same for all rods
+        if (gamma := self.gamma_eq10) is not None:  # the same for all chains
             own = Measured(gamma * self.scale.value, gamma * self.scale.u)
             record |= {"gamma_eq10": gamma, "gamma": own.json()}
         return record | {"needed": self.is_needed} | attributes(self, "sentence")
@@ -109,10 +107,9 @@ def end_correction(protocol: Protocol, problem: CoefficientProblem) -> EndCorrec
         `None` where γ is given as 0.
     """
     assert protocol.surface is not None
-    impacts = {form.chain: rod_impacts(protocol.surface, form.chain, 0.0) for form in problem.forms}
-    gammas = {chain: np.array([rod.gamma for rod in rods]) for chain, rods in impacts.items()}
-    by_eq10 = {rod.gamma for rods in impacts.values() for rod in rods}
-    if by_eq10 == {0.0}:
+    chains = dict.fromkeys(form.chain for form in problem.forms)
+    gammas = {chain: impact_on(protocol.surface, chain, 0.0).gamma for chain in chains}
+    if (by_eq10 := {*gammas.values()}) == {0.0}:
         return None
     cases = one_alpha(problem.forms, lambda form: protocol.condition(form.run))
     inclines = with_nuisances(cases, problem.inclines, prior_air(protocol))

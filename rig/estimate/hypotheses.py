@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
-from rig.model.impact import ALPHA, with_coefficients
-from rig.model.rods import rod_impacts
+from rig.model.impact import ALPHA, impact_on, with_coefficients
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
 
-    AlphasAndSlopes = tuple[Array, Array]
+    AlphaAndSlopes = tuple[float, Array]
 
 END, AIR = "end_correction", "drag"
 CONTACT_U = 1e-3
@@ -38,19 +37,19 @@ def by_model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
     names = [parameter.name for parameter in parameters]
 
     @cache
-    def alphas_at(chain: Chain, incline_deg: float, values: tuple[float, ...]) -> AlphasAndSlopes:
-        return alphas(protocol, chain, incline_deg, dict(zip(names, values, strict=True)))
+    def alpha_at(chain: Chain, incline_deg: float, values: tuple[float, ...]) -> AlphaAndSlopes:
+        return model_alpha(protocol, chain, incline_deg, dict(zip(names, values, strict=True)))
 
     return Hypothesis(
         tuple(parameters),
-        lambda form, values: alphas_at(form.chain, form.run.incline_deg, tuple(values.tolist())),
+        lambda form, values: alpha_at(form.chain, form.run.incline_deg, tuple(values.tolist())),
     )
 
 
-def alphas(
+def model_alpha(
     protocol: Protocol, chain: Chain, incline_deg: float, values: Mapping[str, float]
-) -> AlphasAndSlopes:
-    """α of every rod by Eqs. 8 to 13, shape ``(rods,)``, with its derivatives by coefficients.
+) -> AlphaAndSlopes:
+    """α of all rods by Eqs. 8 to 13, and its derivatives by coefficients, shape ``(values,)``.
 
     Parameters
     ----------
@@ -60,60 +59,50 @@ def alphas(
     alpha, surface = given_alphas(protocol).get(chain, ""), protocol.surface
     assert surface is not None
 
-    def at(moved: Mapping[str, float]) -> Array:
+    def at(moved: Mapping[str, float]) -> float:
         # Of given α's only the chain's own.
         own = {name: value for name, value in moved.items() if not name.startswith(ALPHA)}
         own |= {ALPHA: moved[alpha]} if alpha in moved else {}
-        struck = with_coefficients(surface, chain, own)
-        return np.array([impact.alpha for impact in rod_impacts(*struck, incline_deg)])
+        return impact_on(*with_coefficients(surface, chain, own), incline_deg).alpha
 
-    slopes = np.zeros((chain.rods, len(values)))
-    for n, (name, value) in enumerate(values.items()):
-        low, high = (at({**values, name: value + step}) for step in (-_STEP, _STEP))
-        slopes[:, n] = (high - low) / (2.0 * _STEP)
-    return at(values), slopes
+    slopes = [
+        (at({**values, name: value + _STEP}) - at({**values, name: value - _STEP})) / (2.0 * _STEP)
+        for name, value in values.items()
+    ]
+    return at(values), np.array(slopes)
 
 
-def one_alpha(
-    forms: Sequence[QuadraticForm],
-    key: Callable[[QuadraticForm], object],
-    *,
-    each_rod: bool = False,
-) -> Hypothesis:
-    """Suppose one α for all drops that share a key: an incline, or a run.
+def one_alpha(forms: Sequence[QuadraticForm], key: Callable[[QuadraticForm], object]) -> Hypothesis:
+    """Suppose one α for all drops that share a key: an incline, or a run."""
+    starts: dict[object, list[Array]] = {}
+    for form in forms:
+        starts.setdefault(key(form), []).append(form.alphas)
+    places = list(starts)
+    return Hypothesis(
+        tuple(Parameter(f"α {of}", float(np.mean(alphas))) for of, alphas in starts.items()),
+        lambda form, values: (values[n := places.index(key(form))], np.eye(values.size)[n]),
+    )
 
-    `each_rod`: one for each rod but the top one, whose impact pulls on nothing.
-    """
-    parameters: list[Parameter] = []
-    shares: dict[object, tuple[int, Array]] = {}
-    for group in dict.fromkeys(map(key, forms)):
-        begin = np.mean([form.alphas for form in forms if key(form) == group], axis=0)
-        share = np.eye(begin.size)[:, :-1] if each_rod else np.ones((begin.size, 1))
-        shares[group] = len(parameters), share
-        starts = (begin @ share / share.sum(axis=0)).tolist()
-        parameters += [Parameter(f"α {group}", start) for start in starts]
 
-    def alphas(form: QuadraticForm, values: Array) -> AlphasAndSlopes:
-        first, share = shares[key(form)]
-        slopes = np.zeros((form.alphas.size, values.size))
-        slopes[:, first : first + share.shape[1]] = share
+def open_alphas(forms: Sequence[QuadraticForm]) -> Hypothesis:
+    """Suppose an α for each rod but the top one, whose impact pulls on nothing."""
+    starts = np.mean([form.alphas for form in forms], axis=0)[:-1].tolist()
+
+    def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
+        slopes = np.eye(form.alphas.size, values.size)
         return slopes @ values, slopes
 
-    return Hypothesis(tuple(parameters), alphas)
+    return Hypothesis(
+        tuple(Parameter(f"α {rod}", start) for rod, start in enumerate(starts)), alphas
+    )
 
 
 def with_end_correction(
-    inner: Hypothesis, gammas: Mapping[Chain, Array], scale: float | None
+    inner: Hypothesis, gammas: Mapping[Chain, float], scale: float | None
 ) -> Hypothesis:
-    """Suppose γ to be exactly so many times that of Eq. 10, or (`None`) leave it open.
+    """Suppose γ to be exactly so many times a chain's of Eq. 10, or (`None`) leave it open."""
 
-    Parameters
-    ----------
-    gammas
-        γ of Eq. 10 for every rod of a chain, shape ``(rods,)``.
-    """
-
-    def alphas(form: QuadraticForm, values: Array) -> AlphasAndSlopes:
+    def alphas(form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         target, slopes = inner.alphas(form, values[:-1])
         # m/(M + γm) is here r/(1 + (γ − γ₀)r), with r = m/(M + γ₀m) as in the form.
         change = gammas[form.chain] * form.ratios

@@ -61,11 +61,11 @@ class Hypothesis(NamedTuple):
         Of all that is supposed.
     alphas
         From a drop and those parameters that are no extra, α of every rod, shape ``(rods,)``, with
-        the derivatives, shape ``(rods, parameters)``.
+        the derivatives, shape ``(rods, parameters)``; or without the rods, where it is one α.
     """
 
     parameters: tuple[Parameter, ...]
-    alphas: Callable[[QuadraticForm, Array], tuple[Array, Array]]
+    alphas: Callable[[QuadraticForm, Array], tuple[float | Array, Array]]
 
     def targets(self, form: QuadraticForm, values: Array) -> tuple[Array, Array]:
         """Return α of every rod and the extras, shape ``(n,)``, with their derivatives."""

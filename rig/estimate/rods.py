@@ -11,7 +11,7 @@ from rig.analysis.air import prior_air
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
-from rig.estimate.hypotheses import one_alpha, with_nuisances
+from rig.estimate.hypotheses import one_alpha, open_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import LikelihoodRatio, fit
 
 if TYPE_CHECKING:
@@ -138,9 +138,7 @@ def _impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> Impulses:
     condition, air = protocol.condition(forms[0].run), prior_air(protocol)
     single, open_fit = (
         fit(forms, with_nuisances(alphas, [condition.incline_deg], air))
-        for alphas in (
-            one_alpha(forms, lambda _: "one", each_rod=each_rod) for each_rod in (False, True)
-        )
+        for alphas in (one_alpha(forms, lambda _: "one"), open_alphas(forms))
     )
     rods = forms[0].alphas.size - 1
     weight = forms[0].ratios[:rods] * np.mean([form.arrivals[:rods] for form in forms], axis=0)

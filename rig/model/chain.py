@@ -8,8 +8,6 @@ from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rig.units import Quantity
 
 XI = 4.0
@@ -30,8 +28,6 @@ class Chain:
         Height of each rod's middle above the middle of the bottom rod, m; strictly rising from 0.
     inertia
         ξ = 4I/(mL²), the dimensionless rotational inertia of every rod (Eqs. 8 and 10).
-    inertias
-        The same rod by rod, bottom up, where rods differ; it then replaces `inertia`.
     inertia_z
         ξ about the vertical axis where it is not the same as about the horizontal one (Eq. 13).
     alpha, gamma
@@ -42,7 +38,6 @@ class Chain:
     masses: tuple[float, ...]
     heights: tuple[float, ...]
     inertia: float = UNIFORM_ROD_INERTIA
-    inertias: tuple[float, ...] | None = None
     inertia_z: float | None = None
     alpha: Quantity | None = None
     gamma: float | None = None
@@ -64,10 +59,6 @@ class Chain:
         M is the mass above the rod that struck and m its own. M is summed from the top, so that a
         light end on a heavy chain keeps its digits.
         """
-        pairs = zip(pairwise(self.heights), sums_above(self.masses), self.masses, strict=False)
+        above = [*accumulate(self.masses[:0:-1])][::-1]
+        pairs = zip(pairwise(self.heights), above, self.masses, strict=False)
         return tuple((high - low, rest / mass) for (low, high), rest, mass in pairs)
-
-
-def sums_above(values: Sequence[float]) -> list[float]:
-    """Sum, for each rod but the top one, the values of all rods above it."""
-    return [*accumulate(values[:0:-1])][::-1]

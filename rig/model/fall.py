@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import repeat
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
@@ -53,7 +52,7 @@ class Hit:
     speed_after: float
 
 
-def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float]) -> list[float]:
+def kicks(chain: Chain, alphas: Sequence[float], gamma: float) -> list[float]:
     """Relative speed gain ΔV/V of the chain at each rod's impact, from Eq. 9.
 
     ΔV = J/M with J = α m V / (1 + γ m/M), so ΔV/V = α / (γ + M/m).
@@ -63,7 +62,7 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float])
     alphas
         α of each rod, bottom up, shape ``(rods,)``.
     gamma
-        γ of all rods, or of each.
+        γ of Eq. 10.
 
     Returns
     -------
@@ -71,10 +70,9 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float | Sequence[float])
         Shape ``(rods,)``; the top rod's is 0, there being nothing above it to pull on. Infinite
         where the mass above is nothing beside the rod's own, and γ = 0.
     """
-    gammas = repeat(gamma) if isinstance(gamma, float | int) else gamma
     gains = [
-        alpha / (g + ratio) if g + ratio else math.inf
-        for alpha, g, (_, ratio) in zip(alphas, gammas, chain.legs, strict=False)
+        alpha / (gamma + ratio) if gamma + ratio else math.inf
+        for alpha, (_, ratio) in zip(alphas, chain.legs, strict=False)
     ]
     return [*gains, 0.0]
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, fall, free_fall, kicks
+from rig.model.fall import Fall, fall, free_leg, kicks
 from rig.model.impact import MU, impact_on, stated_coefficients, with_coefficients
+from rig.model.prediction import PredictedIncline
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -20,40 +20,6 @@ if TYPE_CHECKING:
 AT_REST = Quantity(0.0)
 LEAST = {MU: 0.0}
 """Coefficients that cannot be below a value."""
-_ENDS = {"separation": "separation_m", "speed": "speed_m_s", "time": "time_s"}
-"""Results of a prediction, and what a fall's end calls them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Prediction:
-    """What the discrete model says of one scene.
-
-    Attributes
-    ----------
-    model
-        ``discrete`` and what α rests on; ``drag`` where there is air.
-    alpha, gamma, separation, speed, time
-        `None` where the model has no answer; `notes` says why.
-    separation_u, speed_u, time_u
-        Standard uncertainties that follow from those of β, μ (or α), drop, gravity, initial speed
-        and drag; `None` also where Eq. 13 is singular within the uncertainty of μ.
-    in_domain
-        False when any note says that the case leaves the model's domain.
-    """
-
-    incline_deg: float
-    model: str
-    free_fall_speed: float
-    in_domain: bool
-    notes: tuple[str, ...]
-    alpha: float | None = None
-    gamma: float | None = None
-    separation: float | None = None
-    speed: float | None = None
-    time: float | None = None
-    separation_u: float | None = None
-    speed_u: float | None = None
-    time_u: float | None = None
 
 
 def predict(
@@ -66,7 +32,7 @@ def predict(
     initial_speed: Quantity = AT_REST,
     kappas: Sequence[float] = (),
     drag_u: float = 0.0,
-) -> Prediction:
+) -> PredictedIncline:
     """Predict Δz, V and t at one incline by the discrete model (Eqs. 8 to 13).
 
     Parameters
@@ -84,18 +50,25 @@ def predict(
     Uncertainties are first order: each input is moved by ± its standard uncertainty, or, where
     that would leave what is possible, by less and to one side; the slope counts either way.
     """
-    start, pull = initial_speed.value, gravity.value
+    start, pull, height = initial_speed.value, gravity.value, max(0.0, drop.value + chain.length)
     if kappas:
         from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
 
-        free = drag_leg(drop.value + chain.length, start, pull, kappas[0])
+        free = drag_leg(height, start, pull, kappas[0])
     else:
-        free = free_fall(chain, drop.value, pull, start)
+        free = free_leg(height, start, pull)
     air = ", drag" if kappas else ""
     try:
+        _check_order(chain, drop.value)
         impact = impact_on(surface, chain, incline_deg)
     except DomainError as error:
-        return Prediction(incline_deg, f"discrete{air}", free[0], False, (error.message,))
+        return PredictedIncline(
+            incline_deg=incline_deg,
+            model=f"discrete{air}",
+            free_fall_speed_m_s=free[0],
+            in_domain=False,
+            notes=[error.message],
+        )
 
     def fall_with(
         alpha: float = impact.alpha,
@@ -109,9 +82,8 @@ def predict(
         gains = kicks(chain, [alpha] * chain.rods, impact.gamma)
         return drag_fall(chain, gains, [drag * kappa for kappa in kappas], drop, gravity, speed)
 
-    centre = fall_with()
-    notes = impact.notes
-    uncertainties: dict[str, float] = {}
+    centre, notes = fall_with(), [*impact.notes]
+    u: dict[str, float] = {}
     moves = {
         "alpha": _moved_alphas(chain, surface, incline_deg),
         "drop": steps(drop, least=0.0),
@@ -127,24 +99,38 @@ def predict(
             for low, high, weight in ends
         ]
     except DomainError as error:
-        notes = (*notes, f"no uncertainty: within that of μ, {error.message}")
+        notes.append(f"no uncertainty: within that of μ, {error.message}")
     else:
-        for name, key in _ENDS.items():
-            slopes = ((getattr(b, key) - getattr(a, key)) * weight for a, b, weight in spread)
-            uncertainties[f"{name}_u"] = math.hypot(*slopes)
+        for name in ("separation_m", "speed_m_s", "time_s"):
+            slopes = ((getattr(b, name) - getattr(a, name)) * weight for a, b, weight in spread)
+            u[name] = math.hypot(*slopes)
     if impact.basis == "pile":
-        notes = (*notes, "rods gather on a pile: taken as level with the pile's restitution")
-    return Prediction(
-        incline_deg,
-        ("discrete" if impact.basis in {"surface", "level"} else f"discrete, {impact.basis}") + air,
-        free[0],
-        in_domain=not impact.notes,
-        notes=notes,
+        notes.append("rods gather on a pile: taken as level with the pile's restitution")
+    basis = "" if impact.basis in {"surface", "level"} else f", {impact.basis}"
+    return PredictedIncline(
+        incline_deg=incline_deg,
+        model=f"discrete{basis}{air}",
         alpha=impact.alpha,
         gamma=impact.gamma,
-        **{name: getattr(centre, key) for name, key in _ENDS.items()},
-        **uncertainties,
+        separation_m=centre.separation_m,
+        separation_u_m=u.get("separation_m"),
+        speed_m_s=centre.speed_m_s,
+        speed_u_m_s=u.get("speed_m_s"),
+        fall_time_s=centre.time_s,
+        fall_time_u_s=u.get("time_s"),
+        free_fall_speed_m_s=free[0],
+        in_domain=not impact.notes,
+        notes=notes,
     )
+
+
+def _check_order(chain: Chain, drop_m: float) -> None:
+    """Make sure that rods touch the surface after the release, and from the bottom up."""
+    if min([drop_m, *(gap for gap, _ in chain.legs)]) < 0.0:
+        raise DomainError(
+            "a rod touches the surface before the release or before a lower rod",
+            "release the chain higher, or make the surface less steep",
+        )
 
 
 def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quantity:

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rig.analysis.result import GOOD
-from rig.estimate.curves import motion_by_model
+from rig.estimate.curves import model_fall
 from rig.measurands import FALL_TIME, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in
+from rig.protocol.contact import at_contact
 from rig.report.figure import chart
 from rig.report.numbers import with_unit
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
     from rig.analysis.result import DropResult
     from rig.arrays import Array
-    from rig.model.motion import Motion
     from rig.protocol.protocol import Gates, Protocol, Side
     from rig.records import Drop
     from rig.report.figure import Chart
@@ -33,7 +33,7 @@ _MOMENTS = 200
 
 
 class Passages(NamedTuple):
-    """Middles of shadows on one side, in order of time.
+    """Where a top rod or object was: of shadows their middles, in order of time.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ def passages(
     pull = result.quantities[row.name].value if row else protocol.gravity.value
     begun: dict[tuple[int, int], float] = {}
     rows = []
-    for number, edge in enumerate(drop.edges if name is not None else ()):
+    for number, edge in enumerate(drop.edges):
         rod = result.matches.get(number)
         if rod is None or edge.channel not in gates:
             continue
@@ -93,40 +93,46 @@ def fall_figures(
     protocol: Protocol, drop: Drop, hz: float | Fraction, result: DropResult
 ) -> Iterator[Chart]:
     """Yield the pictures of one good drop: its fall first, then what shows the impacts."""
+    run, values, head = result.run, result.quantities, f"Run {result.run.number}"
+    protocol = at_contact(protocol, run.incline_deg, run.impact)
     if result.verdict not in GOOD or protocol.gates is None:
         return
     struck, free = (passages(protocol, drop, hz, result, side) for side in ("impact", "free"))
-    head, values = f"Run {result.run.number}", result.quantities
-    if result.run.impact is None:
+    if run.impact is None:
         if free.time.size > 2:
             yield chart("object", _object(protocol, protocol.gates, free, result), run=head)
         return
     if struck.time.size < 3 or not {FALL_TIME.name, SPEED.name} <= values.keys():
         return
-    head += f" at {result.run.incline_deg:g}°"
+    head += f" at {run.incline_deg:g}°"
     end = values[FALL_TIME.name].value
     released = struck.time[-1] + struck.height[-1] / values[SPEED.name].value - end
     time = struck.time - released
-    motion = motion_by_model(protocol, result.run)
-    curve = _model(motion, np.linspace(0.0, motion.end_s, _MOMENTS))
+    model, twin = (model_fall(protocol, run, role) for role in ("impact", "free"))
+    times = np.linspace(0.0, model.time[-1], _MOMENTS)
+    curve, moments = Passages(times, *model.heights(times)), np.clip(time, 0.0, times[-1])
+    name, points, expected = "height", struck.height, model.heights(moments)[0]
     u = 2.0 * np.hypot(protocol.gates.height_u, protocol.gates.datum_u)
     if free.time.size > 2 and RELEASE_SKEW.name in values:
-        half, skew = 0.5 * protocol.gravity.value, values[RELEASE_SKEW.name]
+        skew = values[RELEASE_SKEW.name]
         # The free chain's way, from all its passages, at the moments of the striking one's.
-        since = free.time - released - skew.value
-        points = np.mean(free.height + half * since**2) - half * time**2 - struck.height
-        name, u = "separation", np.hypot(u, struck.speed * skew.expanded)
+        higher = np.mean(free.height - twin.heights(free.time - released - skew.value)[0])
+        points = twin.heights(time)[0] + higher - struck.height
+        name, expected = "separation", twin.heights(moments)[0] - expected
+        u = np.hypot(u, struck.speed * skew.expanded)
     else:
-        name, points, u = "height", struck.height, np.hypot(u, 2.0 * protocol.drop.u)
-    top = curve["height"][0]
+        u = np.hypot(u, 2.0 * protocol.drop.u)
+    levels = np.linspace(curve.height[0], 0.0, _MOMENTS)
     sources = {
         "curve": curve,
-        "free_fall": [(0.0, top), (2.0 * motion.gravity * top, 0.0)],
+        "separation": twin.heights(times)[0] - curve.height,
+        "levels": levels,
+        "free_fall": twin.passages(levels)[1] ** 2,
         "free": free,
         "struck": struck,
         "time": time,
         "points": points,
-        "errors": _errors(points, _model(motion, time)[name], u),
+        "errors": _errors(points, expected, u),
         "end": [(end, values.get(SEPARATION.name))],
     }
     yield chart(name, sources, run=head)
@@ -162,14 +168,3 @@ def _errors(values: Array, expected: Array, u: Array | float) -> Array:
     """Return what is left over in units of U: nothing finite where nothing has a U."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray((values - expected) / u)
-
-
-def _model(motion: Motion, times: Array) -> dict[str, Array]:
-    """Return where the model has the top rod, m, its squared speed, and Δz, m, at each time."""
-    instants = [motion.at(min(max(time, 0.0), motion.end_s)) for time in times.tolist()]
-    return {
-        "time": times,
-        "height": np.array([at.height_m for at in instants]) + motion.chain.length,
-        "squared_speed": np.array([at.speed_m_s for at in instants]) ** 2,
-        "separation": np.array([at.separation_m for at in instants]),
-    }

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.trajectory import free_trajectory, struck_trajectory
-from rig.model.fall import kicks
-from rig.predictions import air_of, predict_incline
+from rig.errors import DomainError
+from rig.estimate.curves import model_fall
 from rig.protocol.contact import at_contact
 from rig.report.falls import passages
 
@@ -107,7 +107,10 @@ def motions(
     for role, name in sides:
         if name is None or gates is None or not gates.on(role):
             continue
-        rods, model = protocol.chains[name], model_fall(protocol, run, role)
+        rods, model = protocol.chains[name], None
+        with suppress(DomainError):
+            model = model_fall(protocol, run, role)
+            model = replace(model, height=model.height - rods.chain.length)
         times, heights, delay, end = np.empty(0), np.empty(0), 0.0, 0.0
         if recorded is not None:
             seen = passages(protocol, *recorded, role)
@@ -122,30 +125,3 @@ def motions(
             ChainFall(role, rods, times, heights, model, delay, max([end, *times.tolist()]))
         )
     return tuple(falls)
-
-
-def model_fall(protocol: Protocol, run: Run, role: str) -> Trajectory | None:
-    """Take the prediction's fall of a chain, moment by moment; `None` outside its domain.
-
-    Parameters
-    ----------
-    role
-        ``impact`` or ``free``.
-    rods
-        What falls.
-    """
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
-    start, gravity = protocol.drop.value, protocol.gravity.value
-    # A chain that strikes alone is set beside its own free fall.
-    name = run.impact if role == "impact" else run.free or run.impact
-    assert name is not None
-    kappas = air_of(protocol, name) or [0.0] * protocol.chains[name].chain.rods
-    if role == "free" or protocol.surface is None:
-        return free_trajectory(0.0, start, gravity, kappas[0])
-    expected = predict_incline(protocol, run.incline_deg, name)
-    if expected.alpha is None or expected.gamma is None:
-        return None
-    chain = protocol.chains[name].chain
-    gains = np.array(kicks(chain, [expected.alpha] * chain.rods, expected.gamma))
-    places, air = np.array(chain.heights), np.array([*kappas, kappas[-1]])
-    return struck_trajectory(0.0, start, gravity, gains, np.ones(places.size), places, 1.0, air)

@@ -124,9 +124,12 @@ def test_curves_are_the_model_s_and_the_pile_s_edge_is_seen():
     chain = UNIFORM.chains["A"].chain
     for n in range(0, len(inclines), 7):
         one = predict(chain, UNIFORM.surface, inclines[n], UNIFORM.drop, UNIFORM.gravity)
-        assert (curves["separation_m"][n], curves["speed_m_s"][n]) == (one.separation, one.speed)
-        assert curves["separation_U95_m"][n] == pytest.approx(1.959964 * one.separation_u, rel=2e-6)
-        assert curves["speed_U95_m_s"][n] == pytest.approx(1.959964 * one.speed_u, rel=2e-6)
+        for name, u95, u in (
+            ("separation_m", "separation_U95_m", one.separation_u_m),
+            ("speed_m_s", "speed_U95_m_s", one.speed_u_m_s),
+        ):
+            assert curves[name][n] == getattr(one, name)
+            assert curves[u95][n] == pytest.approx(1.959964 * u, rel=2e-6)
     segments = dict(zip(inclines, curves["segments"], strict=True))
     assert segments[30.0] == "surface"
     assert {segment for incline, segment in segments.items() if incline < 30.0} == {"pile"}

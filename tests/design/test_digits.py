@@ -11,7 +11,7 @@ import pytest
 from rig.analysis.components import stated
 from rig.design.cases import BEAM, cases
 from rig.design.forecast import GateLayout, forecast
-from rig.estimate.hypotheses import alphas
+from rig.estimate.hypotheses import model_alpha
 from rig.protocol import reader
 from rig.protocol.protocol import Priors, Protocol
 from rig.units import Quantity
@@ -121,7 +121,7 @@ def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
                 rows[-1][np.append(place, beam)[block.columns]] = slopes
     now = {"restitution": surface.restitution.value, "friction": surface.friction.value}
     chain = protocol.chains["A"].chain
-    ties = [alphas(protocol, chain, case.run.incline_deg, now)[1].mean(axis=0) for case in kinds]
+    ties = [model_alpha(protocol, chain, case.run.incline_deg, now)[1] for case in kinds]
     with localcontext(prec=60):
         slopes = exact(np.array(rows))
         u = [float(x.sqrt()) for x in variances(slopes, exact(np.array(gradients)))]

@@ -215,11 +215,13 @@ def test_air_that_the_protocol_states_counts_once(u):
         assert abs(line["alpha"]["value"] - truth) < 4 * line["alpha"]["u"]
 
 
-def test_the_models_curve_ends_at_the_prediction_where_rods_touch_higher_than_the_top_one():
-    protocol, run = BOARD_GRADED, first(1, BOARD_GRADED, (40.0,))
-    (curve,) = estimate(protocol, dropped(protocol, run)).json()["curves"]
-    speed = predict_incline(protocol, 40.0, "A").speed
-    assert curve["speed2_m2_s2_model"][-1] == pytest.approx(speed**2)
+@pytest.mark.parametrize("air", ["", "drag: {terminal_speed: 15 m/s}\n"], ids=["none", "air"])
+def test_the_models_curves_end_at_the_prediction_where_rods_touch_higher_than_the_top_one(air):
+    protocol = parse(BOARD_GRADED.text + air)
+    (curve,) = estimate(protocol, dropped(protocol, first(1, protocol, (40.0,)))).json()["curves"]
+    expected = predict_incline(protocol, 40.0, "A", "B")
+    assert curve["speed2_m2_s2_model"][-1] == pytest.approx(expected.speed_m_s**2)
+    assert curve["separation_m_model"][-1] == pytest.approx(expected.separation_m, rel=1e-3)
 
 
 def test_inclines_outside_the_model_tell_no_coefficient():

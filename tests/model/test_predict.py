@@ -50,16 +50,16 @@ def test_each_uncertainty_is_slope_times_input(name, incline):
     u = 1e-5  # so small that curvature is below 1e-6 of the slope
     found = with_u(incline, **{name: u})
     separation, speed = slopes(name, incline)
-    assert found.separation_u == pytest.approx(abs(separation) * u, rel=1e-6, abs=0)
-    assert found.speed_u == pytest.approx(abs(speed) * u, rel=1e-6, abs=0)
+    assert found.separation_u_m == pytest.approx(abs(separation) * u, rel=1e-6, abs=0)
+    assert found.speed_u_m_s == pytest.approx(abs(speed) * u, rel=1e-6, abs=0)
 
 
 def test_uncertainties_add_in_quadrature():
     u = {"beta": 0.05, "mu": 0.02, "drop": 0.002, "gravity": 0.01}
     parts = [with_u(**{name: value}) for name, value in u.items()]
     whole = with_u(**u)
-    assert whole.separation_u == pytest.approx(math.hypot(*(p.separation_u for p in parts)))
-    assert whole.speed_u == pytest.approx(math.hypot(*(p.speed_u for p in parts)))
+    assert whole.separation_u_m == pytest.approx(math.hypot(*(p.separation_u_m for p in parts)))
+    assert whole.speed_u_m_s == pytest.approx(math.hypot(*(p.speed_u_m_s for p in parts)))
 
 
 def test_a_small_uncertain_speed_and_little_air_count():
@@ -74,17 +74,17 @@ def test_a_small_uncertain_speed_and_little_air_count():
 
     for found, value in ((pushed, 0.1), (held, 1.0)):
         u = 0.5 * value
-        moved = abs(found(value + u).speed - found(value - u).speed) / 2
+        moved = abs(found(value + u).speed_m_s - found(value - u).speed_m_s) / 2
         assert moved > 0.0
-        assert found(value, u).speed_u == pytest.approx(moved, rel=1e-9)
+        assert found(value, u).speed_u_m_s == pytest.approx(moved, rel=1e-9)
 
 
 def test_gravity_that_may_be_nearly_nothing_is_halved_and_no_less():
     g, u = CENTRE["gravity"], 0.9 * CENTRE["gravity"]
     found = with_u(gravity=u)
     high, low = math.sqrt((g + u) / g), math.sqrt(0.5)
-    wanted = found.speed * (high - low) * u / (u + g / 2)
-    assert found.speed_u == pytest.approx(wanted, rel=1e-11)
+    wanted = found.speed_m_s * (high - low) * u / (u + g / 2)
+    assert found.speed_u_m_s == pytest.approx(wanted, rel=1e-11)
 
 
 @pytest.mark.parametrize("mu", [0.0, 1e-6])
@@ -97,7 +97,7 @@ def test_uncertainty_at_the_edge_of_what_friction_can_be_is_not_halved(mu):
         for x in (0.0, 1e-4)
     ]
     slope = (ends[1].separation_m - ends[0].separation_m) / 1e-4
-    assert found.separation_u == pytest.approx(slope * u, rel=1e-3)
+    assert found.separation_u_m == pytest.approx(slope * u, rel=1e-3)
 
 
 def test_uncertainty_of_a_given_alpha():
@@ -112,7 +112,7 @@ def test_uncertainty_of_a_given_alpha():
             for s in (-1, 1)
         )  # fmt: skip
         slope = (high.separation - low.separation) / (2 * step)
-    assert found.separation_u == pytest.approx(float(slope) * u, rel=1e-6)
+    assert found.separation_u_m == pytest.approx(float(slope) * u, rel=1e-6)
     assert (found.model, found.in_domain) == ("discrete, given", True)
 
 
@@ -120,9 +120,9 @@ def test_a_pile_has_its_own_restitution_and_no_friction():
     surface = Surface(Quantity(0.5, 0.3), Quantity(0.2, 0.1), Pile(30.0, Quantity(-0.37, 1e-5)))
     found = predict(CHAIN, surface, 10.0, DROP, GRAVITY)
     level = predict(CHAIN, Surface(Quantity(-0.37, 1e-5)), 0.0, DROP, GRAVITY)
-    assert (found.separation, found.speed) == (level.separation, level.speed)
-    assert (found.separation_u, found.speed_u) == (level.separation_u, level.speed_u)
-    assert found.separation_u > 0.0
+    assert (found.separation_m, found.speed_m_s) == (level.separation_m, level.speed_m_s)
+    assert (found.separation_u_m, found.speed_u_m_s) == (level.separation_u_m, level.speed_u_m_s)
+    assert found.separation_u_m > 0.0
     assert found.in_domain
     assert any("pile" in note for note in found.notes)
     assert (found.model, level.model) == ("discrete, pile", "discrete")
@@ -133,7 +133,7 @@ def test_outside_the_domain_a_prediction_says_so_and_is_still_given(alpha):
     found = predict(replace(CHAIN, alpha=Quantity(alpha)), SURFACE, 40.0, DROP, GRAVITY)
     assert not found.in_domain
     assert len(found.notes) == 1
-    assert math.copysign(1.0, found.separation) == math.copysign(1.0, alpha)
+    assert math.copysign(1.0, found.separation_m) == math.copysign(1.0, alpha)
 
 
 # ξ = 0.01 makes γ = 25.5; g(θ) ≤ 0 for tan θ between the roots of γ t² − (γ − 1) μ t + 1.
@@ -145,20 +145,22 @@ def test_where_equation_13_is_singular_there_is_no_prediction():
     found = predict(LIGHT_ENDED, Surface(Quantity(0.5), Quantity(1.0)), MIDDLE_DEG, DROP, GRAVITY)
     assert not found.in_domain
     assert "singular" in found.notes[0]
-    assert found.alpha is found.gamma is found.separation is found.speed is found.time is None
-    assert found.separation_u is found.speed_u is None
-    assert found.free_fall_speed == pytest.approx(math.sqrt(2 * 9.81 * 1.345), rel=1e-15)
+    assert found.alpha is found.gamma is found.separation_m is found.speed_m_s is None
+    assert found.fall_time_s is found.separation_u_m is found.speed_u_m_s is None
+    assert found.free_fall_speed_m_s == pytest.approx(math.sqrt(2 * 9.81 * 1.345), rel=1e-15)
 
 
 def test_friction_that_may_be_singular_still_allows_a_prediction():
     """g(θ) > 0 at μ = 0.4 but not at 0.4 + 0.05."""
     found = predict(LIGHT_ENDED, Surface(Quantity(0.5), Quantity(0.4, 0.05)), 15.0, DROP, GRAVITY)
-    assert found.separation > 0.0
+    assert found.separation_m > 0.0
 
 
 @pytest.mark.parametrize("incline", [0.0, 40.0, 80.0])
 def test_free_fall_speed_is_that_of_a_stone(incline):
     found = predict(CHAIN, SURFACE, incline, DROP, GRAVITY)
-    assert found.free_fall_speed == pytest.approx(math.sqrt(2 * 9.81 * (0.18 + 1.165)), rel=1e-15)
-    assert found.speed > found.free_fall_speed
+    assert found.free_fall_speed_m_s == pytest.approx(
+        math.sqrt(2 * 9.81 * (0.18 + 1.165)), rel=1e-15
+    )
+    assert found.speed_m_s > found.free_fall_speed_m_s
     assert found.incline_deg == incline

@@ -42,9 +42,9 @@ def test_read_from_the_protocol(incline, alpha, separation, speed, time):
     found = predict(chain, bare, incline, protocol.drop, protocol.gravity)
     assert found.in_domain
     assert found.alpha == exactly(alpha)
-    assert found.separation == exactly(separation)
-    assert found.speed == exactly(speed)
-    assert found.time == exactly(time)
+    assert found.separation_m == exactly(separation)
+    assert found.speed_m_s == exactly(speed)
+    assert found.fall_time_s == exactly(time)
 
 
 @pytest.mark.parametrize("incline", [0.0, 10.0, 20.0, 29.999])
@@ -52,16 +52,16 @@ def test_below_30_degrees_the_protocol_means_the_pile(incline):
     protocol, chain = scene("inclined-uniform")
     found = predict(chain, protocol.surface, incline, protocol.drop, protocol.gravity)
     assert found.alpha == exactly(PILE_ALPHA)
-    assert found.separation == exactly(PILE_SEPARATION)
-    assert found.speed == exactly(PILE_SPEED)
+    assert found.separation_m == exactly(PILE_SEPARATION)
+    assert found.speed_m_s == exactly(PILE_SPEED)
 
 
 def test_graded_chain_read_from_the_protocol():
     protocol, chain = scene("graded-chain")
     found = predict(chain, protocol.surface, 40, protocol.drop, protocol.gravity)
     assert found.in_domain
-    assert found.separation == exactly(GRADED_SEPARATION)
-    assert found.speed == exactly(GRADED_SPEED)
+    assert found.separation_m == exactly(GRADED_SEPARATION)
+    assert found.speed_m_s == exactly(GRADED_SPEED)
 
 
 @pytest.mark.parametrize(("incline", "alpha", "separation", "speed", "time"), TABLE)

@@ -1,4 +1,4 @@
-"""Rods that differ in inertia: against direct solutions of the paper's equations of motion.
+"""The pull of a rod on its chain: against direct solutions of the paper's equations of motion.
 
 The equations are solved in kilograms, metres and newton seconds for one drawn rod and chain, with
 every impulse and every change of motion an unknown of its own.
@@ -12,15 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
-from rig.errors import DomainError
-from rig.model.chain import Chain
 from rig.model.fall import kicks
-from rig.model.impact import alpha_inclined, alpha_level, gamma_finite, impact_on
-from rig.model.rods import rod_impacts
-from rig.model.surface import Pile, Surface
+from rig.model.impact import alpha_inclined, gamma_finite, impact_on
+from rig.model.surface import Surface
 from rig.units import Quantity
 from tests.examples import examples
-from tests.model.chains import close, decades, even_chain
+from tests.model.chains import chains, close, even_chain
 from tests.model.reference import printed_alpha
 
 TIGHT = 1e-13
@@ -29,8 +26,6 @@ INERTIAS = st.floats(0.02, 1.0)
 INCLINES = st.floats(12.0, 85.0)
 FRICTIONS = st.floats(0.0, 0.2)
 LENGTH, SPEED = 0.102, 5.3
-SURFACE = Surface(Quantity(0.5), Quantity(0.2))
-LEVEL_PILE = Surface(Quantity(0.5), Quantity(0.2), Pile(30.0, Quantity(-0.37)))
 
 
 def solve(rows):
@@ -39,7 +34,7 @@ def solve(rows):
         return mp.lu_solve(system, mp.matrix([row[-1] for row in rows]))
 
 
-def level_pull(beta, mass, inertia, masses_above, inertias_above):
+def level_pull(beta, mass, inertia, masses_above):
     """J from Eqs. 3, 4, S1 and S2, with the ends' velocities of S3 to S6.
 
     Unknowns: impulses F and N; changes of V_z, ω, V_z' and ω'; U_R and U_L. Upward is positive, and
@@ -49,9 +44,7 @@ def level_pull(beta, mass, inertia, masses_above, inertias_above):
         beta, v, half = mp.mpf(beta), mp.mpf(SPEED), mp.mpf(LENGTH) / 2
         m, total = mp.mpf(mass), mp.fsum(masses_above)
         i = mp.mpf(inertia) * m * half**2  # ξ = 4I/(mL²)
-        i_above = mp.fsum(
-            xi * mp.mpf(one) * half**2 for xi, one in zip(inertias_above, masses_above, strict=True)
-        )
+        i_above = mp.mpf(inertia) * total * half**2
         rows = [
             # F, N, ΔV_z, Δω, ΔV_z', Δω', U_R, U_L | right-hand side
             [1, 1, -m, 0, 0, 0, 0, 0, 0],  # Eq. 3
@@ -90,46 +83,20 @@ def inclined_pull(beta, mu, incline_deg, mass, inertia_y, inertia_z):
     return solve(rows)[2]
 
 
-def unlike_chains(most=6, mass_decades=2.0):
-    def build(masses, inertias):
-        size = len(masses)
-        heights = tuple(0.05 * k for k in range(size))
-        return Chain(tuple(masses), heights, inertias=tuple(inertias[:size]))
-
-    masses = st.lists(decades(-mass_decades, mass_decades), min_size=2, max_size=most)
-    return st.builds(build, masses, st.lists(INERTIAS, min_size=most, max_size=most))
-
-
 @examples(60)
-@given(unlike_chains(), RESTITUTIONS)
-def test_unlike_rods_solve_the_equations_of_motion_on_the_level(chain, beta):
-    found = rod_impacts(Surface(Quantity(beta), Quantity(0.2)), chain, 0.0)
-    assert len(found) == chain.rods
-    gains = kicks(chain, [one.alpha for one in found], [one.gamma for one in found])
-    for k, (gain, impact) in enumerate(zip(gains[:-1], found, strict=False)):
+@given(chains(most=6), RESTITUTIONS, INERTIAS)
+def test_rods_solve_the_equations_of_motion_on_the_level(chain, beta, xi):
+    impact = impact_on(Surface(Quantity(beta), Quantity(0.2)), replace(chain, inertia=xi), 0.0)
+    gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
+    for k, gain in enumerate(gains[:-1]):
         m, rest = chain.masses[k], chain.masses[k + 1 :]
-        pull = level_pull(beta, m, chain.inertias[k], rest, chain.inertias[k + 1 :])
+        wanted = float(level_pull(beta, m, xi, rest)) / SPEED
         # Eq. 9, and the gain that a fall is made of; α has the digits of 1 − ξ.
-        loose = TIGHT / max(1.0 - chain.inertias[k], 1e-3)
-        wanted = float(pull) / SPEED
+        loose = TIGHT / max(1.0 - xi, 1e-3)
         assert impact.alpha * m / (1.0 + impact.gamma * m / math.fsum(rest)) == pytest.approx(
             wanted, rel=loose, abs=1e-15 * m
         )
         assert gain * math.fsum(rest) == pytest.approx(wanted, rel=loose, abs=1e-15 * m)
-
-
-@examples(60)
-@given(unlike_chains(), RESTITUTIONS, FRICTIONS, INCLINES, st.one_of(st.none(), INERTIAS))
-def test_unlike_rods_solve_the_equations_of_motion_on_an_incline(
-    chain, beta, mu, incline, inertia_z
-):
-    """ξ_z is the rod's own ξ, or the chain's where it has one."""
-    chain = replace(chain, inertia_z=inertia_z)
-    found = rod_impacts(Surface(Quantity(beta), Quantity(mu)), chain, incline)
-    for mass, xi, impact in zip(chain.masses, chain.inertias, found, strict=True):
-        pull = inclined_pull(beta, mu, incline, mass, xi, inertia_z or xi)
-        loose = TIGHT / max(1.0 - xi, 1e-3)
-        assert impact.alpha == pytest.approx(float(pull) / mass / SPEED, rel=loose, abs=1e-15)
 
 
 @examples(80)
@@ -145,42 +112,3 @@ def test_unlike_axes_solve_the_equations_of_motion(beta, mu, incline, inertia, i
     assert close(impact.alpha, wanted, TIGHT)
     # γ is about the horizontal axis and knows nothing of ξ_z.
     assert impact.gamma == gamma_finite(inertia)
-
-
-@examples(60)
-@given(unlike_chains(), st.floats(0.02, 1.0), st.sampled_from([0.0, 20.0, 40.0, 80.0]))
-def test_like_rods_given_one_by_one_are_like_rods(chain, inertia, incline):
-    one_by_one = replace(chain, inertias=(inertia,) * chain.rods)
-    like = replace(chain, inertia=inertia, inertias=None)
-    for surface in (SURFACE, LEVEL_PILE):
-        wanted = impact_on(surface, like, incline)
-        assert rod_impacts(surface, like, incline) == [wanted] * chain.rods
-        for found in rod_impacts(surface, one_by_one, incline):
-            assert close(found.gamma, wanted.gamma, 1e-15 * chain.rods)
-            assert replace(found, gamma=wanted.gamma) == wanted
-
-
-def test_a_pile_is_level_and_softer_for_each_rod():
-    chain = Chain((1.0,) * 3, (0.0, 0.1, 0.2), inertias=(0.3, 0.2, 0.4))
-    for xi, impact in zip(chain.inertias, rod_impacts(LEVEL_PILE, chain, 20.0), strict=True):
-        assert impact.basis == "pile"
-        assert impact.alpha == alpha_level(-0.37, xi)
-
-
-def test_given_coefficients_win():
-    rods = Chain((1.0,) * 3, (0.0, 0.1, 0.2), inertias=(0.3, 0.2, 0.4))
-    beads = replace(rods, alpha=Quantity(0.12))
-    assert {(one.alpha, one.gamma, one.basis) for one in rod_impacts(SURFACE, beads, 40.0)} == {
-        (0.12, 0.0, "given")
-    }
-    stiff = replace(rods, gamma=0.7)
-    assert {one.gamma for one in rod_impacts(SURFACE, stiff, 40.0)} == {0.7}
-    assert len({one.alpha for one in rod_impacts(SURFACE, stiff, 40.0)}) == 3
-
-
-def test_one_singular_rod_is_enough():
-    slow = Surface(Quantity(0.5), Quantity(1.0))
-    chain = Chain((1.0,) * 3, (0.0, 0.1, 0.2), inertias=(0.3, 0.01, 0.4))
-    with pytest.raises(DomainError, match="singular"):
-        rod_impacts(slow, chain, 20.0)
-    assert rod_impacts(slow, replace(chain, inertias=(0.3, 0.3, 0.4)), 20.0)
