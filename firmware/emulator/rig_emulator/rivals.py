@@ -92,9 +92,9 @@ def compile_for_pico(folder: Path) -> Path:
     """
     own, common = SOURCES.parents[1] / "rp2040", SOURCES.parents[1] / "pico"
     elf, flash, image = (folder / f"pico.{kind}" for kind in ("elf", "bin", "uf2"))
-    sources = [SOURCES / _PICO, common / "clocks.c", *own.glob("*.[cS]")]
+    sources = [SOURCES / _PICO, common / "clocks.c", common / "start.S", *own.glob("*.[cS]")]
     options = ["-O2", "-std=gnu11", "-mcpu=cortex-m0plus", "-mthumb", "-ffreestanding", "-nostdlib"]
-    places = [f"-I{own}", f"-I{common}", f"-T{own}/image.ld", "-o", str(elf)]
+    places = [f"-I{own}", f"-I{common}", f"-T{common}/image.ld", "-o", str(elf)]
     commands = (
         ["arm-none-eabi-gcc", *options, *places, *map(str, sources), "-lgcc"],
         ["arm-none-eabi-objcopy", "-O", "binary", str(elf), str(flash)],

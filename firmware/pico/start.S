@@ -1,6 +1,7 @@
-/* Vectors, a block by which the chip's own program knows an image (data sheet, 5.9), and the way to
- * `main`: everything is copied to RAM and runs there, as on the RP2040. */
-    .cpu cortex-m33
+/* Vectors, and the way to `main`: everything is copied to RAM and runs there, where no wait for the
+ * flash makes a turn of the loop longer than another. */
+#include "vectors.h"
+
     .syntax unified
     .thumb
 
@@ -11,25 +12,18 @@
     .word failed
     .endr
     .word timer_interrupt       /* 0 */
-    .rept 13
+    .rept USB_VECTOR - 1
     .word failed
     .endr
-    .word usb_interrupt         /* 14 */
-    .rept 37
+    .word usb_interrupt
+    .rept VECTOR_COUNT - USB_VECTOR - 1
     .word failed
     .endr
     .endm
 
     .section .start_vectors, "a"
     VECTORS
-    .word 0xFFFFDED3
-    .byte 0x42, 1               /* an item of one word: the image is */
-    .hword 0x1021               /* a program, secure, for Arm, for the RP2350 */
-    .byte 0xFF                  /* the last item: so many words there were */
-    .hword 1
-    .byte 0
-    .word 0                     /* the only block */
-    .word 0xAB123579
+    IMAGE_BLOCK
     .section .ram_vectors, "a"
     VECTORS
 
@@ -37,8 +31,7 @@
     .thumb_func
     .global start
 start:
-    movs r0, #0
-    msr  msplim, r0
+    NO_STACK_LIMIT
     ldr  r0, =load_from
     ldr  r1, =load_to
     ldr  r2, =load_end
