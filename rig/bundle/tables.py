@@ -12,16 +12,17 @@ from rig.measurands import MEASURANDS, Measurand
 from rig.reasons import sentences
 from rig.session.schema import TABLES
 from rig.text_table import csv_text
-from rig.timers.edge_rows import edges_text
+from rig.timers.edge_rows import HEADER, edges_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Container, Iterable, Mapping, Sequence
 
     from rig.clock.calibration import Calibration
     from rig.session.reading import Reader
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
-_ROWS_OF = {"states.csv": "run_state", "pings.csv": "ping", "edges.csv": "edge"}
+_EDGES = "edges.csv"
+_ROWS_OF = {"states.csv": "run_state", "pings.csv": "ping", _EDGES: "edge"}
 """Whose raw records a file has, for the meaning of its columns."""
 
 
@@ -46,6 +47,7 @@ def csv_files(
     session: Reader,
     analysis: Mapping[str, Any],
     clock: Calibration,
+    leave_out: Container[str] = (),
 ) -> dict[str, str]:
     """Make ``runs``, ``summary``, ``budget``, ``edges``, ``states`` and ``pings.csv``, a README.
 
@@ -60,6 +62,8 @@ def csv_files(
         What ``rig analyze --json`` prints.
     clock
         Of its times.
+    leave_out
+        Names of files that are not wanted.
 
     Returns
     -------
@@ -71,9 +75,12 @@ def csv_files(
         {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
     ]
     tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
-    files = {name: csv_text(_columns(rows), rows) for name, rows in tables.items()}
-    files["edges.csv"] = edges_text(session.latest_drops(), lambda drop: clock.scale(drop).hz)
-    return files | {"README.txt": _readme(session, tables)}
+    columns = {name: _columns(rows) for name, rows in tables.items() if name not in leave_out}
+    files = {name: csv_text(heading, tables[name]) for name, heading in columns.items()}
+    if _EDGES not in leave_out:
+        columns[_EDGES] = HEADER
+        files[_EDGES] = edges_text(session.latest_drops(), lambda drop: clock.scale(drop).hz)
+    return files | {"README.txt": _readme(session, columns)}
 
 
 def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
@@ -144,13 +151,13 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
     return columns
 
 
-def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
+def _columns(rows: Iterable[Mapping[str, object]]) -> Sequence[str]:
     """All columns in order of appearance; a void run may lack some that later runs have."""
     fullest = sorted(rows, key=len, reverse=True)
     return list(dict.fromkeys(key for row in fullest for key in row))
 
 
-def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]]) -> str:
+def _readme(session: Reader, described: Mapping[str, Sequence[str]]) -> str:
     lines = ["SIMULATED DATA: nothing fell.", ""] if session.simulated else []
     lines += [
         f"Session made {session.meta['created']} from {session.meta['origin']}",
@@ -159,10 +166,9 @@ def _readme(session: Reader, tables: Mapping[str, Sequence[Mapping[str, object]]
         "Text is UTF-8, numbers have a decimal point, an empty value was not measured.",
         "Units stand at the ends of names. Behind a quantity, _u is its standard uncertainty and",
         "_U95 its expanded uncertainty (95 %), in the same unit.",
-        "edges.csv is in the format that rig import reads and holds the last attempt at each run.",
     ]
-    described = {name: _columns(rows) for name, rows in tables.items()}
-    described["edges.csv"] = ["run", "channel", "time_s", "state"]
+    if _EDGES in described:
+        lines += [f"{_EDGES} holds the last attempt at each run, as rig import reads it."]
     for name, columns in sorted(described.items()):
         lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
     return "\n".join(lines) + "\n"

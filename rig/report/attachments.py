@@ -11,12 +11,17 @@ from rig.bundle.archive import zipped
 from rig.bundle.tables import csv_files
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rig.records import Drop
     from rig.results import SessionResults
     from rig.session.reading import Reader
 
 METHOD = "method.md"
 _DATA = 120_000
-"""Bytes of packed tables at most, so that the page of 108 drops stays under 0.8 MB."""
+"""Bytes of an attached file at most, so that the page of 108 drops stays under 0.8 MB."""
+_EDGES = 5_000
+"""Edges whose large tables take as much: with their drops' budgets 22 to 24 bytes each, packed."""
 _LARGE = ("edges.csv", "budget.csv", "pings.csv")
 
 
@@ -29,18 +34,21 @@ class Attachment(NamedTuple):
     words: str
 
 
-def attachments(session: Reader, outcome: SessionResults) -> list[Attachment]:
-    """Pack a session's tables; without those that are too many for a page to carry."""
-    tables = csv_files(session, outcome.json(), outcome.clock)
+def attachments(
+    session: Reader, outcome: SessionResults, drops: Iterable[Drop]
+) -> list[Attachment]:
+    """Pack a session's tables; without those that its drops make too large for a page to carry."""
+    few = sum(len(drop.edges) for drop in drops) <= _EDGES
+    tables = csv_files(session, outcome.json(), outcome.clock, () if few else _LARGE)
     tables |= {"protocol.yaml": session.protocol_text}
     contents = {name: text.encode("utf-8", "replace") for name, text in tables.items()}
-    words = "results, budgets and edges as CSV files, with the protocol"
-    packed = zipped(contents)
-    if len(packed) > _DATA:
-        words = "results as CSV files, with the protocol; rig export also writes budgets and edges"
-        packed = zipped({n: data for n, data in contents.items() if n not in _LARGE})
+    words = (
+        "results, budgets and edges as CSV files, with the protocol"
+        if few
+        else "results as CSV files, with the protocol; rig export also writes budgets and edges"
+    )
     rows = [
-        ("data.zip", "application/zip", packed, words),
+        ("data.zip", "application/zip", zipped(contents), words),
         ("summary.csv", "text/csv", contents["summary.csv"], "means only"),
         (METHOD, "text/markdown", method_page().encode(), "the whole method"),
     ]

@@ -211,7 +211,11 @@ def _name_series(axes: Axes, panel: Panel) -> None:
 
 def _meet(low: Array, high: Array, starts: Array, ends: Array) -> Any:
     """Count for each box how many others it meets."""
-    return ((low[:, None] < ends) & (starts < high[:, None])).all(axis=2).sum(axis=1)
+    across, up = (
+        (low[:, None, axis] < ends[:, axis]) & (starts[:, axis] < high[:, None, axis])
+        for axis in (0, 1)
+    )
+    return (across & up).sum(axis=1)
 
 
 def _shown(axes: Axes, trace: Trace) -> Array:

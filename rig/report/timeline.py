@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from itertools import accumulate, groupby, pairwise
 from operator import itemgetter
 from statistics import median
@@ -98,13 +99,12 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
     end = _FINE * _WIDTH
     places = [round(ms * end / lanes.span_ms) for ms in _times_ms(drop, hz)]
     bars = marks = ""
+    channels = defaultdict[int, list[tuple[int, bool, bool]]](list)
+    for n, (edge, place) in enumerate(zip(drop.edges, places, strict=True)):
+        if place <= end:
+            channels[edge.channel].append((place, edge.blocked, n in result.matches))
     for number, gate in enumerate(lanes.gates):
-        y = _LANE * (_FINE * number + 1)
-        own = [
-            (place, edge.blocked, n in result.matches)
-            for n, (edge, place) in enumerate(zip(drop.edges, places, strict=True))
-            if edge.channel == gate.channel and place <= end
-        ]
+        y, own = _LANE * (_FINE * number + 1), channels[gate.channel]
         # From each change to the next; an edge like the one before changes nothing.
         states = [(0, bool(drop.initial_state >> gate.channel & 1), True), *own, (end, None, True)]
         changes = [next(same) for _, same in groupby(states, key=itemgetter(1))]
