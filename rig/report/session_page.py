@@ -59,8 +59,9 @@ def session_page(
         Where a section that cannot be made is noted.
     """
     protocol = protocol_of(session)
-    records = {(drop.run, drop.attempt): drop for drop in session.drops()}
-    drops = [(records[drop.run.number, drop.attempt], drop) for drop in outcome.analysis.drops]
+    # Each was compared with its bytes as it was analysed; of those that are damaged none is drawn.
+    whole = [drop for drop in outcome.analysis.drops if not drop.damaged]
+    records = ((session.drop(drop.run.number, drop.attempt), drop) for drop in whole)
     return {
         "template": "session.html",
         "title": protocol.title,
@@ -68,7 +69,7 @@ def session_page(
         "session": session,
         "outcome": outcome,
         "protocol": protocol,
-        "timed": [(record, outcome.clock.scale(record).hz, drop) for record, drop in drops],
+        "timed": [(raw, outcome.clock.scale(raw).hz, drop) for raw, drop in records if raw],
         "bars": bars,
         "estimated": estimated,
         "sections": sections,
