@@ -6,25 +6,26 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Sequence
 from functools import cache, partial
-from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
 
 from rig import __version__
 from rig.streams import say
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from typing import Any, NoReturn
 
-class Command(NamedTuple):
+
+class Command:
     """One command, or one of two words below another.
 
     `arguments` are rows for `_add_argument`, `examples` whole command lines.
     """
 
-    name: str
-    text: str
-    arguments: list[str]
-    examples: list[str]
+    def __init__(self, name: str, text: str, arguments: list[str], examples: list[str]) -> None:
+        self.name, self.text = name, text
+        self.arguments, self.examples = arguments, examples
 
 
 def _read_page(page: str) -> dict[str, list[Command]]:
@@ -45,11 +46,15 @@ def _read_page(page: str) -> dict[str, list[Command]]:
     return groups
 
 
-GROUPS = _read_page(Path(__file__).with_suffix(".txt").read_text("utf-8"))
+with open(  # noqa: PTH123 - pathlib takes a third as long as Python to load
+    os.path.join(os.path.dirname(__file__), "command_help.txt"),  # noqa: PTH118, PTH120
+    encoding="utf-8",
+) as _page:
+    GROUPS = _read_page(_page.read())
 """Every command by its group, in the order in which they are met."""
 COMMANDS = {command.name: command for commands in GROUPS.values() for command in commands}
 
-_NAMED = re.compile(rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))")
+_NAMED = rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))"
 """A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""
 
 
@@ -58,7 +63,7 @@ def runnable(text: str) -> str:
 
     Before anybody activates the environment of `./run demo`, that is ``.venv/bin/rig check``.
     """
-    return _NAMED.sub(lambda _: f"{_program()} ", text)
+    return re.sub(_NAMED, lambda _: f"{_program()} ", text)
 
 
 @cache
@@ -77,7 +82,9 @@ def _program() -> str:
 
 def _join_pairs(typed: Sequence[str]) -> list[str]:
     """Make a single word of the pairs after ``--map``, whatever blanks were typed."""
-    words = [part for word in typed for part in re.split(r"(?<=^--map)=", word, maxsplit=1)]
+    words = []
+    for word in typed:
+        words += word.split("=", 1) if word.startswith("--map=") else [word]
     if "--map" not in words:
         return words
     first = words.index("--map") + 1
@@ -95,7 +102,7 @@ class Parser(argparse.ArgumentParser):
     """A parser whose mistakes name what was meant."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+        super().__init__(**{"formatter_class": argparse.RawDescriptionHelpFormatter, **options})
         self.commands: dict[str, Parser] = {}
 
     def parse(self, args: Sequence[str]) -> argparse.Namespace:
@@ -123,6 +130,8 @@ class Parser(argparse.ArgumentParser):
         self.exit(2)
 
 
+_WIDTH = 78
+"""Characters of a line of the first help, as argparse has it on a terminal of 80."""
 _MODULES = {"import": "import_edges"}
 """Modules of commands whose names are not theirs."""
 _WORDS: dict[str, dict[str, Any]] = {
@@ -174,14 +183,16 @@ def _matching_commands(words: Sequence[str] | None) -> list[Command]:
     return every if any(not word.startswith("-") for word in words) else []
 
 
-def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None = None) -> Parser:
+def build_parser(
+    kinds: Callable[[], dict[str, dict[str, Any]]], words: Sequence[str] | None = None
+) -> Parser:
     """Make the parser of all commands.
 
     Parameters
     ----------
     kinds
-        What argparse needs to know of each kind of value. What stands behind a kind's colon is the
-        first argument of its ``type``.
+        Gives what argparse needs to know of each kind of value; not called where no command is
+        made. What stands behind a kind's colon is the first argument of its ``type``.
     words
         What is to be parsed: commands that it cannot name are left out, as they take time.
     """
@@ -192,6 +203,8 @@ def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None =
     parser = Parser(
         prog="rig",
         usage="rig [-h] [--version] COMMAND ...",
+        # All its lines are short: to wrap them, argparse would load shutil and textwrap.
+        formatter_class=partial(argparse.RawTextHelpFormatter, width=_WIDTH),
         description="Lab-rig controller for falling-chain and photogate experiments.",
         epilog="\n".join(lines) + "\n\n"
         "Exit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a run was\n"
@@ -199,8 +212,9 @@ def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None =
     )
     parser.add_argument("--version", action="version", version=f"rig {__version__}")
     below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
-    parsers = parser.commands
-    for command in _matching_commands(words):
+    parsers, commands = parser.commands, _matching_commands(words)
+    accepted = _WORDS | kinds() if commands else {}
+    for command in commands:
         name = command.name
         outer, _, last = name.rpartition(" ")
         if outer not in below:
@@ -217,5 +231,5 @@ def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None =
             if alone:
                 needed = "one-of" in alone
                 either = either or parsers[name].add_mutually_exclusive_group(required=needed)
-            _add_argument(either if either and alone else parsers[name], row, _WORDS | kinds)
+            _add_argument(either if either and alone else parsers[name], row, accepted)
     return parser

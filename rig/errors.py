@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import Any
+
+    from rig.problems import Problem
 
 
 class RigError(Exception):
@@ -32,26 +36,6 @@ class RigError(Exception):
 
     def __str__(self) -> str:
         return f"{self.message}\n  hint: {self.hint}" if self.hint else self.message
-
-
-class Problem(NamedTuple):
-    """One fault of an input file, at its place (lines and columns count from 1).
-
-    `excerpt` is what a message shows below: the line itself and a caret, or nothing. `reason` is
-    the `rig.reasons.Reason` of the message, where it has one.
-    """
-
-    file: str
-    line: int
-    column: int
-    key: str
-    message: str
-    excerpt: str = ""
-    reason: Any = None
-
-    def __str__(self) -> str:
-        key = f" {self.key}:" if self.key else ""
-        return f"{self.file}:{self.line}:{self.column}:{key} {self.message}{self.excerpt}"
 
 
 class InputError(RigError):

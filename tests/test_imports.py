@@ -54,7 +54,7 @@ def packages_loaded_by(program: str, *arguments: str) -> set[str]:
 @pytest.mark.parametrize(
     ("program", "absent"),
     [
-        (HELP, "msgspec numpy scipy yaml matplotlib textual"),
+        (HELP, "msgspec numpy scipy yaml matplotlib textual rig.commands rig.ready textwrap"),
         (f"import rig.cli\nassert rig.cli.main(['predict', {PROTOCOL!r}]) == 0", "scipy"),
         (f"import rig.cli\nassert rig.cli.main(['check', {PROTOCOL!r}]) == 0", "scipy"),
         ("import rig", "numpy scipy yaml textual"),

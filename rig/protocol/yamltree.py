@@ -14,8 +14,9 @@ from typing import Any
 
 import yaml
 
-from rig.errors import InputError, Problem
+from rig.errors import InputError
 from rig.printable import one_line
+from rig.problems import Problem
 from rig.units import quoted
 
 MAX_DEPTH = 32

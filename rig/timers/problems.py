@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from rig.errors import InputError, Problem
+from rig.errors import InputError
+from rig.problems import Problem
 from rig.reasons import make_reason, remedies
 
 MAX_PROBLEMS = 50
