@@ -28,11 +28,14 @@ class Command:
         self.arguments, self.examples = arguments, examples
 
 
-def _read_page(page: str) -> dict[str, list[Command]]:
+def _read_page() -> dict[str, list[Command]]:
     """Return the commands of each group."""
+    place = f"{__file__.removesuffix('.py')}.txt"
+    with open(place, encoding="utf-8") as page:  # noqa: PTH123 - pathlib takes 5 ms
+        paragraphs = page.read().strip().split("\n\n")
     groups: dict[str, list[Command]] = {}
     shared: dict[str, str] = {}
-    for paragraph in page.strip().split("\n\n"):
+    for paragraph in paragraphs:
         head, *lines = paragraph.splitlines()
         if head == "shared":
             shared = {line.partition(" |")[0]: line for line in lines}
@@ -46,11 +49,7 @@ def _read_page(page: str) -> dict[str, list[Command]]:
     return groups
 
 
-with open(  # noqa: PTH123 - pathlib takes a third as long as Python to load
-    os.path.join(os.path.dirname(__file__), "command_help.txt"),  # noqa: PTH118, PTH120
-    encoding="utf-8",
-) as _page:
-    GROUPS = _read_page(_page.read())
+GROUPS = _read_page()
 """Every command by its group, in the order in which they are met."""
 COMMANDS = {command.name: command for commands in GROUPS.values() for command in commands}
 

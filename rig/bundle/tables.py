@@ -167,8 +167,6 @@ def _readme(session: Reader, described: Mapping[str, Sequence[str]]) -> str:
         "Units stand at the ends of names. Behind a quantity, _u is its standard uncertainty and",
         "_U95 its expanded uncertainty (95 %), in the same unit.",
     ]
-    if _EDGES in described:
-        lines += [f"{_EDGES} holds the last attempt at each run, as rig import reads it."]
     for name, columns in sorted(described.items()):
         lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
     return "\n".join(lines) + "\n"

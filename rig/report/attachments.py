@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import base64
-from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.bundle.archive import zipped
 from rig.bundle.tables import csv_files
+from rig.ready import shipped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -62,7 +61,4 @@ def attachments(
 
 def method_page() -> str:
     """Return the page on the method as Markdown; it travels with the program."""
-    packed = files("rig.report").joinpath(METHOD)
-    if packed.is_file():
-        return packed.read_text(encoding="utf-8")
-    return Path(__file__).parents[2].joinpath("docs", METHOD).read_text(encoding="utf-8")
+    return shipped(f"docs/{METHOD}").read_text("utf-8")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -16,7 +15,6 @@ from rig.report.figure import csv_table
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from matplotlib import RcParams
     from matplotlib.figure import Figure
 
     from rig.report.figure import Chart
@@ -35,16 +33,8 @@ def style() -> Iterator[None]:
     """Have figures look alike in the block, which Ctrl-C does not interrupt."""
     import matplotlib as mpl  # noqa: PLC0415 - half a second that a headless run never pays
 
-    with ctrl_c_waits(), mpl.rc_context(_look()):
+    with ctrl_c_waits(), mpl.rc_context(fname=Path(__file__).with_suffix(".mplstyle")):
         yield
-
-
-@cache
-def _look() -> RcParams:
-    """Return the parameters of `canvas.mplstyle`, which takes longer to read than to apply."""
-    from matplotlib import rc_params_from_file  # noqa: PLC0415 - as in `style`
-
-    return rc_params_from_file(Path(__file__).with_suffix(".mplstyle"), use_default_template=False)
 
 
 def drawing_file(drawing: Figure, kind: Kind, description: str = "") -> bytes:
