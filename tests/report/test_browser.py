@@ -55,13 +55,16 @@ def test_print_has_no_empty_page(page, tmp_path):
     assert len(pages) > 2
     assert all(len(text.split()) > 10 for text in pages)
     assert "separation Δz (cm)" in pages[0], "the first figure is on the first page"
+    appendix = next(n for n, text in enumerate(pages) if "Appendix: Every drop" in text)
+    assert all("attempt" in text for text in pages[appendix:]), "each page of a table has its head"
+    assert "data.zip" not in "".join(pages), "nothing is attached to what a browser prints"
 
 
 def test_a_pdf_needs_no_browser(page, tmp_path):
     paper, session = tmp_path / "report.pdf", page.with_name("a.session")
     assert main(["report", str(session), "-o", str(tmp_path / "a.html"), "--pdf", str(paper)]) == 0
     pages = read_pages(paper)
-    assert 2 < len(pages) <= 6
+    assert 2 < len(pages) <= 5
     assert "Figure 1." in pages[0]
     assert all(text.split()[-1] == str(number) for number, text in enumerate(pages, 1))
     assert "Choose" not in "".join(pages), "nobody can click on paper"
