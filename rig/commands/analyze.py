@@ -13,6 +13,7 @@ from rig.measurands import acceleration_in
 from rig.reasons import make_error
 from rig.report.numbers import plus_minus
 from rig.report.parts import scatter_parts, tables
+from rig.report.templates import lines
 from rig.results import SessionResults, complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
@@ -65,9 +66,7 @@ def main(arguments: Namespace) -> int:
         if video is not None and "video" in members:
             show(["", *_video_lines(video, _by_gates(outcome))])
         if "monte_carlo" in members:
-            from rig.commands.budget import trials_lines  # noqa: PLC0415 - likewise
-
-            show(["", *trials_lines(members["monte_carlo"])])
+            show(["", *lines("trials", members["monte_carlo"])])
     return code
 
 

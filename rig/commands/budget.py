@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis import monte_carlo
@@ -13,19 +12,19 @@ from rig.analysis.session import Analysis, planned_run
 from rig.cache.entry import recall
 from rig.commands.output import print_data, tell_damage
 from rig.errors import InputError
-from rig.measurands import MEASURANDS, Measurand
 from rig.protocol.plan import runs
 from rig.reasons import sentences
-from rig.report.numbers import decimals_for, fixed, plus_minus
+from rig.report.numbers import decimals_for, fixed
+from rig.report.templates import sentence
 from rig.results import SessionResults, calibration, check_open, protocol_of, results
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator, Mapping
 
     from rig.analysis.monte_carlo import Propagated
     from rig.analysis.result import Measured
+    from rig.measurands import Measurand
     from rig.session.reading import Reader
 
 SEED = 1
@@ -39,7 +38,8 @@ def main(arguments: Namespace) -> int:
         outcome = results(session, fresh=fresh)
         make = partial(budget, session, outcome, *asked)
         account = recall(dict, make, "budget", outcome.digest, asked, fresh=fresh)
-    print_data(account, _table(account), as_json=arguments.json)
+    words = sentence("budget", account, _in_fine).split("\n")
+    print_data(account, words, as_json=arguments.json)
     return tell_damage(outcome.analysis)
 
 
@@ -112,33 +112,6 @@ def _lines(measured: Measured) -> dict[str, Any]:
     }
 
 
-def _table(account: Mapping[str, Any]) -> Iterator[str]:
-    """Write a block a quantity, in its own unit and, of its sources, the finer unit."""
-    yield f"run {account['run']}"
-    trials = account["monte_carlo"]
-    for name, value in account["budget"].items():
-        row, trial = MEASURANDS[name], trials["quantities"][name]
-        single = _in_fine(row, account["by_itself"][name]["u"])
-        yield ""
-        yield (
-            f"{row.symbol} = {plus_minus(value, row.scale)} {row.unit} (U, 95 %), "
-            f"u = {_in_fine(row, value['u'])}, ν = {value['degrees']:.0f}, k = {value['k']:.2f}"
-        )
-        for line in value["lines"]:
-            u, _, unit = _in_fine(row, line["u"]).rpartition(" ")
-            yield f"  {line['name']:<18}{u:>10} {unit:<5}{100 * line['share']:6.1f} %"
-        yield (
-            f"  by itself u = {single}; by {trials['trials']} trials (seed {trials['seed']}) "
-            f"{_in_fine(row, trial['u'])}"
-        )
-        digits = decimals_for(row.scale * trial["u"])
-        low, high = (fixed(row.scale * trial[end], digits) for end in ("low", "high"))
-        verdict = ": both agree" if trial["agrees"] else ": they do not agree"
-        yield (
-            f"  95 % of trials in {low} … {high} {row.unit}{verdict if trial['decided'] else ''}"
-        )
-
-
 def _in_fine(row: Measurand, u: float) -> str:
     """Write a standard uncertainty in a quantity's finer unit."""
     fine = row.fine_scale * u
@@ -187,18 +160,3 @@ def session_trials(analysis: Analysis, trials: int) -> dict[str, Any]:
         for (number, attempt), sample in zip(analysis.adjusted, samples, strict=True)
     ]
     return {"trials": trials, "seed": SEED, "runs": by_run}
-
-
-def trials_lines(trials: Mapping[str, Any]) -> Iterator[str]:
-    """Say in words how far both ways agree."""
-    yield f"Monte Carlo of the whole session: {trials['trials']} trials, seed {trials['seed']};"
-    yield "95 % intervals beside value ± 1.96 u (JCGM 101, clause 8)"
-    for name in trials["runs"][0]["quantities"]:
-        drops = [run["quantities"][name] for run in trials["runs"]]
-        agree = sum(drop["agrees"] for drop in drops)
-        undecided = sum(not drop["decided"] for drop in drops)
-        ratio = fmean(drop["u_ratio"] for drop in drops)
-        yield (
-            f"  {MEASURANDS[name].symbol:<12} u by trials / u by budget {ratio:.3f}, "
-            f"{agree} of {len(drops)} agree, {undecided} undecided"
-        )

@@ -6,7 +6,6 @@ import argparse
 import math
 import os
 import re
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
@@ -21,7 +20,7 @@ class _ListFormats(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         rows = import_module("rig.timers.vocabulary").read_rows("formats.txt", "|")
-        sys.stdout.writelines(f"{name}: {how}; {example}\n" for name, _, how, example in rows)
+        print("\n".join(f"{name}: {how}; {example}" for name, _, how, example in rows))
         parser.exit()
 
 

@@ -33,8 +33,8 @@ _GAP_DEG = 2.0  # the curve has a point each degree
 _SEGMENTS = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
 _HIDDEN = " Shaded inclines: the rods would not slide, the model has no answer."
 _CHAINS = " If A and B differ above, the chains differ."
-_SMALL = 4.0
-"""Percent of U² below which a source is among the others."""
+_SMALL = 6.0
+"""Percent of U² below which a source is among the others: its name would have no room."""
 
 
 def result_figure(

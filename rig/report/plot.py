@@ -211,10 +211,7 @@ def _name_series(axes: Axes, panel: Panel) -> None:
 
 def _meet(low: Array, high: Array, starts: Array, ends: Array) -> Any:
     """Count for each box how many others it meets."""
-    across, up = (
-        (low[:, None, axis] < ends[:, axis]) & (starts[:, axis] < high[:, None, axis])
-        for axis in (0, 1)
-    )
+    across, up = np.moveaxis((low[:, None] < ends) & (starts < high[:, None]), 2, 0)
     return (across & up).sum(axis=1)
 
 
