@@ -211,9 +211,8 @@ def build_parser(
     )
     parser.add_argument("--version", action="version", version=f"rig {__version__}")
     below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
-    parsers, commands = parser.commands, _matching_commands(words)
-    accepted = _WORDS | kinds() if commands else {}
-    for command in commands:
+    parsers = parser.commands
+    for command in _matching_commands(words):
         name = command.name
         outer, _, last = name.rpartition(" ")
         if outer not in below:
@@ -230,5 +229,5 @@ def build_parser(
             if alone:
                 needed = "one-of" in alone
                 either = either or parsers[name].add_mutually_exclusive_group(required=needed)
-            _add_argument(either if either and alone else parsers[name], row, accepted)
+            _add_argument(either if either and alone else parsers[name], row, _WORDS | kinds())
     return parser
