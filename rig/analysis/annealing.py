@@ -275,21 +275,18 @@ class Pairing:
         return self._whole(edge_of, speeds)
 
     def _whole(self, edge_of: Index, speeds: Array) -> Index:
-        """Give back the top rod's ends of shadows longer than it that no rod below begins or ends.
+        """Give back the top rod's ends of shadows longer than it.
 
-        A rod that is thrown back and the top rod can make one shadow, and no rod that follows tells
-        whose end it is.
+        A rod that is thrown back is in them too, and no rod that follows tells whose end it is.
         """
         last = self.rods.max(initial=0)
-        below = np.zeros(self.times.size + 1, dtype=np.bool_)
-        below[edge_of[(edge_of >= 0) & (self.rods < last)]] = True
         sides = np.flatnonzero((edge_of >= 0) & (self.rods == last))
         sides = sides[self.other[edge_of[sides]] >= 0]
         edges = edge_of[sides]
         partner = self.other[edges]
         # At uniform acceleration the mean of both speeds is that of the way between.
         length = np.abs(self.times[edges] - self.times[partner]) * (speeds[edges] + speeds[partner])
-        edge_of[sides[(0.5 * length > WIDER * self.widths[sides]) & ~below[partner]]] = -1
+        edge_of[sides[0.5 * length > WIDER * self.widths[sides]]] = -1
         return edge_of
 
     def matched(self, levels: Array, heights: Array, speeds: Array, scale: float) -> list[Index]:

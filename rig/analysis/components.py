@@ -71,10 +71,15 @@ class Components:
     landed: float = 1.0
     stretch: float = 1.0
 
-    def towards(self, other: Components, share: float) -> Components:
-        """Return what is a share of the way to others, by ratios; what is exact stays."""
-        pairs = ((name, getattr(self, name), getattr(other, name)) for name in self.__slots__)
-        return Components(**{n: a * (b / a) ** share if a else a for n, a, b in pairs})
+    def ratios(self, others: Components) -> NDArray[np.float64]:
+        """Logarithm of how much larger each of others is, in their order; 0 of what is exact."""
+        pairs = ((getattr(self, name), getattr(others, name)) for name in self.__slots__)
+        return np.array([math.log(b / a) if a else 0.0 for a, b in pairs])
+
+    def times(self, ratios: NDArray[np.float64]) -> Components:
+        """Return them larger by such ratios."""
+        factors = zip(self.__slots__, np.exp(ratios).tolist(), strict=True)
+        return Components(**{name: getattr(self, name) * factor for name, factor in factors})
 
     def departures(self, loose: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variance of how far rods are off their chain, m².

@@ -170,8 +170,10 @@ class DropCase(NamedTuple):
         while low := gates_too_low(
             self.protocol, last.model.records.values() if last else case._records(), last
         ):
+            begun = readings[case.aside].begun
+            before = None if begun is None else (case.aside, begun)
             case = case._replace(aside=(*case.aside, *low))
-            without = reading, last = case._read(readings, explain=False)
+            without = reading, last = case._read(readings, before, explain=False)
             if not _void_by(reading) - _SKEW:
                 return without
         return stated._read(readings, explain=True) if wrong and explain else (result, fit)
@@ -189,7 +191,11 @@ class DropCase(NamedTuple):
         return DropModel.of(self.protocol, records, begun.guesses, self.scale.u, self.components)
 
     def _read(
-        self, readings: dict[tuple[int, ...], DropIdentity], *, explain: bool
+        self,
+        readings: dict[tuple[int, ...], DropIdentity],
+        before: tuple[tuple[int, ...], Begun] | None = None,
+        *,
+        explain: bool,
     ) -> tuple[DropResult, Fit | None]:
         """Read a drop whose rods strike where the protocol, from the contact point, has them."""
         protocol, run, drop, scale, components, aside = self
@@ -198,7 +204,7 @@ class DropCase(NamedTuple):
         audit = _blank_audit(drop, records)
         rough, reading = scale.coarse(), readings.get(aside)
         if reading is None or reading.scale != rough:
-            reading = identify_drop(protocol, run, drop, rough, components, aside)
+            reading = identify_drop(protocol, run, drop, rough, components, aside, before)
             readings[aside] = reading
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()

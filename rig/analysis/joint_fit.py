@@ -179,8 +179,9 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
     x = _average(drops, len(shared))
     beforehand = stated(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
-    settled, moved, damping, previous = False, 0.0, 1.0, np.zeros(len(shared))
-    inverse, before = np.eye(len(shared)), evidence.components
+    settled, moved, size, before = False, 0.0, len(shared), evidence.components
+    inverse, previous = np.eye(size), np.zeros(size + before.ratios(before).size)
+    damping = np.ones_like(previous)
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
         drops = [_informed(drop.at(x), evidence.components, clock_u) for drop in drops]
@@ -190,18 +191,14 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
             drops = [replace(drop, matches=match(drop.model, drop.x)) for drop in drops]
         # At first the common unknowns are not yet what a drop's own go with: all may be far off.
         root, drops = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
-        step = root.step()
-        moves = _move(drops, x, sd, step, damping) if np.isfinite(step).all() else None
+        step = damping[:size] * root.step()
+        moves = _move(drops, x, sd, step) if np.isfinite(step).all() else None
         if moves is None:
             return JointFit(shared, x, sd, inverse, before, evidence.degrees, (), settled=False)
-        x, drops, residuals, damping = moves
+        x, drops, residuals = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
         variance = np.sum(inverse**2, axis=1)
-        ahead = step / np.sqrt(variance)
-        last, moved = moved, damping * float(np.abs(ahead).max())
-        if round_ > _REMATCH and ahead @ previous < 0.0:
-            damping *= 0.5
-        previous = ahead
+        last, moved = moved, float(np.abs(step / np.sqrt(variance)).max())
         before = evidence.components
         evidence = _weigh(evidence, shared, x, sd, inverse, drops, residuals)
         # As long as steps get shorter alike, the next one is that of the last times their ratio.
@@ -209,7 +206,12 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
         if settled and _steady(before, evidence.components, drops):
             break
         # What flips to and fro, as beside a least scale that is believed, is met half-way.
-        evidence.components = before.towards(evidence.components, damping)
+        ratios = damping[size:] * before.ratios(evidence.components)
+        evidence.components = before.times(ratios)
+        ahead = np.concatenate([step, ratios])
+        if round_ > _REMATCH:
+            damping[ahead * previous < 0.0] *= 0.5
+        previous = ahead
     # Components are those that the solution was made with.
     good = tuple(
         replace(drop, matches=without_strays(drop.model, drop.x, drop.matches)) for drop in drops
@@ -226,8 +228,8 @@ def _informed(
 
 
 def _move(
-    drops: Sequence[JointDrop], x: Array, sd: Array, step: Array, share: float
-) -> tuple[Array, list[JointDrop], list[Residuals], float] | None:
+    drops: Sequence[JointDrop], x: Array, sd: Array, step: Array
+) -> tuple[Array, list[JointDrop], list[Residuals]] | None:
     """Take a step, or as much of it as leads to where chains fall.
 
     Returns
@@ -236,6 +238,7 @@ def _move(
         The common unknowns, the drops there, what all edges leave over, and how much of the step
         was taken; nothing where no part of it will do.
     """
+    share = 1.0
     while share > _SHORTEST:
         common, moved = take(drops, x, sd, step, share)
         remaining = [
@@ -244,7 +247,7 @@ def _move(
             for role, match in drop.matches.items()
         ]
         if all(np.isfinite(residuals.values).all() for residuals in remaining):
-            return common, moved, remaining, share
+            return common, moved, remaining
         share *= 0.5
     return None
 

@@ -8,6 +8,7 @@ request. One routine serves one fall and many falls of one chain at once.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -34,6 +35,11 @@ RELEASE, START, GRAVITY, DRAG = range(COMMON)
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
 _NO_LESS = 1e-3
 """Share of its speed that an impact leaves a chain: adjustments try to throw it back up."""
+
+_NORMAL = math.sqrt(2.0 / math.pi)
+"""Slope of a normal distribution's error function, which a tanh follows to two in a hundred."""
+_FAINT = 1e-3
+"""Probability of a leg below which it does not count."""
 
 
 class Hits(NamedTuple):
@@ -125,8 +131,18 @@ class Trajectory:
         """
         return self.sights(times, by)[2]
 
-    def sights(self, times: Array, by: Array | None = None) -> tuple[Array, Array, Array]:
-        """What `heights` and `derivatives` say, with every leg gone through once."""
+    def sights(
+        self, times: Array, by: Array | None = None, strike_u: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """What `heights` and `derivatives` say, with every leg gone through once.
+
+        Parameters
+        ----------
+        strike_u
+            How well it is known at which height each rod strikes, m, shape ``(rods,)``. Derivatives
+            near a strike are then means of those of both legs, each as likely as it is: those of
+            one leg hold for no step across the strike.
+        """
         leg, since = self._legs(times)
         slopes = self.slopes if by is None else self.slopes_by(by)
         flight = self.gravity, self.kappas(leg)
@@ -146,7 +162,23 @@ class Trajectory:
         pulled = np.flatnonzero(pulls[[GRAVITY, DRAG]].any(axis=0))
         pull = np.stack([by_gravity, by_kappa * self.shares(leg)], axis=-1)
         moved[..., pulled] -= pull @ pulls[[GRAVITY, DRAG]][:, pulled]
+        if strike_u is not None and self.hits is not None:
+            rod, ahead = self._nearest_strike(times, leg)
+            off = speed * ahead / strike_u[rod]
+            other = 0.5 * (np.sign(off) - np.tanh(_NORMAL * off))
+            near = np.flatnonzero(np.abs(other) > _FAINT)
+            # A strike lowers the chain by what it makes it faster, times how long ago it was.
+            kicks = (self.speed[1:] - self.hits.arrival)[rod[near]]
+            moved[near] += (other[near] * kicks)[:, None] * time[1:].take(rod[near], axis=0)
         return self.height.take(leg) - fallen, speed, moved
+
+    def _nearest_strike(self, times: Array, leg: Index) -> tuple[Index, Array]:
+        """Return the rod whose strike is nearest to each time, and how long that is ahead, s."""
+        strikes = self.time[1:]
+        before, after = np.maximum(leg - 1, 0), np.minimum(leg, strikes.size - 1)
+        nearer = strikes[after] - times < times - strikes[before]
+        rod = np.where(nearer | (leg == 0), after, before)
+        return rod, strikes[rod] - times
 
     def passages(self, heights: Array) -> tuple[Array, Array]:
         """When the reference point comes down to each height, s, and how fast, m/s.

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.fit import CLOSE
 from rig.analysis.last_passages import disagreements
 from rig.analysis.likeness import Likeness, likeness
 from rig.analysis.result import GOOD, Measured
@@ -153,8 +154,9 @@ def test_gates_that_not_all_rods_pass_are_left_out(gates):
     for name, measured in without_gates.quantities.items():
         if not name.endswith(("strike_m", "strike_m_s")):
             found = result.quantities[name]
-            assert found.value == pytest.approx(measured.value, rel=1e-6), name
-            assert found.u == pytest.approx(measured.u, rel=1e-4), name
+            # Both end where a step is short enough, from different beginnings.
+            assert abs(found.value - measured.value) < CLOSE * measured.u, name
+            assert found.u == pytest.approx(measured.u, rel=0.01), name  # it has two digits
 
 
 def test_a_low_gate_whose_rods_come_late_is_left_out():

@@ -1,5 +1,7 @@
 """Trajectories against the model room, and their derivatives against 60 digits."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -140,6 +142,24 @@ def test_derivatives_of_heights_at_fixed_times(kappa):
         close(heights, [float(exact.at(mpf(t))) for t in times])
         slopes = [-(exact.at(mpf(t) + STEP) - exact.at(mpf(t) - STEP)) / (2 * STEP) for t in times]
     close(speeds, [float(slope) for slope in slopes])
+
+
+@pytest.mark.parametrize("before", [True, False])
+@pytest.mark.parametrize("sigmas", [0.0, 0.5, 1.0, 2.0, 10.0])
+def test_near_a_strike_both_legs_count_as_much_as_they_are_likely(sigmas, before):
+    """By the normal distribution, which what is used follows to two parts in a hundred."""
+    path, u, rod = struck(PARAMETERS), 1e-4, 2
+    strike, speed = path.time[rod + 1], path.hits.arrival[rod] if before else path.speed[rod + 1]
+    away = max(sigmas * u, 1e-9) / speed
+    times = np.array([strike - away if before else strike + away])
+    found = path.sights(times, strike_u=np.full(RODS, u))[2]
+    # Legs differ by what the strike makes the chain faster, times how long ago it was.
+    legs = path.derivatives(np.array([strike - 1e-12, strike + 1e-12]))
+    other = 0.5 * math.erfc(sigmas / math.sqrt(2.0))
+    own, beyond = legs if before else legs[::-1]
+    jump = np.abs(legs[1] - legs[0]).max()
+    np.testing.assert_allclose(found[0], own + other * (beyond - own), atol=0.03 * jump)
+    assert np.array_equal(found, path.derivatives(times)) == (sigmas == 10.0)
 
 
 @pytest.mark.parametrize("kappa", [0.0, 0.03])
