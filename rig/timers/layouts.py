@@ -18,8 +18,7 @@ from rig.timers.moments import TICK_HZ
 from rig.timers.vocabulary import POWERS, number_of
 
 if TYPE_CHECKING:
-    from rig.timers.events import TimerEvent
-    from rig.timers.timer_file import TimerFile
+    from rig.timers.events import TimerEvent, TimerFile
 
 _LONGEST_S = 60
 """A drop lasts half a second, and nobody waits a minute until it is recorded."""
@@ -190,12 +189,13 @@ def find_layouts(
     states = {event.state for part in file.parts for event in part.events}
     dark = next(ways for state, ways in _DARK.items() if state in states)
     choices: dict[str, Sequence[Any]] = {
-        "unit": [""] if file.has_unit else list(POWERS),
+        "unit": list(POWERS) if file.is_counted else [""],
         # More times than bars: it darkens and clears in turns.
         "dark": dark[-2:] + dark[:-2] if max(counts.values()) > bars else dark,
         "groups": _groupings(file, gates, bars),
     }
-    choices |= {name: [value] for name, value in stated.items() if name in choices}
+    said = {"unit"} if file.has_unit else set()
+    choices |= {name: [value] for name, value in stated.items() if name in choices.keys() - said}
     for unit, dark, groups in itertools.product(*choices.values()):
         power = POWERS.get(unit, 0)
         pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, power, groups)

@@ -11,78 +11,23 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import cache
-from typing import NamedTuple
 
-from rig.timers import vocabulary
-from rig.timers.vocabulary import CLOCK, LONGEST, MEASURED, POWERS, is_number, kinds_of, words
+from rig.timers.preamble import Row, RowBlock
+from rig.timers.vocabulary import (
+    LONGEST,
+    MEASURED,
+    form,
+    is_number,
+    is_remark,
+    kinds_of,
+    normal,
+    words,
+)
 
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
-_PLAIN = re.compile(r"[-+0-9.,;eE\t ]*[0-9][-+0-9.,;eE\t ]*")
-_DECIMAL = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]{1,2})?")
-_LISTED = re.compile(r"\s*(?:\w{1,40}\s?=\s?)?[\[({]+\s*(?=[-+\"'.0-9]|$)|\s*[\])}]+[,;]?\s*$")
-"""What programs print around a list of values, or of lists."""
-_BETWEEN_LISTS = re.compile(r"[\])}]\s?,\s?(?=[\[({])")
-_NAME = re.compile(r"([^\W\d][\w ]*?)[\"']?\s?[=:]?\s?[\"']?$")
-"""What stands before a value: ``gate=``, ``"gate": `` or, in a sentence, ``at``."""
-REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)|FRAME-(?:BEGIN|END)')
-"""A line that is marked as a remark, or parts what sigrok captured."""
-_QUANTITY = re.compile(
-    r"([+-]?[0-9]{1,30}(?:[.,][0-9]{0,30})?(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))",
-    re.IGNORECASE,
-)
-_ASSIGNED = re.compile(r"\s?[=:]\s?")
-_COLUMN_ROLES = {"time", "state", "edge", "volts", "gate", "run", "duration", "index", "derived"}
 _FEWEST_BESIDE = 20
 """Rows beside nothing that tell samples with settings at their left from rows with empty cells."""
-
-
-class Row(NamedTuple):
-    """A line: its number, from 1, what its cells say, and how it was written."""
-
-    line: int
-    texts: list[str]
-    raw: str = ""
-    separator: str = ","
-
-    def cell(self, at: int) -> str:
-        """Return what a column, from 0, has; nothing where the row ends before it."""
-        text = self.texts[at] if at < len(self.texts) else ""
-        # Most are numbers.
-        is_missing = not text[:1].isdigit() and text[:5].casefold() in words()["missing"]
-        return "" if is_missing else text
-
-    def place(self, at: int) -> tuple[int, int]:
-        """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
-        if at >= len(self.texts):
-            return self.line, 1
-        if not self.separator:
-            return self.line, max(0, self.raw.find(self.texts[at])) + 1
-        before = sum(len(cell) + 1 for cell in self.raw.split(self.separator)[:at])
-        rest = self.raw[before:]
-        return self.line, before + len(rest) - len(rest.lstrip(' "')) + 1
-
-
-@dataclass(eq=False, slots=True)
-class RowBlock:
-    """Rows that stand together.
-
-    Attributes
-    ----------
-    headings, above
-        What stands above them, and above those of the block before.
-    width
-        How many cells the first one has.
-    remarks
-        Of the whole file, as far as read.
-    """
-
-    headings: list[Row] = field(default_factory=list)
-    above: list[Row] = field(default_factory=list)
-    width: int = 0
-    remarks: list[Row] = field(default_factory=list)
 
 
 class Table:
@@ -108,7 +53,7 @@ class Table:
         unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
-        plain = [line for _, line in sample if line.strip() and not REMARK.match(line[:LONGEST])]
+        plain = [line for _, line in sample if line.strip() and not is_remark(line)]
         self._names = _find_names(plain)
         self.separator = "" if self._names else find_separator(plain)
         self._usual: tuple[tuple[bool, bool], ...] = ()
@@ -134,7 +79,10 @@ class Table:
         if not cells or len(cells) != len(self._usual):
             cells = split_cells(line, self.separator)
         if "," in line and (self.separator != "," or '"' in line):
-            return [t.replace(",", ".") if _DECIMAL.fullmatch(t[:LONGEST]) else t for t in cells]
+            return [
+                t.replace(",", ".") if form("decimal comma").fullmatch(t[:LONGEST]) else t
+                for t in cells
+            ]
         return cells
 
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
@@ -144,10 +92,10 @@ class Table:
         for number, line in self._lines:
             if not line or line.isspace():
                 continue
-            if block.width and not self._beside and _PLAIN.fullmatch(line):
+            if block.width and not self._beside and form("plain row").fullmatch(line):
                 yield block, Row(number, self.split(line), line, self.separator)
                 continue
-            mark = REMARK.match(line[:LONGEST])
+            mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, self.separator)
             if mark:
@@ -181,7 +129,7 @@ class Table:
     def _begins_block(self, row: Row, block: RowBlock) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
         is_again = row.texts in [above.texts for above in block.headings]
-        is_heading = is_again or 0 < len(row.texts) <= 2 * count_known(row)
+        is_heading = is_again or 0 < len(row.texts) <= 2 * row.known
         has_number = any(map(is_number, row.texts))
         return (is_heading and not has_number) or (not row.raw[:1].isdigit() and _is_mark(row))
 
@@ -206,31 +154,17 @@ def split_cells(line: str, separator: str) -> list[str]:
 
 def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
-    if not _LISTED.match(line):
+    if not form("list").match(line):
         return [(number, line)]
-    pieces = _BETWEEN_LISTS.split(line)
-    return [(number, _LISTED.sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
-
-
-@cache
-def _value_pattern() -> re.Pattern[str]:
-    """Return what is a value within words: a time of day, a number or a state, but no key."""
-    states = set().union(*(words()[role] for role in ("blocked", "clear", "high", "low")))
-    longest = sorted((w for w in states if len(w) > 2), key=len, reverse=True)
-    return re.compile(
-        rf"(?<![\w.]){CLOCK.pattern}|(?<![\w.])[-+]?[0-9]+(?:[.,][0-9]+)?(?:e[-+]?[0-9]{{1,2}})?"
-        r"(?:\s?(?:s|ms|us|µs|μs|ns|micros|millis|seconds))?(?![\w.])"
-        r"|(?<=[a-z_])[0-9]{1,4}(?![\w.]|[\"']?\s?[:=])"
-        rf"|(?<!\w)(?:{'|'.join(map(re.escape, longest))}|true|false)(?!\w|[\"']?\s?[:=])",
-        re.IGNORECASE,
-    )
+    pieces = form("between lists").split(line)
+    return [(number, form("list").sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
 
 
 def _named_values(line: str) -> list[tuple[str, str]]:
     """Return the values between the words of a line, each with the words right before it."""
     values, end = [], 0
-    for match in _value_pattern().finditer(line[:LONGEST]):
-        name = _NAME.search(line[end : match.start()])
+    for match in form("value").finditer(line[:LONGEST]):
+        name = form("value name").search(line[end : match.start()])
         values.append((name[1].strip() if name else "", match[0].replace(",", ".")))
         end = match.end()
     return values
@@ -251,7 +185,7 @@ def find_separator(lines: Sequence[str]) -> str:
         if sum(separator in row for row in rows) * 2 > len(rows):
             return separator
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
-    numbers = [row.replace(",", ".") for row in rows if _DECIMAL.fullmatch(row)]
+    numbers = [row.replace(",", ".") for row in rows if form("decimal comma").fullmatch(row)]
     if not is_named and len(numbers) * 2 > len(rows):
         # 0,25 below 1,5 is no decimal comma: times go on. Levels of inputs are 0 and 1.
         is_rising = sorted(numbers, key=float) == numbers and set("".join(rows)) - set("01,")
@@ -272,38 +206,10 @@ def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
     return tuple((text != "", bool(MEASURED & kinds_of(text))) for text in texts)
 
 
-def count_known(row: Row) -> int:
-    """Count the cells of a row that say what a column is."""
-    texts = [text for text in row.texts if text and not is_number(text)]
-    return sum(bool(_COLUMN_ROLES & vocabulary.roles_in(t) or vocabulary.unit_of(t)) for t in texts)
-
-
 def _is_mark(row: Row) -> bool:
     """Whether a row says that another run, or gate, begins: ``--- Run 2 ---``."""
-    text = vocabulary.normal(" ".join(row.texts)).strip("-=*#:<>[] ")
-    name = re.match(
-        r"([^\W\d]+(?: set)?)\s*(?:[#:]|nr|no)?\s*([0-9]{0,4})[ :=*#-]*(\D{0,12}$)?", text
-    )
+    text = normal(" ".join(row.texts)).strip("-=*#:<>[] ")
+    name = form("mark").match(text)
     is_named = name is not None and name[1].strip() in words()["run"] | words()["gate"]
     is_whole = name is not None and name[3] is not None and bool(name[2] or not name[3])
     return "vernier format" in text or (is_named and is_whole)
-
-
-def find_time_base(block: RowBlock) -> tuple[float, float] | None:
-    """Return the first sample's time and the step, s, that settings state; `None` without.
-
-    A setting's value stands behind its name, after ``:`` or ``=`` or in the next cell, or below it.
-    """
-    rows, stated = [*block.remarks, *block.headings], dict[str, float]()
-    for above, below in itertools.pairwise([*rows, Row(0, [])]):
-        for n, text in enumerate(above.texts):
-            name, _, inside = _ASSIGNED.sub("\0", text[:60]).partition("\0")
-            roles = [r for r in ("rate", "start", "step") if r in vocabulary.roles_in(name)]
-            places = (inside, above.cell(n + 1), below.cell(n))
-            for role, place in itertools.product(roles[:1], places):
-                if match := _QUANTITY.fullmatch(place.strip()):
-                    factor = {"k": 3, "m": 6, "g": 9}.get((match[2] or "").lower(), 0)
-                    power = factor - POWERS.get(vocabulary.unit_of((match[3] or "").lower()), 0)
-                    stated.setdefault(role, float(match[1].replace(",", ".")) * 10.0**power)
-    step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
-    return (stated.get("start", 0.0), step) if step else None

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.timers.lines import read_lines
+from rig.timers.preamble import RowBlock
 from rig.timers.problems import ProblemList
-from rig.timers.table import RowBlock, Table
+from rig.timers.table import Table
 from rig.timers.vocabulary import is_number
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.arrays import Array
-    from rig.timers.table import Row
+    from rig.timers.preamble import Row
 
 FEWEST = 6
 """Frames that tell an acceleration and how much they scatter."""
