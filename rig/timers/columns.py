@@ -6,11 +6,11 @@ Facts are collected of each column (of its heading, its unit, its values), and t
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,14 +19,16 @@ from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, form, is_number, 
 
 if TYPE_CHECKING:
     from rig.timers.events import TimerFile
-    from rig.timers.preamble import Row, RowBlock
     from rig.timers.problems import ProblemList
+    from rig.timers.table import Row, RowBlock
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
 VALUES = (SAMPLED, ("state", "cleared"), ("edge",), ())
 """Roles that say what happened; of a table that has several, the first are read."""
 _MOST_COLUMNS = 200
+_BESIDE = 0.1
+"""Share of the rows below which a column has settings that stand beside samples."""
 _FEWEST_TIMES = 4
 """Columns, each later than the one before, that are times side by side."""
 
@@ -122,6 +124,12 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts, len(rows)) for n, texts in cells.items() if texts}
     heading = block.find_heading(facts, width)
+    if heading is None:  # settings may stand beside samples
+        beside = {n for n in facts if len(cells[n]) < _BESIDE * len(rows)}
+        block.headings += [
+            row._replace(texts=[t * (n in beside) for n, t in enumerate(row.texts)]) for row in rows
+        ]
+        facts = {n: fact for n, fact in facts.items() if n not in beside}
     table = {
         "single": len(facts) == 1,
         "rising": any({"rises", "fractions"} <= fact for fact in facts.values()),
@@ -195,11 +203,12 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     prefix, colon, rest = name.partition(":")
     if colon and rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
-    units = [name, *(row.cell(n) for row in block.headings if row.has_units)]
+    units = [name, *(row.cell(n) for row in reversed(block.headings) if row.has_units)]
     units = [vocabulary.unit_of(text) for text in units]
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
-    names = [name, *(row.cell(n) for row in block.headings if row is not heading)]
-    column.gate = next(filter(None, map(_find_gate, names)), "")
+    labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
+    numbers = (row.cell(n) for row in block.headings if row.has_numbers)
+    column.gate = next(filter(None, itertools.chain(labels, numbers)), "")
     is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
     facts = facts | vocabulary.roles_in(name) | ({"time"} if is_bare_unit else set())
     facts |= {"timed"} if unit in POWERS else {{"v": "volt", "": "unitless"}.get(unit, "")}
@@ -221,16 +230,12 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     return column
 
 
-def _find_gate(text: str) -> str:
-    return text.strip() if form("bare number").fullmatch(text[:20]) else find_label(text, "gate")
-
-
 def _facts_of_values(texts: Sequence[str], rows: int) -> set[str]:
     """Return what holds of the values of a column, of which some may be missing."""
     kinds = [vocabulary.kinds_of(text) for text in texts]
     numbers = [float(text) for text in texts if is_number(text)]
     is_whole = all(vocabulary.number_of(t) is not None and not set(t) & set(".,+-") for t in texts)
-    steps, is_numeric = {b - a for a, b in pairwise(numbers)}, len(numbers) == len(texts)
+    steps, is_numeric = {b - a for a, b in itertools.pairwise(numbers)}, len(numbers) == len(texts)
     is_count = all(form("count").fullmatch(text) for text in texts)
     facts = {
         "levels": all("state" in kind for kind in kinds),
@@ -261,9 +266,11 @@ def find_signals(columns: Sequence[TimerColumn]) -> list[Signal]:
     for clock in times:
         own = [value for value in values if _clock_of(value, times) is clock]
         is_only = all(other is clock or other.run != clock.run for other in times)
-        for value in own:
+        named = Counter(map(_label_of, own))
+        for n, value in enumerate(own, 1):
             is_beside = is_sampled or len(own) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate * (not is_only)
+            label += f" ({n})" if is_sampled and named[label] > 1 else ""
             signals.append(Signal(clock, value, clock.run or value.run, label))
         if not own and not is_sampled:
             is_lone = sum(other.gate == clock.gate for other in times) == 1

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.records import Drop, Edge
 from rig.timers.moments import TICK_HZ, moment, seconds
-from rig.timers.preamble import Row
-from rig.timers.table import split_cells
+from rig.timers.table import Row, split_cells
 from rig.timers.vocabulary import LONGEST, is_remark
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import sys
 from array import array
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,12 @@ from rig.timers.moments import TICK_HZ, moment
 from rig.timers.vocabulary import is_number, number_of, state_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from rig.arrays import Array
     from rig.reasons import Reason
-    from rig.timers.columns import Signal, TimerColumn
-    from rig.timers.preamble import Row, TimeBase
+    from rig.timers.columns import TimerColumn
     from rig.timers.problems import ProblemList
+    from rig.timers.table import Row, TimeBase
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
@@ -154,12 +153,14 @@ class EventReader:
         self, file: TimerFile, columns: Sequence[TimerColumn], title: str, base: TimeBase
     ) -> None:
         self.file, self.base, self.signals = file, base, find_signals(columns)
+        self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
+        self.values = [signal.value for signal in self.signals if signal.value]
         places = {column.role: column.at for column in reversed(columns)}
-        self.is_sampled = bool(places.keys() & set(SAMPLED))
+        self.is_sampled, self.is_analog = bool(places.keys() & set(SAMPLED)), "volts" in places
         places = {} if self.is_sampled else places
         self.run_at, self.gate_at = (places.get(role, sys.maxsize) for role in ("run", "gate"))
-        self.has_several = len(self.signals) > 1 and any(signal.value for signal in self.signals)
-        runs = [clock.run for clock in {signal.clock for signal in self.signals}]
+        self.has_several = len(self.signals) > 1 and len(self.values) > 0
+        runs = [clock.run for clock in self.clocks]
         self.is_single = len(set(runs)) == len(runs)
         file.is_sampled |= self.is_sampled
         file.is_wide |= not self.is_sampled and len(runs) > 1 and not any(runs)
@@ -168,94 +169,114 @@ class EventReader:
         self.parts: dict[tuple[str, int], tuple[FilePart, dict[str, int]]] = {}
         self.starts: dict[str, int] = {}
         self.states: dict[tuple[str, str], str] = {}
-        self.traces = {signal: array("d") for signal in self.signals}
-        self.origin, self.ticks, self.count = 0, array("d"), 0
+        self.origin, self.ticks, self.samples, self.count = 0, array("d"), array("d"), 0
 
     def read(self, rows: Iterable[Row]) -> None:
         """Read rows; each gives events, or says that nothing changes, or is unread."""
-        file = self.file
+        before: list[str] = []
         for count, row in enumerate(rows):
-            file.rows += 1
-            cells = self._cells(row, count)
-            file.unread += [] if cells else [row.line]
-            # Where each row has the states of all inputs, most of them are as they were.
-            is_whole = self.has_several and len(cells) == len(self.signals)
-            for signal, tick, value in cells:
-                if tick is None or value is None:
-                    self._reject(row, signal.clock if tick is None else signal.value)
-                    break
-                if self.is_sampled and signal is self.signals[0]:
-                    self._note_time(row, signal.clock, tick)
-                if isinstance(value, str):
-                    self._add_state(row, signal, tick, value, is_whole=is_whole)
-                else:
-                    self.traces[signal].extend((tick - self.origin, value, row.line))
+            self.file.rows += 1
+            times = dict(self._times(row, count))
+            if self.is_sampled and self.clocks[0] in times:
+                self._note_time(row, times[self.clocks[0]])
+            if self.is_analog:
+                self._add_volts(row, times)
+                continue
+            words = [row.cell(value.at) for value in self.values]
+            if words != before or not self.is_sampled:  # most samples are as those before
+                self._add_states(row, times)
+            before = words
         steps = np.diff(self.ticks[:_SHOWN])
         if steps.size:
             usual = float(np.median(steps))
-            file.period_s = usual / TICK_HZ if steps.max() < _REGULAR * usual else None
-        file.notes += [
-            self._add_crossings(signal, np.array(trace).reshape(-1, 3).T)
-            for signal, trace in self.traces.items()
-            if signal.value and signal.value.role == "volts"
-        ]
+            self.file.period_s = usual / TICK_HZ if steps.max() < _REGULAR * usual else None
+        if self.is_analog:
+            self._add_crossings()
 
-    def _cells(self, row: Row, count: int) -> list[tuple[Signal, int | None, str | float | None]]:
-        """Return what a row says of each input: a time and a value, `None` if not accepted."""
-        cells = []
-        for signal in self.signals:
-            clock, value = signal.clock, signal.value
-            text = row.cell(clock.at) if clock.at >= 0 else str(count)
-            word = row.cell(value.at) if value else ""
+    def _times(self, row: Row, count: int) -> Iterator[tuple[TimerColumn, int]]:
+        """Yield the times that a row says, ps, each with its column."""
+        for clock in self.clocks:
+            text = row.cell(clock.at) if clock.at >= 0 else "-"
+            tick = moment(text, clock.power or 0) if clock.at >= 0 else count * TICK_HZ
             # Of another input's row nothing is said; telephones fill up with zeros.
-            is_filler = clock.numbered and signal is not self.signals[0] and not moment(text)
-            is_said = word or self.is_sampled or not (value and self.has_several)
-            if text and is_said and not is_filler:
-                tick = moment(text, clock.power or 0)
-                if clock.role != "time" and tick is not None:
-                    tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
-                cells.append((signal, tick, read_value(value.role, word) if value else clock.state))
-        return cells
+            is_filler = tick == 0 and clock.numbered and clock is not self.clocks[0]
+            if text and tick is None:
+                self._reject(row, clock)
+            elif tick is not None and not is_filler:
+                start, step = self.base
+                is_count = clock.role != "time"
+                yield clock, round(start * TICK_HZ + step * tick) if is_count else tick
 
-    def _note_time(self, row: Row, clock: TimerColumn, tick: int) -> None:
+    def _note_time(self, row: Row, tick: int) -> None:
         """Note when samples were taken, one after the other."""
         self.origin = self.origin if self.ticks else tick
         if self.ticks and tick - self.origin < self.ticks[-1]:
-            text = row.cell(clock.at)
-            self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
+            at = self.clocks[0].at
+            self.file.problems.add(*row.place(at), "time", "backwards", text=row.cell(at))
         self.ticks.append(tick - self.origin)
 
-    def _add_state(
-        self, row: Row, signal: Signal, tick: int, state: str, *, is_whole: bool
-    ) -> None:
-        """Add an event where a state begins that was not there before."""
-        run, label = row.cell(self.run_at) or signal.run, row.cell(self.gate_at) or signal.label
-        is_first = (run, label) not in self.states
-        usual = state if self.is_sampled else "clear" if is_whole or not tick else None
-        is_same = state == self.states.get((run, label), usual)
-        self.states[run, label] = state
-        if not is_same or not (is_whole or is_first or self.is_sampled):
-            at = 0 if self.is_single or run or label else signal.clock.at
-            self._add(run, at, TimerEvent(tick, label, state, row.line))
-            lasting_s = abs(tick - self.starts.setdefault(run, tick)) / TICK_HZ
-            if signal.clock.power is not None and lasting_s > LONGEST_S:
-                place = *row.place(signal.clock.at), signal.clock.role
-                values = {"lasting_s": lasting_s, "limit_s": LONGEST_S}
-                self.file.problems.add(*place, "too_long", recording="the recording", **values)
+    def _add_volts(self, row: Row, times: Mapping[TimerColumn, int]) -> None:
+        """Keep what a row of samples says, NaN where it says nothing."""
+        try:
+            volts: list[Any] = [float(row.texts[value.at]) for value in self.values]
+        except (IndexError, ValueError):
+            volts = [read_value("volts", row.cell(value.at)) for value in self.values]
+        if None in volts:
+            self._reject(row, self.values[volts.index(None)])
+            return
+        self.file.unread += [] if times else [row.line]
+        ticks = [times[c] - self.origin if c in times else math.nan for c in self.clocks]
+        self.samples.extend([*ticks, *volts, row.line])
 
-    def _add_crossings(self, signal: Signal, trace: Array) -> Reason:
-        """Add the events of volts; return how many they are, or that nothing passes."""
-        times, volts, lines = trace[:, np.isfinite(trace[1])]
-        threshold = find_threshold(volts) if volts.size else None
-        if threshold is None:
-            span = {"low": min(volts, default=math.nan), "high": max(volts, default=math.nan)}
-            return make_reason("no_passage", input=signal.label, **span)
-        crossings = list(find_crossings(times, volts, threshold))
-        for n, time, is_high in crossings:
-            tick, state = self.origin + round(time), "high" if is_high else "low"
-            self._add(signal.run, 0, TimerEvent(tick, signal.label, state, int(lines[n])))
-        counts = {"crossings": len(crossings), "level": threshold[0]}
-        return make_reason("crossings", input=signal.label, **counts)
+    def _add_states(self, row: Row, times: Mapping[TimerColumn, int]) -> None:
+        """Add an event for each state that begins with a row and was not there before."""
+        words = ((s, row.cell(s.value.at) if s.value else "") for s in self.signals)
+        cells = [
+            (signal, word)
+            for signal, word in words
+            if signal.clock in times and (word or not (signal.value and self.has_several))
+        ]
+        self.file.unread += [] if cells else [row.line]
+        # Where each row has the states of all inputs, most of them are as they were.
+        is_whole = self.has_several and len(cells) == len(self.signals)
+        for signal, word in cells:
+            clock, tick = signal.clock, times[signal.clock]
+            state = read_value(signal.value.role, word) if signal.value else clock.state
+            if state is None:
+                self._reject(row, signal.value or clock)
+            if not isinstance(state, str):
+                continue
+            key = row.cell(self.run_at) or signal.run, row.cell(self.gate_at) or signal.label
+            usual = state if self.is_sampled else "clear" if is_whole or not tick else None
+            is_same = state == self.states.get(key, usual)
+            is_first = key not in self.states
+            self.states[key] = state
+            if not is_same or not (is_whole or is_first or self.is_sampled):
+                at = 0 if self.is_single or any(key) else clock.at
+                self._add(key[0], at, TimerEvent(tick, key[1], state, row.line))
+                lasting_s = abs(tick - self.starts.setdefault(key[0], tick)) / TICK_HZ
+                if clock.power is not None and lasting_s > LONGEST_S:
+                    place = *row.place(clock.at), clock.role
+                    values = {"lasting_s": lasting_s, "limit_s": LONGEST_S}
+                    self.file.problems.add(*place, "too_long", recording="the recording", **values)
+
+    def _add_crossings(self) -> None:
+        """Add the events of volts; note how many they are, or that nothing passes."""
+        data = np.array(self.samples).reshape(-1, len(self.clocks) + len(self.values) + 1).T
+        for signal, trace in zip(self.signals, data[len(self.clocks) :], strict=False):
+            times, lines, name = data[self.clocks.index(signal.clock)], data[-1], signal.label
+            at = np.flatnonzero(np.isfinite(times) & np.isfinite(trace))
+            threshold = find_threshold(trace[at]) if at.size else None
+            if threshold is None:
+                low, high = min(trace[at], default=math.nan), max(trace[at], default=math.nan)
+                self.file.notes.append(make_reason("no_passage", input=name, low=low, high=high))
+                continue
+            crossings = list(find_crossings(times[at], trace[at], threshold))
+            for n, time, is_high in crossings:
+                state, line = "high" if is_high else "low", int(lines[at[n]])
+                self._add(signal.run, 0, TimerEvent(self.origin + round(time), name, state, line))
+            counts = {"crossings": len(crossings), "level": threshold[0]}
+            self.file.notes.append(make_reason("crossings", input=name, **counts))
 
     def _add(self, run: str, at: int, event: TimerEvent) -> None:
         """Add an event of a run, or of a column of times, to its part."""
@@ -273,9 +294,8 @@ class EventReader:
         if self.count > MAX_EVENTS:
             self.file.problems.refuse(event.line, 1, "too_many_events", limit=MAX_EVENTS)
 
-    def _reject(self, row: Row, column: TimerColumn | None) -> None:
+    def _reject(self, row: Row, column: TimerColumn) -> None:
         """Note a cell whose value is not accepted."""
-        assert column is not None
         text = row.texts[column.at] if column.at < len(row.texts) else ""
         accepted = roles()[column.role][1]
         self.file.problems.reject(*row.place(column.at), column.role, text, accepted)

@@ -272,7 +272,7 @@ def _read_map(
     """Read what a dry run prints: settings, and the gate's channel of each input."""
     pairs = form("assigned").findall(text) or [(text, "")]
     channels, stated = dict(pairs), dict[str, Any]()
-    for name in channels.keys() & SETTINGS.keys() - set(file.labels):
+    for name in [name for name in channels if name in SETTINGS and name not in file.labels]:
         stated[name] = channels.pop(name)
         if not re.fullmatch(SETTINGS[name], stated[name]):
             raise refusal(place, "layout_unclear", text=f"{name}={stated[name]:.40}")

@@ -1,7 +1,8 @@
-"""A text file as blocks of rows: cells below headings, with remarks and settings.
+"""A text file as blocks of rows: cells below a preamble of headings, units, remarks and settings.
 
 How the lines of a file are written (cells parted by a separator, or values between words) is found
-out from its first lines; then lines are read one after the other, and none is kept.
+out from its first lines; then lines are read one after the other, and none is kept. A setting is a
+name with its value behind ``:`` or ``=``, in the next cell or below it.
 """
 
 from __future__ import annotations
@@ -10,24 +11,138 @@ import csv
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from rig.timers.preamble import Row, RowBlock
-from rig.timers.vocabulary import (
-    LONGEST,
-    MEASURED,
-    form,
-    is_number,
-    is_remark,
-    kinds_of,
-    normal,
-    words,
-)
+from rig.timers import vocabulary
+from rig.timers.vocabulary import LONGEST, MEASURED, form, is_number, is_remark, kinds_of, roles_in
 
+TimeBase = tuple[float, float]
+"""When the first sample was taken, and the time between two, s."""
+_COLUMN_ROLES = {"time", "state", "edge", "volts", "gate", "run", "duration", "index", "derived"}
+_UNFILLED = {"setting", "index"}
+"""Roles of columns that may have a name and no values: a rate, or comments."""
+_PREFIXES = {"k": 3, "m": 6, "g": 9}
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
-_FEWEST_BESIDE = 20
-"""Rows beside nothing that tell samples with settings at their left from rows with empty cells."""
+
+
+class Row(NamedTuple):
+    """A line: its number, from 1, what its cells say, and how it was written."""
+
+    line: int
+    texts: list[str]
+    raw: str = ""
+    separator: str = ","
+
+    def cell(self, at: int) -> str:
+        """Return what a column, from 0, has; nothing where the row ends before it."""
+        text = self.texts[at] if at < len(self.texts) else ""
+        # Most are numbers.
+        is_missing = not text[:1].isdigit() and text[:5].casefold() in vocabulary.words()["missing"]
+        return "" if is_missing else text
+
+    @property
+    def known(self) -> int:
+        """How many cells say what a column is."""
+        texts = [text for text in self.texts if text and not is_number(text)]
+        units = ({"volts"} if vocabulary.unit_of(text) else set() for text in texts)
+        roles = [_COLUMN_ROLES & (roles_in(text) | u) for text, u in zip(texts, units, strict=True)]
+        return sum(map(bool, roles)) if set().union(*roles) - {"derived"} else 0
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether it numbers the columns: ``x-axis,1,2``."""
+        return len(self.texts) > 2 and all(map(form("bare number").fullmatch, self.texts[1:]))
+
+    @property
+    def has_units(self) -> bool:
+        """Whether it has units only, perhaps behind their name: ``Y_Unit_Label``."""
+        texts = [vocabulary.normal(text.strip("()[]- ")) for text in self.texts]
+        texts = list(filter(None, texts))
+        is_unit = [form("unit").fullmatch(text) is not None for text in texts]
+        return bool(texts) and all(is_unit[1:]) and (is_unit[0] or "unit" in texts[0])
+
+    def place(self, at: int) -> tuple[int, int]:
+        """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
+        if at >= len(self.texts):
+            return self.line, 1
+        if not self.separator:
+            return self.line, max(0, self.raw.find(self.texts[at])) + 1
+        before = sum(len(cell) + 1 for cell in self.raw.split(self.separator)[:at])
+        rest = self.raw[before:]
+        return self.line, before + len(rest) - len(rest.lstrip(' "')) + 1
+
+
+@dataclass(eq=False, slots=True)
+class RowBlock:
+    """Rows that stand together.
+
+    Attributes
+    ----------
+    headings, above
+        What stands above them, and above those of the block before.
+    width
+        How many cells the first one has.
+    remarks
+        Of the whole file, as far as read.
+    """
+
+    headings: list[Row] = field(default_factory=list)
+    above: list[Row] = field(default_factory=list)
+    width: int = 0
+    remarks: list[Row] = field(default_factory=list)
+
+    def find_heading(self, filled: Collection[int], width: int) -> Row | None:
+        """Return the row with most cells that are known; above and below may stand symbols, units.
+
+        A row with a measured number, or with more names than there are columns, is a setting.
+        """
+        rows = [
+            row
+            for row in self.headings
+            if row.known
+            and "unit" not in vocabulary.normal(row.texts[0])
+            and (len(row.texts) > 1 or len(filled) == 1)
+            and any(row.cell(n) and not is_number(row.cell(n)) for n in filled)
+            and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
+            and (row.has_numbers or not any(MEASURED & kinds_of(t) for t in row.texts[:width]))
+        ]
+        return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
+
+    def find_time_base(self) -> TimeBase | None:
+        """Return the first sample's time and the step, s, that settings state; `None` without."""
+        stated: dict[str, float] = {}
+        for name, places in self._settings():
+            role = next((role for role in ("rate", "start", "step") if role in roles_in(name)), "")
+            for match in map(form("quantity").fullmatch, places) if role else ():
+                if match:
+                    power = _PREFIXES.get((match[2] or "").lower(), 0)
+                    power -= vocabulary.POWERS.get(vocabulary.unit_of((match[3] or "").lower()), 0)
+                    stated.setdefault(role, float(match[1].replace(",", ".")) * 10.0**power)
+        step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
+        return (stated.get("start", 0.0), step) if step else None
+
+    def _settings(self) -> Iterator[tuple[str, tuple[str, ...]]]:
+        """Yield the name of each setting, and where its value may stand."""
+        for above, below in itertools.pairwise([*self.remarks, *self.headings, Row(0, [])]):
+            for n, text in enumerate(above.texts):
+                name, _, inside = form("assignment").sub("\0", text[:60]).partition("\0")
+                yield name, (inside.strip(), above.cell(n + 1), below.cell(n))
+
+    def find_inputs(self, places: Sequence[int]) -> list[str]:
+        """Return names for columns without a heading.
+
+        A row lists as many inputs, each equally far to the left of its column.
+        """
+        for row in [*self.remarks, *self.headings]:
+            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
+            named = [n for n, label in enumerate(labels) if label]
+            distances = {at - n for at, n in zip(places, named, strict=False)}
+            if len(named) == len(places) and len(distances) == 1 and min(distances) >= 0:
+                return [labels[n] for n in named]
+        return []
 
 
 class Table:
@@ -61,9 +176,6 @@ class Table:
         shapes = Counter({shape: n for shape, n in shapes.items() if any(map(all, shape))})
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
-        filled = [n for n, (is_filled, _) in enumerate(usual) if is_filled]
-        is_beside = count > max(_FEWEST_BESIDE, 0.9 * shapes.total()) and filled[0] > 1
-        self._beside = filled if is_beside else []
 
     def blocks(self) -> Iterator[tuple[RowBlock, Iterator[Row]]]:
         """Yield blocks of rows; the rows of each are to be taken before the next."""
@@ -92,7 +204,7 @@ class Table:
         for number, line in self._lines:
             if not line or line.isspace():
                 continue
-            if block.width and not self._beside and form("plain row").fullmatch(line):
+            if block.width and form("plain row").fullmatch(line):
                 yield block, Row(number, self.split(line), line, self.separator)
                 continue
             mark = form("remark").match(line[:LONGEST])
@@ -101,7 +213,6 @@ class Table:
             if mark:
                 remark = row
                 self.remarks += [row] * (number <= _SAMPLE)
-            row = self._without_settings(row, block) if self._beside else row
             if _is_mark(row) if mark else block.width > 0 and self._begins_block(row, block):
                 block = RowBlock([row], block.headings, remarks=self.remarks)
             elif not mark and self._is_row(row, block):
@@ -117,15 +228,6 @@ class Table:
                 else:
                     block.headings.append(row)
 
-    def _without_settings(self, row: Row, block: RowBlock) -> Row:
-        """Return a row; settings that stand beside its samples go to the headings."""
-        samples = [text if n in self._beside else "" for n, text in enumerate(row.texts)]
-        settings = ["" if n in self._beside else text for n, text in enumerate(row.texts)]
-        if not (any(settings) and _is_data(samples)):
-            return row
-        block.headings.append(row._replace(texts=settings))
-        return row._replace(texts=samples)
-
     def _begins_block(self, row: Row, block: RowBlock) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
         is_again = row.texts in [above.texts for above in block.headings]
@@ -134,8 +236,11 @@ class Table:
         return (is_heading and not has_number) or (not row.raw[:1].isdigit() and _is_mark(row))
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
-        texts = row.texts
-        is_usual = any(texts) and (_shape(texts) == self._usual or _is_data(texts))
+        texts, shape, usual = row.texts, _shape(row.texts), self._usual
+        if usual and not any(is_filled for is_filled, _ in usual[:2]):
+            # Samples of an oscilloscope, beside which settings may stand.
+            shape = tuple(a if b[0] else b for a, b in zip(shape, usual, strict=False))
+        is_usual = any(texts) and (shape == usual or _is_data(texts))
         # One of data with a fault: some of it is a number, as in those above.
         return is_usual or (1 < len(texts) == block.width and any(map(is_number, texts)))
 
@@ -208,8 +313,5 @@ def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
 
 def _is_mark(row: Row) -> bool:
     """Whether a row says that another run, or gate, begins: ``--- Run 2 ---``."""
-    text = normal(" ".join(row.texts)).strip("-=*#:<>[] ")
-    name = form("mark").match(text)
-    is_named = name is not None and name[1].strip() in words()["run"] | words()["gate"]
-    is_whole = name is not None and name[3] is not None and bool(name[2] or not name[3])
-    return "vernier format" in text or (is_named and is_whole)
+    text = vocabulary.normal(" ".join(row.texts)).strip("-=*#:<>[] ")
+    return form("mark").fullmatch(text) is not None

@@ -24,7 +24,7 @@ from rig.timers.vcd import BEGINNINGS, vcd_rows
 from rig.timers.vocabulary import LONGEST, recognise_format
 
 if TYPE_CHECKING:
-    from rig.timers.preamble import Row, RowBlock
+    from rig.timers.table import Row, RowBlock
 
 _SAMPLE = 200
 """Rows that show what columns are."""
