@@ -183,7 +183,8 @@ class EventReader:
                 self._add_volts(row, times)
                 continue
             words = [row.cell(value.at) for value in self.values]
-            if words != before or not self.is_sampled:  # most samples are as those before
+            # Most samples are as those before.
+            if words != before or not (self.is_sampled and times):
                 self._add_states(row, times)
             before = words
         steps = np.diff(self.ticks[:_SHOWN])
