@@ -97,11 +97,12 @@ class RowBlock:
     def find_heading(self, filled: Collection[int], width: int) -> Row | None:
         """Return the row with most cells that are known; above and below may stand symbols, units.
 
-        A row with a measured number, or with more names than there are columns, is a setting.
+        A row with a measured number, or with more names than there are columns, is a setting. A
+        remark may name the columns where nothing else does.
         """
         rows = [
             row
-            for row in self.headings
+            for row in self.headings or [row for row in self.remarks if len(row.texts) == width]
             if row.known
             and "unit" not in vocabulary.normal(row.texts[0])
             and (len(row.texts) > 1 or len(filled) == 1)
@@ -114,22 +115,19 @@ class RowBlock:
     def find_time_base(self) -> TimeBase | None:
         """Return the first sample's time and the step, s, that settings state; `None` without."""
         stated: dict[str, float] = {}
-        for name, places in self._settings():
-            role = next((role for role in ("rate", "start", "step") if role in roles_in(name)), "")
-            for match in map(form("quantity").fullmatch, places) if role else ():
-                if match:
-                    power = _PREFIXES.get((match[2] or "").lower(), 0)
-                    power -= vocabulary.POWERS.get(vocabulary.unit_of((match[3] or "").lower()), 0)
-                    stated.setdefault(role, float(match[1].replace(",", ".")) * 10.0**power)
-        step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
-        return (stated.get("start", 0.0), step) if step else None
-
-    def _settings(self) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Yield the name of each setting, and where its value may stand."""
         for above, below in itertools.pairwise([*self.remarks, *self.headings, Row(0, [])]):
             for n, text in enumerate(above.texts):
                 name, _, inside = form("assignment").sub("\0", text[:60]).partition("\0")
-                yield name, (inside.strip(), above.cell(n + 1), below.cell(n))
+                places = inside.strip(), above.cell(n + 1), below.cell(n)
+                found = list(filter(None, map(form("quantity").fullmatch, places)))
+                role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
+                if role and found:
+                    number, prefix, unit = found[0].groups("")
+                    power = vocabulary.POWERS.get(vocabulary.unit_of(unit.lower()), 0)
+                    power = _PREFIXES.get(prefix.lower(), 0) - power
+                    stated.setdefault(role, float(number.replace(",", ".")) * 10.0**power)
+        step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
+        return (stated.get("start", 0.0), step) if step else None
 
     def find_inputs(self, places: Sequence[int]) -> list[str]:
         """Return names for columns without a heading.
@@ -200,7 +198,6 @@ class Table:
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
-        remark = Row(0, [])
         for number, line in self._lines:
             if not line or line.isspace():
                 continue
@@ -210,14 +207,10 @@ class Table:
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, self.separator)
-            if mark:
-                remark = row
-                self.remarks += [row] * (number <= _SAMPLE)
+            self.remarks += [row] if mark and number <= _SAMPLE else []
             if _is_mark(row) if mark else block.width > 0 and self._begins_block(row, block):
                 block = RowBlock([row], block.headings, remarks=self.remarks)
             elif not mark and self._is_row(row, block):
-                if not block.headings and len(list(filter(None, remark.texts))) == len(row.texts):
-                    block.headings.append(remark)  # with a name for each cell
                 block.width = block.width or len(row.texts)
                 yield block, row
             elif not mark and any(row.texts):
