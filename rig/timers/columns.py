@@ -120,7 +120,8 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         values = {"columns": width, "limit": _MOST_COLUMNS}
         file.problems.refuse(rows[0].line, 1, "too_many_columns", **values)
     if all(len(row.texts) != width for row in block.headings):
-        block.headings += block.above  # one without a heading has that of the block above
+        # One without a heading has that of the block above.
+        block.headings += [row for row in block.above if not row.is_mark]
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts, len(rows)) for n, texts in cells.items() if texts}
     heading = block.find_heading(facts, width)
@@ -135,8 +136,9 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         "rising": any({"rises", "fractions"} <= fact for fact in facts.values()),
         "listed": _is_each_row_rising(rows, width),
         "digital": all("levels" in fact for fact in facts.values()),
-        "rated": block.find_time_base() is not None,
     }
+    if table["digital"]:
+        table["rated"] = block.find_time_base() is not None
     shared = {fact for fact, holds in table.items() if holds}
     columns = [_read_heading(block, heading, n, fact | shared) for n, fact in facts.items()]
     if heading is None:

@@ -52,6 +52,12 @@ class Row(NamedTuple):
         return sum(map(bool, roles)) if set().union(*roles) - {"derived"} else 0
 
     @property
+    def is_mark(self) -> bool:
+        """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
+        text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
+        return form("mark").fullmatch(text) is not None
+
+    @property
     def has_numbers(self) -> bool:
         """Whether it numbers the columns: ``x-axis,1,2``."""
         return len(self.texts) > 2 and all(map(form("bare number").fullmatch, self.texts[1:]))
@@ -119,10 +125,10 @@ class RowBlock:
             for n, text in enumerate(above.texts):
                 name, _, inside = form("assignment").sub("\0", text[:60]).partition("\0")
                 places = inside.strip(), above.cell(n + 1), below.cell(n)
-                found = list(filter(None, map(form("quantity").fullmatch, places)))
+                quantities = list(filter(None, map(form("quantity").fullmatch, places)))
                 role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
-                if role and found:
-                    number, prefix, unit = found[0].groups("")
+                if role and quantities:
+                    number, prefix, unit = quantities[0].groups("")
                     power = vocabulary.POWERS.get(vocabulary.unit_of(unit.lower()), 0)
                     power = _PREFIXES.get(prefix.lower(), 0) - power
                     stated.setdefault(role, float(number.replace(",", ".")) * 10.0**power)
@@ -208,7 +214,7 @@ class Table:
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, self.separator)
             self.remarks += [row] if mark and number <= _SAMPLE else []
-            if _is_mark(row) if mark else block.width > 0 and self._begins_block(row, block):
+            if row.is_mark if mark else block.width > 0 and self._begins_block(row, block):
                 block = RowBlock([row], block.headings, remarks=self.remarks)
             elif not mark and self._is_row(row, block):
                 block.width = block.width or len(row.texts)
@@ -226,7 +232,7 @@ class Table:
         is_again = row.texts in [above.texts for above in block.headings]
         is_heading = is_again or 0 < len(row.texts) <= 2 * row.known
         has_number = any(map(is_number, row.texts))
-        return (is_heading and not has_number) or (not row.raw[:1].isdigit() and _is_mark(row))
+        return (is_heading and not has_number) or (not row.raw[:1].isdigit() and row.is_mark)
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
         texts, shape, usual = row.texts, _shape(row.texts), self._usual
@@ -302,9 +308,3 @@ def _is_data(texts: Sequence[str]) -> bool:
 def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
     """Return which cells are filled, and numbers; of most rows of data it is the same."""
     return tuple((text != "", bool(MEASURED & kinds_of(text))) for text in texts)
-
-
-def _is_mark(row: Row) -> bool:
-    """Whether a row says that another run, or gate, begins: ``--- Run 2 ---``."""
-    text = vocabulary.normal(" ".join(row.texts)).strip("-=*#:<>[] ")
-    return form("mark").fullmatch(text) is not None

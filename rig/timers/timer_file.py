@@ -85,7 +85,8 @@ def _read_block(file: TimerFile, block: RowBlock, rows: Iterator[Row]) -> None:
     sample = list(itertools.islice(rows, _SAMPLE))
     columns = columns_of(file, block, sample)
     file.columns |= {column.name: column.meaning for column in columns}
-    roles, base = {column.role for column in columns}, block.find_time_base()
+    roles = {column.role for column in columns}
+    base = None if "time" in roles else block.find_time_base()
     title = " ".join(block.headings[0].texts) if block.headings else ""
     reader, start = EventReader(file, columns, title, base or (0.0, 1.0)), len(file.parts)
     if reader.is_sampled and base is None and "time" not in roles:
