@@ -6,27 +6,29 @@ Facts are collected of each column (of its heading, its unit, its values), and t
 
 from __future__ import annotations
 
-import re
+import itertools
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers import vocabulary
-from rig.timers.table import Row, RowBlock, count_known, find_time_base
-from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, is_number, normal, words
+from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, form, is_number, normal, words
 
 if TYPE_CHECKING:
+    from rig.timers.events import TimerFile
     from rig.timers.problems import ProblemList
-    from rig.timers.timer_file import TimerFile
+    from rig.timers.table import Row, RowBlock
 
-VALUES = (("level", "volts"), ("state", "cleared"), ("edge",), ())
+SAMPLED = ("level", "volts")
+"""Roles of samples: what an input was at a time, whether it changed then or not."""
+VALUES = (SAMPLED, ("state", "cleared"), ("edge",), ())
 """Roles that say what happened; of a table that has several, the first are read."""
-_UNITS = {*POWERS, "v"}
 _MOST_COLUMNS = 200
+_BESIDE = 0.1
+"""Share of the rows below which a column has settings that stand beside samples."""
 _FEWEST_TIMES = 4
 """Columns, each later than the one before, that are times side by side."""
 
@@ -49,8 +51,9 @@ class TimerColumn:
         Its heading.
     role
         A key of `roles`.
-    power
-        Of times: decimal power from seconds; `None` where the file does not say it.
+    power, has_unit
+        Of times: decimal power from seconds, `None` for counts of an unknown unit, and whether the
+        file says it.
     gate, run
         Which input and which run all its values are of; empty where the heading does not say.
     state
@@ -61,8 +64,9 @@ class TimerColumn:
 
     at: int
     name: str
-    role: str
+    role: str = ""
     power: int | None = 0
+    has_unit: bool = True
     gate: str = ""
     run: str = ""
     state: str = ""
@@ -98,17 +102,7 @@ class Signal(NamedTuple):
     label: str
 
 
-def _find_role(facts: set[str]) -> str:
-    return next(
-        role
-        for role, rule in vocabulary.read_rows("columns.txt", ":")
-        if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
-    )
-
-
-def columns_of(
-    file: TimerFile, block: RowBlock, rows: Sequence[Row], problems: ProblemList
-) -> list[TimerColumn]:
+def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[TimerColumn]:
     """Find out what the columns of a block are, in the way in which the file is read.
 
     Parameters
@@ -123,31 +117,36 @@ def columns_of(
     """
     width = max(len(row.texts) for row in rows)
     if width > _MOST_COLUMNS:
-        problems.refuse(rows[0].line, 1, "too_many_columns", columns=width, limit=_MOST_COLUMNS)
+        values = {"columns": width, "limit": _MOST_COLUMNS}
+        file.problems.refuse(rows[0].line, 1, "too_many_columns", **values)
     if all(len(row.texts) != width for row in block.headings):
-        block.headings += block.above  # one without a heading has that of the block above
+        # One without a heading has that of the block above.
+        block.headings += [row for row in block.above if not row.is_mark]
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
-    facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
-    heading = _find_heading(block, facts, width)
-    if all("levels" in fact for fact in facts.values()):
-        heading = _name_levels(len(facts), block) or heading
-    if heading is None and _is_each_row_rising(rows, width):
-        heading = Row(0, [f"moment {n}" for n in range(1, width + 1)])
-    is_rising = any({"rises", "fractions"} <= fact for fact in facts.values())
-    for n, fact in facts.items():
-        is_bare = heading is None or not (heading.line or heading.cell(n))
-        fact.update({"bare"} if is_bare else (), {"single"} if len(facts) == 1 else ())
-        fact.update({"rival"} if is_rising and "fractions" not in fact else ())
-    columns = [_read_heading(block, heading, n, fact) for n, fact in facts.items()]
-    for column in columns:
-        if column.role == "level" and len(cells[column.at]) < len(rows):
-            column.role = "state"  # of samples, each row has every level
-        if column.role == "time" and column.power is None:
-            # Fractions are seconds, and so are small whole numbers.
-            is_count = all(re.fullmatch(r"[+-]?[0-9]{1,30}", text) for text in cells[column.at])
-            is_long = is_count and abs(int(cells[column.at][-1]) - int(cells[column.at][0])) > 100
-            column.power = POWERS[file.unit] if file.unit else None if is_long else 0
-    _name_traces(block, columns if heading is None else [])
+    facts = {n: _facts_of_values(texts, len(rows)) for n, texts in cells.items() if texts}
+    heading = block.find_heading(facts, width)
+    if heading is None:  # settings may stand beside samples
+        beside = {n for n in facts if len(cells[n]) < _BESIDE * len(rows)}
+        block.headings += [
+            row._replace(texts=[t * (n in beside) for n, t in enumerate(row.texts)]) for row in rows
+        ]
+        facts = {n: fact for n, fact in facts.items() if n not in beside}
+    table = {
+        "single": len(facts) == 1,
+        "rising": any({"rises", "fractions"} <= fact for fact in facts.values()),
+        "listed": _is_each_row_rising(rows, width),
+        "digital": all("levels" in fact for fact in facts.values()),
+    }
+    if table["digital"]:
+        table["rated"] = block.find_time_base() is not None
+    shared = {fact for fact, holds in table.items() if holds}
+    columns = [_read_heading(block, heading, n, fact | shared) for n, fact in facts.items()]
+    if heading is None:
+        inputs = [column for column in columns if column.role in SAMPLED]
+        count = [f"D{n}" for n, column in enumerate(inputs) if column.role == "level"]
+        names = block.find_inputs([column.at for column in inputs]) or count
+        for column, name in zip(inputs, names, strict=False):
+            column.gate = column.name = name
     # Of columns that say the same times in other units, the finest is kept.
     times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
     finest = {(c.gate, c.run, c.state): c.power for c in sorted(times, key=attrgetter("power"))}
@@ -158,7 +157,10 @@ def columns_of(
     for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
         readings = column.role.split("|")
         file.ways, column.role = max(file.ways, len(readings)), readings[file.way % len(readings)]
-    _check_columns(columns, heading, rows[0], problems)
+    for column in columns:
+        if column.role == "time" and not column.has_unit:
+            file.has_unit, file.is_counted = False, file.is_counted or column.power is None
+    _check_columns(columns, heading, rows[0], file.problems)
     return columns
 
 
@@ -169,28 +171,6 @@ def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
     return width >= _FEWEST_TIMES and is_list
 
 
-def _name_levels(width: int, block: RowBlock) -> Row | None:
-    """Return a heading for levels that have only a rate: as a remark lists, or D0, D1."""
-    labels = {text.casefold() for row in block.headings[-1:] for text in row.texts}
-    if labels - {"logic", "analog"} or not find_time_base(block):
-        return None
-    lists = [row.raw.partition(":")[2].split(",") for row in block.remarks]
-    names = next((n for n in lists if len(n) == width), [f"D{n}" for n in range(width)])
-    texts = (text.strip() for text in names)
-    return Row(0, [text if find_label(text, "gate") else f"input {text}" for text in texts])
-
-
-def _name_traces(block: RowBlock, columns: Sequence[TimerColumn]) -> None:
-    """Name volts without a heading as settings do, each equally far to the left of its trace."""
-    texts = sorted((n, text) for row in block.headings for n, text in enumerate(row.texts))
-    labels = [(n, label) for n, text in texts if (label := find_label(text, "gate"))]
-    traces = list(zip([c for c in columns if c.role == "volts"], labels, strict=False))
-    distances = {trace.at - n for trace, (n, _) in traces}
-    if len(distances) == 1 and min(distances) >= 0:
-        for trace, (_, label) in traces:
-            trace.gate = label
-
-
 def _check_columns(
     columns: Sequence[TimerColumn], heading: Row | None, first: Row, problems: ProblemList
 ) -> None:
@@ -198,8 +178,9 @@ def _check_columns(
     counts, above = Counter(column.role for column in columns), heading or first
     repeated = max(counts["state"], counts["edge"], counts["gate"]) > 1
     # Two traces of an oscilloscope stand beside each other, each with its times.
-    is_open = repeated or counts["other"] or counts["time"] not in {1, counts["volts"] or 1}
-    if heading is None and is_open:
+    is_timed = counts["time"] in {1, counts["volts"] or 1} or counts["level"] > 0
+    is_listed = all(column.numbered for column in columns)
+    if heading is None and (repeated or counts["other"] or not (is_timed or is_listed)):
         place = first.place(columns[min(2, len(columns) - 1)].at)
         problems.add(*place, "", "no_heading", columns=len(columns))
     for column in columns if heading else ():
@@ -209,78 +190,55 @@ def _check_columns(
             problems.add(*place, column.name, "ambiguous", **values)
         elif column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
             problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
-    if not counts.keys() & {"time", *VALUES[0]}:
+    if not counts.keys() & {"time", *SAMPLED}:
         durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
         code = "durations" if durations else "no_time_column"
         problems.add(above.line, 1, "", code, numbers=durations)
     problems.raise_if_any()
 
 
-def _find_heading(block: RowBlock, filled: Collection[int], width: int) -> Row | None:
-    """Return the row with most cells that are known; above and below may stand symbols, units.
-
-    A row with a measured number, or with more names than there are columns, is a setting.
-    """
-    rows = [
-        row
-        for row in block.headings
-        if count_known(row)
-        and (len(row.texts) > 1 or len(filled) == 1)
-        and any(text and not is_number(text) and n in filled for n, text in enumerate(row.texts))
-        and not any(
-            text and "setting" not in vocabulary.roles_in(text) for text in row.texts[width:]
-        )
-        and not any(is_number(text) and not text.isdecimal() for text in row.texts[:width])
-    ]
-    return max(rows, key=lambda row: (count_known(row), len("".join(row.texts))), default=None)
-
-
 def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str]) -> TimerColumn:
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
-    name, beside = (
-        heading.cell(n) if heading else "",
-        [r.cell(n) for r in block.headings if r is not heading],
-    )
-    prefix, colon, rest = name.partition(":")
-    column = TimerColumn(n, name or f"column {n + 1}", "", run=find_label(name, "run"))
+    name = heading.cell(n) if heading else ""
+    column = TimerColumn(n, name or f"column {n + 1}", run=find_label(name, "run"))
     name = name.replace(column.run, " ") if column.run else name
+    prefix, colon, rest = name.partition(":")
     if colon and rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
-    below = [row.cell(n) for row in block.headings if _has_units(row)]
-    units = [vocabulary.unit_of(text) for text in (name, *below)]
-    unit = next((unit for unit in units if unit in _UNITS), units[0])
-    column.gate = next(filter(None, map(_find_gate, [name, *beside])), "")
-    kinds = dict.fromkeys(POWERS, "timed") | {"v": "volt", "": "unitless"}
-    facts = facts | vocabulary.roles_in(name)
-    facts |= {kinds.get(unit, ""), "labelled" * bool(column.gate), "numbered" * bool(column.run)}
-    if unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]:
-        facts |= {"time"}
-    column.role = _find_role(facts)
+    units = [name, *(row.cell(n) for row in reversed(block.headings) if row.has_units)]
+    units = [vocabulary.unit_of(text) for text in units]
+    unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
+    labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
+    numbers = (row.cell(n) for row in block.headings if row.has_numbers)
+    column.gate = next(filter(None, itertools.chain(labels, numbers)), "")
+    is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
+    facts = facts | vocabulary.roles_in(name) | ({"time"} if is_bare_unit else set())
+    facts |= {"timed"} if unit in POWERS else {{"v": "volt", "": "unitless"}.get(unit, "")}
+    facts |= set() if heading and (heading.line or heading.cell(n)) else {"bare"}
+    facts |= {"labelled"} if column.gate else set()
+    facts |= {"numbered"} if column.run else set()
+    column.role = next(
+        role
+        for role, rule in vocabulary.read_rows("columns.txt", ":")
+        if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
+    )
     if column.role == "time":
-        column.power = POWERS.get(unit if unit or "_" in name else normal(name))
+        power = POWERS.get(unit if unit or "_" in name else normal(name))
+        column.has_unit = power is not None or "suffixed" in facts
+        # Fractions are seconds, and so are small whole numbers.
+        column.power = power if power is not None or "counted" in facts else 0
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
-        column.numbered = "moment" in facts
+        column.numbered = bool({"moment", "listed"} & facts)
     return column
 
 
-def _has_units(row: Row) -> bool:
-    """Whether a row has units only, perhaps behind their name: ``Y_Unit_Label``."""
-    texts = [normal(text.strip("()[] ")) for text in row.texts if text.strip("-")]
-    units = set().union(*(listed for role, listed in words().items() if role.startswith("unit")))
-    is_unit = [text in units or (not n and "unit" in text) for n, text in enumerate(texts)]
-    return len(texts) > 0 and all(is_unit)
-
-
-def _find_gate(text: str) -> str:
-    bare = re.fullmatch(r"\s*[0-9]{1,3}\s*", text[:20])
-    return text.strip() if bare else find_label(text, "gate")
-
-
-def _facts_of_values(texts: Sequence[str]) -> set[str]:
+def _facts_of_values(texts: Sequence[str], rows: int) -> set[str]:
+    """Return what holds of the values of a column, of which some may be missing."""
     kinds = [vocabulary.kinds_of(text) for text in texts]
     numbers = [float(text) for text in texts if is_number(text)]
     is_whole = all(vocabulary.number_of(t) is not None and not set(t) & set(".,+-") for t in texts)
-    steps, is_numeric = {b - a for a, b in pairwise(numbers)}, len(numbers) == len(texts)
+    steps, is_numeric = {b - a for a, b in itertools.pairwise(numbers)}, len(numbers) == len(texts)
+    is_count = all(form("count").fullmatch(text) for text in texts)
     facts = {
         "levels": all("state" in kind for kind in kinds),
         "suffixed": all({"timed", "clock"} & kind for kind in kinds),
@@ -288,11 +246,13 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
         "counts": is_numeric and is_whole and numbers[0] in {0, 1} and steps == {1.0},
+        "counted": is_count and abs(int(texts[-1]) - int(texts[0])) > 100,
         "few": is_whole and len(texts) >= 2 * len(set(texts)),
-        "binary": set(texts) <= {"0", "1"},
+        "bits": set(texts) <= {"0", "1"},
         "words": not numbers,
         "short": len(texts) < 3,
         "many": len(texts) > 30,
+        "gaps": len(texts) < rows,
     }
     return {fact for fact, holds in facts.items() if holds}
 
@@ -301,25 +261,23 @@ def find_signals(columns: Sequence[TimerColumn]) -> list[Signal]:
     """Give each column of times the values that belong to it: of its run, and of its input."""
     chosen = ([c for c in columns if c.role in listed] for listed in VALUES)
     values = next(filter(None, chosen), [])
-    times = [column for column in columns if column.role == "time"]
-    if not times:
-        count = next((column for column in columns if column.role == "index"), ROW_COUNT)
-        return [Signal(count, value, value.run, _label_of(value)) for value in values]
-    owners = [(_clock_of(value, times), value) for value in values]
+    counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
+    times = [column for column in columns if column.role == "time"] or counts
+    is_sampled = any(value.role in SAMPLED for value in values)
     signals = []
     for clock in times:
-        own = [value for owner, value in owners if owner is clock]
-        is_lone = sum(other.gate == clock.gate for other in times) == 1
-        is_named = is_lone and clock.gate in clock.name and not (clock.run or clock.state)
-        label = clock.name if clock.gate and is_named else clock.gate
-        for value in own:
-            run = clock.run or value.run
-            if value.role in VALUES[0] or len(own) > 1:
-                signals.append(Signal(clock, value, run, _label_of(value)))
-            else:
-                is_only = all(t is clock or t.run != clock.run for t in times)
-                signals.append(Signal(clock, value, run, clock.gate or value.gate * (not is_only)))
-        if not own and not (values and values[0].role in VALUES[0]):
+        own = [value for value in values if _clock_of(value, times) is clock]
+        is_only = all(other is clock or other.run != clock.run for other in times)
+        named = Counter(map(_label_of, own))
+        for n, value in enumerate(own, 1):
+            is_beside = is_sampled or len(own) > 1
+            label = _label_of(value) if is_beside else clock.gate or value.gate * (not is_only)
+            label += f" ({n})" if is_sampled and named[label] > 1 else ""
+            signals.append(Signal(clock, value, clock.run or value.run, label))
+        if not own and not is_sampled:
+            is_lone = sum(other.gate == clock.gate for other in times) == 1
+            is_named = is_lone and clock.gate in clock.name and not (clock.run or clock.state)
+            label = clock.name if clock.gate and is_named else clock.gate
             signals.append(Signal(clock, None, clock.run, label))
     return signals
 
@@ -333,5 +291,5 @@ def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:
 
 def _label_of(value: TimerColumn) -> str:
     """Return what the file calls an input: the heading of samples, or the gate's name in it."""
-    is_named = value.role in VALUES[0] and value.gate in value.name
+    is_named = value.role in SAMPLED and value.gate in value.name
     return value.name if is_named or not value.gate else value.gate

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rig.records import Drop, Edge
 from rig.timers.moments import TICK_HZ, moment, seconds
-from rig.timers.table import REMARK, Row, split_cells
-from rig.timers.vocabulary import LONGEST
+from rig.timers.table import Row, split_cells
+from rig.timers.vocabulary import LONGEST, is_remark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -31,7 +31,7 @@ _LONGEST_RUN_S = 3600
 
 def is_own(head: Iterable[str]) -> bool:
     """Whether lines begin as the project's own format does, perhaps below remarks."""
-    plain = (line[:LONGEST] for line in head if line.strip() and not REMARK.match(line[:LONGEST]))
+    plain = (line[:LONGEST] for line in head if line.strip() and not is_remark(line))
     first = next(plain, "").lower()
     return [text.strip() for text in first.split(",")[:2]] == list(HEADER[:2])
 
@@ -43,7 +43,7 @@ def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[
     plain = (
         Row(number, split_cells(line, ","), line)
         for number, line in lines
-        if line.strip() and not REMARK.match(line)
+        if line.strip() and not is_remark(line)
     )
     heading = next(plain, Row(1, []))
     if tuple(map(str.lower, heading.texts)) != HEADER:
@@ -82,8 +82,8 @@ def _read_cells(row: Row, problems: ProblemList) -> list[Any]:
         problems.add(row.line, 1, "", "wrong_width", **values)
         return [None]
     cells = []
-    for n, (text, (form, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
-        cells.append(read(text) if re.fullmatch(form, text) else None)
+    for n, (text, (pattern, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
+        cells.append(read(text) if re.fullmatch(pattern, text) else None)
         if cells[-1] is None:
             problems.reject(*row.place(n), HEADER[n], text, accepted)
     return cells

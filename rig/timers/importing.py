@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rig.errors import InputError
 from rig.reasons import make_reason
 from rig.timers.edge_rows import HEADER, is_own, read_edges
-from rig.timers.events import LONGEST_S
+from rig.timers.events import LONGEST_S, TimerFile
 from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, read_drops
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList, refusal
-from rig.timers.timer_file import TimerFile, read_ways
-from rig.timers.vocabulary import POWERS
+from rig.timers.timer_file import read_ways
+from rig.timers.vocabulary import POWERS, form
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -116,7 +116,7 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
         drops = read_edges(enumerate(read_lines(place), 1), ProblemList(place))
         return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
     readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
-    for file in read_ways(place, options.unit):
+    for file in read_ways(place):
         try:
             stated = _read_stated(options, file, gates)
         except InputError as error:
@@ -171,21 +171,20 @@ def _choose(
     rough.sort(key=lambda row: -row[0])
     near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
     # What the file says comes first: the contrary may be proposed, and is never taken.
-    matches = [
-        (fit(reading.drops, True), reading) for reading in near if reading.layout.dark != "inverted"
-    ]
-    ranked = [row for row in matches if row[0].share >= _GOOD]
+    own = [reading for reading in near if reading.layout.dark != "inverted"]
+    matches = [(fit(reading.drops, True), reading) for reading in own]
+    ranked = [(match, reading) for match, reading in matches if match.share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
-    if not ranked:
-        share = max(share for share, reading in rough if reading.layout.dark != "inverted")
-        is_open = rough[0][1].layout.dark not in {"states", "inverted"}
-        good = [reading.layout for share, reading in rough if share >= _GOOD or is_open]
-        options = "; ".join(map(str, [*good[:3], "--as-read"]))
-        raise refusal(place, "no_reading_fits", share=100 * share, options=options)
-    (match, reading), *rest = ranked
+    (match, reading), *rest = ranked or [(FallMatch(0.0), readings[0])]
     if rest and match.evidence - rest[0][0].evidence < _DECISIVE:
-        options = " or ".join(str(row[1].layout) for row in ranked[:2])
+        options = " or ".join(str(reading.layout) for _, reading in ranked[:2])
         raise refusal(place, "several_readings", options=options)
+    if not ranked:
+        says_dark = any(reading.layout.dark == "states" for reading in readings)
+        good = [reading.layout for share, reading in rough if share >= _GOOD or not says_dark]
+        options = "; ".join(map(str, [*good[:3], "--as-read"]))
+        shares = [share for share, reading in rough if reading.layout.dark != "inverted"]
+        raise refusal(place, "no_reading_fits", share=100 * max(shares, default=0), options=options)
     return reading, match
 
 
@@ -251,33 +250,33 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
 
 
 def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
-    """Return what is decided by a saved layout and by options, which come before it."""
-    saved, stated = Path(options.map_file or ""), dict[str, Any]()
+    """Return what is decided: by a saved layout, and by options, which come after it."""
+    saved, channel, texts = Path(options.map_file or ""), options.channel, dict[str, str]()
     if saved.is_file():
         with saved.open(encoding="utf-8", errors="replace") as stream:
-            text = stream.read(LONGEST_MAP).strip()
-        stated = _read_map(text, options.map_file, file, gates, {})
-    stated |= {"dark": options.dark} if options.dark else {}
-    if options.map is not None:
-        return _read_map(options.map, "--map", file, gates, stated)
-    if options.channel is not None and len(file.labels) < 2:
-        text = f"{next(iter(file.labels), 'input')}={options.channel}"
-        return _read_map(text, "--channel", file, gates, stated)
+            texts[options.map_file] = stream.read(LONGEST_MAP).strip()
+    texts |= {"--dark": f"dark={options.dark}"} if options.dark else {}
+    texts |= {"--unit": f"unit={options.unit}"} if options.unit else {}
+    if channel is not None and len(file.labels) < 2:
+        texts["--channel"] = f"{next(iter(file.labels), 'input')}={channel}"
+    texts |= {"--map": options.map} if options.map is not None else {}
+    stated = dict[str, Any]()
+    for place, text in texts.items():
+        stated |= _read_map(text, place, file, gates, stated.get("groups"))
     return stated
 
 
 def _read_map(
-    text: str, place: str, file: TimerFile, gates: Sequence[int], stated: Mapping[str, Any]
+    text: str, place: str, file: TimerFile, gates: Sequence[int], groups: str | None
 ) -> dict[str, Any]:
     """Read what a dry run prints: settings, and the gate's channel of each input."""
-    pairs = re.findall(r"\s*([^=]+?)\s*(?:=\s*([^\s,=]*)[\s,]*|$)", text) or [(text, "")]
-    settings = {name: value for name, value in pairs if name in set(SETTINGS) - set(file.labels)}
-    for name, value in settings.items():
-        if not re.fullmatch(SETTINGS[name], value):
-            raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
-    stated = {**stated, **settings}
-    inputs = {name or "input": name for name in input_names(file, stated.get("groups"), gates)}
-    channels = {label: channel for label, channel in pairs if label not in settings}
+    pairs = form("assigned").findall(text) or [(text, "")]
+    channels, stated = dict(pairs), dict[str, Any]()
+    for name in [name for name in channels if name in SETTINGS and name not in file.labels]:
+        stated[name] = channels.pop(name)
+        if not re.fullmatch(SETTINGS[name], stated[name]):
+            raise refusal(place, "layout_unclear", text=f"{name}={stated[name]:.40}")
+    inputs = {x or "input": x for x in input_names(file, stated.get("groups", groups), gates)}
     for label, channel in channels.items():
         if label not in inputs:
             raise refusal(place, "input_unknown", text=label, inputs=", ".join(inputs))
@@ -285,4 +284,4 @@ def _read_map(
             accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
             raise refusal(place, "not_accepted", text=f"{label}={channel}", accepted=accepted)
     numbers = {inputs[label]: int(channel) for label, channel in channels.items()}
-    return {**stated, **({"channels": numbers} if numbers else {})}
+    return stated | ({"channels": numbers} if numbers else {})

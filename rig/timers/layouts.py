@@ -18,8 +18,7 @@ from rig.timers.moments import TICK_HZ
 from rig.timers.vocabulary import POWERS, number_of
 
 if TYPE_CHECKING:
-    from rig.timers.events import TimerEvent
-    from rig.timers.timer_file import TimerFile
+    from rig.timers.events import TimerEvent, TimerFile
 
 _LONGEST_S = 60
 """A drop lasts half a second, and nobody waits a minute until it is recorded."""
@@ -117,44 +116,40 @@ class FileReading(NamedTuple):
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    runs: dict[int, list[Edge]] = {}
-    lines, power = set[int](), 10 ** POWERS.get(layout.unit, 0)
-    for events, number in _cut(file, layout):
-        counts = Counter[str]()
+    inputs, names, power = (
+        list(layout.channels),
+        _part_names(file),
+        10 ** POWERS.get(layout.unit, 0),
+    )
+    has_gates, passes = layout.groups == "gates", layout.groups == "passing"
+    by_row = file.is_wide and layout.groups in {"rows", "passing"}
+    limit = round(layout.pause_s * TICK_HZ) * power
+    groups: dict[tuple[int, int], list[TimerEvent]] = {}
+    cuts, numbers = Counter[int](), dict[int, int | None]()
+    events = [(event, n) for n, part in enumerate(file.parts) for event in part.events]
+    for event, part in sorted(events, key=lambda row: row[0].tick):  # equal ones stay in order
+        group = 0 if has_gates else event.line if by_row else part
+        before = groups.get((group, cuts[group]), [event])[-1]
+        cuts[group] += 0 < limit <= event.tick - before.tick
+        label = event.label or names[part] * has_gates
+        groups.setdefault((group, cuts[group]), []).append(event._replace(label=label))
+        numbers.setdefault(group, 0 if has_gates else number_of(file.parts[part].run))
+    runs, lines = dict[int, list[Edge]](), set[int]()
+    for (group, _), drop in sorted(groups.items()):
+        number = 0 if cuts[group] else numbers[group]
         run = number if number and number not in runs else max(runs, default=0) + 1
-        for event in events:
-            if event.label in layout.channels:
-                dark = layout.is_dark(event, counts[event.label])
-                edge = Edge(event.tick // power, layout.channels[event.label], dark)
+        counts, share = Counter[str](), max(1, len(drop) // max(1, len(inputs)))
+        for k, event in enumerate(drop):
+            # Where gates pass one after the other, there are as many at each.
+            label = inputs[min(k // share, len(inputs) - 1)] if passes else event.label
+            if label in layout.channels:
+                dark = layout.is_dark(event, counts[label])
+                edge = Edge(event.tick // power, layout.channels[label], dark)
                 runs.setdefault(run, []).append(edge)
                 lines.add(event.line)
-                counts[event.label] += 1
+                counts[label] += 1
     drops = [make_drop(run, runs[run]) for run in sorted(runs)]
     return FileReading(file, layout, drops, lines)
-
-
-def _cut(file: TimerFile, layout: FileLayout) -> Iterator[tuple[list[TimerEvent], int]]:
-    """Yield the events of each run in order, with its number where the file says it."""
-    has_gates, gates = layout.groups == "gates", list(layout.channels)
-    by_row = file.is_wide and layout.groups in {"rows", "passing"}
-    groups: dict[int, tuple[int, list[TimerEvent]]] = {}
-    for n, (name, part) in enumerate(zip(_part_names(file), file.parts, strict=True)):
-        number = 0 if has_gates else number_of(part.run) or 0
-        for event in part.events:
-            key = 0 if has_gates else event.line if by_row else n
-            label = event.label or name * has_gates
-            groups.setdefault(key, (number, []))[1].append(event._replace(label=label))
-    limit = round(layout.pause_s * TICK_HZ) * 10 ** POWERS.get(layout.unit, 0)
-    for number, events in groups.values():
-        events.sort(key=lambda event: event.tick)  # equal times stay in their order
-        gaps = [b.tick - a.tick for a, b in itertools.pairwise(events)]
-        cuts = [0, *(n for n, gap in enumerate(gaps, 1) if limit and gap >= limit), len(events)]
-        for begin, end in itertools.pairwise(cuts):
-            run, size = events[begin:end], max(1, (end - begin) // max(1, len(gates)))
-            if layout.groups == "passing":  # as many at each gate
-                labels = (gates[min(k // size, len(gates) - 1)] for k in range(len(run)))
-                run = [e._replace(label=label) for e, label in zip(run, labels, strict=True)]
-            yield run, number if len(cuts) == 2 else 0
 
 
 def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> list[str]:
@@ -190,14 +185,15 @@ def find_layouts(
     states = {event.state for part in file.parts for event in part.events}
     dark = next(ways for state, ways in _DARK.items() if state in states)
     choices: dict[str, Sequence[Any]] = {
-        "unit": [""] if file.has_unit else list(POWERS),
+        "unit": list(POWERS) if file.is_counted else [""],
         # More times than bars: it darkens and clears in turns.
         "dark": dark[-2:] + dark[:-2] if max(counts.values()) > bars else dark,
         "groups": _groupings(file, gates, bars),
     }
-    choices |= {name: [value] for name, value in stated.items() if name in choices}
+    said = {"unit"} if file.has_unit else set()
+    choices |= {name: [value] for name, value in stated.items() if name in choices.keys() - said}
     for unit, dark, groups in itertools.product(*choices.values()):
-        power = POWERS.get(unit, 0)
+        power = POWERS[unit or "s"]
         pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, power, groups)
         maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, groups)
         for channels, pause in itertools.product(maps, pauses):

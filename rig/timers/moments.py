@@ -6,7 +6,7 @@ from datetime import date
 from decimal import ROUND_HALF_EVEN, Context
 from typing import TYPE_CHECKING
 
-from rig.timers.vocabulary import CLOCK, POWERS, TIMED, is_number, unit_of
+from rig.timers.vocabulary import POWERS, form, is_number, unit_of
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -29,9 +29,9 @@ def moment(text: str, power: int = 0) -> int | None:
     int or None
         `None` for what is no such time.
     """
-    if text[-1:] == "s" and (timed := TIMED.fullmatch(text)):
+    if text[-1:] == "s" and (timed := form("timed").fullmatch(text)):
         text, power = timed[1].replace(",", "."), POWERS[unit_of(timed[2])]
-    match = CLOCK.fullmatch(text) if ":" in text else None
+    match = form("clock").fullmatch(text) if ":" in text else None
     if match is None:
         return picoseconds(text, -power)
     first, mark, second, third, hours, minutes, rest = match.groups()

@@ -1,7 +1,8 @@
-"""A text file as blocks of rows: cells below headings, with remarks and settings.
+"""A text file as blocks of rows: cells below a preamble of headings, units, remarks and settings.
 
 How the lines of a file are written (cells parted by a separator, or values between words) is found
-out from its first lines; then lines are read one after the other, and none is kept.
+out from its first lines; then lines are read one after the other, and none is kept. A setting is a
+name with its value behind ``:`` or ``=``, in the next cell or below it.
 """
 
 from __future__ import annotations
@@ -10,33 +11,21 @@ import csv
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from typing import NamedTuple
 
 from rig.timers import vocabulary
-from rig.timers.vocabulary import CLOCK, LONGEST, MEASURED, POWERS, is_number, kinds_of, words
+from rig.timers.vocabulary import LONGEST, MEASURED, form, is_number, is_remark, kinds_of, roles_in
 
+TimeBase = tuple[float, float]
+"""When the first sample was taken, and the time between two, s."""
+_COLUMN_ROLES = {"time", "state", "edge", "volts", "gate", "run", "duration", "index", "derived"}
+_UNFILLED = {"setting", "index"}
+"""Roles of columns that may have a name and no values: a rate, or comments."""
+_PREFIXES = {"k": 3, "m": 6, "g": 9}
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
-_PLAIN = re.compile(r"[-+0-9.,;eE\t ]*[0-9][-+0-9.,;eE\t ]*")
-_DECIMAL = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]{1,2})?")
-_LISTED = re.compile(r"\s*(?:\w{1,40}\s?=\s?)?[\[({]+\s*(?=[-+\"'.0-9]|$)|\s*[\])}]+[,;]?\s*$")
-"""What programs print around a list of values, or of lists."""
-_BETWEEN_LISTS = re.compile(r"[\])}]\s?,\s?(?=[\[({])")
-_NAME = re.compile(r"([^\W\d][\w ]*?)[\"']?\s?[=:]?\s?[\"']?$")
-"""What stands before a value: ``gate=``, ``"gate": `` or, in a sentence, ``at``."""
-REMARK = re.compile(r'\s*"?(?:#|%|//)+\s*|;+\s+(?=[^;]+$)|FRAME-(?:BEGIN|END)')
-"""A line that is marked as a remark, or parts what sigrok captured."""
-_QUANTITY = re.compile(
-    r"([+-]?[0-9]{1,30}(?:[.,][0-9]{0,30})?(?:e[+-]?[0-9]{1,3})?)\s?(?:([kmg]?)hz|([a-zµμ]{0,3}))",
-    re.IGNORECASE,
-)
-_ASSIGNED = re.compile(r"\s?[=:]\s?")
-_COLUMN_ROLES = {"time", "state", "edge", "volts", "gate", "run", "duration", "index", "derived"}
-_FEWEST_BESIDE = 20
-"""Rows beside nothing that tell samples with settings at their left from rows with empty cells."""
 
 
 class Row(NamedTuple):
@@ -51,8 +40,35 @@ class Row(NamedTuple):
         """Return what a column, from 0, has; nothing where the row ends before it."""
         text = self.texts[at] if at < len(self.texts) else ""
         # Most are numbers.
-        is_missing = not text[:1].isdigit() and text[:5].casefold() in words()["missing"]
+        is_missing = not text[:1].isdigit() and text[:5].casefold() in vocabulary.words()["missing"]
         return "" if is_missing else text
+
+    @property
+    def known(self) -> int:
+        """How many cells say what a column is."""
+        texts = [text for text in self.texts if text and not is_number(text)]
+        units = ({"volts"} if vocabulary.unit_of(text) else set() for text in texts)
+        roles = [_COLUMN_ROLES & (roles_in(text) | u) for text, u in zip(texts, units, strict=True)]
+        return sum(map(bool, roles)) if set().union(*roles) - {"derived"} else 0
+
+    @property
+    def is_mark(self) -> bool:
+        """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
+        text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
+        return form("mark").fullmatch(text) is not None
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether it numbers the columns: ``x-axis,1,2``."""
+        return len(self.texts) > 2 and all(map(form("bare number").fullmatch, self.texts[1:]))
+
+    @property
+    def has_units(self) -> bool:
+        """Whether it has units only, perhaps behind their name: ``Y_Unit_Label``."""
+        texts = [vocabulary.normal(text.strip("()[]- ")) for text in self.texts]
+        texts = list(filter(None, texts))
+        is_unit = [form("unit").fullmatch(text) is not None for text in texts]
+        return bool(texts) and all(is_unit[1:]) and (is_unit[0] or "unit" in texts[0])
 
     def place(self, at: int) -> tuple[int, int]:
         """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
@@ -84,6 +100,54 @@ class RowBlock:
     width: int = 0
     remarks: list[Row] = field(default_factory=list)
 
+    def find_heading(self, filled: Collection[int], width: int) -> Row | None:
+        """Return the row with most cells that are known; above and below may stand symbols, units.
+
+        A row with a measured number, or with more names than there are columns, is a setting. A
+        remark may name the columns where nothing else does.
+        """
+        rows = [
+            row
+            for row in self.headings or [row for row in self.remarks if len(row.texts) == width]
+            if row.known
+            and "unit" not in vocabulary.normal(row.texts[0])
+            and (len(row.texts) > 1 or len(filled) == 1)
+            and any(row.cell(n) and not is_number(row.cell(n)) for n in filled)
+            and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
+            and (row.has_numbers or not any(MEASURED & kinds_of(t) for t in row.texts[:width]))
+        ]
+        return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
+
+    def find_time_base(self) -> TimeBase | None:
+        """Return the first sample's time and the step, s, that settings state; `None` without."""
+        stated: dict[str, float] = {}
+        for above, below in itertools.pairwise([*self.remarks, *self.headings, Row(0, [])]):
+            for n, text in enumerate(above.texts):
+                name, _, inside = form("assignment").sub("\0", text[:60]).partition("\0")
+                places = inside.strip(), above.cell(n + 1), below.cell(n)
+                quantities = list(filter(None, map(form("quantity").fullmatch, places)))
+                role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
+                if role and quantities:
+                    number, prefix, unit = quantities[0].groups("")
+                    power = vocabulary.POWERS.get(vocabulary.unit_of(unit.lower()), 0)
+                    power = _PREFIXES.get(prefix.lower(), 0) - power
+                    stated.setdefault(role, float(number.replace(",", ".")) * 10.0**power)
+        step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
+        return (stated.get("start", 0.0), step) if step else None
+
+    def find_inputs(self, places: Sequence[int]) -> list[str]:
+        """Return names for columns without a heading.
+
+        A row lists as many inputs, each equally far to the left of its column.
+        """
+        for row in [*self.remarks, *self.headings]:
+            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
+            named = [n for n, label in enumerate(labels) if label]
+            distances = {at - n for at, n in zip(places, named, strict=False)}
+            if len(named) == len(places) and len(distances) == 1 and min(distances) >= 0:
+                return [labels[n] for n in named]
+        return []
+
 
 class Table:
     """A text file of rows.
@@ -108,7 +172,7 @@ class Table:
         unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
-        plain = [line for _, line in sample if line.strip() and not REMARK.match(line[:LONGEST])]
+        plain = [line for _, line in sample if line.strip() and not is_remark(line)]
         self._names = _find_names(plain)
         self.separator = "" if self._names else find_separator(plain)
         self._usual: tuple[tuple[bool, bool], ...] = ()
@@ -116,9 +180,6 @@ class Table:
         shapes = Counter({shape: n for shape, n in shapes.items() if any(map(all, shape))})
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
-        filled = [n for n, (is_filled, _) in enumerate(usual) if is_filled]
-        is_beside = count > max(_FEWEST_BESIDE, 0.9 * shapes.total()) and filled[0] > 1
-        self._beside = filled if is_beside else []
 
     def blocks(self) -> Iterator[tuple[RowBlock, Iterator[Row]]]:
         """Yield blocks of rows; the rows of each are to be taken before the next."""
@@ -134,31 +195,28 @@ class Table:
         if not cells or len(cells) != len(self._usual):
             cells = split_cells(line, self.separator)
         if "," in line and (self.separator != "," or '"' in line):
-            return [t.replace(",", ".") if _DECIMAL.fullmatch(t[:LONGEST]) else t for t in cells]
+            return [
+                t.replace(",", ".") if form("decimal comma").fullmatch(t[:LONGEST]) else t
+                for t in cells
+            ]
         return cells
 
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
-        remark = Row(0, [])
         for number, line in self._lines:
             if not line or line.isspace():
                 continue
-            if block.width and not self._beside and _PLAIN.fullmatch(line):
+            if block.width and form("plain row").fullmatch(line):
                 yield block, Row(number, self.split(line), line, self.separator)
                 continue
-            mark = REMARK.match(line[:LONGEST])
+            mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, self.separator)
-            if mark:
-                remark = row
-                self.remarks += [row] * (number <= _SAMPLE)
-            row = self._without_settings(row, block) if self._beside else row
-            if _is_mark(row) if mark else block.width > 0 and self._begins_block(row, block):
+            self.remarks += [row] if mark and number <= _SAMPLE else []
+            if row.is_mark if mark else block.width > 0 and self._begins_block(row, block):
                 block = RowBlock([row], block.headings, remarks=self.remarks)
             elif not mark and self._is_row(row, block):
-                if not block.headings and len(list(filter(None, remark.texts))) == len(row.texts):
-                    block.headings.append(remark)  # with a name for each cell
                 block.width = block.width or len(row.texts)
                 yield block, row
             elif not mark and any(row.texts):
@@ -169,25 +227,19 @@ class Table:
                 else:
                     block.headings.append(row)
 
-    def _without_settings(self, row: Row, block: RowBlock) -> Row:
-        """Return a row; settings that stand beside its samples go to the headings."""
-        samples = [text if n in self._beside else "" for n, text in enumerate(row.texts)]
-        settings = ["" if n in self._beside else text for n, text in enumerate(row.texts)]
-        if not (any(settings) and _is_data(samples)):
-            return row
-        block.headings.append(row._replace(texts=settings))
-        return row._replace(texts=samples)
-
     def _begins_block(self, row: Row, block: RowBlock) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
         is_again = row.texts in [above.texts for above in block.headings]
-        is_heading = is_again or 0 < len(row.texts) <= 2 * count_known(row)
+        is_heading = is_again or 0 < len(row.texts) <= 2 * row.known
         has_number = any(map(is_number, row.texts))
-        return (is_heading and not has_number) or (not row.raw[:1].isdigit() and _is_mark(row))
+        return (is_heading and not has_number) or (not row.raw[:1].isdigit() and row.is_mark)
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
-        texts = row.texts
-        is_usual = any(texts) and (_shape(texts) == self._usual or _is_data(texts))
+        texts, shape, usual = row.texts, _shape(row.texts), self._usual
+        if usual and not any(is_filled for is_filled, _ in usual[:2]):
+            # Samples of an oscilloscope, beside which settings may stand.
+            shape = tuple(a if b[0] else b for a, b in zip(shape, usual, strict=False))
+        is_usual = any(texts) and (shape == usual or _is_data(texts))
         # One of data with a fault: some of it is a number, as in those above.
         return is_usual or (1 < len(texts) == block.width and any(map(is_number, texts)))
 
@@ -206,31 +258,17 @@ def split_cells(line: str, separator: str) -> list[str]:
 
 def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
-    if not _LISTED.match(line):
+    if not form("list").match(line):
         return [(number, line)]
-    pieces = _BETWEEN_LISTS.split(line)
-    return [(number, _LISTED.sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
-
-
-@cache
-def _value_pattern() -> re.Pattern[str]:
-    """Return what is a value within words: a time of day, a number or a state, but no key."""
-    states = set().union(*(words()[role] for role in ("blocked", "clear", "high", "low")))
-    longest = sorted((w for w in states if len(w) > 2), key=len, reverse=True)
-    return re.compile(
-        rf"(?<![\w.]){CLOCK.pattern}|(?<![\w.])[-+]?[0-9]+(?:[.,][0-9]+)?(?:e[-+]?[0-9]{{1,2}})?"
-        r"(?:\s?(?:s|ms|us|µs|μs|ns|micros|millis|seconds))?(?![\w.])"
-        r"|(?<=[a-z_])[0-9]{1,4}(?![\w.]|[\"']?\s?[:=])"
-        rf"|(?<!\w)(?:{'|'.join(map(re.escape, longest))}|true|false)(?!\w|[\"']?\s?[:=])",
-        re.IGNORECASE,
-    )
+    pieces = form("between lists").split(line)
+    return [(number, form("list").sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
 
 
 def _named_values(line: str) -> list[tuple[str, str]]:
     """Return the values between the words of a line, each with the words right before it."""
     values, end = [], 0
-    for match in _value_pattern().finditer(line[:LONGEST]):
-        name = _NAME.search(line[end : match.start()])
+    for match in form("value").finditer(line[:LONGEST]):
+        name = form("value name").search(line[end : match.start()])
         values.append((name[1].strip() if name else "", match[0].replace(",", ".")))
         end = match.end()
     return values
@@ -251,7 +289,7 @@ def find_separator(lines: Sequence[str]) -> str:
         if sum(separator in row for row in rows) * 2 > len(rows):
             return separator
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
-    numbers = [row.replace(",", ".") for row in rows if _DECIMAL.fullmatch(row)]
+    numbers = [row.replace(",", ".") for row in rows if form("decimal comma").fullmatch(row)]
     if not is_named and len(numbers) * 2 > len(rows):
         # 0,25 below 1,5 is no decimal comma: times go on. Levels of inputs are 0 and 1.
         is_rising = sorted(numbers, key=float) == numbers and set("".join(rows)) - set("01,")
@@ -270,40 +308,3 @@ def _is_data(texts: Sequence[str]) -> bool:
 def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
     """Return which cells are filled, and numbers; of most rows of data it is the same."""
     return tuple((text != "", bool(MEASURED & kinds_of(text))) for text in texts)
-
-
-def count_known(row: Row) -> int:
-    """Count the cells of a row that say what a column is."""
-    texts = [text for text in row.texts if text and not is_number(text)]
-    return sum(bool(_COLUMN_ROLES & vocabulary.roles_in(t) or vocabulary.unit_of(t)) for t in texts)
-
-
-def _is_mark(row: Row) -> bool:
-    """Whether a row says that another run, or gate, begins: ``--- Run 2 ---``."""
-    text = vocabulary.normal(" ".join(row.texts)).strip("-=*#:<>[] ")
-    name = re.match(
-        r"([^\W\d]+(?: set)?)\s*(?:[#:]|nr|no)?\s*([0-9]{0,4})[ :=*#-]*(\D{0,12}$)?", text
-    )
-    is_named = name is not None and name[1].strip() in words()["run"] | words()["gate"]
-    is_whole = name is not None and name[3] is not None and bool(name[2] or not name[3])
-    return "vernier format" in text or (is_named and is_whole)
-
-
-def find_time_base(block: RowBlock) -> tuple[float, float] | None:
-    """Return the first sample's time and the step, s, that settings state; `None` without.
-
-    A setting's value stands behind its name, after ``:`` or ``=`` or in the next cell, or below it.
-    """
-    rows, stated = [*block.remarks, *block.headings], dict[str, float]()
-    for above, below in itertools.pairwise([*rows, Row(0, [])]):
-        for n, text in enumerate(above.texts):
-            name, _, inside = _ASSIGNED.sub("\0", text[:60]).partition("\0")
-            roles = [r for r in ("rate", "start", "step") if r in vocabulary.roles_in(name)]
-            places = (inside, above.cell(n + 1), below.cell(n))
-            for role, place in itertools.product(roles[:1], places):
-                if match := _QUANTITY.fullmatch(place.strip()):
-                    factor = {"k": 3, "m": 6, "g": 9}.get((match[2] or "").lower(), 0)
-                    power = factor - POWERS.get(vocabulary.unit_of((match[3] or "").lower()), 0)
-                    stated.setdefault(role, float(match[1].replace(",", ".")) * 10.0**power)
-    step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
-    return (stated.get("start", 0.0), step) if step else None

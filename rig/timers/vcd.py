@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from rig.timers.vocabulary import POWERS
+from rig.timers.vocabulary import POWERS, form
 
 if TYPE_CHECKING:
     from rig.timers.problems import ProblemList
 
-_SCALE = re.compile(r"\$timescale\s+(.{0,40}?)\s*(?:\$end|$)")
-_ACCEPTED = re.compile(r"(1|10|100)\s*([munp]?s)")
-_WIRE = re.compile(r"\$var\s+\w+\s+1\s+(\S+)\s+(\S+)")
-"""A wire of one bit: ``$var wire 1 ! D0``."""
 _POWERS = POWERS | {"ps": 12}
 BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
 _LONGEST_HEAD = 1_000_000
@@ -28,8 +23,8 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
         head += line[:200] + " "
         if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
             break
-    stated, names = _SCALE.search(head), dict(_WIRE.findall(head))
-    scale = _ACCEPTED.fullmatch(stated[1] if stated else "")
+    stated, names = form("time scale").search(head), dict(form("wire").findall(head))
+    scale = form("scale").fullmatch(stated[1] if stated else "")
     if stated is None:
         problems.refuse(1, 1, "no_rate", lacks="a $timescale")
     if scale is None:

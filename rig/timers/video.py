@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
 from rig.timers.table import RowBlock, Table
-from rig.timers.vocabulary import is_number
+from rig.timers.vocabulary import form, is_number
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 
 FEWEST = 6
 """Frames that tell an acceleration and how much they scatter."""
-_NAME = re.compile(r"([txy])(?![A-Za-z])", re.IGNORECASE)
-_UNIT = re.compile(r"[(\[/_]\s*([^\W\d_]+)")
 _LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _SCALES = {"t": {"": 1.0, "s": 1.0, "ms": 1e-3}, "x": _LENGTHS, "y": _LENGTHS}
 _HINT = (
@@ -76,7 +73,7 @@ def _find_columns(row: Row) -> dict[str, tuple[int, Row, str]]:
     """Return where t, x and y stand in a heading, and their units; nothing if one of them lacks."""
     columns = {}
     for n, text in reversed(list(enumerate(row.texts))):
-        if name := _NAME.match(text):
-            unit = _UNIT.search(text)
+        if name := form("axis").match(text):
+            unit = form("axis unit").search(text)
             columns[name[1].lower()] = n, row, unit[1] if unit else ""
     return dict(sorted(columns.items())) if len(columns) == len(_SCALES) else {}

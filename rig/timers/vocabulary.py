@@ -12,28 +12,8 @@ POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
 SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns", None: "an unknown unit"}
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
-CLOCK = re.compile(
-    r"(?:([0-9]{1,4})([-./])([0-9]{1,2})[-./]([0-9]{1,4})[T ]+)?"
-    r"(?:([0-9]{1,2}):)?([0-9]{1,3}):([0-9]{1,2}(?:[.,][0-9]{1,15})?)(?:Z|[+-][0-9:]{4,6})?"
-)
-"""A time of day, perhaps with its date."""
-TIMED = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s?(s|ms|us|µs|μs|ns)")
-"""A time with its unit."""
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,2})?")
-_FORMS = {
-    "number": _NUMBER,
-    "comma": re.compile(_NUMBER.pattern.replace(r"\.", "[.,]")),
-    "clock": CLOCK,
-    "timed": TIMED,
-    "input": re.compile(r"[A-Za-z_]{1,20}[ _-]?[0-9]{1,4}"),
-}
-"""How a cell is written that is a value, by its kind."""
 MEASURED = frozenset({"number", "clock"})
 """Kinds of a cell that no heading has."""
-_BRACKETED = re.compile(r"[\[({]\s*([^\W\d_]{1,20})\s*[\])}]")
-_LAST = re.compile(r"(?:^|[\W_])([^\W\d_]{1,20})\W*$")
-_ENDING = r"(?![^\W\d_])"
-_NUMBERED = r"[\s#:_-]{0,3}(?:nr\.?|no\.?)?\s?(?:[0-9]{1,4}|[a-d])(?![^\W_])"
 
 
 @cache
@@ -52,10 +32,22 @@ def words() -> dict[str, frozenset[str]]:
 
 
 @cache
-def _pattern(role: str, number: str = "") -> re.Pattern[str]:
-    known = words()[role] | (words()[f"{role} letter"] if number and role == "gate" else set())
-    listed = "|".join(sorted(map(re.escape, known), key=len, reverse=True))
-    return re.compile(rf"(?<![^\W\d_])(?:{listed}){number or _ENDING}", re.IGNORECASE)
+def form(name: str) -> re.Pattern[str]:
+    """Return a form of `forms.txt`, or an expression in which such forms stand."""
+    return re.compile(_expand(name))
+
+
+def _expand(name: str) -> str:
+    forms = dict(read_rows("forms.txt", " ; "))
+    return re.sub("<([a-z ]+)>", lambda match: _part(match[1]), forms.get(name, name))
+
+
+def _part(name: str) -> str:
+    if name in dict(read_rows("forms.txt", " ; ")):
+        return f"(?:{_expand(name)})"
+    role = name.removeprefix("long ")
+    known = (word for word in words()[role] if role == name or len(word) > 2)
+    return f"(?i:{'|'.join(sorted(map(re.escape, known), key=len, reverse=True))})"
 
 
 def without_accents(text: str) -> str:
@@ -77,7 +69,7 @@ def normal(heading: str) -> str:
 @lru_cache(10_000)
 def roles_in(heading: str) -> frozenset[str]:
     """Return the roles of which a heading has a word, and ``setting`` where it names one."""
-    facts = {role for role in words() if _pattern(role).search(normal(heading))}
+    facts = {role for role in words() if form(f"<begin><{role}><end>").search(normal(heading))}
     is_setting = is_number(heading) or bool({"start", "step", "rate"} & facts)
     facts |= {"gate"} if find_label(heading, "gate") else set()
     return frozenset(facts | ({"setting"} if is_setting else set()))
@@ -85,7 +77,7 @@ def roles_in(heading: str) -> frozenset[str]:
 
 def find_label(name: str, role: str) -> str:
     """Return the part of a heading that names an input, or a run, with its number."""
-    match = _pattern(role, _NUMBERED).search(without_accents(name[:LONGEST]))
+    match = form(f"{role} label").search(without_accents(name[:LONGEST]))
     return match[0] if match else ""
 
 
@@ -99,8 +91,8 @@ def unit_of(heading: str) -> str:
         A key of `POWERS`, ``v`` for volts and light, or the word in brackets.
     """
     text = normal(heading)
-    units = _BRACKETED.findall(text)
-    for word in (*units, *_LAST.findall(text)):
+    units = form("bracketed unit").findall(text)
+    for word in (*units, *form("last word").findall(text)):
         for unit in (*POWERS, "v"):
             if word in words()[f"unit {unit}"]:
                 return unit
@@ -124,7 +116,7 @@ def state_of(text: str) -> str:
 
 def is_number(text: str) -> bool:
     """Whether a text is a number with a decimal point."""
-    return len(text) <= LONGEST and _NUMBER.fullmatch(text) is not None
+    return len(text) <= LONGEST and form("number").fullmatch(text) is not None
 
 
 @lru_cache(10_000)
@@ -134,15 +126,20 @@ def kinds_of(text: str) -> frozenset[str]:
     Returns
     -------
     frozenset of str
-        ``number`` (with a decimal point) or ``comma``; ``clock``, a time of day, perhaps with its
-        date; ``timed``, a time with its unit; ``input``, a name with its number; ``state``, with
-        what `state_of` says.
+        ``number`` (with a decimal point) or ``comma number``; ``clock``, a time of day, perhaps
+        with its date; ``timed``, a time with its unit; ``input``, a name with its number;
+        ``state``, with what `state_of` says.
     """
-    kinds = {kind for kind, form in _FORMS.items() if form.fullmatch(text[: LONGEST + 1])}
+    state, forms = state_of(text), ("number", "comma number", "clock", "timed", "input")
+    kinds = {kind for kind in forms if form(kind).fullmatch(text[: LONGEST + 1])}
     if len(text) > LONGEST or ("input" in kinds and "start" in roles_in(text)):
         return frozenset()
-    state = state_of(text)
     return frozenset(kinds | ({"state", state} if state else set()))
+
+
+def is_remark(line: str) -> bool:
+    """Whether a line is marked as a remark."""
+    return form("remark").match(line[:LONGEST]) is not None
 
 
 def number_of(label: str) -> int | None:

@@ -89,6 +89,12 @@ def test_what_no_fall_decides_is_asked_with_the_line_to_add(look):
     assert "--map 'dark=" in done.err
 
 
+def test_a_grouping_that_the_file_has_not_is_refused(look):
+    done = look(HEAD + rows(RUNS[0]), "--map", "groups=gates")
+    assert done.code == 2
+    assert "at most 0 % of a run's edges" in done.err
+
+
 @pytest.mark.parametrize("name", ["Gates below each other", "Milliseconds without a unit"])
 def test_what_the_dry_run_prints_is_accepted(look, tmp_path, name):
     content = shapes()[name].content

@@ -253,6 +253,9 @@ def shapes() -> dict[str, Shape]:
             lambda k, t, v: "\t".join([f"{t:.6f}", *(f"{x:.6f}" for x in v)]) + "\t\n",
             encoding=encoding,
         )
+    found["LabVIEW, comments without a cell"] = scope(
+        lvm.format(".", "One"), lambda k, t, v: "\t".join(f"{x:.6f}" for x in (t, *v)) + "\n"
+    )
     found["LabVIEW without times"] = scope(
         lvm.format(".", "No"),
         lambda k, t, v: "\t".join(["", *(f"{x:.6f}" for x in v)]) + "\t\n",
@@ -266,6 +269,9 @@ def shapes() -> dict[str, Shape]:
         + "logic,logic,logic,logic\n"
         + "".join(",".join(map(str, levels(RUNS[0], t))) + "\n" for t in times)
         + "FRAME-END\n").encode(),
+        RUNS[:1], sampled=STEP, bare=True)  # fmt: skip
+    found["sigrok, inputs with names"] = Shape(
+        found["sigrok"].content.replace(b"D0, D1, D2, D3", b"top, upper, lower, bottom"),
         RUNS[:1], sampled=STEP, bare=True)  # fmt: skip
     found["VCD"] = text(vcd(RUNS[0]))
     found["Time at each gate"] = Shape(

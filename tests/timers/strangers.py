@@ -48,6 +48,10 @@ def strangers() -> dict[str, Shape]:
         ("On and off of each gate", ",".join(
             f"Gate {g} {w}" for g in HEIGHTS for w in ("on", "off")) + "\n"
          + table([f"{t:.6f}" for t, _, _ in edges] for edges in RUNS)),
+        ("Pairs in German", "Versuch;" + ";".join(f"L{g} {w} (s)" for g in HEIGHTS
+         for w in ("an", "aus")) + "\n"
+         + table(([n, *(f"{t:.6f}" for t, _, _ in edges)]
+                  for n, edges in enumerate(RUNS, 1)), ";")),
         ("Times of a row, numbered", "drop," + ",".join(f"t{k}" for k in range(1, 9)) + "\n"
          + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
         ("A word for gates that is unknown", "Prova;Traguardo;Tempo (s);Stato\n"
@@ -116,6 +120,7 @@ def strangers() -> dict[str, Shape]:
         sampled=1e-3)  # fmt: skip
     for name, head, separator, form in (
         ("Axes by numbers", "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", ",", "{:+.5E}"),
+        ("Names repeated", "Time,Ampl,Ampl,Ampl,Ampl\n", ",", "{:.4e}"),
         ("Units in words", "Time,CH1,CH2,CH3,CH4\nin s,in V,in V,in V,in V\n", ",", "{:.4e}"),
         ("Light", "t (s);Light 0 (lx);Light 1 (lx);Light 2 (lx);Light 3 (lx)\n", ";", "{:.5f}"),
         ("Counts of a converter", "t(s) A0 A1 A2 A3\n", " ", "{:.4f}"),

@@ -1,0 +1,56 @@
+"""Volts or light as a signal that is high or low: where they cross the middle between two levels.
+
+They become levels with hysteresis around the middle between dark and bright; they change where a
+straight line between two samples crosses that middle.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rig.arrays import Array
+
+_HYSTERESIS = 0.2
+"""Share of the swing between dark and bright, half of it on either side of the middle."""
+_CLEAR_SWING = 8.0
+"""Swing over the noise of each level below which there is no passage to be seen."""
+_SCATTER = 1.4826
+"""Standard deviation over the median of absolute deviations, of normal noise."""
+
+
+def find_crossings(
+    times: Array, volts: Array, threshold: tuple[float, float]
+) -> Iterator[tuple[int, float, bool]]:
+    """Yield the sample behind each crossing, its moment, and whether it rises."""
+    is_high = volts > threshold[0]
+    sure = np.flatnonzero(np.abs(volts - threshold[0]) > threshold[1])
+    turns = sure[1:][is_high[sure[1:]] != is_high[sure[:-1]]]
+    crossings = np.flatnonzero(is_high[1:] != is_high[:-1]) + 1
+    for n in crossings[np.searchsorted(crossings, turns, side="right") - 1]:
+        share = (volts[n] - threshold[0]) / (volts[n] - volts[n - 1])
+        yield int(n), float(times[n] - share * (times[n] - times[n - 1])), bool(is_high[n])
+
+
+def find_threshold(volts: Array) -> tuple[float, float] | None:
+    """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
+    low, high = float(volts.min()), float(volts.max())
+    for _ in range(50):  # two means, one for each level
+        above = volts > 0.5 * (low + high)
+        if above.all() or not above.any():
+            return None
+        before = low, high
+        low, high = float(np.median(volts[~above])), float(np.median(volts[above]))
+        if before == (low, high):
+            break
+    noise = max(
+        float(np.median(np.abs(volts[above] - high))),
+        float(np.median(np.abs(volts[~above] - low))),
+    )
+    if high - low < _CLEAR_SWING * _SCATTER * noise:
+        return None
+    return 0.5 * (low + high), 0.5 * _HYSTERESIS * (high - low)
