@@ -45,8 +45,7 @@ def digits(found: dict) -> set[bytes]:
 
 
 @pytest.mark.usefixtures("analysed_once")
-def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp_path, monkeypatch):
-    monkeypatch.setattr("rig.report.canvas.KINDS", ("svg", "png"))  # of PDF nobody reads a digit
+def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp_path):
     protocol, session, page = (tmp_path / name for name in ("b.yaml", "b.session", "b.html"))
     protocol.write_text(short("[40 deg]", 4) + "\nblind: true\n", "utf-8")
     assert "blind" in call("check", protocol).out
