@@ -19,7 +19,7 @@ from rig.tui.app import THEMES, RigApp
 from rig.tui.context import Options
 from rig.tui.state import state_of
 from tests.cli.lab import short
-from tests.tui.lab import KEYS, run
+from tests.tui.lab import KEYS, draw_without_pause, run
 from tests.tui.screen import colours_of, text_of
 
 THEME_NAMES = [theme.name for theme in THEMES]
@@ -45,8 +45,7 @@ MOMENTS = {
 @pytest.fixture
 def looks(tmp_path, monkeypatch):
     """Make a session to look at, with figures that are drawn without a pause."""
-    for module in ("rig.tui.widgets.figure", "bench.pictures"):
-        monkeypatch.setattr(f"{module}.PAUSE_S", 0.05)
+    draw_without_pause(monkeypatch)
     path = tmp_path / "looks.session"
     Session.create(path, short(), "looks.yaml", simulated=True, origin="sim://").close()
     return path

@@ -14,7 +14,7 @@ import pytest
 from bench import pictures
 from bench.pictures import SIZES, draw, screenshots, seen
 from tests.cli.lab import short
-from tests.tui.lab import KEYS
+from tests.tui.lab import KEYS, draw_without_pause
 from tests.tui.screen import text_of
 from tests.tui.test_looks import GOLDENS
 
@@ -26,6 +26,7 @@ PAGES = ["protocol", "device", "run", "live", "result", "session", "history"]
 def recorded(tmp_path, monkeypatch):
     """A session and its protocol in the working folder, so that no screen shows another's name."""
     monkeypatch.chdir(tmp_path)
+    draw_without_pause(monkeypatch)
     protocol, session = Path("looks.yaml"), Path("looks.session")
     protocol.write_text(short(), "utf-8")
     session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
