@@ -8,9 +8,6 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from rig.commands import design
-from rig.design.trials import trials
-
 
 def filled_once(
     temporary: pytest.TempPathFactory, name: str, fill: Callable[[Path], object]
@@ -29,6 +26,22 @@ def filled_once(
     return folder
 
 
+@pytest.fixture(scope="session")
+def loops_compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Have one worker compile the resolved world's loops, which takes as long as a hundred tests.
+
+    In a new clone each worker would begin to, for what another one compiles is kept at its end.
+    """
+
+    def fill(_: Path) -> None:
+        from sim.resolved.fall import fall
+        from tests.sim.test_resolved import SCENES
+
+        fall(SCENES[0], step=1e-5, after=1e-3)
+
+    filled_once(tmp_path_factory, "loops compiled", fill)
+
+
 def once(work: Callable) -> Callable:
     """Make a function that remembers what `work` returned, and of what."""
     returned = {}
@@ -45,6 +58,9 @@ def once(work: Callable) -> Callable:
 @pytest.fixture(scope="module")
 def analysed_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Have the tests of a module share kept results, and the trial drops that they only show."""
+    from rig.commands import design
+    from rig.design.trials import trials
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("shared")))
         trial_drops = once(trials)
