@@ -88,7 +88,7 @@ def test_commands_work(bare):
         "predict inclined-uniform --json",
         "new my.yaml --scene object --yes",
         "analyze chains.session",
-        "report chains.session -o report.html --figures figures",
+        "report chains.session -o report.html",
         "export chains.session --csv csv",
         "export chains.session --bundle chains.eln",
         "replay chains.session",
