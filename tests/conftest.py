@@ -11,6 +11,8 @@ import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
+from tests.once import loops_compiled  # noqa: F401 - a fixture
+
 # `./run test` says the same every time: the same examples, and none that an earlier run has left.
 # To look for new ones is for `./run bench search`, which keeps what it finds under .hypothesis/.
 # A busy machine is no fault of the code: no example is timed.

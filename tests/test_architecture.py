@@ -110,10 +110,8 @@ def test_files_of_a_way_are_there_and_counted(title):
 
 
 @pytest.mark.parametrize("paper", PAPERS, ids=lambda path: path.name)
-def test_files_and_links_of_a_paper_lead_somewhere(paper):
+def test_files_that_a_paper_names_are_there(paper):
     text = paper.read_text("utf-8")
-    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
-        assert "://" in target or (paper.parent / target).exists(), target
     for name in re.findall(r"`((?:rig|sim|tests|firmware|protocols)/[\w./-]+\.\w+)`", text):
         assert (ROOT / name).is_file(), name
     for name in re.findall(r"`(\w+\.py)`", text):

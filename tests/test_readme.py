@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli import _parser
+from tests.once import filled_once
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -45,30 +47,70 @@ BEFORE = {
 """What the reader of a page has done before."""
 
 
+ONE_PROCESS = """
+import shlex, subprocess, sys
+from rig.cli import main
+
+for line in sys.argv[1:]:
+    words = shlex.split(line, comments=True)
+    ours = words[0] == "rig" and not {"|", ">", ">>", "<", "&&", ";"} & {*words}
+    code = main(words[1:]) if ours else subprocess.run(["bash", "-c", line]).returncode
+    if code:
+        sys.exit(f"{line} ended with {code}")
+"""
+"""Commands one after the other: what each has to load takes longer than most of them."""
+
+
 @pytest.fixture(scope="session")
 def installed(tmp_path_factory):
     """An environment with the wheel in it, outside the clone; other packages are the tests' own."""
-    folder = tmp_path_factory.mktemp("installed")
-    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
-    wheels, environment = folder / "wheels", folder / "environment"
-    subprocess.run([*pip, "wheel", "-q", "--no-deps", "-w", wheels, ROOT], check=True)
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
-    (wheel,) = wheels.iterdir()
-    python = environment / "bin/python"
-    subprocess.run([*pip, "--python", python, "install", "-q", "--no-deps", wheel], check=True)
-    paths = sysconfig.get_paths(vars={"base": str(environment), "platbase": str(environment)})
-    (Path(paths["purelib"]) / "others.pth").write_text(f"{sysconfig.get_paths()['purelib']}\n")
-    return environment
+
+    def fill(folder):
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
+        wheels, environment = folder / "wheels", folder / "environment"
+        subprocess.run([*pip, "wheel", "-q", "--no-deps", "-w", wheels, ROOT], check=True)
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
+        (wheel,) = wheels.iterdir()
+        python = environment / "bin/python"
+        subprocess.run([*pip, "--python", python, "install", "-q", "--no-deps", wheel], check=True)
+        paths = sysconfig.get_paths(vars={"base": str(environment), "platbase": str(environment)})
+        (Path(paths["purelib"]) / "others.pth").write_text(f"{sysconfig.get_paths()['purelib']}\n")
+
+    return filled_once(tmp_path_factory, "installed", fill) / "environment"
 
 
-def carry_out(command, folder, installed):
-    """Run a command in a folder as somebody who has activated the environment of the wheel."""
+def carry_out(folder, installed, first, *more):
+    """Run commands in a folder as somebody who has activated the environment of the wheel.
+
+    The first is run by a shell, as it stands; those that follow it in one process.
+    """
     path = f"{installed / 'bin'}:{os.environ['PATH']}"
     where = {"cwd": folder, "env": os.environ | {"PATH": path, "MPLBACKEND": "agg"}}
-    done = subprocess.run(["/bin/bash", "-c", command], capture_output=True, text=True,
-                          check=False, stdin=subprocess.DEVNULL, **where)  # fmt: skip
-    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
+    said = ""
+    for words in (["/bin/bash", "-c", first], ["python", "-c", ONE_PROCESS, *more])[
+        : 1 + any(more)
+    ]:
+        done = subprocess.run(words, capture_output=True, text=True, check=False,
+                              stdin=subprocess.DEVNULL, **where)  # fmt: skip
+        assert done.returncode == 0, f"{first}\n{done.stdout}\n{done.stderr}"
+        said += done.stdout
+    return said
+
+
+@pytest.fixture
+def reader(page, tmp_path, tmp_path_factory, installed):
+    """Return a folder in which the reader of a page has done what comes before it."""
+    before = BEFORE.get(page.name, ())
+    if before[:1] == [CHAINS]:  # as most do
+        chains = filled_once(
+            tmp_path_factory, "chains", lambda folder: carry_out(folder, installed, CHAINS)
+        )
+        shutil.copytree(chains, tmp_path, dirs_exist_ok=True)
+        before = before[1:]
+    if before:
+        carry_out(tmp_path, installed, *before)
+    (tmp_path / ".venv").symlink_to(installed)
+    return tmp_path
 
 
 def commands(page: Path, language: str = "sh") -> list[str]:
@@ -84,12 +126,10 @@ def runnable(page: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("page", list(filter(runnable, PAGES)), ids=lambda page: page.name)
-def test_every_command_works_in_an_installed_wheel(page, tmp_path, installed):
-    (tmp_path / ".venv").symlink_to(installed)
-    for command in [*BEFORE.get(page.name, ()), *runnable(page)]:
-        carry_out(command, tmp_path, installed)
+def test_every_command_works_in_an_installed_wheel(page, reader, installed):
+    carry_out(reader, installed, *runnable(page))
     if page.name == "tutorial.md":  # what docs/python.md begins with
-        assert_python_works(tmp_path, installed)
+        assert_python_works(reader, installed)
 
 
 def test_each_reason_not_to_run_a_command_is_needed():
@@ -97,10 +137,12 @@ def test_each_reason_not_to_run_a_command_is_needed():
     assert all(any(part in line for line in every) for part in NOT_RUN)
 
 
-@pytest.mark.parametrize("command", re.findall(r"`(rig (?:new|check|predict) [^`]*)`", CHOICE))
-def test_every_command_of_the_choice_works(command, tmp_path, installed):
+def test_every_command_of_the_choice_works(tmp_path, installed):
     (tmp_path / "protocols").symlink_to(ROOT / "protocols")
-    carry_out(command, tmp_path, installed)
+    choice = re.findall(r"`(rig (?:new|check|predict) [^`]*)`", CHOICE)
+    assert len(choice) == 7
+    again = [command for each in choice for command in (each, "rm -f my*")]
+    carry_out(tmp_path, installed, *again)
 
 
 def test_readme_begins_with_the_choice_that_new_shows():
@@ -108,9 +150,9 @@ def test_readme_begins_with_the_choice_that_new_shows():
 
 
 def assert_python_works(folder, installed):
-    carry_out(f"{DROPS.replace('my.', 'other.')} --seed 2", folder, installed)
     (folder / "page.py").write_text("\n".join(commands(ROOT / "docs/python.md", "python")))
-    said = carry_out("python page.py", folder, installed)
+    other = f"{DROPS.replace('my.', 'other.')} --seed 2"
+    said = carry_out(folder, installed, other, "python page.py")
     assert r"\begin{tabular}" in said
     assert r"\pm" in said
     assert (folder / "separation.svg").is_file()

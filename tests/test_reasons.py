@@ -4,6 +4,7 @@ import ast
 import re
 import sqlite3
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,10 +25,10 @@ SQLITE = {name.lower() for name in dir(sqlite3) if name.startswith("SQLITE_")}
 DISARMED = {f"disarmed_{reason.name.lower()}" for reason in DisarmReason}
 
 
+@cache
 def trees():
-    for path in RIG.rglob("*.py"):
-        if path.name not in {"wordings.py", "reasons.py"}:
-            yield path, ast.parse(path.read_text("utf-8"))
+    paths = [path for path in RIG.rglob("*.py") if path.name not in {"wordings.py", "reasons.py"}]
+    return [(path, ast.parse(path.read_text("utf-8"))) for path in paths]
 
 
 def texts(tree):
@@ -38,8 +39,10 @@ def texts(tree):
     }
 
 
+@cache
 def raised_codes():
     """Codes that calls name, with the file and the call that does."""
+    raised = []
     for path, tree in trees():
         for call in ast.walk(tree):
             if not isinstance(call, ast.Call):
@@ -47,8 +50,8 @@ def raised_codes():
             names = re.findall(r"\w+", ast.unparse(call.func))
             at = RAISERS.get(names[-1], RAISERS.get(".".join(names[-2:])))
             if at is not None and len(call.args) > at:
-                for text in texts(call.args[at]):
-                    yield path, text, call
+                raised += [(path, text, call) for text in texts(call.args[at])]
+    return raised
 
 
 def test_each_raised_code_is_in_the_table():

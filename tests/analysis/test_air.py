@@ -89,6 +89,7 @@ def test_a_chain_of_another_wood_needs_not_fall_as_its_width_says():
             assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u, name
 
 
+@pytest.mark.usefixtures("loops_compiled")
 def test_gravity_by_a_graded_chain_is_right_where_air_makes_its_strings_taut():
     """In the resolved world, whose rods hang tilted: no equation of the analysis is in it."""
     ready, seeds = PROTOCOLS / "graded-chain.yaml", [1, 5, 7, 8]

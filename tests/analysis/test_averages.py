@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import ttest_ind
 
 from rig.analysis.averages import difference
 from rig.analysis.quantities import BUDGET, COMMON
@@ -19,6 +18,8 @@ def test_of_runs_that_scatter_it_is_students_interval():
     rng = np.random.default_rng(1)
     one, other = rng.normal(3.0, 1.0, 5), rng.normal(2.0, 1.0, 8)
     found = difference(runs(one, 1e-6), runs(other, 1e-6))
+    from scipy.stats import ttest_ind  # takes a second, which collecting need not
+
     interval = ttest_ind(one, other).confidence_interval(0.95)
     low, high = found.value - found.expanded, found.value + found.expanded
     assert (low, high) == pytest.approx((interval.low, interval.high), rel=1e-6)

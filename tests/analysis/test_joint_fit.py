@@ -376,8 +376,11 @@ def test_where_little_scatters_and_few_gates_tell_of_it_the_joint_fit_settles(la
         assert getattr(found.joint.components, name) >= least * (1.0 - 1e-12), name
 
 
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("dials", [Dials(), with_dials(hang_sd=0.2e-3, jitter_sd=2e-6)])
-def test_beams_that_rods_pass_while_others_strike_do_not_keep_the_joint_fit_from_settling(dials):
+def test_beams_that_rods_pass_while_others_strike_do_not_keep_the_joint_fit_from_settling(
+    dials, seed
+):
     """A pitch and half a width up: each edge may be before an impact or after it, as the rig is."""
     chain = STANDARD.chain
     pitch = 1165.0 / (chain["rods"] - 1)
@@ -386,11 +389,10 @@ def test_beams_that_rods_pass_while_others_strike_do_not_keep_the_joint_fit_from
     protocol = parse(
         GateLayout(STANDARD, beams, (20, 60, 100, 140, 204, 350, 690, 1078)).protocol()
     )
-    for seed in (2, 3):
-        drops = [case(protocol, dials, seed=seed, run=run) for run in EIGHT]
-        found = analysis(drops)
-        assert found.joint is not None
-        assert found.joint.settled
-        for one, result in zip(drops, found.runs, strict=True):
-            separation = result.quantities["separation_m"]
-            assert abs(separation.value - true_value(one.truth, "separation_m")) < 4 * separation.u
+    drops = [case(protocol, dials, seed=seed, run=run) for run in EIGHT]
+    found = analysis(drops)
+    assert found.joint is not None
+    assert found.joint.settled
+    for one, result in zip(drops, found.runs, strict=True):
+        separation = result.quantities["separation_m"]
+        assert abs(separation.value - true_value(one.truth, "separation_m")) < 4 * separation.u

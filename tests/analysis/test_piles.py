@@ -10,6 +10,8 @@ from rig.bench.falls import Asked, falls
 from rig.protocol.plan import runs as planned
 from tests.analysis.drops import PROTOCOLS, UNIFORM, codes
 
+pytestmark = pytest.mark.usefixtures("loops_compiled")
+
 RUNS = {run.number: run for run in planned(UNIFORM)}
 
 

@@ -17,6 +17,7 @@ def here(monkeypatch):
     )
 
 
+@pytest.mark.usefixtures("loops_compiled")
 def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, here):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(study, "DROPS", (1,))

@@ -11,7 +11,9 @@ from rig.reasons import make_reason
 
 def test_every_fault_is_of_some_layout_and_another_rig_than_the_stated_one():
     for fault in WRONG_RIGS:
-        rigs = [(one, rig) for one in LAYOUTS for rig in fault.rigs(one.protocol())]
+        every = [(one, [*fault.rigs(one.protocol())]) for one in LAYOUTS]
+        # Each layout's smallest and largest fault: what lies between is made alike.
+        rigs = [(one, rig) for one, sizes in every for rig in (*sizes[:1], *sizes[1:][-1:])]
         assert rigs, fault.name
         for layout, (size, text) in rigs:
             assert parse(text).gates is not None

@@ -12,6 +12,8 @@ from rig.report.canvas import figure_file
 from rig.report.film import film_figure
 from tests.report.test_figures import FILM
 
+pytestmark = pytest.mark.usefixtures("loops_compiled")
+
 
 def ensemble(incline: float):
     times = [n / 960 for n in range(20)]

@@ -12,7 +12,10 @@ import pytest
 
 from rig.cli import main
 from tests.cli.lab import PROTOCOLS, rig, short
-from tests.once import analysed_once  # noqa: F401 - a fixture
+from tests.once import (
+    analysed_once,  # noqa: F401 - a fixture
+    filled_once,
+)
 
 
 class Done(NamedTuple):
@@ -38,35 +41,53 @@ class Finished:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    folder = tmp_path_factory.mktemp("finished")
-    protocol, session = folder / "short.yaml", folder / "short.session"
-    protocol.write_text(short(), "utf-8")
-    done = rig("run", protocol, "--port", "sim://", "--session", session, "--seed", 1)
-    return Finished(session, protocol, Done(done.returncode, done.stdout, done.stderr))
+    def fill(folder: Path) -> None:
+        protocol, session = folder / "short.yaml", folder / "short.session"
+        protocol.write_text(short(), "utf-8")
+        done = rig("run", protocol, "--port", "sim://", "--session", session, "--seed", 1)
+        told = done.returncode, done.stdout, done.stderr
+        (folder / "told.json").write_text(json.dumps(told), "utf-8")
+
+    folder = filled_once(tmp_path_factory, "finished", fill)
+    told = json.loads((folder / "told.json").read_text("utf-8"))
+    return Finished(folder / "short.session", folder / "short.yaml", Done(*told))
 
 
 @pytest.fixture(scope="session")
 def fences(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record ten drops of a fence, which are quickly analysed."""
-    protocol, session = PROTOCOLS / "picket-fence.yaml", tmp_path_factory.mktemp("fences") / "s"
-    assert main(["run", str(protocol), "--port", "sim://?seed=2", "--session", str(session)]) == 0
-    return session
+
+    def fill(folder: Path) -> None:
+        words = ["run", PROTOCOLS / "picket-fence.yaml", "--port", "sim://?seed=2", "--session"]
+        assert main([*map(str, words), str(folder / "s")]) == 0
+
+    return filled_once(tmp_path_factory, "fences", fill) / "s"
 
 
 @pytest.fixture(scope="session")
-def analysis(finished: Finished) -> dict[str, Any]:
+def analysis(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What ``rig analyze --json`` prints of the finished session."""
-    return json.loads(rig("analyze", finished.session, "--json").stdout)
+
+    def fill(folder: Path) -> None:
+        said = rig("analyze", finished.session, "--json").stdout
+        (folder / "said.json").write_text(said, "utf-8")
+
+    folder = filled_once(tmp_path_factory, "analysis", fill)
+    return json.loads((folder / "said.json").read_text("utf-8"))
 
 
 @pytest.fixture(scope="session")
 def page(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return what ``rig report`` writes of the finished session."""
-    path = tmp_path_factory.mktemp("page") / "report.html"
-    done = rig("report", finished.session, "-o", path)
-    assert (done.returncode, done.stdout) == (0, ""), done.stderr
-    assert done.stderr == f"report: {path}\n"
-    return path
+
+    def fill(folder: Path) -> None:
+        path = folder / "alone" / "report.html"
+        path.parent.mkdir()
+        done = rig("report", finished.session, "-o", path)
+        assert (done.returncode, done.stdout) == (0, ""), done.stderr
+        assert done.stderr == f"report: {path}\n"
+
+    return filled_once(tmp_path_factory, "page", fill) / "alone" / "report.html"
 
 
 @pytest.fixture

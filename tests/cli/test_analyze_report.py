@@ -112,7 +112,8 @@ def test_bars_are_as_long_as_the_analysis_says(finished):
         assert Mean(drawn, SEPARATION).bars[bars] == pytest.approx(expected[bars], rel=1e-9), bars
 
 
-def test_the_reader_chooses_what_bars_stand_for(call, finished, tmp_path):
+def test_the_reader_chooses_what_bars_stand_for(call, finished, tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.report.canvas.KINDS", ("svg",))
     done = call("report", finished.session, "-o", tmp_path / "r.html",
                 "--figures", tmp_path, "--bars", "half-SD")  # fmt: skip
     assert done.code == 0, done.err

@@ -93,6 +93,7 @@ def test_a_given_alpha_needs_no_surface_numbers(call):
     assert line["separation_u_m"] > 0.0
 
 
+@pytest.mark.usefixtures("analysed_once")
 @pytest.mark.parametrize("protocol", sorted(PROTOCOLS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
     done = call("check", protocol)
@@ -118,6 +119,7 @@ def test_check_for_one_board_is_its_refusal(call):
     assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in err
 
 
+@pytest.mark.usefixtures("analysed_once")
 def test_the_readme_says_which_boards_can_do_a_ready_protocol(call):
     readme = (PROTOCOLS.parent / "README.md").read_text("utf-8")
     for path in PROTOCOLS.glob("*.yaml"):

@@ -105,7 +105,7 @@ def test_no_opening_within_a_boot_loader_takes_longer_than_five_seconds():
     wiring, chance = BOARDS["mega"], random.Random(5)
     image = behind_loader(wiring.mcu, LOADERS["mega"], firmware_for(wiring))
     board, clock = EmulatedBoard(wiring, image), VirtualClock()
-    for n in range(12):
+    for n in range(6):
         port = EmulatedSerial("test", board=board, timeout=0.02, clock=clock)
         for _ in range(n % 3 and chance.randrange(8)):
             clock.sleep(chance.uniform(0.05, 0.3))

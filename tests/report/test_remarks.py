@@ -10,12 +10,13 @@ import pytest
 
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
+from rig.cli import main
 from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.report.finding import void_lines
 from rig.report.templates import lines
 from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
-from tests.cli.lab import rig, short
+from tests.cli.lab import short
 
 
 def void(run, attempt, *reasons, verdict="void"):
@@ -54,15 +55,26 @@ def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_k
     assert remedies([MOTHS, SKEW, SKEW]) == remedies([SKEW]) != [general]
 
 
-def test_a_session_without_a_good_run_says_why(tmp_path):
+@pytest.fixture
+def rig(capsys):
+    """Call a command; return its code and what it said."""
+
+    def call(*words):
+        code = main([*map(str, words)])
+        return code, capsys.readouterr().out
+
+    return call
+
+
+def test_a_session_without_a_good_run_says_why(rig, tmp_path):
     protocol, session = tmp_path / "p.yaml", tmp_path / "s"
     protocol.write_text(short("40 deg", 1), "utf-8")
     done = rig("run", protocol, "--port", "sim://?skew_sd=1s", "--session", session, "--yes")
-    assert done.returncode == 3
-    told = rig("analyze", session).stdout
+    assert done[0] == 3
+    _, told = rig("analyze", session)
     assert "No accepted runs" in told
     assert "run 1 (attempts 1–3): " in told
-    assert rig("report", session, "-o", tmp_path / "r.html").returncode == 0
+    assert rig("report", session, "-o", tmp_path / "r.html")[0] == 0
     what = told.splitlines()[told.splitlines().index("what to do:") + 1].strip()
     assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
@@ -77,16 +89,16 @@ def test_air_is_said_with_its_uncertainty():
     assert "κ = 0.031234 ± 0.000020 per m" in line
 
 
-def test_a_run_in_air_tells_of_it(tmp_path):
+def test_a_run_in_air_tells_of_it(rig, tmp_path):
     protocol, session = tmp_path / "air.yaml", tmp_path / "air.session"
     protocol.write_text(short(), "utf-8")
-    done = rig("run", protocol, "--port", "sim://?seed=2&drag=0.03&skew_sd=1ms",
-               "--session", session, "--yes")  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "Air drag: κ = 0.0" in done.stdout
+    code, told = rig("run", protocol, "--port", "sim://?seed=2&drag=0.03&skew_sd=1ms",
+                     "--session", session, "--yes")  # fmt: skip
+    assert code == 0
+    assert "Air drag: κ = 0.0" in told
     (one,) = [
         one
-        for one in json.loads(rig("analyze", session, "--json").stdout)["learned"]["unknowns"]
+        for one in json.loads(rig("analyze", session, "--json")[1])["learned"]["unknowns"]
         if one["name"] == "drag"
     ]
     assert one["value"][0] == pytest.approx(0.03, abs=4 * one["u"][0])

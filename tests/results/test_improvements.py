@@ -23,7 +23,7 @@ def analysis(protocol):
     return analyze(protocol, [one.drop for one in drops], lambda _: drops[0].scale)
 
 
-@pytest.mark.parametrize("datum_u", [3e-4, 6e-4])
+@pytest.mark.parametrize("datum_u", [6e-4, pytest.param(3e-4, marks=pytest.mark.slow)])
 def test_what_is_measured_better_brings_at_least_what_was_promised(datum_u):
     stated = replace(UNIFORM, plan=PLAN, gates=replace(UNIFORM.gates, datum_u=datum_u))
     summary = analysis(stated).summary

@@ -9,6 +9,7 @@ from rig.analysis.comparison import compare
 from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.session import analyze
+from rig.cli import main
 from rig.clock.calibration import TimeScale
 from rig.reasons import plain_reason
 from rig.records import Job
@@ -17,7 +18,7 @@ from rig.results.known_drops import KnownDrops
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.cli.lab import rig, short
+from tests.cli.lab import short
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +27,8 @@ def blocks(tmp_path_factory):
     folder = tmp_path_factory.mktemp("blocks")
     protocol, session = folder / "abba.yaml", folder / "abba.session"
     protocol.write_text(short("[40 deg]", 6).replace("settle", "order: ABBA, settle"), "utf-8")
-    done = rig("run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes")
-    assert done.returncode == 0, done.stderr
+    words = ["run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes"]
+    assert main([*map(str, words)]) == 0
     return session
 
 

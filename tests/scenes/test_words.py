@@ -21,7 +21,7 @@ from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.tui.app import RigApp
 from rig.tui.context import Options
-from tests.tui.lab import KEYS
+from tests.tui.lab import KEYS, draw_without_pause
 from tests.tui.screen import text_of
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
@@ -113,6 +113,7 @@ def test_a_draft_and_its_drawings_speak_the_words_of_their_scene(
 
 def test_screens_speak_the_words_of_their_scene(recorded, monkeypatch):
     scene, protocol, sessions = recorded
+    draw_without_pause(monkeypatch)
     monkeypatch.setattr(pictures, "LiveAnalysis", sessions.__getitem__)
     # Before there is a result all sessions look the same.
     for first, session in zip((4, 1), sessions, strict=True):

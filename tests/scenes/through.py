@@ -8,12 +8,17 @@ import signal
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import pytest
 
 from rig import __version__
 from rig.analysis.result import GOOD
 from rig.cli import main
+from rig.report import canvas
+from rig.report.figure import Chart
 from rig.report.templates import sentence
 from tests.scenes.draw import Scene
 
@@ -108,6 +113,25 @@ def _ending(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
+
+
+@contextmanager
+def one_kind_each(first: int) -> Iterator[None]:
+    """Write each figure as a file of one kind, the next one of the next: all take long to draw.
+
+    That a figure is written in every kind is for tests/report.
+    """
+    turns, kinds = count(), len(canvas.KINDS)
+    with pytest.MonkeyPatch.context() as patch:
+
+        def written(path: Path, figure: Chart) -> None:
+            number, kind = divmod(next(turns), kinds)
+            if (number + kind) % kinds == first % kinds:
+                write(path, figure)
+
+        write = canvas.write_figure
+        patch.setattr(canvas, "write_figure", written)
+        yield
 
 
 def _not_strict(constant: str) -> float:
@@ -276,7 +300,10 @@ class _Journey:
 
     def reported(self, found: Any) -> None:
         page = self.folder / "report.html"
-        done = self.call("report", self.session, "-o", page, "--figures", self.folder / "figures")
+        with one_kind_each(self.scene.seed):
+            done = self.call(
+                "report", self.session, "-o", page, "--figures", self.folder / "figures"
+            )
         if done.code != DONE:
             return
         html = page.read_text("utf-8")

@@ -41,15 +41,32 @@ class Pair:
             for one in (self.board, judge)
         )
 
-    def findings(self):
-        options = SelftestOptions(drops=DROPS, release=True)
+    def findings(self, drops=DROPS):
+        options = SelftestOptions(drops=drops, release=True)
         return selftest(self.port, self.port.clock, options, self.judge_port)
 
 
+@pytest.fixture(scope="module")
+def pair():
+    """Two boards that have started, which takes long; what a test changes, it changes back."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rig.selftest.requests.BOOT_WAIT_S", 0.0)  # opening restarts none of them
+        patch.setattr("rig.selftest.run.CHECKS", dict(islice(CHECKS.items(), 1)))
+        yield Pair()
+
+
 @pytest.fixture
-def pair(monkeypatch):
-    monkeypatch.setattr("rig.selftest.run.CHECKS", dict(islice(CHECKS.items(), 1)))
-    return Pair()
+def late(pair, monkeypatch):
+    """Have one comparator slower than the others."""
+    edge = pair.board.avr.edge
+
+    def by(late_ns):
+        def later(cycle, pin, level):
+            edge(cycle + round(late_ns * 0.12) * (pin == "GP3"), pin, level)
+
+        monkeypatch.setattr(pair.board.avr, "edge", later)
+
+    return by
 
 
 def test_a_right_board_is_measured_as_the_emulator_itself_measures_it(pair):
@@ -68,26 +85,24 @@ def test_a_right_board_is_measured_as_the_emulator_itself_measures_it(pair):
     assert len(found) == 7
 
 
-def test_wires_that_are_missing_are_asked_for(pair):
-    del pair.board.wires[PICO.releases[0]]
-    found = {finding.name: finding for finding in islice(pair.findings(), 4)}
+def test_a_gate_that_is_a_little_late_is_right_and_a_wire_that_is_missing_asked_for(
+    pair, late, monkeypatch
+):
+    late(40)
+    monkeypatch.delitem(pair.board.wires, PICO.releases[0])
+    found = {finding.name: finding for finding in islice(pair.findings(drops=2), 4)}
     assert found["stamps"].verdict is Verdict.OK
     assert found["release pulse"].reason.code == "judged_edges"
-    pair.judge.wires.clear()
+
+
+def test_wires_to_the_gates_that_are_missing_are_asked_for(pair, monkeypatch):
+    monkeypatch.setattr(pair.judge, "wires", {})
     *_, stamps = islice(pair.findings(), 3)
     assert stamps.reason.code == "judged_edges"
     assert "docs/first-board.md" in stamps.advice
 
 
-@pytest.mark.parametrize(("late_ns", "code"), [(40, None), (2_000, "judged_limit")])
-def test_gates_that_are_late_are_found_out(pair, late_ns, code):
-    """One comparator is slower than the others."""
-    slow = pair.board.avr
-    edge = slow.edge
-
-    def later(cycle, pin, level):
-        edge(cycle + round(late_ns * 0.12) * (pin == "GP3"), pin, level)
-
-    slow.edge = later
-    *_, stamps = islice(pair.findings(), 3)
-    assert (stamps.reason.code if stamps.reason else None) == code
+def test_a_gate_that_is_too_late_is_found_out(pair, late):
+    late(2_000)
+    *_, stamps = islice(pair.findings(drops=1), 3)
+    assert stamps.reason.code == "judged_limit"

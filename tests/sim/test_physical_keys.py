@@ -19,6 +19,8 @@ from sim.resolved_dials import read_resolved_dials
 from sim.resolved_lab import ResolvedLab
 from tests.protocol.keys import put, value
 
+pytestmark = pytest.mark.usefixtures("loops_compiled")
+
 BESIDE_THE_FALL = (
     "protocol", "title", "notes", "blind", "reference", "release", "plan", "accept", "priors",
 )  # fmt: skip

@@ -15,6 +15,8 @@ from sim.resolved.hanging import stable_step
 from sim.resolved.motion import push
 from sim.resolved.scene import Board, Bounce, Chain, Fall, Rods, Strings
 
+pytestmark = pytest.mark.usefixtures("loops_compiled")
+
 GRAVITY, DROP = 9.81, 1.0
 MASS, LENGTH, DIAMETER = 5.8e-3, 0.102, 12.7e-3
 PITCH = 1.165 / 24

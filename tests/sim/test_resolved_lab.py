@@ -23,6 +23,8 @@ from sim.resolved_dials import ResolvedDials, read_resolved_dials
 from sim.resolved_lab import ResolvedLab, at_level
 from sim.scene import choose_world, set_scene
 
+pytestmark = pytest.mark.usefixtures("loops_compiled")
+
 GRAVITY = 9.81
 SCENE = """
 protocol: 1

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from distributed import LocalCluster
 
 from rig.protocol import reader
 from rig.sweep import executor as module
@@ -36,8 +35,15 @@ def computed(layout, length, threads=1, show=lambda _: None):
 
 
 @pytest.fixture(scope="module")
-def local():
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
+def cluster():
+    from distributed import LocalCluster  # takes half a second, which collecting need not
+
+    return LocalCluster
+
+
+@pytest.fixture(scope="module")
+def local(cluster):
+    with cluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
         yield local
 
 
@@ -65,8 +71,8 @@ def test_the_command_on_a_cluster_writes_the_same_file(sweep, local, tmp_path):
     assert (tmp_path / "there.csv").read_bytes() == (tmp_path / "here.csv").read_bytes()
 
 
-def test_a_cluster_without_workers_is_refused(sweep):
-    with LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty:
+def test_a_cluster_without_workers_is_refused(sweep, cluster):
+    with cluster(n_workers=0, processes=False, dashboard_address=":0") as empty:
         done = sweep("x.csv", "friction=0..1:3", more=("--cluster", empty.scheduler_address))
     assert done.code == 4
     assert "no workers" in done.err

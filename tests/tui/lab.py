@@ -15,6 +15,7 @@ from inspect import isawaitable
 from pathlib import Path
 from typing import Any
 
+import pytest
 from textual.pilot import Pilot
 
 from rig.campaign.machine import Stage
@@ -172,6 +173,12 @@ class Lab:
             await operator.press("enter")
             await operator.at(Stage.PREPARE)
             yield operator
+
+
+def draw_without_pause(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have figures drawn as soon as their data are there, and looked at as soon."""
+    for module in ("rig.tui.widgets.figure", "bench.pictures"):
+        monkeypatch.setattr(f"{module}.PAUSE_S", 0.05)
 
 
 def short_folder() -> Path:

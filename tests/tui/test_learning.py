@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from rig.cli import main
 from rig.reasons import plain_reason
 from rig.records import Job
 from rig.results.live import LiveAnalysis
@@ -16,7 +17,7 @@ from rig.tui.drop_words import number_table, past_runs, sentence
 from rig.tui.plots import drop_pictures, session_pictures
 from rig.tui.survey import session_list
 from rig.wordings import NOTE
-from tests.cli.lab import rig, short
+from tests.cli.lab import short
 from tests.tui.lab import KEYS, Operator, run
 
 
@@ -26,8 +27,8 @@ def recorded(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("learned")
     protocol, session = folder / "abba.yaml", folder / "abba.session"
     protocol.write_text(short("[40 deg]", 4), "utf-8")
-    done = rig("run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes")
-    assert done.returncode == 0, done.stderr
+    words = ["run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes"]
+    assert main([*map(str, words)]) == 0
     return session
 
 

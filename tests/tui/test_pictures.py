@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from bench.pictures import SIZES, draw, seen
+from bench import pictures
+from bench.pictures import SIZES, draw, screenshots, seen
 from tests.cli.lab import short
-from tests.tui.lab import KEYS
+from tests.tui.lab import KEYS, draw_without_pause
 from tests.tui.screen import text_of
 from tests.tui.test_looks import GOLDENS
 
@@ -25,6 +26,7 @@ PAGES = ["protocol", "device", "run", "live", "result", "session", "history"]
 def recorded(tmp_path, monkeypatch):
     """A session and its protocol in the working folder, so that no screen shows another's name."""
     monkeypatch.chdir(tmp_path)
+    draw_without_pause(monkeypatch)
     protocol, session = Path("looks.yaml"), Path("looks.session")
     protocol.write_text(short(), "utf-8")
     session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
@@ -42,8 +44,10 @@ def test_all_pages_look_as_they_did(recorded):
         assert text + "\n" == golden.read_text("utf-8"), golden.name
 
 
-def test_pictures_say_that_they_are_simulated_and_need_no_server(recorded, tmp_path):
+def test_pictures_say_that_they_are_simulated_and_need_no_server(recorded, tmp_path, monkeypatch):
+    """The first page has no session, and the last has: words of all are compared above."""
     session, files = recorded
+    monkeypatch.setattr(pictures, "screenshots", lambda view: screenshots(view)[::6])
     for path in draw(session, tmp_path / "drawn", KEYS, files, [(80, 24)], ["light"]):
         text = path.read_text("utf-8")
         assert "SIMULATED" in text or path.name.startswith("protocol"), path.name

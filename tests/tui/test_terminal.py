@@ -109,7 +109,9 @@ def terminal() -> Iterator[Terminal]:
 
 
 @_NEEDS_TMUX
-@pytest.mark.parametrize("url", ["sim://?seed=3", "emu://?seed=3"])
+@pytest.mark.parametrize(
+    "url", ["sim://?seed=3", pytest.param("emu://?seed=3", marks=pytest.mark.slow)]
+)
 def test_an_abba_session_by_keys_alone(terminal, url):
     if url.startswith("emu"):
         pytest.importorskip("rig_emulator.stand")

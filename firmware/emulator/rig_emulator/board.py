@@ -30,7 +30,7 @@ _BOOT = wire.CODES[wire.Boot]
 _POWERED_S = 0.1  # the board has been on for a while when the port is opened
 _PULSE_NS = 10**7  # width of the reference's pulses
 _HISTORY = 10_000
-_WIRE_NS = 100_000  # for which an edge is under way to another board: both keep step so closely
+_WIRE_NS = 400_000  # for which an edge is under way to another board: both keep step so closely
 
 
 class EmulatedBoard:
