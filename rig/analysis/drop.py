@@ -170,8 +170,7 @@ class DropCase(NamedTuple):
         while low := gates_too_low(
             self.protocol, last.model.records.values() if last else case._records(), last
         ):
-            begun = readings[case.aside].begun
-            before = None if begun is None else (case.aside, begun)
+            before = readings[case.aside].begun
             case = case._replace(aside=(*case.aside, *low))
             without = reading, last = case._read(readings, before, explain=False)
             if not _void_by(reading) - _SKEW:
@@ -193,7 +192,7 @@ class DropCase(NamedTuple):
     def _read(
         self,
         readings: dict[tuple[int, ...], DropIdentity],
-        before: tuple[tuple[int, ...], Begun] | None = None,
+        before: Begun | None = None,
         *,
         explain: bool,
     ) -> tuple[DropResult, Fit | None]:

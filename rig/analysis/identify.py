@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from rig.analysis.annealing import Annealed
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
-    from rig.analysis.fit import Matches
     from rig.arrays import Index
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
@@ -142,39 +141,27 @@ def identify_drop(
     scale: TimeScale,
     components: Components,
     aside: Collection[int] = (),
-    before: tuple[Collection[int], Begun] | None = None,
+    before: Begun | None = None,
 ) -> DropIdentity:
     """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`.
 
     Parameters
     ----------
     before
-        Which gates were left out when this was found, and each edge begins as the rod it was.
+        Where the chains were found to be with more gates.
     """
     earliest = -math.inf if drop.fire_tick is None else 0.0
     records = chain_records(protocol, run, drop, scale.hz, aside)
     if before is not None:
-        left_out, begun = before
-        model = DropModel.of(protocol, records, begun.guesses, scale.u, components)
-        same = settle(model, _without(records, left_out, begun.matches), begun.x)
-        return DropIdentity(scale, {}, begun=Begun(begun.guesses, same.matches, same.x))
+        model = DropModel.of(protocol, records, before.guesses, scale.u, components)
+        same = settle(model, x=before.x)
+        return DropIdentity(scale, {}, begun=Begun(before.guesses, same.matches, same.x))
     identification = identify(protocol, records, scale.u, components, earliest)
     unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
     if unlike or fit is None:
         poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
         return DropIdentity(scale, unlike, poor)
     return DropIdentity(scale, unlike, begun=Begun(fit.model.guesses, fit.matches, fit.x))
-
-
-def _without(records: Sequence[ChainRecord], aside: Collection[int], matches: Matches) -> Matches:
-    """Leave out the matches of gates that are aside now, and were not before."""
-    remaining: Matches = {}
-    for record in records:
-        used = {train.gate for train in record.trains}
-        gates = used | {train.gate for train in record.aside} - {*aside}
-        pairs = zip(sorted(gates), matches[record.role], strict=True)
-        remaining[record.role] = [match for gate, match in pairs if gate in used]
-    return remaining
 
 
 def identify(

@@ -163,22 +163,15 @@ class Trajectory:
         pull = np.stack([by_gravity, by_kappa * self.shares(leg)], axis=-1)
         moved[..., pulled] -= pull @ pulls[[GRAVITY, DRAG]][:, pulled]
         if strike_u is not None and self.hits is not None:
-            rod, ahead = self._nearest_strike(times, leg)
-            off = speed * ahead / strike_u[rod]
+            strikes = self.time[1:]
+            rod = np.abs(times[:, None] - strikes).argmin(axis=1)  # whose strike is the nearest
+            off = speed * (strikes[rod] - times) / strike_u[rod]
             other = 0.5 * (np.sign(off) - np.tanh(_NORMAL * off))
             near = np.flatnonzero(np.abs(other) > _FAINT)
             # A strike lowers the chain by what it makes it faster, times how long ago it was.
             kicks = (self.speed[1:] - self.hits.arrival)[rod[near]]
             moved[near] += (other[near] * kicks)[:, None] * time[1:].take(rod[near], axis=0)
         return self.height.take(leg) - fallen, speed, moved
-
-    def _nearest_strike(self, times: Array, leg: Index) -> tuple[Index, Array]:
-        """Return the rod whose strike is nearest to each time, and how long that is ahead, s."""
-        strikes = self.time[1:]
-        before, after = np.maximum(leg - 1, 0), np.minimum(leg, strikes.size - 1)
-        nearer = strikes[after] - times < times - strikes[before]
-        rod = np.where(nearer | (leg == 0), after, before)
-        return rod, strikes[rod] - times
 
     def passages(self, heights: Array) -> tuple[Array, Array]:
         """When the reference point comes down to each height, s, and how fast, m/s.
