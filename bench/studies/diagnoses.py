@@ -22,7 +22,7 @@ from bench.studies.layout_catalogue import (
 from bench.studies.time_scales import time_scale
 from bench.studies.wrong_rigs import WRONG_RIGS
 from bench.workers import results
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.bench.falls import Asked, falls, simulation
 from rig.bench.findings import Findings
 from rig.clock.calibration import TimeScale
@@ -182,7 +182,7 @@ def cells(layout: GateLayout, drops: int, clean: int) -> list[DiagnosisTally]:
             for fall in islice(all_falls, len(case.asked.seeds)):
                 scale = time_scale(fall.seed)
                 slow = TimeScale(scale.hz / (1.0 - case.slow), scale.u)
-                result, _ = fit_drop(protocol, planned[fall.drop.run], fall.drop, slow)
+                result, _ = DropCase(protocol, planned[fall.drop.run], fall.drop, slow).read()
                 case.cell.add(result)
     return [case.cell for case in cases]
 

@@ -15,7 +15,7 @@ from bench.studies.columns import Column, aligned
 from bench.studies.errors import Errors
 from bench.studies.figures import estimators_figure
 from bench.studies.sessions import with_device
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import joint_fit
 from rig.analysis.monte_carlo import monte_carlo
 from rig.analysis.quantities import COMPUTED, Adjusted, measurands
@@ -137,7 +137,9 @@ def estimators(
         if result.verdict in GOOD and result.learned
     ]
     begin = time.process_time()
-    fits = [fit_drop(protocol, result.run, fall.drop, scale)[1] for result, fall, scale in good]
+    fits = [
+        DropCase(protocol, result.run, fall.drop, scale).read()[1] for result, fall, scale in good
+    ]
     alone_s = _since(begin, good)
     cases = [
         _Case(protocol, fall, scale, fit)

@@ -16,7 +16,7 @@ from bench.studies.figures import layouts_figure
 from bench.studies.layout_catalogue import LAYOUTS, chosen
 from bench.studies.time_scales import time_scale
 from bench.workers import results
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.result import GOOD
 from rig.bench.falls import STRAY, Asked, falls, simulation
 from rig.bench.findings import Findings
@@ -193,9 +193,9 @@ def cells(layout: GateLayout, drops: int) -> list[Cell]:
         for cell in part:
             for fall in islice(all_falls, drops):
                 begin = time.process_time()
-                result, _ = fit_drop(
+                result, _ = DropCase(
                     protocol, planned[fall.drop.run], fall.drop, time_scale(fall.seed)
-                )
+                ).read()
                 cell.add(protocol, fall, result, time.process_time() - begin)
     return part
 

@@ -82,10 +82,6 @@ class Estimate:
         """Return the standard uncertainty of a function with these derivatives."""
         return float(np.linalg.norm((gradient * self.sd) @ self.inverse))
 
-    def beyond(self, x: Array) -> float:
-        """How far this is from other unknowns, see `length`."""
-        return length(scaled(self.x - x, self.sd), self.root)
-
     @cached_property
     def degrees(self) -> float:
         """Degrees of freedom: edges less the unknowns that they determine."""

@@ -121,7 +121,7 @@ class DropCase(NamedTuple):
         before
             What was found of it at any time scale. Results are the same without it.
         explain
-            As for `fit_drop`.
+            As for `read`.
         """
         readings = {} if before is None else {**before.identified}
         result, fit = self.read(readings, explain=explain)
@@ -157,7 +157,8 @@ class DropCase(NamedTuple):
         readings
             What its edges are where some gates are left out, as far as it is known, and will be.
         explain
-            As for `fit_drop`.
+            Whether to seek what else than the protocol would explain a drop that is void as it is:
+            it takes many times as long as all the rest. Of others it is sought where they ask.
         """
         drop, readings = self.drop, {} if readings is None else readings
         if drop.damage:  # the file's, and no finding about chains or gates
@@ -268,29 +269,6 @@ class DropCase(NamedTuple):
         assert self.components is not None
         premise = Premise(self.protocol, self.run, scale.hz, self.aside)
         return Explainer(premise, thinned(self.drop, scale.hz), scale.u, self.components, suspects)
-
-
-def fit_drop(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    scale: TimeScale,
-    components: Components | None = None,
-    *,
-    explain: bool = True,
-) -> tuple[DropResult, Fit | None]:
-    """Find out what a drop says by itself; keep what a joint fit begins with, too.
-
-    Parameters
-    ----------
-    protocol, run, drop, scale, components
-        As in `DropCase`.
-    explain
-        Whether to seek what else than the protocol would explain a drop that is void as it is: it
-        takes many times as long as all the rest. Of others it is sought where they ask for it.
-    """
-    case = DropCase(protocol, run, drop, scale, components)
-    return case.read(explain=explain)
 
 
 def _void_by(result: DropResult) -> set[str]:

@@ -156,10 +156,6 @@ class DropModel:
         about = self.protocol, record, self.pairings[role], self.clock_u, scales
         return SideFall.of(*about, np.sqrt(variance))
 
-    def begun(self, guesses: Mapping[str, Guess]) -> DropModel:
-        """Return the same drop with other first guesses."""
-        return self.changed(guesses=guesses)
-
     def under(self, protocol: Protocol) -> DropModel:
         """Return the same drop with the priors of another protocol, alike but for these."""
         # Its heights stay: they may be counted from a contact point that is this drop's own.
@@ -185,10 +181,6 @@ class DropModel:
             },
         )
 
-    def owned(self, owners: Mapping[str, str]) -> DropModel:
-        """Return the same drop with its rig told from others."""
-        return self.changed(owners=owners)
-
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
         """Return the same drop with its edges moved in time, by so many seconds each."""
         return self.changed(
@@ -197,10 +189,6 @@ class DropModel:
                 for role, pairing in self.pairings.items()
             }
         )
-
-    def suspecting(self, suspect: Unknown) -> DropModel:
-        """Return the same drop with one thing more that is not known, behind all others."""
-        return self.changed(suspects=(suspect,))
 
     def first(self) -> Array:
         """Unknowns as the first guess has them, shape ``(unknowns,)``."""
@@ -256,21 +244,6 @@ class DropModel:
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )
 
-    def spread(self, role: str, derivatives: Array) -> Array:
-        """Derivatives by a trajectory's parameters → by all unknowns.
-
-        Parameters
-        ----------
-        derivatives
-            Shape ``(…, parameters)``.
-
-        Returns
-        -------
-        ndarray
-            Shape ``(…, unknowns)``.
-        """
-        return derivatives @ self.slopes[role].path
-
     def stretch(self, x: Array) -> Array:
         """Size of each mode of the stretch, m."""
         own, usual = (x[self.unknowns[name]] for name in STRETCHES)
@@ -304,12 +277,8 @@ class DropModel:
         loose = _loose(self.trajectory(role, x), times, seen)
         return Residuals(values, self._sigma(seen, speed, loose), speed, seen.burst == 0.0, loose)
 
-    def independent(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
-        """Return `residuals` with of each what the one before tells of it taken away."""
-        return self.parted(role, self.residuals(role, x, matches), matches)
-
     def parted(self, role: str, rows: Residuals, matches: Sequence[Index]) -> Residuals:
-        """Make `independent` of some residuals."""
+        """Take from some residuals of each what the one before tells of it."""
         rows = rows._replace(values=rows.values.copy(), sigma=rows.sigma.copy())
         self._part(self._matched(role, matches), rows.loose > 0.0, rows.values, rows.sigma)
         return rows

@@ -305,7 +305,7 @@ class Explainer:
             Whether the rods that pass beams are taken as they are: with a size other ones may, and
             the drop is adjusted once more.
         """
-        opened, x = model.suspecting(fault.suspect(model)), np.append(x, 0.0)
+        opened, x = model.changed(suspects=(fault.suspect(model),)), np.append(x, 0.0)
         if score is not None:
             largest = max(fault.sizes)
             x += float(np.clip(score.size, -largest, largest)) * np.append(score.follow, 1.0)

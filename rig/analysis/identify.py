@@ -304,7 +304,7 @@ def log_evidence(fit: Fit) -> float:
     estimate, model = fit.estimate, fit.model
     total = 0.0
     for role, matches in fit.matches.items():
-        rows = model.independent(role, estimate.x, matches)
+        rows = model.parted(role, model.residuals(role, estimate.x, matches), matches)
         sigma = rows.sigma * estimate.scatter
         beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
         total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
@@ -351,14 +351,11 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
     tried: list[Reading] = []
     for pair in close:
         sides = dict(zip(readings, pair, strict=True))
-        begun = model.begun({role: side.guess for role, side in sides.items()})
+        begun = model.changed(guesses={role: side.guess for role, side in sides.items()})
         matches = {
             role: model.pairings[role].numbered(side.edges[0]) for role, side in sides.items()
         }
-        fits = [settle(begun, matches)]
-        if not fits[0].estimate.settled:  # once more, from where it has the chains
-            fits.append(settle(model.begun({role: fitted_guess(fits[0], role) for role in sides})))
-        tried.append(max(map(weigh, fits), key=lambda reading: reading.evidence))
+        tried.append(weigh(settle(begun, matches)))
     best, *rest = _ranked(tried)
     shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:

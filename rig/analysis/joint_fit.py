@@ -184,7 +184,10 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
     damping = np.ones_like(previous)
     for round_ in range(_ROUNDS):
         sd = np.zeros(len(shared))
-        drops = [_informed(drop.at(x), evidence.components, clock_u) for drop in drops]
+        # Priors follow the scatter that was found, and impulses the α that was found.
+        for n, drop in enumerate(drop.at(x) for drop in drops):
+            u = clock_u[drop.model.owners.get("rig")]
+            drops[n] = replace(drop, model=drop.model.informed(evidence.components, u, drop.x))
         for drop in drops:
             sd[drop.here] = drop.model.unknowns.sd[drop.common]
         if round_ == _REMATCH:
@@ -217,14 +220,6 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
         replace(drop, matches=without_strays(drop.model, drop.x, drop.matches)) for drop in drops
     )
     return JointFit(shared, x, sd, inverse, before, evidence.degrees, good, settled)
-
-
-def _informed(
-    drop: JointDrop, components: Components, clock_u: Mapping[str | None, float]
-) -> JointDrop:
-    """Let priors follow the scatter that was found, and impulses the α that was found."""
-    rig = drop.model.owners.get("rig")
-    return replace(drop, model=drop.model.informed(components, clock_u[rig], drop.x))
 
 
 def _move(

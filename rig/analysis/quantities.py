@@ -143,7 +143,7 @@ class Adjusted:
         return Dual(slopes @ self.x, slopes)
 
     def _by_path(self, role: str, value: Array | float, slopes: Array) -> Dual:
-        return Dual(value, self.model.spread(role, slopes))
+        return Dual(value, slopes @ self.model.slopes[role].path)
 
     def _path(self, role: str) -> Trajectory:
         return self.model.trajectory(role, self.x)

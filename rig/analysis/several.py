@@ -184,7 +184,7 @@ def _own(parts: Sequence[SessionPart], shared: Mapping[str, Sequence[Sequence[st
             for name in group:
                 suffixes[name][owner] = suffix
     return {
-        (place, job): replace(fit, model=fit.model.owned(suffixes[part.name]))
+        (place, job): replace(fit, model=fit.model.changed(owners=suffixes[part.name]))
         for place, part in enumerate(parts)
         for job, fit in part.analysis.adjusted.items()
     }

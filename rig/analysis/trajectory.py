@@ -116,20 +116,9 @@ class Trajectory:
         fallen, speed, _ = fall_for(since, self.speed.take(leg), self.gravity, self.kappas(leg))
         return self.height.take(leg) - fallen, speed
 
-    def derivatives(self, times: Array, by: Array | None = None) -> Array:
-        """Derivatives of the height at fixed times.
-
-        Parameters
-        ----------
-        by
-            Derivatives of the parameters by anything else, shape ``(parameters, others)``.
-
-        Returns
-        -------
-        ndarray
-            Shape ``(…, times, parameters)``, or ``(…, times, others)``.
-        """
-        return self.sights(times, by)[2]
+    def derivatives(self, times: Array) -> Array:
+        """Derivatives of the height at fixed times by all parameters."""
+        return self.sights(times)[2]
 
     def sights(
         self, times: Array, by: Array | None = None, strike_u: Array | None = None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.session import Analysis, planned_run
 from rig.cache.entry import recall
 from rig.commands.output import print_data, tell_damage
@@ -69,7 +69,7 @@ def budget(
     protocol = protocol_of(session)
     check_open(session, protocol)
     planned = planned_run({run.number: run for run in runs(protocol)}, drop)
-    single, fit = fit_drop(protocol, planned, drop, calibration(session).scale(drop))
+    single, fit = DropCase(protocol, planned, drop, calibration(session).scale(drop)).read()
     if fit is None:
         raise InputError(f"run {number} is void: {sentences(single.reasons)}")
     result = next(result for result in outcome.analysis.runs if result.run.number == number)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import stated
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity
 from rig.analysis.identify import log_evidence, most_votes
 from rig.clock.calibration import TimeScale
@@ -98,7 +98,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         shares.append(votes / max(1, len(drop.edges), due))
         near, expected = near + votes, expected + due
         if exact and len(results) < _COMPARED:
-            result, fit = fit_drop(protocol, run, drop, rate, explain=False)
+            result, fit = DropCase(protocol, run, drop, rate).read(explain=False)
             evidence += log_evidence(fit) if fit else 0.0
             gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
             results.append(result)

@@ -10,7 +10,7 @@ import numpy as np
 from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import Components
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import match
 from rig.analysis.identify import Identification, fitted_guess, identify
@@ -58,7 +58,7 @@ class Case:
     scale: TimeScale
 
     def analyze(self, components: Components = STATED) -> DropResult:
-        return fit_drop(self.protocol, self.run, self.drop, self.scale, components)[0]
+        return DropCase(self.protocol, self.run, self.drop, self.scale, components).read()[0]
 
     def with_edges(self, edges) -> Case:
         """The same drop with other edges; they need not be in order of time."""

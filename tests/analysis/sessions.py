@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from functools import cache
 
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.fit import Fit
 from rig.analysis.joint_fit import JointFit, joint_fit
 from rig.analysis.session import Analysis, analyze
@@ -22,7 +22,7 @@ def cases(
 
 def fits(drops: Iterable[Case]) -> list[Fit]:
     """Each drop by itself."""
-    found = [fit_drop(one.protocol, one.run, one.drop, one.scale) for one in drops]
+    found = [DropCase(one.protocol, one.run, one.drop, one.scale).read() for one in drops]
     assert all(result.verdict == "accepted" for result, _ in found)
     return [fit for _, fit in found if fit is not None]
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from rig.analysis.adjust import DONE, adjust
-from rig.analysis.equations import Equations, Residuals
+from rig.analysis.adjust import DONE, adjust, length
+from rig.analysis.equations import Equations, Residuals, scaled
 from tests.analysis.drops import SCENES, case
 
 HUBER = 4.0
@@ -111,7 +111,7 @@ def test_an_outlier_pulls_with_bounded_force(outlier):
     assert found.settled
     usual = adjust(model, ALL, np.zeros(5))
     assert usual.settled
-    assert usual.beyond(found.x) < DONE
+    assert length(scaled(usual.x - found.x, usual.sd), usual.root) < DONE
     jacobian, offset = model.stacked()
     residuals = (offset + jacobian @ found.x) / found.scatter
     assert np.abs(residuals).max() > HUBER

@@ -11,7 +11,7 @@ import pytest
 from bench.studies.time_scales import time_scale
 from rig.analysis.air import lags, unlike
 from rig.analysis.chain_records import chain_records
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.gravity import free_gravity
 from rig.analysis.session import analyze
 from rig.analysis.swing import strike_shifts
@@ -97,7 +97,7 @@ def test_gravity_by_a_graded_chain_is_right_where_air_makes_its_strings_taut():
     graded, off = SCENES["graded"], []
     runs = {run.number: run for run in planned(graded)}
     for fall in falls([Asked(url, seeds, [[1]] * len(seeds))]):
-        _, fit = fit_drop(graded, runs[1], fall.drop, time_scale(fall.seed))
+        _, fit = DropCase(graded, runs[1], fall.drop, time_scale(fall.seed)).read()
         gravity = free_gravity(fit)
         off.append((gravity.value - graded.gravity.value) / gravity.u)
     assert np.sqrt(np.mean(np.square(off))) < 1.5, off

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.quantities import measurands
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
@@ -19,7 +19,7 @@ def test_each_line_is_what_its_source_adds(scene):
     """The estimate is −C(Jᵀr − x₀): linear in the edges r and in the prior means x₀."""
     protocol = SCENES[scene]
     one = case(protocol, incline=None if scene == "fence" else 40.0)
-    fit = fit_drop(one.protocol, one.run, one.drop, one.scale)[1]
+    fit = DropCase(one.protocol, one.run, one.drop, one.scale).read()[1]
     size, at = fit.x.size, fit.model.unknowns
     jacobian = np.zeros((0, size))
     for rows in fit.estimate.rows.values():

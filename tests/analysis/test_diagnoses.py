@@ -9,7 +9,7 @@ import pytest
 from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.explanations import NEITHER, Explanation, name_fault
 from rig.analysis.faults import Fault, faults, upside_down
 from rig.analysis.result import GOOD
@@ -250,7 +250,7 @@ def test_a_wrong_clock_and_wrong_gravity_cannot_be_told_apart_and_both_are_said(
     slow = TimeScale(one.scale.hz / (1.0 - share), one.scale.u)
     result = replace(one, scale=slow).analyze()
     # It reads well, but for what it is void: that must not depend on how many were void before.
-    late, _ = fit_drop(one.protocol, one.run, one.drop, slow, explain=False)
+    late, _ = DropCase(one.protocol, one.run, one.drop, slow).read(explain=False)
     assert (late.verdict, late.reasons) == ("void", result.reasons)
     (reason,) = result.reasons
     assert reason.code == "unclear_fault"

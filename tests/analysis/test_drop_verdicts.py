@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.identify import pattern_faults
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
@@ -176,7 +176,7 @@ def test_what_is_no_fall_of_this_chain_is_void(scene, change):
     wrong = one.with_edges(change(one))
     # What else would explain it is sought for single chains, which are quickest.
     explain = scene == "single"
-    result, _ = fit_drop(wrong.protocol, wrong.run, wrong.drop, wrong.scale, explain=explain)
+    result, _ = DropCase(wrong.protocol, wrong.run, wrong.drop, wrong.scale).read(explain=explain)
     assert result.verdict == "void"
     assert result.reasons
 

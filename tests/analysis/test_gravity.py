@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.drop import DropCase, fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity, free_gravity
 from rig.clock.calibration import TimeScale
 from rig.units import Quantity
@@ -17,7 +17,7 @@ QUIET = Dials.quiet()
 
 
 def gravity(one: Case, scale: TimeScale | None = None, protocol=None):
-    result, fit = fit_drop(protocol or one.protocol, one.run, one.drop, scale or one.scale)
+    result, fit = DropCase(protocol or one.protocol, one.run, one.drop, scale or one.scale).read()
     return result.quantities.get("gravity_m_s2") or free_gravity(fit)
 
 
@@ -101,5 +101,5 @@ def test_where_nothing_falls_freely_past_beams_there_is_no_check():
     single = case(SINGLE, QUIET)
     assert check(single, single.scale) is None
     void = case(UNIFORM, QUIET, incline=40.0).with_edges([])
-    result, _ = fit_drop(UNIFORM, void.run, void.drop, void.scale)
+    result, _ = DropCase(UNIFORM, void.run, void.drop, void.scale).read()
     assert check_gravity(UNIFORM, [result]) is None

@@ -11,7 +11,7 @@ from scipy.special import log_ndtr
 from bench.studies.coverage import COEFFICIENTS, draw_rigs
 from bench.studies.time_scales import time_scale
 from rig.analysis.annealing import MISSED, STRAYS
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.identify import LEAD, deciding_gate, pattern_faults
 from rig.bench.falls import falls
 from rig.errors import InputError
@@ -326,7 +326,7 @@ def test_steps_that_an_edge_at_an_impact_stops_are_begun_once_more(tmp_path):
     protocol = reader.parse(rig.text)
     runs = {run.number: run for run in planned(protocol)}
     (fall,) = falls([rig.ask(tmp_path)._replace(runs=[[4]])])
-    result, fit = fit_drop(protocol, runs[4], fall.drop, time_scale(rig.seed))
+    result, fit = DropCase(protocol, runs[4], fall.drop, time_scale(rig.seed)).read()
     assert fit.estimate.settled
     assert result.verdict == "accepted"
     for name in ("speed_m_s", "separation_raw_m"):

@@ -9,7 +9,7 @@ import pytest
 from bench.studies.layout_catalogue import LAYOUTS, STANDARD, GateLayout
 from rig.analysis.budgets import Budgets
 from rig.analysis.components import LEAST_SHARE, above
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.equations import STRAY, linearize
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.joint_fit import FEWEST
@@ -304,7 +304,7 @@ def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it(seed):
     # The limit lies between what the drop says by itself and what it says among all.
     scene = replace(UNIFORM, accept=replace(UNIFORM.accept, release_skew=sum(sizes) / 2.0))
     n = runs.index(latest)
-    alone, _ = fit_drop(scene, drops[n].run, drops[n].drop, drops[n].scale)
+    alone, _ = DropCase(scene, drops[n].run, drops[n].drop, drops[n].scale).read()
     among = analysis([replace(one, protocol=scene) for one in drops])
     assert (alone.verdict in GOOD) is (sizes[0] < sizes[1])
     assert (among.runs[n].verdict in GOOD) is (sizes[1] < sizes[0])

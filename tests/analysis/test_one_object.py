@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rig.analysis.drop import fit_drop
+from rig.analysis.drop import DropCase
 from rig.analysis.gate_passages import moment
 from rig.analysis.quantities import Adjusted
 from rig.analysis.session import analyze
@@ -80,7 +80,7 @@ def test_without_disturbance_everything_is_as_it_fell(protocol):
 @BOTH
 def test_derivatives_at_a_gate_are_those_of_the_values(protocol):
     one = case(protocol, Dials(), run=1, seed=2)
-    fit = fit_drop(protocol, one.run, one.drop, one.scale)[1]
+    fit = DropCase(protocol, one.run, one.drop, one.scale).read()[1]
     gate = protocol.gates.gates[2]
     here = moment(Adjusted(fit.model, fit.x), gate)
     for at in np.flatnonzero(fit.model.unknowns.sd):

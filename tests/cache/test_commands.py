@@ -88,7 +88,7 @@ def test_what_is_kept_is_said_again_to_the_last_byte(session, tmp_path, capsys, 
     with monkeypatch.context() as patch:
         for work in ("rig.analysis.drop.DropCase.summary", "rig.analysis.session.joint_fit",
                      "rig.results.estimated.estimate", "rig.commands.report.session_page",
-                     "rig.commands.budget.fit_drop"):  # fmt: skip
+                     "rig.analysis.drop.DropCase.read"):  # fmt: skip
             patch.setattr(work, refuse)
         at = [n for n, end in enumerate(cold) if end[0] in {0, 3}]
         assert len(at) > 5
