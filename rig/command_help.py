@@ -6,6 +6,7 @@ import argparse
 import os
 import re
 import sys
+from collections import namedtuple
 from functools import cache, partial
 
 from rig import __version__
@@ -17,15 +18,16 @@ if TYPE_CHECKING:
     from typing import Any, NoReturn
 
 
-class Command:
+class Command(namedtuple("Command", "name text arguments examples")):
     """One command, or one of two words below another.
 
     `arguments` are rows for `_add_argument`, `examples` whole command lines.
     """
 
-    def __init__(self, name: str, text: str, arguments: list[str], examples: list[str]) -> None:
-        self.name, self.text = name, text
-        self.arguments, self.examples = arguments, examples
+    name: str
+    text: str
+    arguments: list[str]
+    examples: list[str]
 
 
 def _read_page() -> dict[str, list[Command]]:

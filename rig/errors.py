@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from typing import Any
 
-    from rig.problems import Problem
+
+# Of collections, for typing takes a third as long to load as Python.
+class Problem(
+    namedtuple("Problem", "file line column key message excerpt reason", defaults=("", None))
+):
+    """One fault of an input file, at its place (lines and columns count from 1).
+
+    `excerpt` is what a message shows below: the line itself and a caret, or nothing. `reason` is
+    the `rig.reasons.Reason` of the message, where it has one.
+    """
+
+    file: str
+    line: int
+    column: int
+    key: str
+    message: str
+    excerpt: str
+    reason: Any
+
+    def __str__(self) -> str:
+        key = f" {self.key}:" if self.key else ""
+        return f"{self.file}:{self.line}:{self.column}:{key} {self.message}{self.excerpt}"
 
 
 class RigError(Exception):

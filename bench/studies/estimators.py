@@ -206,7 +206,7 @@ def mean_of_draws(fit: Fit, draws: int, seed: int, spread: float = 1.0) -> Timer
     """
     rng = np.random.default_rng(seed)
     model, estimate = fit.model, fit.estimate
-    values, vectors = np.linalg.eigh(estimate.covariance)
+    values, vectors = np.linalg.eigh(estimate.inverse @ estimate.inverse.T)
     root = spread * estimate.sd[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     total = np.zeros(len(_NAMES))
     for _ in range(draws):

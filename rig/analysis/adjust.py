@@ -74,9 +74,9 @@ class Estimate:
         return np.linalg.inv(self.root).astype(float, copy=False)
 
     @cached_property
-    def covariance(self) -> Array:
-        """R⁻¹R⁻ᵀ, in units of the prior uncertainties."""
-        return self.inverse @ self.inverse.T
+    def own_u(self) -> Array:
+        """Standard uncertainty of each unknown."""
+        return np.asarray(np.linalg.norm(self.inverse, axis=1) * self.sd)
 
     def u(self, gradient: Array) -> float:
         """Return the standard uncertainty of a function with these derivatives."""

@@ -320,12 +320,9 @@ class DropModel:
         late = np.divide(off, speed, out=np.zeros_like(off), where=near & (speed > 0.0))
         return stamps + late, late, levels, loose
 
-    def _strike_u(self, role: str) -> Array | None:
+    def _strike_u(self, role: str) -> Array:
         """How well it is known at which height each rod strikes, see `Trajectory.sights`."""
-        ratios = self.records[role].ratios
-        if ratios is None:
-            return None
-        places = self.slopes[role].path[COMMON + ratios.size :]
+        _, places = np.split(self.slopes[role].path[COMMON:], 2)
         return np.maximum(_TOLD * np.sqrt(places**2 @ self.unknowns.sd**2), SHARPEST)
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:

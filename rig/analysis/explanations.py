@@ -24,7 +24,7 @@ from rig.analysis.chain_records import chain_records
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, faults
-from rig.analysis.fit import match, settle
+from rig.analysis.fit import settle
 from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weigh, well_read
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
@@ -189,7 +189,7 @@ class Explainer:
         wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
         x = fit.x.copy()
         model = fit.model.informed(wider, self.clock_u, x)
-        reading = weigh(settle(model, match(model, x), x=x))
+        reading = weigh(settle(model, x=x))
         log_odds = self._absolute(reading, self.setting.hz) - CLEAR - stated
         yield Explanation(NEITHER, {}, log_odds, whole=True)
 
@@ -275,9 +275,8 @@ class Explainer:
         if fault.of_air:
             # Its size was integrated out, as everything that is unknown.
             fit, occam = reading.fit, 0.0
-            at, estimate = fit.model.unknowns["drag"], fit.estimate
-            size = fit.model.kappa(estimate.x)
-            u = math.sqrt(estimate.covariance[at, at].item()) * float(estimate.sd[at][0])
+            size = fit.model.kappa(fit.x)
+            u = float(fit.estimate.own_u[fit.model.unknowns["drag"]][0])
         return self._explanation(fault, size, u, reading, premise.hz, stated + occam)
 
     def _open(
@@ -309,9 +308,9 @@ class Explainer:
         if score is not None:
             largest = max(fault.sizes)
             x += float(np.clip(score.size, -largest, largest)) * np.append(score.follow, 1.0)
-        reading = weigh(settle(opened, match(opened, x), x=x))
+        reading = weigh(settle(opened, x=x))
         estimate = reading.fit.estimate
-        further, u = float(estimate.x[-1]), math.sqrt(estimate.covariance[-1, -1]) * estimate.sd[-1]
+        further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if not APART * u < abs(size + further) <= max(fault.sizes):
             return None  # a smaller one may be none, and a larger one has another reason
         premise = fault.premise(self.setting, size + further)

@@ -20,7 +20,6 @@ from rig.analysis.annealing import (
     LEAST,
     MISSED,
     PEAKS,
-    Guess,
     Pairing,
     SideFall,
     log_density,
@@ -319,24 +318,8 @@ def held_back(fit: Fit) -> float:
     at = model.unknowns["drag"].start
     if not estimate.sd[at]:
         return 0.0
-    unit = np.eye(estimate.x.size)[at]
-    u = float(np.linalg.norm(np.linalg.solve(estimate.root.T, unit)) * estimate.sd[at])
-    below = -model.kappa(estimate.x) / u / math.sqrt(2.0)
+    below = -model.kappa(estimate.x) / float(estimate.own_u[at]) / math.sqrt(2.0)
     return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
-
-
-def fitted_guess(fit: Fit, role: str) -> Guess:
-    """Return where an adjustment has a chain begin, as a guess for a further one."""
-    at, x = fit.model.unknowns, fit.x
-    path = fit.model.trajectory(role, x)
-    alpha = float(x[at["alpha"]][0]) if role == "impact" else 0.0
-    return Guess(
-        float(path.time[0]),
-        float(path.height[0]),
-        fit.model.guesses[role].alpha + alpha,
-        fit.model.kappa(x),
-        float(x[at["clock"]][0]),
-    )
 
 
 def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> Identification:
@@ -372,8 +355,10 @@ def _shares(model: DropModel, matched: Mapping[str, int]) -> dict[str, float]:
 
 def weigh(fit: Fit) -> Reading:
     """Weigh a fit of all sides."""
-    releases = [fitted_guess(fit, role).release for role in fit.model.records]
-    evidence = log_evidence(fit) + _simultaneous(fit.model.protocol, releases)
+    paths = [fit.model.trajectory(role, fit.x) for role in fit.model.records]
+    evidence = log_evidence(fit) + _simultaneous(
+        fit.model.protocol, [float(path.time[0]) for path in paths]
+    )
     return Reading(fit, evidence if math.isfinite(evidence) else -math.inf)
 
 

@@ -32,7 +32,7 @@ def other_incline(fit: Fit, run: Run) -> tuple[Reason, ...]:
         return ()
     at = model.unknowns["alpha"]
     alpha = model.guesses["impact"].alpha + float(estimate.x[at][0])
-    u = math.sqrt(estimate.covariance[at, at].item()) * float(estimate.sd[at][0])
+    u = float(estimate.own_u[at][0])
     chain = model.records["impact"].chain.chain
 
     def off(incline_deg: float) -> tuple[float, float]:

@@ -116,14 +116,10 @@ class Trajectory:
         fallen, speed, _ = fall_for(since, self.speed.take(leg), self.gravity, self.kappas(leg))
         return self.height.take(leg) - fallen, speed
 
-    def derivatives(self, times: Array) -> Array:
-        """Derivatives of the height at fixed times by all parameters."""
-        return self.sights(times)[2]
-
     def sights(
         self, times: Array, by: Array | None = None, strike_u: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """What `heights` and `derivatives` say, with every leg gone through once.
+        """What `heights` says, and derivatives of the height, with every leg gone through once.
 
         Parameters
         ----------

@@ -179,7 +179,8 @@ def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
     model, estimate = fit.model, fit.estimate
     at = model.unknowns["drag"].start
     off, sd = float(estimate.x[at]), float(estimate.sd[at])
-    kappa, variance = float(model.kappa(estimate.x)), float(estimate.covariance[at, at])
+    kappa = float(model.kappa(estimate.x))
+    variance = float(estimate.inverse[at] @ estimate.inverse[at])
     u = math.sqrt(variance) * sd
     # By the edges alone, without what the protocol makes of them.
     share = 1.0 / (1.0 - min(variance, 0.9))

@@ -121,7 +121,7 @@ def _blocks(drop: Fit | JointDrop, alphas: Array) -> tuple[list[EquationRows], i
         rows = model.equations(role, x, matches)
         pairing = model.pairings[role]
         times = pairing.times[pairing.observed(matches)[1]] * (1.0 + x[at["clock"]])
-        path = model.trajectory(role, x).derivatives(times)
+        path = model.trajectory(role, x).sights(times)[2]
         # A contact point higher up is met as if every rod that strikes hung that much lower.
         lower = -path[:, COMMON + alphas.size :].sum(axis=1)
         extra = np.column_stack([lower, path[:, DRAG]])

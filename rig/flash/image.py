@@ -10,11 +10,10 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from rig.errors import InputError
+from rig.errors import InputError, Problem
 from rig.files import read_input
 from rig.flash.boards import FIRMWARE, TARGETS, Target
 from rig.flash.uf2 import read_blocks
-from rig.problems import Problem
 from rig.reasons import make_error
 
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START = range(6)

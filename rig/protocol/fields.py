@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
-from rig.problems import Problem
+from rig.errors import Problem
 from rig.protocol import keys
 from rig.protocol.yamltree import Mapping, Node, Place, ScalarNode, Sequence
 from rig.units import UnitError, parse, quoted

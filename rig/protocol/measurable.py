@@ -11,8 +11,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from rig.boards import BOARDS, LONGEST_RECORD_MS, Capabilities
-from rig.errors import InputError
-from rig.problems import Problem
+from rig.errors import InputError, Problem
 from rig.protocol.protocol import AT_REST, SIDES, Gate, Gates, Protocol
 from rig.protocol.yamltree import load, place_of
 from rig.reasons import make_error

@@ -9,9 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rig.errors import InputError
+from rig.errors import InputError, Problem
 from rig.files import read_input
-from rig.problems import Problem
 from rig.protocol import protocol as scene
 from rig.protocol.chains import read_chains
 from rig.protocol.checks import check_scene

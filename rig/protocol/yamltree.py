@@ -14,9 +14,8 @@ from typing import Any
 
 import yaml
 
-from rig.errors import InputError
+from rig.errors import InputError, Problem
 from rig.printable import one_line
-from rig.problems import Problem
 from rig.units import quoted
 
 MAX_DEPTH = 32

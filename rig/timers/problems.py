@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from rig.errors import InputError
-from rig.problems import Problem
+from rig.errors import InputError, Problem
 from rig.reasons import make_reason, remedies
 
 MAX_PROBLEMS = 50

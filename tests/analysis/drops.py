@@ -13,7 +13,7 @@ from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import match
-from rig.analysis.identify import Identification, fitted_guess, identify
+from rig.analysis.identify import Identification, identify
 from rig.analysis.result import DropResult
 from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
@@ -92,9 +92,21 @@ class Case:
 
     def guesses(self) -> dict[str, Guess]:
         """Where the best reading has each chain begin."""
-        found = self.identify()
-        assert found.fit is not None
-        return {role: fitted_guess(found.fit, role) for role in found.fit.model.records}
+        fit = self.identify().fit
+        assert fit is not None
+        paths = {role: fit.model.trajectory(role, fit.x) for role in fit.model.records}
+        at = fit.model.unknowns
+        alpha = fit.x[at["alpha"]].sum() if "alpha" in at else 0.0
+        return {
+            role: Guess(
+                path.time[0],
+                path.height[0],
+                fit.model.guesses[role].alpha + (alpha if role == "impact" else 0.0),
+                fit.model.kappa(fit.x),
+                fit.x[at["clock"]][0],
+            )
+            for role, path in paths.items()
+        }
 
     def model(self) -> tuple[DropModel, dict]:
         """The observation equations of this drop, and the matches that the first guess gives."""

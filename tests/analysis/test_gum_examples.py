@@ -50,7 +50,7 @@ def test_impedance():
         assert value == pytest.approx(stated, abs=6e-4)
         assert found.u(gradient) == pytest.approx(u, abs=6e-4)
     rows = np.array([gradient for *_, gradient in gradients.values()]) * sd
-    whole = rows @ found.covariance @ rows.T
+    whole = rows @ (found.inverse @ found.inverse.T) @ rows.T
     scale = np.sqrt(np.diag(whole))
     correlations = (whole / np.outer(scale, scale))[[0, 0, 1], [1, 2, 2]]
     np.testing.assert_allclose(correlations, [-0.588, -0.485, 0.993], atol=6e-4)
@@ -75,8 +75,8 @@ def test_thermometer():
     assert found.x == pytest.approx([-0.1712, 0.00218], abs=5e-5)
     u = [found.u(row) for row in np.eye(2)]
     assert u == pytest.approx([0.0029, 0.00067], rel=0.02)
-    correlation = found.covariance[0, 1] / math.sqrt(
-        found.covariance[0, 0] * found.covariance[1, 1]
+    correlation = (found.inverse @ found.inverse.T)[0, 1] / math.sqrt(
+        (found.inverse @ found.inverse.T)[0, 0] * (found.inverse @ found.inverse.T)[1, 1]
     )
     assert correlation == pytest.approx(-0.930, abs=6e-4)
     at = np.array([1.0, 10.0])
