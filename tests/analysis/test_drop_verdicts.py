@@ -391,6 +391,6 @@ def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
             unknowns={"drag": slice(0, 1)},
             kappa=lambda _x: -share * _SURE * u,
         ),
-        estimate=SimpleNamespace(x=[0.0], covariance=np.array([[0.25]]), sd=[4.0], scatter=1.0),
+        estimate=SimpleNamespace(x=[0.0], inverse=np.array([[0.5]]), sd=[4.0], scatter=1.0),
     )
     assert bool(_air(fit)["air_accelerates"]) == pushed

@@ -17,8 +17,9 @@ from rig.analysis.monte_carlo import (
     tolerance,
     until_stable,
 )
-from rig.commands.budget import session_trials, trials_lines
+from rig.commands.budget import session_trials
 from rig.errors import InputError
+from rig.report import templates
 from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits
 
 TRIALS = 150
@@ -95,7 +96,7 @@ def test_trials_of_a_session_are_said_run_by_run():
             assert one["low"] < one["mean"] < one["high"]
             assert type(one["agrees"]) is bool
             assert one["u_ratio"] > 0.0
-    head, _, *lines = trials_lines(found)
+    head, _, *lines = templates.lines("trials", found)
     assert "3 trials, seed 1" in head
     assert len(lines) == len(found["runs"][0]["quantities"])
     assert all("of 4 agree" in line for line in lines)
