@@ -74,7 +74,7 @@ class Components:
     def ratios(self, others: Components) -> NDArray[np.float64]:
         """Logarithm of how much larger each of others is, in their order; 0 of what is exact."""
         pairs = ((getattr(self, name), getattr(others, name)) for name in self.__slots__)
-        return np.array([math.log(b / a) if a else 0.0 for a, b in pairs])
+        return np.log([max(b / a, np.finfo(float).tiny) if a else 1.0 for a, b in pairs])
 
     def times(self, ratios: NDArray[np.float64]) -> Components:
         """Return them larger by such ratios."""
