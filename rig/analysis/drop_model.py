@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from rig.analysis.air import prior_air
-from rig.analysis.annealing import Guess, Pairing, SideFall
+from rig.analysis.annealing import PART, Guess, Pairing, SideFall
 from rig.analysis.components import SHARPEST, Components, stated
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
 from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
@@ -321,9 +321,13 @@ class DropModel:
         return stamps + late, late, levels, loose
 
     def _strike_u(self, role: str) -> Array:
-        """How well it is known at which height each rod strikes, see `Trajectory.sights`."""
+        """How well it is known at which height each rod strikes, see `Trajectory.sights`.
+
+        To a part of a rod's width at least, whatever is stated: further off no step leads.
+        """
         _, places = np.split(self.slopes[role].path[COMMON:], 2)
-        return np.maximum(_TOLD * np.sqrt(places**2 @ self.unknowns.sd**2), SHARPEST)
+        sd, width = np.sqrt(places**2 @ self.unknowns.sd**2), min(self.records[role].chain.widths)
+        return np.clip(_TOLD * sd, SHARPEST, width / PART)
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Observation equations of one side for its matched edges.

@@ -183,13 +183,12 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
     inverse, previous = np.eye(size), np.zeros(size + before.ratios(before).size)
     damping = np.ones_like(previous)
     for round_ in range(_ROUNDS):
-        sd = np.zeros(len(shared))
+        sd, drops = np.zeros(size), [drop.at(x) for drop in drops]
         # Priors follow the scatter that was found, and impulses the α that was found.
-        for n, drop in enumerate(drop.at(x) for drop in drops):
+        for n, drop in enumerate(drops):
             u = clock_u[drop.model.owners.get("rig")]
-            drops[n] = replace(drop, model=drop.model.informed(evidence.components, u, drop.x))
-        for drop in drops:
-            sd[drop.here] = drop.model.unknowns.sd[drop.common]
+            model = drop.model.informed(evidence.components, u, drop.x)
+            drops[n], sd[drop.here] = replace(drop, model=model), model.unknowns.sd[drop.common]
         if round_ == _REMATCH:
             drops = [replace(drop, matches=match(drop.model, drop.x)) for drop in drops]
         # At first the common unknowns are not yet what a drop's own go with: all may be far off.
@@ -229,9 +228,9 @@ def _move(
 
     Returns
     -------
-    x, drops, left, share
-        The common unknowns, the drops there, what all edges leave over, and how much of the step
-        was taken; nothing where no part of it will do.
+    x, drops, left
+        The common unknowns, the drops there, and what all edges leave over; nothing where no part
+        of the step will do.
     """
     share = 1.0
     while share > _SHORTEST:
