@@ -180,7 +180,7 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
     beforehand = stated(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, moved, size, before = False, 0.0, len(shared), evidence.components
-    inverse, previous = np.eye(size), np.zeros(size + before.ratios(before).size)
+    inverse, previous = np.eye(size), np.zeros(size + len(before.__slots__))
     damping = np.ones_like(previous)
     for round_ in range(_ROUNDS):
         sd, drops = np.zeros(size), [drop.at(x) for drop in drops]

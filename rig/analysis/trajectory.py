@@ -123,10 +123,19 @@ class Trajectory:
 
         Parameters
         ----------
+        times
+            As in `heights`.
+        by
+            Derivatives of the parameters by anything else, shape ``(parameters, others)``.
         strike_u
             How well it is known at which height each rod strikes, m, shape ``(rods,)``. Derivatives
             near a strike are then means of those of both legs, each as likely as it is: those of
             one leg hold for no step across the strike.
+
+        Returns
+        -------
+        height, speed, derivatives
+            m, m/s; the last has the shape ``(…, times, parameters)``, or ``(…, times, others)``.
         """
         leg, since = self._legs(times)
         slopes = self.slopes if by is None else self.slopes_by(by)
@@ -154,8 +163,8 @@ class Trajectory:
             other = 0.5 * (np.sign(off) - np.tanh(_NORMAL * off))
             near = np.flatnonzero(np.abs(other) > _FAINT)
             # A strike lowers the chain by what it makes it faster, times how long ago it was.
-            kicks = (self.speed[1:] - self.hits.arrival)[rod[near]]
-            moved[near] += (other[near] * kicks)[:, None] * time[1:].take(rod[near], axis=0)
+            kicks = other * (self.speed[1:] - self.hits.arrival)[rod]
+            moved[near] += kicks[near, None] * time[rod[near] + 1]
         return self.height.take(leg) - fallen, speed, moved
 
     def passages(self, heights: Array) -> tuple[Array, Array]:

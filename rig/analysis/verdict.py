@@ -184,7 +184,7 @@ def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
     u = math.sqrt(variance) * sd
     # By the edges alone, without what the protocol makes of them.
     share = 1.0 / (1.0 - min(variance, 0.9))
-    alone = {"kappa": kappa + (share - 1.0) * off, "U95": 2.0 * math.sqrt(share * variance) * sd}
+    alone = {"kappa": kappa + (share - 1.0) * off, "U95": 2.0 * math.sqrt(share) * u}
     blown = estimate.scatter > RESTLESS and abs(off) > APART * sd
     table: dict[str, tuple[bool, dict[str, float]]] = {
         "air": (model.protocol.drag is not None and abs(off) > STRAY * sd, alone),

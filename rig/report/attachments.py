@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 METHOD = "method.md"
 _DATA = 120_000
 """Bytes of an attached file at most, so that the page of 108 drops stays under 0.8 MB."""
-_EDGES = 5_000
-"""Edges whose large tables take as much: with their drops' budgets 22 to 24 bytes each, packed."""
+_ROWS = 5_000
+"""Edges and pings whose tables take as much: with budgets of drops 22 to 24 bytes each, packed."""
 _LARGE = ("edges.csv", "budget.csv", "pings.csv")
 
 
@@ -36,8 +36,8 @@ class Attachment(NamedTuple):
 def attachments(
     session: Reader, outcome: SessionResults, drops: Iterable[Drop]
 ) -> list[Attachment]:
-    """Pack a session's tables; without those that its drops make too large for a page to carry."""
-    few = sum(len(drop.edges) for drop in drops) <= _EDGES
+    """Pack a session's tables; without those that are too large for a page to carry."""
+    few = sum(len(drop.edges) for drop in drops) + len(session.pings()) <= _ROWS
     tables = csv_files(session, outcome.json(), outcome.clock, () if few else _LARGE)
     tables |= {"protocol.yaml": session.protocol_text}
     contents = {name: text.encode("utf-8", "replace") for name, text in tables.items()}

@@ -96,12 +96,12 @@ class Case:
         assert fit is not None
         paths = {role: fit.model.trajectory(role, fit.x) for role in fit.model.records}
         at = fit.model.unknowns
-        alpha = fit.x[at["alpha"]].sum() if "alpha" in at else 0.0
         return {
             role: Guess(
                 path.time[0],
                 path.height[0],
-                fit.model.guesses[role].alpha + (alpha if role == "impact" else 0.0),
+                fit.model.guesses[role].alpha
+                + (fit.x[at["alpha"]][0] if role == "impact" else 0.0),
                 fit.model.kappa(fit.x),
                 fit.x[at["clock"]][0],
             )
