@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 BOARDS = ["sim", "emu", "bought"]
 FAULTS = ["daemon", "runner", "cable", "reset", "brownout", "disk", "noise", "busy", "race", "deaf"]
-WORLDS = ["model", "resolved", "mujoco", "coefficients"]
+WORLDS = ["model", "resolved", "mujoco", "coefficients", "stated", "usual"]
 
 
 class Option(NamedTuple):
@@ -104,33 +104,17 @@ _PAGE = _folder("folder for a page of the same", required=False)
 _FILES = _folder("folder for page, CSV and JSON")
 _JOBS = _number("--jobs", "processes at a time")
 _SIDE_BY_SIDE = _number("--jobs", "side by side", 1)
-_PORT = _option("--port", default="sim://", help="simulation URL, with dials if wanted")
 _SEED = _option("--seed", type=_seed, default=1, metavar="N", help="of the simulation")
-_REPEATS = _number("--repeats", "drops at each incline (default 4)", 4)
 _LAYOUT = _option("--only", metavar="TEXT", help='layouts such as "10 rods: 2 + 2"')
 _PROTOCOLS = _option(
     "--protocols", default="protocols", metavar="DIR", help="where the ready protocols are"
 )
 
 BENCHES = {
-    "accuracy": Bench("studies.accuracy", "errors of Δz, V and skew, coverage, matches", (
-        _PAGE, _scene(), _PORT,
-        _number("--seeds", "sessions to simulate (default 5)", 5),
-        _number("--repeats", "drops at each incline, not the protocol's"),
-    )),
-    "agreement": Bench("agreement", "how rarely a true model is refuted", (
-        _PAGE, _scene(), _SIDE_BY_SIDE,
-        _number("--sessions", "to simulate", 100),
-        _option("--drops", type=_count, nargs="+", default=[1, 2, 4, 12], metavar="N",
-                help="at each incline"),
-    )),
     "bulk": Bench("studies.bulk", "many falls in Python, numpy, numba and C; limits of speed", (
         _folder("folder for a page of the same", required=False),
         _number("--falls", "in a batch", 100_000),
         _number("--rounds", "of measurement", 15),
-    )),
-    "clock": Bench("clock", "how well the board's clock is known after a time", (
-        _scene("protocols/picket-fence.yaml"), _number("--seeds", "lines to simulate", 20),
     )),
     "coverage": Bench("studies.coverage", "how often intervals hold, over drawn rigs", (
         _FILES, _SEED, _JOBS, _PROTOCOLS,
@@ -151,9 +135,7 @@ BENCHES = {
         _option("--clean", type=int, metavar="N", help="on each layout without a fault"),
     )),
     "estimators": Bench("studies.estimators", "error against run time from edges to Δz and V", (
-        _FILES, _scene(), _PORT, _SEED, _REPEATS,
-        _number("--budget", "seconds that one Monte Carlo setting may take (default 120)", 120,
-                metavar="S"),
+        _FILES, _scene(), _SEED, _number("--repeats", "drops at each incline (default 1)", 1),
     )),
     "faults": Bench("faults", "kill, pull and garble sessions; count what is lost", (
         _number("--share", "of the full counts", 100, metavar="PERCENT"),
@@ -162,12 +144,6 @@ BENCHES = {
                 help="virtual, real firmware in an emulator, or that behind a boot loader"),
         _option("--kind", dest="kinds", nargs="+", metavar="KIND", choices=FAULTS,
                 help="only these"),
-    )),
-    "hostile_files": Bench("hostile_files", "altered files through all commands", (
-        _number("--sessions", "to alter", 2000),
-        _number("--protocols", "to alter", 2000),
-        _number("--tables", "of other timers", 1000),
-        _option("--seed", type=int, default=0, help="of the first"),
     )),
     "layouts": Bench("studies.layouts", "which layouts of gates let drops be read", (
         _FILES, _LAYOUT, _JOBS,
@@ -179,30 +155,19 @@ BENCHES = {
         _number("--mutants", "in all", 200),
         _option("--seed", type=int, default=1, help="which ones"),
         _option("--rooms", nargs="+", metavar="ROOM", help="only in these"),
-        _option("--where", default="", metavar="TEXT", help="only those that have it"),
         _switch("--list", "only say which they are"),
-        _option("--most", type=float, default=600.0, metavar="S",
-                help="of tests each, the quickest first"),
-        _option("--page", metavar="FILE", help="write what came of it there"),
     )),
     "pictures": Bench("pictures", "all pages of the terminal as SVG files", (
         _folder("write a file a page and size there"),
         _option("--session", required=True, metavar="FILE", help="with a drop at least"),
     )),
     "resolved": Bench("studies.resolved", "the resolved world by itself", (
-        _folder("folder for what is made"), _PROTOCOLS,
+        _folder("folder for what is made"),
         _number("--falls", "of 25 rods with each step", 48),
     ), either=(
-        _option("--film", type=float, metavar="DEG", help="draw one fall at this incline"),
         _switch("--work", "error against run time of that world itself"),
         _switch("--published", "chains of other experiments in that world"),
-    )),
-    "soak": Bench("soak", "runs without end, and days on which nothing happens", (
-        _number("--runs", "to record", 10_000),
-        _option("--hours", type=float, default=24.0, metavar="H", help="of virtual time"),
-    )),
-    "stop": Bench("stop", "how long STOP takes to the wire, whatever is going on", (
-        _number("--stops", "in each condition", 50),
+        _option("--paper", type=int, choices=[3, 4], help="that world in a figure of the paper"),
     )),
     "tui": Bench("tui", "what the screen costs, and how late it is", (_PAGE, _scene())),
 }  # fmt: skip

@@ -84,10 +84,9 @@ def disturbed(
     accept = _FULL if kind == "disk" else _DOWN
     while not tally.sessions or tally.disturbed < count:
         with ProcessFixture(
-            runs, seed + tally.sessions, dials, board=board, busy=busy, small_disk=kind == "disk"
+            runs, seed + tally.sessions, dials, board=board, busy=busy
         ) as processes:
             processes.start_daemon()
-            tally.full_disk = processes.disk.how if processes.disk else ""
             moments = []
             while tally.disturbed < count:
                 processes.see_to_runner()
@@ -117,10 +116,9 @@ def _disturb(processes: ProcessFixture, kind: str, chance: random.Random) -> Non
     elif kind in {"reset", "brownout"}:
         processes.hand(kind)
     elif kind == "disk":
-        assert processes.disk is not None
-        processes.disk.fill(processes.daemon)
+        processes.fill_disk()
         time.sleep(chance.uniform(0.1, _DISK_FULL_S))
-        processes.disk.free(processes.daemon)
+        processes.free_disk()
     else:
         raise ValueError(kind)
     with suppress(subprocess.TimeoutExpired):
@@ -250,7 +248,5 @@ def _lines(board: str, kinds: dict[str, FaultTally]) -> Iterator[str]:
         ends = (round(tally.longest_on_s * 1e3), round(tally.off_after_s * 1e3), len(tally.broken))
         rows.append([kind, *map(str, counts), share, *map(str, ends)])
     yield from text_table(rows, left={0})
-    if "disk" in kinds:
-        yield f"a full disk: {kinds['disk'].full_disk}"
     if "deaf" in kinds:
         yield f"a daemon nobody read from grew by {kinds['deaf'].memory_bytes / 1e6:.1f} MB"

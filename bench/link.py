@@ -1,9 +1,8 @@
 """How much the link bears: decoding alone, and from a terminal by way of the disk to a client.
 
-The stream is EVENTS frames, as a board sends them. Beside it, as limits from both sides: reading
-the same bytes with pyserial and doing nothing with them, and a decoder that takes them one by one,
-the way pyFirmata does. What a processor does alone is told by its own time; the rest needs a
-machine with nothing else to do, so the load is told too.
+The stream is EVENTS frames, as a board sends them. Beside it, as a rival: a decoder that takes
+bytes one by one, the way pyFirmata does. What a processor does alone is told by its own time; the
+rest needs a machine with nothing else to do, so the load is told too.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import subprocess
 import sys
 import time
 from functools import partial
-from itertools import accumulate
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -57,7 +55,7 @@ print(json.dumps([rate, memory_bytes(None) / 2**20]))
 _WATCH = """
 import asyncio, json, sys, time
 from pathlib import Path
-from rig.daemon.aclient import AsyncClient
+from rig.daemon.client import AsyncClient
 
 async def watch(path, wanted):
     client, seen = await AsyncClient.connect(path, "bench"), []
@@ -77,23 +75,6 @@ async def watch(path, wanted):
 
 asyncio.run(watch(Path(sys.argv[1]), int(sys.argv[2])))
 """
-
-
-def read_alone(count: int, every_s: float) -> tuple[float, list[float]]:
-    """Read frames through a terminal with pyserial and do nothing with them; see `delivered`."""
-    data = frames(count)
-    ends = [*accumulate(map(len, data))]
-    terminal = PtyWriter(data, every_s)
-    port = open_port(terminal.path)
-    terminal.start()
-    got, seen = 0, []
-    while got < ends[-1]:
-        got += len(port.read(max(1, port.in_waiting)))
-        seen.append((got, time.monotonic()))
-    times = terminal.sent()
-    port.close()
-    terminal.close()
-    return count * EVENTS_PER_FRAME / (seen[-1][1] - times[0]), _latencies(times, ends, seen)
 
 
 def _latencies(
@@ -211,19 +192,13 @@ def link() -> dict[str, Any]:
         "decoded_to_edges": speed(to_edges, _FRAMES),
         "decoded_bytewise": speed(bytewise, _FRAMES // 10),
     }
-    say("reading …")
-    rates["read_by_pyserial_alone"] = max(read_alone(_FRAMES, 0.0)[0] for _ in range(_BEST_OF))
     say("delivering …")
     rates["recorded_and_delivered"], busy_mb = flood()
     every_s = EVENTS_PER_FRAME / _RATE
-    latencies = {
-        "read_by_pyserial_alone": spread(read_alone(_STEADY_FRAMES, every_s)[1]),
-        "recorded_and_delivered": spread(delivered(_STEADY_FRAMES, every_s)[1]),
-    }
     say("idling …")
     return {
         "edges_per_s": rates,
-        "latency_at_5000_per_s_s": latencies,
+        "latency_at_5000_per_s_s": spread(delivered(_STEADY_FRAMES, every_s)[1]),
         "idle": idle(),
         "busy": {"memory_mb": busy_mb},
         "load": os.getloadavg()[0],
@@ -234,10 +209,8 @@ def link() -> dict[str, Any]:
 def _lines(found: Mapping[str, Any]) -> Iterator[str]:
     for name, rate in found["edges_per_s"].items():
         yield f"{name.replace('_', ' '):<28}{rate:>12,.0f} edges/s"
-    yield "latency at 5000 edges/s, median and p99"
-    for name, late in found["latency_at_5000_per_s_s"].items():
-        median, p99 = late["median"] * 1e3, late["p99"] * 1e3
-        yield f"{name.replace('_', ' '):<28}{median:>7.1f} {p99:.1f} ms"
+    median, p99 = (1e3 * late for late in found["latency_at_5000_per_s_s"].values())
+    yield f"{'latency at 5000 edges/s':<28}{median:>7.1f} ms, p99 {p99:.1f} ms"
     idle = found["idle"]
     yield f"{'idle daemon':<28}{idle['alone_cpu']:>12.1%} of a core"
     yield f"{'with one who watches':<28}{idle['watched_cpu']:>12.1%} of a core"

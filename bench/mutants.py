@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 from bench.process_fixture import FENCE
 from rig.errors import RigError
 from rig.recorder.controller import Controller
+from rig.recorder.published import PublishedState
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-MEMORY_BYTES = 500 << 20
 LONGEST_S = 20.0
 VALUES: tuple[Any, ...] = (
     None, -1, 0, 7, 2**31, 2**63 - 1, -(2**63), 1.5, "", "abc", "null", "[]", "{}", "[1]", "[[]]",
@@ -35,7 +35,7 @@ def make_session(folder: Path, runs: int = 1) -> Path:
     """Record a few simulated drops."""
     protocol, session = folder / "fence.yaml", folder / "sound"
     protocol.write_text(FENCE.replace("RUNS", str(runs)), "utf-8")
-    rig = Controller("sim://")
+    rig = Controller("sim://", PublishedState())
     try:
         rig.open_session(str(protocol), str(session), 3)
         for run in range(1, runs + 1):

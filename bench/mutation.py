@@ -1,8 +1,7 @@
 """Faults put into the software, one at a time, and whether any test notices.
 
 A fault is tried on a copy of the project, by the tests of its room that run through its line, the
-quickest first, until one fails. Which those are is known from one run of each room's tests. What
-was noticed in an earlier run is not tried again while file and test are the same.
+quickest first, until one fails. Which those are is known from one run of each room's tests.
 """
 
 from __future__ import annotations
@@ -20,20 +19,17 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import accumulate
 from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
 
-from bench.mutation_memory import Memory
 from bench.mutation_plugin import RECORD, SELECT
 from bench.mutators import c_faults, python_faults
 from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.errors import InputError
-from rig.files import write_atomic
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
@@ -63,10 +59,15 @@ ROOMS = {
     "link": Room(("rig/link",), ("tests/link",)),
     "session": Room(("rig/session",), ("tests/session", "tests/recover")),
     "model": Room(("rig/model",), ("tests/model",)),
-    "daemon": Room(("rig/daemon", "rig/recorder"), ("tests/daemon", "tests/recorder")),
+    "daemon": Room(("rig/daemon", "rig/recorder"), ("tests/daemon",)),
     "core": Room(("firmware/core",), ("tests/firmware/test_core.py",)),
 }
 LEAST_KILLED = 0.9
+_HEAD = """\
+# Faults put into the source
+
+`./run bench mutation`: {count} faults drawn by seed {seed}, one at a time, each tried by the tests
+that run through its line."""
 
 
 class Mutant(NamedTuple):
@@ -146,7 +147,7 @@ def _within_a_function(path: str, line: int) -> range:
 def run(arguments: Namespace) -> Iterator[Findings]:
     """Put faults in and see what is noticed; it has failed when less than nine of ten were."""
     rooms = arguments.rooms or list(ROOMS)
-    mutants = list(_sampled(rooms, arguments.mutants, arguments.seed, arguments.where))
+    mutants = list(_sampled(rooms, arguments.mutants, arguments.seed))
     if arguments.list:
         yield Findings({"faults": [*map(str, mutants)]}, [*map(str, mutants)])
         return
@@ -155,18 +156,20 @@ def run(arguments: Namespace) -> Iterator[Findings]:
         for number in range(arguments.jobs):
             copies.put(_copied(Path(folder) / str(number)))
         reached = {room: _reached(room, copies) for room in rooms}
-        outcomes = list(_tried(mutants, reached, copies, arguments.jobs, arguments.most))
-    if arguments.page:
-        write_atomic(arguments.page, page(outcomes, arguments.seed))
-    rows = [["room", "faults", "noticed", "share", "tests each", "s each"]]
-    rows += [[room, *_counted(group)] for room, group in _by_room(outcomes)]
-    survived = [outcome for outcome in outcomes if not outcome.by]
-    for outcome in survived:
-        say(f"not noticed: {outcome.mutant}")
+        outcomes = list(_tried(mutants, reached, copies, arguments.jobs))
+    table = [["room", "faults", "noticed", "share"]]
+    table += [[room, *_counted(group)] for room, group in _by_room(outcomes)]
+    survived = [outcome.mutant for outcome in outcomes if not outcome.by]
+    reasons = {(row["file"], row["old"], row["new"]): row["why"] for row in _survivors()}
+    lines = [*text_table(table, left={0}, rule=True), "", "not noticed, and why it may stay:"]
+    for mutant in survived:
+        why = reasons.get((mutant.path, mutant.fault.old, mutant.fault.new), "nobody knows")
+        lines.append(f"{mutant}: {why}")
     yield Findings(
         {"outcomes": [[*map(str, outcome)] for outcome in outcomes]},
-        text_table(rows, left={0}, rule=True),
-        rows=[outcome.row() for outcome in outcomes],
+        lines,
+        _HEAD.format(count=len(outcomes), seed=arguments.seed),
+        [outcome.row() for outcome in outcomes],
         failed=len(survived) > (1.0 - LEAST_KILLED) * len(outcomes),
     )
 
@@ -179,30 +182,6 @@ def _by_room(outcomes: list[Outcome]) -> Iterator[tuple[str, list[Outcome]]]:
             yield room, group
 
 
-def page(outcomes: list[Outcome], seed: int) -> str:
-    """Write what came of it as a page, and of each fault that nobody noticed why it may stay."""
-    lines = [
-        "# Faults put into the source",
-        "",
-        f"`./run bench mutation`: {len(outcomes)} faults drawn by seed {seed}, one at a time, each "
-        "tried by the tests that run through its line.",
-        "",
-        "| room | faults | noticed | |",
-        "|---|---|---|---|",
-    ]
-    for room, group in _by_room(outcomes):
-        sources = ", ".join(f"`{one}`" for one in ROOMS[room].sources) if room != "all" else room
-        count, noticed, share, *_ = _counted(group)
-        lines.append(f"| {sources} | {count} | {noticed} | {share} |")
-    lines += ["", "Not noticed:", "", "| fault | why it may stay |", "|---|---|"]
-    reasons = {(row["file"], row["old"], row["new"]): row["why"] for row in _survivors()}
-    for mutant in [outcome.mutant for outcome in outcomes if not outcome.by]:
-        words = str(mutant).replace("|", "&#124;")
-        why = reasons.get((mutant.path, mutant.fault.old, mutant.fault.new), "")
-        lines.append(f"| {words} | {why} |")
-    return "\n".join([*lines, ""])
-
-
 def _survivors() -> list[dict[str, str]]:
     """Read which faults no test can or need notice, and why."""
     text = Path(__file__).with_name("mutation_survivors.csv").read_text("utf-8")
@@ -211,12 +190,10 @@ def _survivors() -> list[dict[str, str]]:
 
 def _counted(some: list[Outcome]) -> list[str]:
     noticed = sum(bool(one.by) for one in some)
-    means = [sum(values) / len(some) for values in zip(*(one[2:] for one in some), strict=True)]
-    share = f"{noticed / len(some):.0%}"
-    return [str(len(some)), str(noticed), share, *(f"{mean:.0f}" for mean in means)]
+    return [str(len(some)), str(noticed), f"{noticed / len(some):.0%}"]
 
 
-def _sampled(rooms: list[str], count: int, seed: int, where: str) -> Iterator[Mutant]:
+def _sampled(rooms: list[str], count: int, seed: int) -> Iterator[Mutant]:
     """Draw as many faults of each room, one by one in turn, so that fewer are the first of more."""
     turns = []
     for room in rooms:
@@ -227,7 +204,7 @@ def _sampled(rooms: list[str], count: int, seed: int, where: str) -> Iterator[Mu
             for fault in (c_faults if room == "core" else python_faults)(path.read_text("utf-8"))
         ]
         random.Random(f"{room} {seed}").shuffle(found)
-        turns.append([one for one in found if where in str(one)])
+        turns.append(found)
     in_turn = (
         some[n] for n in range(max(map(len, turns), default=0)) for some in turns if some[n:]
     )
@@ -254,7 +231,7 @@ def _reached(room: str, copies: SimpleQueue[Path]) -> Reached:
         say(f"{room}: which tests run through which lines")
         sources = [str(copy / one) for one in ROOMS[room].sources]
         asked = {RECORD: os.pathsep.join([str(kept.with_suffix(".new")), *sources])}
-        code, told = _pytest(copy, asked, _tests_of(room), None)
+        code, told = _pytest(copy, asked, ROOMS[room].tests, None)
         copies.put(copy)
         if code:
             raise InputError(f"tests of {room} fail without any fault\n{told[-2000:]}")
@@ -276,10 +253,6 @@ def _state_of(room: Room) -> str:
     return found.hexdigest()[:12]
 
 
-def _tests_of(room: str) -> list[str]:
-    return [one for one in ROOMS[room].tests if (ROOT / one).exists()]
-
-
 def _pytest(
     copy: Path, asked: dict[str, str], tests: Iterable[str], patience_s: float | None
 ) -> tuple[int | None, str]:
@@ -291,10 +264,7 @@ def _pytest(
         cwd=copy,
         env=os.environ
         | asked
-        | {
-            "PYTHONPATH": os.pathsep.join([str(copy), str(copy / "bench" / "children")]),
-            "PYTHONDONTWRITEBYTECODE": "1",
-        },
+        | {"PYTHONPATH": os.pathsep.join([str(copy), str(copy / "bench" / "children")])},
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         start_new_session=True,
     )  # fmt: skip
@@ -319,17 +289,11 @@ def _tried(
     reached: dict[str, Reached],
     copies: SimpleQueue[Path],
     jobs: int,
-    most_s: float,
 ) -> Iterator[Outcome]:
-    memory = Memory(ROOT, KEPT / "noticed.json")
-    faulty = {one: one.fault.put_into((ROOT / one.path).read_text("utf-8")) for one in mutants}
-
     def each(mutant: Mutant) -> Outcome:
-        if by := memory.noticed_by(mutant.path, faulty[mutant]):
-            return Outcome(mutant, by, 0, 0.0)
         copy = copies.get()
         try:
-            return _try(mutant, reached[mutant.room], copy, most_s)
+            return _try(mutant, reached[mutant.room], copy)
         finally:
             copies.put(copy)
 
@@ -337,20 +301,15 @@ def _tried(
         for number, one in enumerate(pool.map(each, mutants), 1):
             by = one.by or "NOT NOTICED"
             say(f"{number}/{len(mutants)} {one.seconds:.0f} s {one.mutant}: {by}")
-            if one.by:
-                memory.note(one.mutant.path, faulty[one.mutant], one.by)
             yield one
 
 
-def _try(mutant: Mutant, reached: Reached, copy: Path, most_s: float) -> Outcome:
+def _try(mutant: Mutant, reached: Reached, copy: Path) -> Outcome:
     tests = reached.tests(mutant.path, mutant.fault.line)
-    if mutant.path.endswith(".py"):
-        spent = accumulate(reached.seconds[one] for one in tests)
-        tests = [one for one, until in zip(tests, spent, strict=True) if until <= most_s]
     begun = monotonic()
     place = copy / mutant.path
     sound = place.read_text("utf-8")
-    place.write_text(mutant.fault.put_into(sound), "utf-8")
+    _put(place, mutant.fault.put_into(sound))
     selected = copy / "selected.json"
     selected.write_text(json.dumps(tests), "utf-8")
     patience_s = _START_S + _PATIENCE * sum(reached.seconds[one] for one in tests)
@@ -358,8 +317,15 @@ def _try(mutant: Mutant, reached: Reached, copy: Path, most_s: float) -> Outcome
         files = sorted({one.partition("::")[0] for one in tests})
         code, told = _pytest(copy, {SELECT: str(selected)}, files, patience_s)
     finally:
-        place.write_text(sound, "utf-8")
+        _put(place, sound)
     return Outcome(mutant, _noticed_by(code, told), len(tests), monotonic() - begun)
+
+
+def _put(place: Path, source: str) -> None:
+    """Write a source and forget what was compiled of it, which looks as new for a second."""
+    place.write_text(source, "utf-8")
+    for compiled in (place.parent / "__pycache__").glob(f"{place.stem}.*.pyc"):
+        compiled.unlink()
 
 
 def _noticed_by(code: int | None, told: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -12,8 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
-from bench.small_disk import SmallDisk
-from rig.daemon.client import Client
+from rig.daemon.client import Client, Line
 from rig.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -60,8 +60,6 @@ class ProcessFixture:
         boot loader and a USB chip that resets it at each opening.
     busy
         Share of bytes that are changed while both directions are under way.
-    small_disk
-        Whether the session is on a disk that can be filled.
     """
 
     def __init__(
@@ -72,7 +70,6 @@ class ProcessFixture:
         *,
         board: str = "sim",
         busy: float = 0.0,
-        small_disk: bool = False,
     ) -> None:
         self._folder = TemporaryDirectory(prefix="rig-")
         self.folder = Path(self._folder.name)
@@ -82,8 +79,7 @@ class ProcessFixture:
         self.port = self.folder / "port"
         self.socket = self.folder / "door" / "rig.sock"
         self.log = self.folder / "board.jsonl"
-        self.disk = SmallDisk(self.folder / "disk") if small_disk else None
-        self.session = (self.disk.folder if self.disk else self.folder) / "session"
+        self.session = self.folder / "session"
         self.told = ""  # what the last runner said
         self._kind, self._busy = board, busy
         self._followed = 0  # bytes of the log
@@ -108,8 +104,6 @@ class ProcessFixture:
     def __exit__(self, *_exc: object) -> None:
         for process in (self.runner, self.daemon, self.board):
             self.kill(process)
-        if self.disk is not None:
-            self.disk.close()
         self._folder.cleanup()
 
     # ------------------------------------------------------------------ processes
@@ -161,6 +155,18 @@ class ProcessFixture:
                     with suppress(BrokenPipeError):
                         stream.close()
 
+    def fill_disk(self) -> None:
+        """Let no file of the session grow, as on a full disk."""
+        self._limit_files(max(file.stat().st_size for file in self.folder.glob("session*")))
+
+    def free_disk(self) -> None:
+        """Make room again."""
+        self._limit_files(resource.RLIM_INFINITY)
+
+    def _limit_files(self, size: int) -> None:
+        assert self.daemon is not None
+        resource.prlimit(self.daemon.pid, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
     def hand(self, what: str) -> None:
         """Do something at the board, see `sim.pty`."""
         assert self.board is not None
@@ -170,7 +176,7 @@ class ProcessFixture:
 
     def client(self, name: str = "a test") -> Client:
         """Connect to the daemon, once it answers."""
-        return Client(self.socket, name)
+        return Client(Line(self.socket, name))
 
     def _start(self, *arguments: object, stdin: int = subprocess.DEVNULL) -> Process:
         return subprocess.Popen(

@@ -31,8 +31,6 @@ class FaultTally:
         something was armed or on for certain.
     memory_bytes
         By how much a daemon grew while somebody did not read what it sent.
-    full_disk
-        What stood for a full disk, see `bench.small_disk.SmallDisk`.
     broken
         Promises that were not kept, see `bench.invariants.broken`.
     """
@@ -47,7 +45,6 @@ class FaultTally:
     longest_on_s: float = 0.0
     off_after_s: float = 0.0
     memory_bytes: int = 0
-    full_disk: str = ""
     broken: list[str] = field(default_factory=list)
 
     def add(self, other: FaultTally) -> None:
@@ -56,7 +53,6 @@ class FaultTally:
             setattr(self, name, getattr(self, name) + getattr(other, name))
         for name in ("longest_on_s", "off_after_s", "memory_bytes"):
             setattr(self, name, max(getattr(self, name), getattr(other, name)))
-        self.full_disk = self.full_disk or other.full_disk
         self.fell_upon += other.fell_upon
         self.broken += other.broken
 

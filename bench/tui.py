@@ -25,7 +25,7 @@ from bench.process_fixture import processor_s
 from bench.streaming import fire, serve, spread
 from rig.bench.findings import Findings
 from rig.commands.output import say
-from rig.daemon.client import Client
+from rig.daemon.client import Client, Line
 from rig.session.store import Session
 from rig.text_table import text_table
 
@@ -142,7 +142,7 @@ def _opened(folder: Path, protocol: str) -> dict[str, Any]:
 
 
 def _in_terminal(folder: Path, protocol: str, server: Server) -> dict[str, Any]:
-    client = Client(server.path, "bench")
+    client = Client(Line(server.path, "bench"))
     client.take_control()
     client.open_session(protocol, str(folder / "bench.session"))
     try:

@@ -16,10 +16,11 @@ import tempfile
 from pathlib import Path
 from string import Template
 
+import numpy as np
 from PIL import Image
 
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.model.fall import kicks
-from rig.model.motion import Motion
 from rig.predictions import predict_incline
 from rig.protocol.reader import read
 
@@ -45,29 +46,30 @@ def loop() -> str:
     Whoever asks for less motion gets its last moment, without motion.
     """
     protocol = read(ROOT / "protocols/inclined-uniform.yaml")
-    chain, drop = protocol.chains["A"].chain, protocol.drop.value
+    chain, drop, gravity = protocol.chains["A"].chain, protocol.drop.value, protocol.gravity.value
     model = predict_incline(protocol, INCLINE_DEG, "A", "B")
     assert model.alpha is not None
     assert model.gamma is not None
-    gains = kicks(chain, [model.alpha] * chain.rods, model.gamma)
-    motion = Motion(chain, gains, drop, protocol.gravity.value)
-    begin, end = HANGING_S / PERIOD_S, (HANGING_S + SLOWER * motion.end_s) / PERIOD_S
+    gains = np.array(kicks(chain, [model.alpha] * chain.rods, model.gamma))
+    places = np.array(chain.heights)
+    struck = struck_trajectory(0.0, drop, gravity, np.ones(chain.rods), gains, places)
+    lasting = float(struck.time[-1])
+    begin, end = HANGING_S / PERIOD_S, (HANGING_S + SLOWER * lasting) / PERIOD_S
     left, bottom, width, height = PLOT
-    most = motion.at(motion.end_s).separation_m
-    times = [motion.end_s * n / MOMENTS for n in range(MOMENTS + 1)]
-    instants = [motion.at(time) for time in times]
-    shares = [begin + (end - begin) * n / MOMENTS for n in range(MOMENTS + 1)]
+    part = np.arange(MOMENTS + 1) / MOMENTS
+    heights, speeds = struck.heights(lasting * part)
+    free, _ = free_trajectory(0.0, drop, gravity).heights(lasting * part)
+    most = float((free - heights)[-1])
+    shares = (begin + (end - begin) * part).tolist()
     falls = {
-        "strike": [PX_PER_M * (drop - now.height_m) for now in instants],
-        "free": [PX_PER_M * (drop - now.height_m - now.separation_m) for now in instants],
+        "strike": (PX_PER_M * (drop - heights)).tolist(),
+        "free": (PX_PER_M * (drop - free)).tolist(),
     }
-    curve = [
-        (left + width * now.time_s / motion.end_s, bottom - height * now.separation_m / most)
-        for now in instants
-    ]
+    across, up = left + width * part, bottom - height * (free - heights) / most
+    curve = [*zip(across.tolist(), up.tolist(), strict=True)]
     moves = {name: [(0.0, down) for down in downs] for name, downs in falls.items()}
     rods = [CONTACT_PX - PX_PER_M * (drop + above) for above in chain.heights]
-    hits = [HANGING_S + SLOWER * hit.time_s for hit in motion.hits]
+    hits = (HANGING_S + SLOWER * struck.time[1:]).tolist()
     return Template((ROOT / "docs/loop.svg.txt").read_text("utf-8")).substitute(
         period=f"{PERIOD_S:g}",
         keyframes="\n".join(_keyframes(*move, shares) for move in (moves | {"dot": curve}).items()),
@@ -85,11 +87,11 @@ def loop() -> str:
         ahead=f"{CONTACT_PX - PX_PER_M * most:.1f}",
         between=f"{CONTACT_PX - PX_PER_M * most / 2.0:.1f}",
         cm=f"{100 * most:.1f}",
-        ms=f"{1e3 * motion.end_s:.0f}",
-        speed=f"{instants[-1].speed_m_s:.1f}",
+        ms=f"{1e3 * lasting:.0f}",
+        speed=f"{speeds[-1]:.1f}",
         curve=" ".join(f"{x:.1f},{y:.1f}" for x, y in curve),
         dot=f"translate({curve[-1][0]:.1f}px,{curve[-1][1]:.1f}px)",
-        ticks=_ticks(1e3 * motion.end_s, 100 * most),
+        ticks=_ticks(1e3 * lasting, 100 * most),
         slower=SLOWER,
         incline=f"{INCLINE_DEG:g}",
     )

@@ -7,14 +7,16 @@ import signal
 import sys
 from importlib import import_module
 
-from rig.command_help import Parser, build_parser, runnable
+from rig.command_page import first_answer, first_help
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
 
 TYPE_CHECKING = False  # as typing has it, which takes a third as long as Python to load
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import Any
+    from types import FrameType
+
+    from rig.command_help import Parser
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -47,30 +49,20 @@ def _run(argv: Sequence[str] | None) -> int:
         import argcomplete  # noqa: PLC0415 - nobody else needs it
 
         argcomplete.autocomplete(_parser())
+    struck: list[object] = []
     try:
         seen = sys.stdin.isatty() and sys.stdout.isatty()
-        words = (sys.argv[1:] if argv is None else argv) or ["tui"] * seen
-        parser = _parser(words)
-        try:
-            arguments = parser.parse(words)
-        finally:
-            sys.stdout.flush()  # of --help, here, where a closed pipe is understood
-        if "module" not in arguments:
-            say(parser.format_help(), end="")
-            return BAD_INPUT
-        from rig.ctrl_c import ctrl_c_goes_to  # noqa: PLC0415 - `rig --help` needs none of it
-
-        command = import_module(f"rig.commands.{arguments.module}")
-        with ctrl_c_goes_to(signal.default_int_handler):
-            code: int = command.main(arguments)
-            sys.stdout.flush()
+        return _carry_out((sys.argv[1:] if argv is None else [*argv]) or ["tui"] * seen, struck)
     except RigError as error:
+        from rig.command_help import runnable  # noqa: PLC0415 - `rig --help` needs none of it
+
         say(runnable(str(error)))
         return error.exit_code
-    except (KeyboardInterrupt, RuntimeError) as error:
-        # A class in the making turns what strikes it into a RuntimeError.
-        if not isinstance(error.__cause__ or error, KeyboardInterrupt):
-            raise
+    except (KeyboardInterrupt, Exception) as error:
+        # What Ctrl-C strikes may end otherwise: a class in the making turns it into a RuntimeError,
+        # and a module half loaded lacks what others look for.
+        if not struck and not isinstance(error.__cause__ or error, KeyboardInterrupt):
+            return _refusal(error)
         # A command that has something to say of what comes next raises it with these words.
         words = error.args if isinstance(error, KeyboardInterrupt) else ()
         say("; ".join(["rig: interrupted", *map(str, words)]))
@@ -78,33 +70,57 @@ def _run(argv: Sequence[str] | None) -> int:
         # in spite of all; text that runs to its end makes it forget.
         exec("")  # noqa: S102
         return INTERRUPTED
-    except BrokenPipeError:
-        return 0  # whoever read our output has seen enough
-    except ModuleNotFoundError as error:
-        package = (error.name or "").partition(".")[0]
-        if package not in OPTIONAL:
-            raise
-        from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-        install = f"{quote(sys.executable)} -m pip install {OPTIONAL[package]}"
-        say(f"rig: this needs {OPTIONAL[package]}: {install}")
+
+def _carry_out(words: list[str], struck: list[object]) -> int:
+    """Run the command that words name; `struck` grows with each Ctrl-C meanwhile."""
+    if answer := first_answer(words):
+        print(answer, end="", flush=True)
+        return 0
+    try:
+        arguments = _parser(words).parse(words)
+    finally:
+        sys.stdout.flush()  # of --help, here, where a closed pipe is understood
+    if "module" not in arguments:
+        say(first_help(), end="")
         return BAD_INPUT
-    except OSError as error:
-        named = error.strerror and error.filename
-        say(f"rig: {error.filename}: {error.strerror}" if named else f"rig: {error}")
-        return BAD_INPUT
+    from rig.ctrl_c import ctrl_c_goes_to  # noqa: PLC0415 - `rig --help` needs none of it
+
+    def strike(number: int, frame: FrameType | None) -> None:
+        struck.append(frame)
+        signal.default_int_handler(number, frame)
+
+    command = import_module(f"rig.commands.{arguments.module}")
+    with ctrl_c_goes_to(strike):
+        code: int = command.main(arguments)
+        sys.stdout.flush()
     return code
 
 
+def _refusal(error: BaseException) -> int:
+    """Say what the system refused, and return the exit code; raise a fault of the program."""
+    if isinstance(error, BrokenPipeError):
+        return 0  # whoever read our output has seen enough
+    if isinstance(error, ModuleNotFoundError):
+        package = (error.name or "").partition(".")[0]
+        if package in OPTIONAL:
+            from shlex import quote  # noqa: PLC0415 - never needed otherwise
+
+            install = f"{quote(sys.executable)} -m pip install {OPTIONAL[package]}"
+            say(f"rig: this needs {OPTIONAL[package]}: {install}")
+            return BAD_INPUT
+    if not isinstance(error, OSError):
+        raise error
+    named = error.strerror and error.filename
+    say(f"rig: {error.filename}: {error.strerror}" if named else f"rig: {error}")
+    return BAD_INPUT
+
+
 def _parser(words: Sequence[str] | None = None) -> Parser:
-    return build_parser(_kinds, words)
+    from rig.command_help import build_parser  # noqa: PLC0415 - `rig --help` needs none of it
+    from rig.commands.kinds import KINDS  # noqa: PLC0415 - likewise
 
-
-def _kinds() -> dict[str, dict[str, Any]]:
-    """Load what argparse needs to know of each kind of value."""
-    from rig.commands.kinds import KINDS  # noqa: PLC0415 - `rig --help` needs none of it
-
-    return KINDS
+    return build_parser(KINDS, words)
 
 
 if __name__ == "__main__":

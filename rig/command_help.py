@@ -6,54 +6,19 @@ import argparse
 import os
 import re
 import sys
-from collections import namedtuple
 from functools import cache, partial
+from shlex import quote
 
 from rig import __version__
+from rig.command_page import COMMANDS, first_help
 from rig.streams import say
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from typing import Any, NoReturn
 
-
-class Command(namedtuple("Command", "name text arguments examples")):
-    """One command, or one of two words below another.
-
-    `arguments` are rows for `_add_argument`, `examples` whole command lines.
-    """
-
-    name: str
-    text: str
-    arguments: list[str]
-    examples: list[str]
-
-
-def _read_page() -> dict[str, list[Command]]:
-    """Return the commands of each group."""
-    place = f"{__file__.removesuffix('.py')}.txt"
-    with open(place, encoding="utf-8") as page:  # noqa: PTH123 - pathlib takes 5 ms
-        paragraphs = page.read().strip().split("\n\n")
-    groups: dict[str, list[Command]] = {}
-    shared: dict[str, str] = {}
-    for paragraph in paragraphs:
-        head, *lines = paragraph.splitlines()
-        if head == "shared":
-            shared = {line.partition(" |")[0]: line for line in lines}
-        elif head.startswith("## "):
-            groups[head.removeprefix("## ")] = commands = []
-        elif not head.startswith("#"):
-            examples = [line.strip(" $") for line in lines if line.startswith("  $ ")]
-            name, text = head.split(": ", 1)
-            rows = [shared.get(line, line) for line in lines[: len(lines) - len(examples)]]
-            commands.append(Command(name, text, rows, examples))
-    return groups
-
-
-GROUPS = _read_page()
-"""Every command by its group, in the order in which they are met."""
-COMMANDS = {command.name: command for commands in GROUPS.values() for command in commands}
+    from rig.command_page import Command
 
 _NAMED = rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))"
 """A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""
@@ -69,8 +34,7 @@ def runnable(text: str) -> str:
 
 @cache
 def _program() -> str:
-    from shlex import quote  # noqa: PLC0415 - only for what names a command
-    from shutil import which  # noqa: PLC0415 - likewise
+    from shutil import which  # noqa: PLC0415 - only for what names a command
 
     installed = os.path.join(os.path.dirname(sys.executable), "rig")  # noqa: PTH118, PTH120
     if which("rig"):
@@ -105,15 +69,38 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"formatter_class": argparse.RawDescriptionHelpFormatter, **options})
         self.commands: dict[str, Parser] = {}
+        self.labels: dict[str, str] = {}
+        self.rules: list[tuple[str, str, str]] = []
 
     def parse(self, args: Sequence[str]) -> argparse.Namespace:
-        """Parse; what is left over is the mistake of the sub-command that was named."""
-        words = _join_pairs(args)
-        arguments, rest = self.parse_known_args(words)
+        """Parse; what is left over or in wrong company is the mistake of the sub-command."""
+        arguments, rest = self.parse_known_args(_join_pairs(args))
+        command = self.commands.get(vars(arguments).pop("command", ""), self)
         if rest:
-            name = next((word for word in words if word in self.commands), "")
-            self.commands.get(name, self).error(f"unknown arguments: {' '.join(rest)}")
+            command.error(f"unknown arguments: {' '.join(rest)}")
+        command._check_company(arguments)
         return arguments
+
+    def _check_company(self, arguments: argparse.Namespace) -> None:
+        """Refuse an argument that another one makes useless, or that is useless without another."""
+        given = {
+            name
+            for name, value in vars(arguments).items()
+            if name in self.labels and value != [] and value != self.get_default(name)
+        }
+        for name, rule, other in self.rules:
+            if name in given and (other in given) == (rule == "without"):
+                verb = "needs" if rule == "with" else "is of no use beside"
+                self.error(f"{self.labels[name]} {verb} {self.labels[other]}")
+
+    def format_help(self) -> str:
+        """Return the help of a command, or the first help."""
+        return super().format_help() if self.prog != "rig" else first_help()
+
+    def group(self, *, needed: bool) -> argparse._MutuallyExclusiveGroup:
+        """Return the group of arguments of which at most one is accepted."""
+        groups = self._mutually_exclusive_groups
+        return groups[0] if groups else self.add_mutually_exclusive_group(required=needed)
 
     def _check_value(self, action: argparse.Action, value: object) -> None:
         if action.choices is not None and value not in action.choices:
@@ -122,8 +109,9 @@ class Parser(argparse.ArgumentParser):
             accepted = list(map(str, action.choices))
             likely = get_close_matches(str(value), accepted, n=1)
             guess = f"did you mean {likely[0]}? " if likely else ""
-            message = f"found '{value}'; {guess}accepted: {', '.join(accepted)}"
-            raise argparse.ArgumentError(action, message)
+            raise argparse.ArgumentError(
+                action, f"found '{value}'; {guess}accepted: {', '.join(accepted)}"
+            )
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is, and end."""
@@ -131,8 +119,6 @@ class Parser(argparse.ArgumentParser):
         self.exit(2)
 
 
-_WIDTH = 78
-"""Characters of a line of the first help, as argparse has it on a terminal of 80."""
 _MODULES = {"import": "import_edges"}
 """Modules of commands whose names are not theirs."""
 _WORDS: dict[str, dict[str, Any]] = {
@@ -140,19 +126,16 @@ _WORDS: dict[str, dict[str, Any]] = {
     "yes-no": {"action": argparse.BooleanOptionalAction},
     "append": {"action": "append"},
     "required": {"required": True},
-    "either": {},
-    "one-of": {},
     "?": {"nargs": "?"},
     "*": {"nargs": "*"},
     "+": {"nargs": "+"},
 }
 """What the words of the page's second column mean to argparse, beside ``=DEFAULT``, ``{CHOICES}``
-and kinds of values; of several with ``either`` at most one is accepted, of ``one-of`` just one."""
+and kinds of values; of several with ``either`` at most one is accepted, of ``one-of`` just one.
+``with:NAME`` and ``without:NAME`` say what an argument has no use without, and beside what."""
 
 
-def _add_argument(
-    parser: argparse._ActionsContainer, row: str, kinds: dict[str, dict[str, Any]]
-) -> None:
+def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) -> None:
     """Accept what a row of the page describes."""
     names, words, text = (part.strip() for part in row.split("|", 2))
     *flags, metavar = names.split()
@@ -161,17 +144,32 @@ def _add_argument(
         flags.append(metavar)
     else:
         options["metavar"] = metavar
+    place: argparse._ActionsContainer = parser
+    rules = []
     for word in words.split():
+        kind, _, detail = word.partition(":")
         if word.startswith("="):
             options["default"] = word.removeprefix("=")
         elif word.startswith("{"):
-            options["choices"] = list(map(options.get("type", str), word.strip("{}").split(",")))
+            accepted = word.strip("{}").split(",")
+            options |= {"choices": [*map(_number, accepted)], "type": _number}
+        elif kind in {"with", "without"}:
+            rules += [(kind, other) for other in detail.split(",")]
+        elif kind in {"either", "one-of"}:
+            place = parser.group(needed=kind == "one-of")
         else:
-            kind, _, detail = word.partition(":")
             options |= kinds[kind]
             if detail:
                 options["type"] = partial(options["type"], detail)
-    parser.add_argument(*flags, **options)
+    action = place.add_argument(*flags, **options)
+    label = metavar if metavar.lower() == action.dest else names
+    parser.labels[action.dest] = flags[-1] if action.option_strings else label
+    parser.rules += [(action.dest, *rule) for rule in rules]
+
+
+def _number(text: str) -> int | str:
+    """Return a choice as the number that it is; any other text is no such choice."""
+    return int(text) if text.isdecimal() else text
 
 
 def _matching_commands(words: Sequence[str] | None) -> list[Command]:
@@ -184,35 +182,20 @@ def _matching_commands(words: Sequence[str] | None) -> list[Command]:
     return every if any(not word.startswith("-") for word in words) else []
 
 
-def build_parser(
-    kinds: Callable[[], dict[str, dict[str, Any]]], words: Sequence[str] | None = None
-) -> Parser:
+def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None = None) -> Parser:
     """Make the parser of all commands.
 
     Parameters
     ----------
     kinds
-        Gives what argparse needs to know of each kind of value; not called where no command is
-        made. What stands behind a kind's colon is the first argument of its ``type``.
+        What argparse needs to know of each kind of value. What stands behind a kind's colon is the
+        first argument of its ``type``.
     words
         What is to be parsed: commands that it cannot name are left out, as they take time.
     """
-    lines = []
-    for group, commands in GROUPS.items():
-        top = (command for command in commands if " " not in command.name)
-        lines += ["", f"{group}:", *(f"  {command.name:<12}{command.text}" for command in top)]
-    parser = Parser(
-        prog="rig",
-        usage="rig [-h] [--version] COMMAND ...",
-        # All its lines are short: to wrap them, argparse would load shutil and textwrap.
-        formatter_class=partial(argparse.RawTextHelpFormatter, width=_WIDTH),
-        description="Lab-rig controller for falling-chain and photogate experiments.",
-        epilog="\n".join(lines) + "\n\n"
-        "Exit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a run was\n"
-        "void, 4 device trouble, 130 interrupted. rig replay: 1 the results differ.",
-    )
+    parser = Parser(prog="rig", usage="rig [-h] [--version] COMMAND ...")
     parser.add_argument("--version", action="version", version=f"rig {__version__}")
-    below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND", help=argparse.SUPPRESS)}
+    below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND")}
     parsers = parser.commands
     for command in _matching_commands(words):
         name = command.name
@@ -224,12 +207,8 @@ def build_parser(
         parsers[name] = below[outer].add_parser(
             last, description=command.text, epilog=examples, **options
         )
-        parsers[name].set_defaults(module=_MODULES.get(name, name.replace(" ", "_")))
-        either = None
+        module = _MODULES.get(name, name.replace(" ", "_"))
+        parsers[name].set_defaults(module=module, command=name)
         for row in command.arguments:
-            alone = {"either", "one-of"} & set(row.split("|")[1].split())
-            if alone:
-                needed = "one-of" in alone
-                either = either or parsers[name].add_mutually_exclusive_group(required=needed)
-            _add_argument(either if either and alone else parsers[name], row, _WORDS | kinds())
+            _add_argument(parsers[name], row, _WORDS | kinds)
     return parser

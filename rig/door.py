@@ -22,7 +22,8 @@ from rig.model.prediction import PredictedIncline
 from rig.predictions import predictions
 from rig.protocol import reader
 from rig.ready import find_protocol
-from rig.report.numbers import with_unit
+from rig.reasons import make_error
+from rig.report.numbers import ranges, with_unit
 from rig.report.parts import means_parts, summary_table
 from rig.report.templates import parts_html
 from rig.results import SessionResults, calibration, protocol_of, results
@@ -152,11 +153,11 @@ class RecordedSession:
         """
         import numpy as np  # noqa: PLC0415 - a door costs nothing before it is used
 
-        attempts = (drop for drop in self._file.drops() if drop.run == run)
-        drops = [drop for drop in attempts if attempt in {None, drop.attempt}]
+        recorded = [*self._file.drops()]
+        drops = [drop for drop in recorded if drop.run == run and attempt in {None, drop.attempt}]
         if not drops:
-            recorded = sorted({drop.run for drop in self._file.drops()})
-            raise InputError(f"no recorded drop of run {run}", f"recorded are the runs {recorded}")
+            runs = ranges("run", [drop.run for drop in recorded])
+            raise make_error(InputError, "run_unrecorded", path=self._file.path, run=run, runs=runs)
         drop = drops[-1]
         if drop.damage:
             raise SessionError(

@@ -19,6 +19,8 @@ _KINDS = {
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }
+_SQLITE = b"SQLite format 3\0"
+"""How a session file begins: nothing but its own recorder ever writes there."""
 _DESCRIPTORS = ("/dev/", "/proc/")
 """Where a shell puts the pipe of ``<(...)`` or ``|``: somebody writes into it, and it ends."""
 
@@ -57,8 +59,8 @@ def read_input(path: str | os.PathLike[str], limit: int = -1) -> bytes:
         return stream.read(limit)
 
 
-def write_atomic(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` as UTF-8 so that a crash leaves the old file or the new one.
+def write_atomic(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write text as UTF-8, or bytes, so that a crash leaves the old file or the new one.
 
     A path that is a device or a pipe (``/dev/stdout``) is written straight through, since
     replacing it would be wrong.
@@ -67,8 +69,8 @@ def write_atomic(path: str | os.PathLike[str], text: str) -> None:
     ----------
     path
         The file to make or replace; a symbolic link is followed.
-    text
-        The whole content, line ends as they stand.
+    content
+        All of it, line ends as they stand.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def write_atomic(path: str | os.PathLike[str], text: str) -> None:
         If the place cannot be written: no such folder, no permission, disk full.
     """
     with replacing(path) as stream:
-        stream.write(text.encode("utf-8"))
+        stream.write(content if isinstance(content, bytes) else content.encode("utf-8"))
 
 
 def check_place(path: str | os.PathLike[str]) -> None:
@@ -85,7 +87,7 @@ def check_place(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        There is no such folder, or a folder is in its place.
+        There is no such folder, or a folder or a session is in its place.
     """
     target = Path(os.path.realpath(path))
     with suppress(OSError):  # what may not be looked at is told when it is written
@@ -94,6 +96,20 @@ def check_place(path: str | os.PathLike[str]) -> None:
         if not target.parent.is_dir():
             what = os.strerror(errno.ENOENT)
             raise InputError(f"cannot write {path}: {what}", "make its folder first")
+        if target.is_file() and read_input(target, len(_SQLITE)) == _SQLITE:
+            raise InputError(f"cannot write {path}: a session is there", "name another file")
+
+
+def check_new(path: str | os.PathLike[str]) -> None:
+    """See that nothing is at a place yet, for a file that people write on.
+
+    Raises
+    ------
+    InputError
+        Something is there.
+    """
+    if os.path.lexists(path):
+        raise InputError(f"{path} already exists", "name a new file, or move this file away")
 
 
 @contextmanager
@@ -129,10 +145,9 @@ def state_folder() -> Path:
         This user has no home.
     """
     try:
-        base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state"
+        return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "chainrig"
     except RuntimeError as error:
         raise InputError(f"no folder for logs: {error}", "set XDG_STATE_HOME") from error
-    return Path(base) / "chainrig"
 
 
 def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
@@ -143,15 +158,6 @@ def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
             stat = file.stat()
             stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))
     return tuple(stats)
-
-
-def identity_of(path: Path) -> tuple[int, int] | None:
-    """Return device and number of what is at a path, which a file that replaces it has not."""
-    try:
-        about = path.stat()
-    except OSError:
-        return None
-    return about.st_dev, about.st_ino
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
@@ -168,16 +174,6 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
     return folder
-
-
-def sync_directory(path: Path) -> None:
-    """Make the names in a folder durable, where the file system can."""
-    with suppress(OSError):  # some network and FAT mounts refuse to sync a folder
-        handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 @contextmanager
@@ -197,4 +193,9 @@ def _replacing(target: Path) -> Iterator[BinaryIO]:
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
-    sync_directory(target.parent)
+    with suppress(OSError):  # some network and FAT mounts refuse to sync a folder
+        handle = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

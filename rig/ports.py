@@ -19,7 +19,7 @@ def is_simulated(url: str) -> bool:
     return _split(url).scheme in SIMULATED
 
 
-def completed(url: str, protocol: Path, session: Path, seed: int | None, before: str = "") -> str:
+def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: str = "") -> str:
     """Tell a simulation its scene, seed and where to keep the hidden truth.
 
     Parameters
@@ -72,18 +72,12 @@ def check_name(url: str) -> None:
         Something stands before the ``?`` or behind a ``#``.
     """
     parts = _split(url)
-    if parts.scheme not in SIMULATED:
-        return
-    example = f"{parts.scheme}://?{_EXAMPLES[parts.scheme]}"
-    if name := parts.netloc + parts.path:
+    extra = parts.netloc + parts.path or (parts.fragment and f"#{parts.fragment}")
+    if extra and parts.scheme in SIMULATED:
         raise InputError(
-            f"{url}: found {name!r} before the ?, where nothing is accepted",
-            f"leave it out; what is wanted is said behind the ?, as in {example}",
-        )
-    if parts.fragment:
-        raise InputError(
-            f"{url}: found {'#' + parts.fragment!r} at its end, where nothing is accepted",
-            "leave it out; a # that belongs to a setting is written %23",
+            f"{url}: unexpected {extra!r}",
+            f"leave it out; settings stand behind the ?, as in {parts.scheme}://?"
+            f"{_EXAMPLES[parts.scheme]}; a # in a setting is written %23",
         )
 
 

@@ -5,7 +5,6 @@ Mechanics that a scene does not have are not loaded.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,8 @@ from rig.units import Quantity
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from rig.model.chain import Chain
+    from rig.model.surface import Surface
     from rig.protocol.protocol import Protocol, RodChain, Run
 
 
@@ -108,21 +109,19 @@ def _vary_coefficients(
     protocol: Protocol, run: Run, struck: str
 ) -> Iterator[tuple[str, Protocol, Protocol, float]]:
     """Each coefficient, made less and more, and its uncertainty over the distance between them."""
-    from rig.model import impact, predict  # noqa: PLC0415 - only where something is struck
+    from rig.model.impact import ALPHA  # noqa: PLC0415 - only where something is struck
+    from rig.model.predict import moved_coefficients  # noqa: PLC0415 - likewise
 
     surface, rods = protocol.surface, protocol.chains[struck]
     assert surface is not None
 
-    def changed(values: dict[str, float]) -> Protocol:
-        other, chain = impact.with_coefficients(surface, rods.chain, values)
+    def protocol_with(other: Surface, chain: Chain) -> Protocol:
         chains = {**protocol.chains, struck: replace(rods, chain=chain)}
         return replace(protocol, surface=other, chains=chains)
 
-    own = {impact.ALPHA: f"alpha {protocol.condition(run).impact_chain}"}
-    stated = impact.stated_coefficients(surface, rods.chain, run.incline_deg)
-    for name, value in stated.items():
-        for low, high, share in predict.steps(value, predict.LEAST.get(name, -math.inf)):
-            yield own.get(name, name), changed({name: low}), changed({name: high}), share
+    own = {ALPHA: f"alpha {protocol.condition(run).impact_chain}"}
+    for name, low, high, share in moved_coefficients(surface, rods.chain, run.incline_deg):
+        yield own.get(name, name), protocol_with(*low), protocol_with(*high), share
 
 
 def notes(protocol: Protocol) -> list[str]:
@@ -146,9 +145,9 @@ def _free_fall(protocol: Protocol) -> PredictedIncline:
         value.value for value in (protocol.drop, protocol.gravity, protocol.initial_speed)
     )
     if protocol.drag is None:
-        from rig.model.fall import free_fall  # noqa: PLC0415 - all that this scene needs
+        from rig.model.fall import free_leg  # noqa: PLC0415 - all that this scene needs
 
-        speed, time = free_fall(rods.chain, drop, gravity, start)
+        speed, time = free_leg(drop + rods.chain.length, start, gravity)
     else:
         from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
 

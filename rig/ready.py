@@ -13,7 +13,7 @@ WIRED = {"pico": "rp2040", "mega": "atmega2560", "uno": "atmega328p"}
 
 def ready_protocols() -> dict[str, Path]:
     """Return the ready protocols by their names, which have no ending."""
-    return {path.stem: path for path in sorted(shipped("protocols").glob("*.yaml"))}
+    return {path.stem: path for path in sorted(find_resource("protocols").glob("*.yaml"))}
 
 
 def ready_protocol(name: str) -> Path:
@@ -50,10 +50,10 @@ def wiring_picture(board: str) -> Path:
     InputError
         Where this installation lacks it.
     """
-    return shipped(f"firmware/{WIRED[board]}/wiring.svg")
+    return find_resource(f"firmware/{WIRED[board]}/wiring.svg")
 
 
-def shipped(name: str) -> Path:
+def find_resource(name: str) -> Path:
     """Find a file or a folder that comes with this program.
 
     Raises

@@ -43,7 +43,12 @@ class _ByBytes(Reader):
         have = {drop.job for drop in acknowledged}
         stored = {drop.job: drop for drop in session.drops()}
         late = [drop for drop in replay.unfinished_drops() if drop.job in stored.keys() - have]
-        drops = sorted(_once([*acknowledged, *late]), key=_JOB)
+        # What was acknowledged again, for the first ACKNOWLEDGE was lost on its way, counts once.
+        once = {
+            (drop.job, drop.certificate, drop.fire_tick, drop.edges): drop
+            for drop in [*acknowledged, *late]
+        }
+        drops = sorted(once.values(), key=_JOB)
         self._drops = [as_old_as(stored.get(drop.job, drop), drop) for drop in drops]
 
     def digest(self) -> None:
@@ -92,11 +97,3 @@ def _compare(session: Reader, progress: Progress | None) -> Outcome:
     compare("results", results(once_more, progress).records(), stored)
     lines.append("identical" if not differences else f"DIFFERENT: {', '.join(differences)}")
     return Outcome(tuple(lines), tuple(differences))
-
-
-def _once(drops: list[Drop]) -> list[Drop]:
-    """Leave out what was acknowledged again because the first ACKNOWLEDGE was lost on its way."""
-    unique: dict[object, Drop] = {}
-    for drop in drops:
-        unique.setdefault((drop.job, drop.certificate, drop.fire_tick, drop.edges), drop)
-    return list(unique.values())

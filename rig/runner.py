@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from contextlib import suppress
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from contextlib import closing, suppress
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.campaign import machine
 from rig.campaign.machine import Effect, Event, Flow, Stage, step
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.result import DropResult
-    from rig.daemon.connecting import Rig
+    from rig.daemon.client import Client
     from rig.protocol.protocol import Protocol
 
 
@@ -40,8 +39,7 @@ _FALL = (machine.FireRelease, machine.Collect, machine.Stop)
 _VALUE = 17  # characters, as of −3.2076 ± 0.0017
 
 
-@dataclass(frozen=True, slots=True)
-class Operator:
+class Operator(NamedTuple):
     """Whoever stands at the rig.
 
     Attributes
@@ -50,13 +48,10 @@ class Operator:
         Shows one line of narration.
     ask
         Shows a request and returns when it is done; `None` when nobody is there (``--yes``).
-    judged
-        Shows what came of a drop of so many that are planned; `None` says it in a line.
     """
 
     say: Callable[[str], None]
     ask: Callable[[str], None] | None = None
-    judged: Callable[[DropResult, int], None] | None = None
 
 
 def run_protocol(
@@ -65,10 +60,11 @@ def run_protocol(
     session_path: str,
     operator: Operator,
     seed: int | None = None,
-    interrupts: Interrupts | None = None,
     socket: Path | None = None,
 ) -> SessionResults:
-    """Carry out a plan, or what is left of it, and analyse the session.
+    """Carry out a plan, or what is left of it, and analyse the session; only in the main thread.
+
+    Ctrl-C and SIGTERM stop it where no record is torn apart.
 
     Parameters
     ----------
@@ -82,8 +78,6 @@ def run_protocol(
         Who prepares each drop and is told about it.
     seed
         Of a simulation.
-    interrupts
-        What stops the campaign: see `rig.recorder.recorder.Recorder`.
     socket
         Of the daemon to go through: see `rig.daemon.connecting.connect`.
 
@@ -97,21 +91,19 @@ def run_protocol(
     protocol = reader.read(source)
     check_gates(protocol)
     check_recordable(protocol)
-    interrupts = Interrupts() if interrupts is None else interrupts
-    rig = connect(url, operator.say, interrupts, socket)
-    try:
-        fetched = rig.open_session(source, session_path, seed)
-        if fetched is not None:
-            operator.say("fetching run {}, attempt {}, from the device".format(*fetched))
-        campaign = Campaign(protocol, rig, operator, interrupts)
-        campaign.carry_out()
-        rig.close_session()
-    finally:
-        rig.close()
-    # The owner of the port has let go of the file: results are the runner's own business.
-    with Session.open(session_path, readonly=True) as session:
-        operator.say("analysing the session …")
-        return results(session, drops=campaign.live.known)
+    interrupts = Interrupts()
+    with interrupts.caught():
+        with closing(connect(url, operator.say, interrupts, socket)) as rig:
+            fetched = rig.open_session(source, session_path, seed)
+            if fetched is not None:
+                operator.say("fetching run {}, attempt {}, from the device".format(*fetched))
+            campaign = Campaign(protocol, rig, operator, interrupts)
+            campaign.carry_out()
+            rig.close_session()
+        # The owner of the port has let go of the file: results are the runner's own business.
+        with interrupts.let_through(), Session.open(session_path, readonly=True) as session:
+            operator.say("analysing the session …")
+            return results(session)
 
 
 class Campaign:
@@ -130,7 +122,7 @@ class Campaign:
     """
 
     def __init__(
-        self, protocol: Protocol, rig: Rig, operator: Operator, interrupts: Interrupts
+        self, protocol: Protocol, rig: Client, operator: Operator, interrupts: Interrupts
     ) -> None:
         self.protocol = protocol
         self.rig = rig
@@ -206,12 +198,10 @@ class Campaign:
             self.operator.say(f"not fired: {trouble}")
         if self.operator.ask is None:
             return
-        if trouble and not unfired:
-            self.operator.ask(f"not armed: {trouble}")
-            return
         again = f", attempt {job.attempt}" if job.attempt > 1 else ""
-        what = describe_setup(self._left[0])
-        self.operator.ask(f"run {job.run} of {len(self.plan)}{again}: {what}")
+        request = f"run {job.run} of {len(self.plan)}{again}: {describe_setup(self._left[0])}"
+        with self.interrupts.let_through():
+            self.operator.ask(f"not armed: {trouble}" if trouble and not unfired else request)
 
     def _rest_s(self) -> float:
         """How long everything rests before the release; a clock once known well enough stays so."""
@@ -241,13 +231,12 @@ class Campaign:
 
     def _fall(self) -> None:
         """Let go, and stay until the drop is recorded: preparing it took minutes."""
-        with self.interrupts.held():
-            try:
-                while self._effects and isinstance(self._effects[0], _FALL):
-                    self._do(self._effects.popleft())
-            except KeyboardInterrupt:
-                self._stop("interrupted by the operator")
-                raise
+        try:
+            while self._effects and isinstance(self._effects[0], _FALL):
+                self._do(self._effects.popleft())
+        except KeyboardInterrupt:
+            self._stop("interrupted by the operator")
+            raise
 
     def _do(self, effect: Effect) -> None:
         """Carry one effect out and tell the plan what came of it."""
@@ -271,10 +260,7 @@ class Campaign:
                 case machine.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
-                    if self.operator.judged is None:
-                        self.operator.say(narration(self._result, len(self.plan)))
-                    else:
-                        self.operator.judged(self._result, len(self.plan))
+                    self.operator.say(narration(self._result, len(self.plan)))
         except DeviceRefusedError as refusal:
             self._failed = refusal
             self._take(machine.effect_failure(self.flow.ticket, refusal))
@@ -284,7 +270,8 @@ class Campaign:
     def _judge(self, job: Job) -> None:
         if self._drop is None or job != self._drop.job:
             self._drop = self.rig.collect(*job)
-        result = self._result = self.live.judge(self.session, self._drop)
+        with self.interrupts.let_through():
+            result = self._result = self.live.judge(self.session, self._drop)
         self._take(machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons))
 
     def _stop(self, why: str) -> None:

@@ -28,13 +28,13 @@ def open_streams() -> None:
 def settle_streams() -> None:
     """Write out what still waits in stdout and stderr, or let it vanish."""
     for stream in (sys.stdout, sys.stderr):
-        with tolerated(stream):
+        with tolerate_broken(stream):
             stream.flush()
 
 
 def say(line: str, end: str = "\n") -> None:
     """Tell the user something that is no result: a campaign goes on when nobody listens."""
-    with tolerated(sys.stderr):
+    with tolerate_broken(sys.stderr):
         print(printable(line), end=end, file=sys.stderr, flush=True)
 
 
@@ -54,7 +54,7 @@ def ask(question: str) -> str:
 
 
 @contextmanager
-def tolerated(stream: TextIO) -> Iterator[None]:
+def tolerate_broken(stream: TextIO) -> Iterator[None]:
     """Point a stream that cannot be written at nothing.
 
     What could not be written waits in its buffer. Python would try once more as it ends, fail, and

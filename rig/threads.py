@@ -52,11 +52,11 @@ def one_thread(work: Callable[P, T]) -> Callable[P, T]:
     """
 
     @wraps(work)
-    def bounded(*args: P.args, **kwargs: P.kwargs) -> T:
+    def run_bounded(*args: P.args, **kwargs: P.kwargs) -> T:
         with _BOUND:
             return work(*args, **kwargs)
 
-    return bounded
+    return run_bounded
 
 
 @cache

@@ -37,53 +37,53 @@ class UnitError(ValueError):
 
 
 class Dimension(Enum):
-    """What a quantity measures: its name with the article, and an example to follow."""
+    """What a quantity measures: its name with the article, an example to follow, its units.
 
-    LENGTH = ("a length", "180 mm")
-    TIME = ("a time", "80 ms")
-    ANGLE = ("an angle", "40 deg")
-    ACCELERATION = ("an acceleration", "9.81 m/s^2")
-    SPEED = ("a speed", "5.2 m/s")
-    MASS = ("a mass", "35 g")
-    DENSITY = ("a density", "1.2 kg/m^3")
-    FREQUENCY = ("a frequency", "1 Hz")
-    TURNING = ("a rate of turning", "0.5 rad/s")
-    NUMBER = ("a plain number", "0.50 ± 0.05")
+    Units are in their canonical spelling, each with what it is in base units. The foot is the
+    international one, exact since 1959; π/180 has 50 digits, for no fraction gives it exactly.
 
-    def __init__(self, noun: str, example: str) -> None:
+    Attributes
+    ----------
+    noun, example
+        For messages.
+    factors
+        What each accepted unit is in base units.
+    """
+
+    LENGTH = (
+        "a length",
+        "180 mm",
+        "m 1, mm 1/1000, cm 1/100, µm 1/1000000, km 1000, in 0.0254, ft 0.3048",
+    )
+    TIME = ("a time", "80 ms", "s 1, ms 1/1000, µs 1/1000000, ns 1/1000000000, min 60, h 3600")
+    ANGLE = (
+        "an angle",
+        "40 deg",
+        "deg 1, rad 57.295779513082320876798154814105170332405472466564, "
+        "mrad 0.057295779513082320876798154814105170332405472466564",
+    )
+    ACCELERATION = ("an acceleration", "9.81 m/s^2", "m/s^2 1, cm/s^2 1/100, ft/s^2 0.3048")
+    SPEED = ("a speed", "5.2 m/s", "m/s 1, cm/s 1/100, km/h 5/18")
+    MASS = ("a mass", "35 g", "kg 1, g 1/1000, mg 1/1000000")
+    DENSITY = ("a density", "1.2 kg/m^3", "kg/m^3 1, g/cm^3 1000")
+    FREQUENCY = ("a frequency", "1 Hz", "Hz 1, kHz 1000")
+    TURNING = (
+        "a rate of turning",
+        "0.5 rad/s",
+        "rad/s 1, deg/s 0.017453292519943295769236907684886127134428718885417",
+    )
+    NUMBER = ("a plain number", "0.50 ± 0.05", "1 1, % 1/100, ppm 1/1000000")
+
+    def __init__(self, noun: str, example: str, units: str) -> None:
         self.noun, self.example = noun, example
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Accepted units in their canonical spelling."""
-        return tuple(_FACTORS[self])
+        pairs = map(str.split, units.split(", "))
+        self.factors = {unit: Fraction(factor) for unit, factor in pairs}
 
 
-# 180/π to 50 digits: the only factor that no fraction gives exactly.
-_DEGREES_PER_RADIAN = Fraction("57.295779513082320876798154814105170332405472466564")
-_FOOT = Fraction("0.3048")  # international foot and inch, exact since 1959
-
-_FACTORS: dict[Dimension, dict[str, Fraction | int | str]] = {
-    Dimension.LENGTH: {
-        "m": 1, "mm": "1/1000", "cm": "1/100", "µm": "1/1000000", "km": 1000, "in": _FOOT / 12,
-        "ft": _FOOT,
-    },
-    Dimension.TIME: {
-        "s": 1, "ms": "1/1000", "µs": "1/1000000", "ns": "1/1000000000", "min": 60, "h": 3600,
-    },
-    Dimension.ANGLE: {"deg": 1, "rad": _DEGREES_PER_RADIAN, "mrad": _DEGREES_PER_RADIAN / 1000},
-    Dimension.ACCELERATION: {"m/s^2": 1, "cm/s^2": "1/100", "ft/s^2": _FOOT},
-    Dimension.SPEED: {"m/s": 1, "cm/s": "1/100", "km/h": "5/18"},
-    Dimension.MASS: {"kg": 1, "g": "1/1000", "mg": "1/1000000"},
-    Dimension.DENSITY: {"kg/m^3": 1, "g/cm^3": 1000},
-    Dimension.FREQUENCY: {"Hz": 1, "kHz": 1000},
-    Dimension.TURNING: {"rad/s": 1, "deg/s": 1 / _DEGREES_PER_RADIAN},
-    Dimension.NUMBER: {"1": 1, "%": "1/100", "ppm": "1/1000000"},
-}  # fmt: skip
 UNITS: dict[str, tuple[Dimension, Fraction]] = {
-    unit: (dimension, Fraction(factor))
-    for dimension, factors in _FACTORS.items()
-    for unit, factor in factors.items()
+    unit: (dimension, factor)
+    for dimension in Dimension
+    for unit, factor in dimension.factors.items()
 }
 """What each unit measures, and what it is in base units."""
 # The micro sign and the Greek letter look alike and both come off keyboards.
@@ -116,7 +116,7 @@ def significant(value: float) -> str:
     return f"{Decimal(f'{value:.2g}'):f}"
 
 
-def quoted(text: str, limit: int = 40) -> str:
+def quote(text: str, limit: int = 40) -> str:
     """Return `text` for a one-line message: in quotes, control characters escaped, cut short."""
     return repr(text if len(text) <= limit else text[:limit] + "…")
 
@@ -152,7 +152,7 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
         pointed = _DECIMAL_COMMA.sub(r"\1.\2", clean)
         if pointed != clean and (_BRACKETED.fullmatch(pointed) or _PLAIN.fullmatch(pointed)):
             accepted_form = f"write a decimal point, not a comma: {pointed}"
-        raise UnitError(f"found {quoted(text)}; {accepted_form}")
+        raise UnitError(f"found {quote(text)}; {accepted_form}")
     parts = match.groupdict()
     unit, u_unit = parts["unit"], parts.get("u_unit")
     if parts["u"] is not None and match.re is _PLAIN:
@@ -161,25 +161,25 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     value = _scale(parts["value"], factor / int(parts.get("per") or 1), clean)
     if parts.get("last"):
         if parts["u"] is not None:
-            raise UnitError(f"found {quoted(text)} with two uncertainties; {accepted_form}")
+            raise UnitError(f"found {quote(text)} with two uncertainties; {accepted_form}")
         digits = Decimal(parts["value"]).as_tuple().exponent
         return Quantity(value, _scale(f"{parts['last']}e{digits}", factor, clean))
     if parts["u"] is None:
         return Quantity(value)
     u = _scale(parts["u"], _factor(u_unit or unit, dimension, clean), clean)
     if u < 0:
-        raise UnitError(f"found {quoted(text)}; an uncertainty is at least 0")
+        raise UnitError(f"found {quote(text)}; an uncertainty is at least 0")
     return Quantity(value, u)
 
 
 def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str | None, str | None]:
     """Return the units of a value and of what stands behind its ``±``."""
     if unit is not None and u_unit is None:
-        raise UnitError(f"found {quoted(text)}; the part after ± needs a unit too")
+        raise UnitError(f"found {quote(text)}; the part after ± needs a unit too")
     if unit is None and u_unit in _RELATIVE:
         # "0.50 ± 10 %" is read by some as 10 % of 0.50 and by others as (0.50 ± 10) %.
         raise UnitError(
-            f"found {quoted(text)}, which has two meanings; "
+            f"found {quote(text)}, which has two meanings; "
             f"write both parts in the same unit: 0.50 ± 0.05 or 50 % ± 5 %"
         )
     return unit or u_unit, u_unit
@@ -189,19 +189,19 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
     """Return what one `unit` is in base units, if it measures `dimension`."""
     name = "".join((unit or "1").split()).translate(_SPELLINGS).replace("**", "^")
     name = _ALIASES.get(name, name)
-    accepted = f"{dimension.noun} is written in {', '.join(dimension.units)}"
+    accepted = f"{dimension.noun} is written in {', '.join(dimension.factors)}"
     if name not in UNITS:
         import difflib  # noqa: PLC0415 - only a mistake needs it
 
-        folded = {accepted_unit.casefold(): accepted_unit for accepted_unit in dimension.units}
+        folded = {accepted_unit.casefold(): accepted_unit for accepted_unit in dimension.factors}
         close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
         guess = f"did you mean {folded[close[0]]}? " if close else ""
-        raise UnitError(f"unknown unit {quoted(unit or '')}; {guess}{accepted}")
+        raise UnitError(f"unknown unit {quote(unit or '')}; {guess}{accepted}")
     measures, factor = UNITS[name]
     if measures is not dimension:
         if unit is None:
             raise UnitError(
-                f"found {quoted(text)} without a unit; {accepted}, such as {dimension.example}"
+                f"found {quote(text)} without a unit; {accepted}, such as {dimension.example}"
             )
         raise UnitError(
             f"{text} is {measures.noun}; accepted: {dimension.noun}, such as {dimension.example}"
@@ -221,7 +221,7 @@ def _scale(number: str, factor: Fraction, text: str) -> float:
     except ArithmeticError:
         result = 0.0
     if result == 0:
-        raise UnitError(f"found {quoted(text)}, too large or too small")
+        raise UnitError(f"found {quote(text)}, too large or too small")
     return result
 
 

@@ -59,6 +59,16 @@ def string_shadows(rods: Sequence[Shadow], chance: float, rng: np.random.Generat
     return shadows
 
 
+def bounces(strikes_s: Iterable[float], chance: float, rng: np.random.Generator) -> list[Shadow]:
+    """Shadows of some of the rods that struck, as they come up once more."""
+    shadows: list[Shadow] = []
+    for strike_s in strikes_s:
+        if rng.random() < chance:
+            at = strike_s + float(rng.uniform(4e-3, 30e-3))
+            shadows.append(Shadow(at, at + float(rng.uniform(2e-3, 10e-3)), NOT_A_ROD))
+    return shadows
+
+
 def receive(
     shadows: Iterable[Shadow], channel: int, dials: Dials, rng: np.random.Generator
 ) -> list[SeenEdge]:

@@ -23,14 +23,17 @@ from .transmitter import Transmitter
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from .lab_interface import Lab
+    from .interfaces import Lab
 
 CAPACITY = 1024
+TICK_HZ = 16_000_000
 MAX_PULSE_US = 500_000
 LATE_TICKS = 256
 POWER_ON, EXTERNAL_RESET, BROWN_OUT = 1, 2, 4  # the AVR's PORF, EXTRF and BORF in MCUSR
 RESTARTED = 128  # in a certificate, beside the causes
 _EXECUTION_NS = 60_000  # from a request's last byte to its execution
+HELD = ("label", "fire_tick", "events", "crc32", "overflows")
+"""What of a drop's certificate a look into the board shows."""
 _BATCH = 16  # events worth a frame of their own
 _OLDEST_NS = 10_000_000  # an event waits no longer than this for company
 _STEADY_NS = 300_000  # the emergency stop's input is the same for so long
@@ -47,16 +50,14 @@ class VirtualBoard:
         What the gates see.
     seed
         Chooses unique id, tokens and the counter's start.
-    tick_hz, ppm, drift_ppm, wander_ppm
-        Nominal rate, and how the true rate is off: see `sim.counter.Counter`.
+    ppm, drift_ppm, wander_ppm
+        How the true rate is off `TICK_HZ`: see `sim.counter.Counter`.
     baudrate
         Of the line.
     capacity
         Events that fit its memory.
     streams
         Whether that memory is for the latest events only.
-    start_tick
-        The counter at virtual time 0; by default from the seed.
     protocol_version
         What it claims to speak.
     """
@@ -66,14 +67,12 @@ class VirtualBoard:
         lab: Lab,
         seed: int = 0,
         *,
-        tick_hz: int = 16_000_000,
         ppm: float = 0.0,
         drift_ppm: float = 0.0,
         wander_ppm: float = 0.0,
         baudrate: int = 500_000,
         capacity: int = CAPACITY,
         streams: bool = False,
-        start_tick: int | None = None,
         protocol_version: int = wire.PROTOCOL_VERSION,
     ) -> None:
         self.lab = lab
@@ -83,7 +82,7 @@ class VirtualBoard:
             board="virtual",
             firmware="sim",
             unique_id=hashlib.sha256(f"virtual board {seed}".encode()).digest()[:8],
-            tick_hz=tick_hz,
+            tick_hz=TICK_HZ,
             gates=16,
             releases=4,
             max_pulse_us=MAX_PULSE_US,
@@ -93,9 +92,9 @@ class VirtualBoard:
             channels=_CHANNELS,
         )
         self._random = random.Random(f"board {seed}")
-        start = self._random.getrandbits(32) if start_tick is None else start_tick
+        start = self._random.getrandbits(32)
         self.counter = Counter(
-            tick_hz, ppm, start, drift_ppm=drift_ppm, wander_ppm=wander_ppm, seed=seed
+            TICK_HZ, ppm, start, drift_ppm=drift_ppm, wander_ppm=wander_ppm, seed=seed
         )
         self._now_ns = 0
         self._boot_ns: int | None = None
@@ -183,6 +182,20 @@ class VirtualBoard:
         """Mask of the release outputs that are on now."""
         return self._controller.release.on(self._now_ns)
 
+    def phase(self) -> Phase:
+        """Tell what it is doing."""
+        return self._controller.phase
+
+    def held(self) -> tuple[dict[str, int], list[tuple[int, int]]]:
+        """Tell what it keeps of the drop it holds: the certificate's main fields, the events."""
+        drop = self._controller.drop
+        assert drop is not None
+        events: list[tuple[int, int]] = []
+        while part := drop.part(len(events), wire.EVENTS_PER_FRAME).snapshots:
+            events += [(event.tick, event.state) for event in part]
+        certificate = drop.certificate()
+        return {name: getattr(certificate, name) for name in HELD}, events
+
     def advance(self, until_ns: int) -> None:
         """Let happen what happens until a moment."""
         while (upcoming := self._upcoming()) is not None and upcoming[0] <= until_ns:
@@ -192,8 +205,8 @@ class VirtualBoard:
 
     def next_ns(self) -> int | None:
         """Say when something will happen next, or `None` when nothing will."""
-        upcoming = self._upcoming()
-        return None if upcoming is None else upcoming[0]
+        when_ns, _ = self._upcoming() or (None, None)
+        return when_ns
 
     def _forget(self, restarts: int = 0) -> None:
         self._decoder = Decoder()
@@ -209,27 +222,26 @@ class VirtualBoard:
         """Find what happens next. Sending is polled: meanwhile only interrupts happen."""
         if self._boot_ns is not None:
             return self._boot_ns, self._boot
+        state, inputs, polled = self._controller, self._inputs, self.line.free_ns
         upcoming: list[tuple[int, Callable[[], None]]] = []
-        free_ns = self.line.free_ns
-        state = self._controller
-        if self._inputs.stop_turns_ns is not None:
-            upcoming.append((self._inputs.stop_turns_ns, self._stop_turns))
-        if self._inputs.pulses_ns:
-            upcoming.append((self._inputs.pulses_ns[0], self._reference_pulse))
+        if inputs.stop_turns_ns is not None:
+            upcoming.append((inputs.stop_turns_ns, self._stop_turns))
+        if inputs.pulses_ns:
+            upcoming.append((inputs.pulses_ns[0], self._reference_pulse))
         if state.coming:
             upcoming.append((state.coming[0].when_ns, self._gate_changes))
         if state.sense_ns is not None:
             upcoming.append((state.sense_ns, self._sense))
         if state.end_ns is not None:
-            upcoming.append((max(state.end_ns, free_ns), self._close))
+            upcoming.append((max(state.end_ns, polled), self._close))
             if state.drop is not None and state.drop.unsent:
                 full = state.drop.unsent >= _BATCH
                 due_ns = self._now_ns if full else self._oldest_ns + _OLDEST_NS
-                upcoming.append((max(due_ns, free_ns), self._stream))
+                upcoming.append((max(due_ns, polled), self._stream))
         if state.order is not None:
-            upcoming.append((max(state.lapses_ns, free_ns), self._lapse))
+            upcoming.append((max(state.lapses_ns, polled), self._lapse))
         if self._inbox:
-            upcoming.append((max(self._inbox[0][0] + _EXECUTION_NS, free_ns), self._listen))
+            upcoming.append((max(self._inbox[0][0] + _EXECUTION_NS, polled), self._listen))
         return min(upcoming, key=lambda item: item[0]) if upcoming else None
 
     def _boot(self) -> None:

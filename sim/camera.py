@@ -7,13 +7,12 @@ slope of its middle. Reading a blurred rod adds noise.
 
 from __future__ import annotations
 
-from statistics import fmean
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    import numpy as np
 
 FRAME_RATE_HZ = 480.0
 SPEED_FRAMES = 4
@@ -21,8 +20,8 @@ POSITION_NOISE_M = 0.5e-3
 
 
 def camera_reading(
-    impact_top: Callable[[float], float],
-    free_top: Callable[[float], float],
+    impact_top: Callable[[Any], Any],
+    free_top: Callable[[Any], Any],
     hit_s: float,
     rng: np.random.Generator,
 ) -> tuple[float, float]:
@@ -31,15 +30,13 @@ def camera_reading(
     Parameters
     ----------
     impact_top, free_top
-        Height of each top rod's middle against time, m.
+        Heights of each top rod's middle at some times, m.
     hit_s
         When the impact chain's top rod hits.
     """
-    phase = float(rng.uniform(0.0, 1.0))  # of a frame, between the last one and the impact
-    times = [hit_s - (phase + i) / FRAME_RATE_HZ for i in range(SPEED_FRAMES)]
-    noise = rng.normal(0.0, POSITION_NOISE_M, SPEED_FRAMES + 1).tolist()
-    struck = [impact_top(t) + e for t, e in zip(times, noise, strict=False)]
-    middle = fmean(times)
-    spread = sum((t - middle) ** 2 for t in times)
-    slope = sum((t - middle) * z for t, z in zip(times, struck, strict=True)) / spread
-    return free_top(times[0]) + noise[-1] - struck[0], -slope
+    phase = rng.uniform(0.0, 1.0)  # of a frame, between the last one and the impact
+    times = hit_s - (phase + np.arange(SPEED_FRAMES)) / FRAME_RATE_HZ
+    *noise, last = rng.normal(0.0, POSITION_NOISE_M, SPEED_FRAMES + 1)
+    struck = impact_top(times) + noise
+    slope, _ = np.polyfit(times - times.mean(), struck, 1)
+    return float(free_top(times[0]) + last - struck[0]), -float(slope)

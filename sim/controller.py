@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.link import messages as wire
 from rig.link.messages import DisarmReason, Phase, RefusalReason
@@ -14,14 +14,14 @@ from .snapshots import take_snapshots
 
 if TYPE_CHECKING:
     import random
+    from collections.abc import Callable
 
     from rig.link.frames import Frame
 
     from .counter import Counter
     from .inputs import Inputs
-    from .lab_interface import Lab
+    from .interfaces import Lab
 
-_NO_PULSE = (0, wire.PulseEnd.ORDERED)
 _SILENCE_NS = wire.HOST_SILENCE_MS * 10**6
 
 
@@ -160,26 +160,18 @@ class Microcontroller:
             request = wire.unpack(frame.type, frame.payload)
         except wire.MessageError:
             return wire.Refused(RefusalReason.BAD_PARAMETER, 0)
-        match request:
-            case wire.Identify():
-                return self._identify(request)
-            case wire.Ping():
-                return wire.Pong(self._counter.tick_at(self._now_ns))
-            case wire.Status():
-                return self._status()
-            case wire.Arm():
-                return self._arm(request)
-            case wire.Fire():
-                return self._fire(request)
-            case wire.Abort():
-                return self._abort()
-            case wire.Read():
-                return self._read(request)
-            case wire.Acknowledge():
-                return self._acknowledge(request)
-            case wire.Reference():
-                return self._reference
-        raise AssertionError(request)
+        answers: dict[type, Callable[[Any], wire.DeviceMessage]] = {
+            wire.Identify: self._identify,
+            wire.Ping: lambda _: wire.Pong(self._counter.tick_at(now_ns)),
+            wire.Status: lambda _: self._status(),
+            wire.Arm: self._arm,
+            wire.Fire: self._fire,
+            wire.Abort: lambda _: self._abort(),
+            wire.Read: self._read,
+            wire.Acknowledge: self._acknowledge,
+            wire.Reference: lambda _: self._reference,
+        }
+        return answers[type(request)](request)
 
     def _identify(self, request: wire.Identify) -> wire.DeviceMessage:
         version = self._identity.protocol_version
@@ -243,7 +235,7 @@ class Microcontroller:
             self.release.pulse(order.release, self._now_ns, pulse_us)
         changes = self._lab.drop(order.label)
         hz = self._counter.hz(self._now_ns)
-        snapshots = take_snapshots(changes, 0, order.gates, hz)
+        snapshots = take_snapshots(changes, order.gates, hz)
         self.coming.extend(
             Coming(self._now_ns + round(s.ticks / hz * 1e9), (tick + s.ticks) % 2**32, s.state)
             for s in snapshots
@@ -260,9 +252,10 @@ class Microcontroller:
         self.end_ns = self.sense_ns = None
         self.coming.clear()
         if self.drop is not None:
-            lasted_ns, by = self.release.lasted() if self.drop.order.release else _NO_PULSE
-            ticks = round(lasted_ns * 1e-9 * self._identity.tick_hz)
-            self.drop.released(ticks, by, self.restarts)
+            self.drop.restarts = self.restarts
+            if self.drop.order.release:
+                lasted_ns, by = self.release.latest_pulse()
+                self.drop.release = round(lasted_ns * 1e-9 * self._identity.tick_hz), by
 
     def _abort(self) -> wire.DeviceMessage:
         self.order = None
@@ -274,30 +267,30 @@ class Microcontroller:
         return wire.Done()
 
     def _read(self, request: wire.Read) -> wire.DeviceMessage:
-        refused = self._not_held(request.label)
-        if refused is not None or self.drop is None:
-            return refused or wire.Refused(RefusalReason.NO_SUCH_DROP, 0)
+        drop = self._held(request.label)
+        if isinstance(drop, wire.Refused):
+            return drop
         if request.count == 0:
-            return self.drop.certificate()
-        if request.first >= len(self.drop):
+            return drop.certificate()
+        if request.first >= len(drop):
             return wire.Refused(RefusalReason.BAD_PARAMETER, 0)
-        if request.first < self.drop.first_kept:
-            return wire.Refused(RefusalReason.NOT_KEPT, self.drop.first_kept)
-        return self.drop.part(request.first, request.count)
+        if request.first < drop.first_kept:
+            return wire.Refused(RefusalReason.NOT_KEPT, drop.first_kept)
+        return drop.part(request.first, request.count)
 
     def _acknowledge(self, request: wire.Acknowledge) -> wire.DeviceMessage:
-        refused = self._not_held(request.label)
-        if refused is not None or self.drop is None:
-            return refused or wire.Refused(RefusalReason.NO_SUCH_DROP, 0)
-        if request.crc32 != self.drop.certificate().crc32:
+        drop = self._held(request.label)
+        if isinstance(drop, wire.Refused):
+            return drop
+        if request.crc32 != drop.certificate().crc32:
             return wire.Refused(RefusalReason.WRONG_CRC, 0)
         self.drop = None
         return wire.Done()
 
-    def _not_held(self, label: int) -> wire.Refused | None:
-        """Say why a label's drop cannot be given, or `None`."""
+    def _held(self, label: int) -> Recording | wire.Refused:
+        """Return a label's drop, or why it cannot be given."""
         if self.end_ns is not None:
             return wire.Refused(RefusalReason.BUSY, 0)
         if self.drop is None or self.drop.order.label != label:
             return wire.Refused(RefusalReason.NO_SUCH_DROP, 0)
-        return None
+        return self.drop

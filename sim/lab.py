@@ -5,15 +5,15 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from rig.errors import InputError
 from rig.link.messages import TEST_RUN, unpack_label
 from rig.model.chain import Chain
-from rig.model.drag import drag_hits
-from rig.model.fall import kicks
+from rig.model.drag import air_legs
+from rig.model.fall import hits, kicks
 from rig.model.impact import impact_on
 from rig.model.surface import Surface
 from rig.protocol.contact import contact_level, higher_contacts
@@ -23,8 +23,7 @@ from rig.protocol.protocol import GUESSED
 from rig.units import Quantity
 
 from .air import air
-from .beam import NOT_A_ROD, SeenEdge, Shadow, receive, string_shadows
-from .camera import camera_reading
+from .beam import SeenEdge, Shadow, bounces, receive, string_shadows
 from .dials import or_stated
 from .path import Path
 from .truth import Truth
@@ -35,8 +34,6 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
 
     from .dials import Dials
-
-AnyTruth = TypeVar("AnyTruth", bound=Truth)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +65,24 @@ class Hung:
     rng: np.random.Generator
 
 
+class Falls(NamedTuple):
+    """What became of the chains of one drop.
+
+    Attributes
+    ----------
+    shadows
+        Of rods, by channel, times in s after fire; beams that no chain passes have none.
+    truth
+        Fields of the truth, but for those of every drop.
+    strikes_s
+        When rods strike that may bounce back through the lowest beam, s after fire.
+    """
+
+    shadows: dict[int, list[Shadow]]
+    truth: dict[str, Any]
+    strikes_s: Sequence[float] = ()
+
+
 class ChainLab:
     """Everything behind the gates, reproducible from one seed.
 
@@ -87,8 +102,6 @@ class ChainLab:
 
     Attributes
     ----------
-    filmed
-        Whether the truth says how every rod moved, where that is known: it is much to say.
     series
         Which drops of the same rig: those of another series are others.
 
@@ -97,6 +110,8 @@ class ChainLab:
     InputError
         If chains that start with a speed are asked for.
     """
+
+    truth_kind: ClassVar[type[Truth]] = Truth
 
     def __init__(
         self,
@@ -110,7 +125,6 @@ class ChainLab:
         self.seed = seed
         self.dials = dials = dials.on(protocol, self._share)
         self.tell = tell
-        self.filmed = False
         self.series = 0
         self.runs = {run.number: run for run in runs(protocol)}
         self.gates = protocol.gates.gates if protocol.gates else ()
@@ -130,6 +144,10 @@ class ChainLab:
             gate.channel: dials.beam_sd * self._rng("beam", gate.channel).normal()
             for gate in self.gates
         }
+        self.check()
+
+    def check(self) -> None:
+        """See that this world has what the scene needs: the model has it."""
 
     def _surface(self) -> Surface | None:
         """Draw the surface as it really is; what a dial says of it is exact."""
@@ -141,10 +159,8 @@ class ChainLab:
             off = dials.impact_error * of.u * float(self._rng(subject).normal())
             return Quantity(or_stated(dial, of.value + off))
 
-        pile = stated.pile
-        if pile is not None:
-            softness = draw("pile", pile.restitution, dials.restitution)
-            pile = replace(pile, restitution=softness)
+        if (pile := stated.pile) is not None:
+            pile = replace(pile, restitution=draw("pile", pile.restitution, dials.restitution))
         friction = draw("friction", stated.friction, dials.friction)
         return Surface(
             draw("restitution", stated.restitution, dials.restitution),
@@ -195,48 +211,48 @@ class ChainLab:
         if is_test(label):
             return 0
         run, _ = self._run(label)
-        mask = 0
+        mask, hanging = 0, self.hanging(run)
         for gate in self.gates:
-            name = run.impact if gate.side == "impact" else run.free
-            if name is None:
-                continue
-            body = self.bodies[name]
-            middles = self.hang_height + body.offsets + self._shift(body, gate)
-            if np.any(np.abs(middles - self.heights[gate.channel]) < body.widths / 2):
-                mask |= 1 << gate.channel
+            if (body := hanging.get(gate.side)) is not None:
+                middles = self.hang_height + body.offsets + self._shift(body, gate)
+                if np.any(np.abs(middles - self.heights[gate.channel]) < body.widths / 2):
+                    mask |= 1 << gate.channel
         return mask
+
+    def hanging(self, run: Run) -> dict[Side, Body]:
+        """Return the chain on each side that has one."""
+        names: dict[Side, str | None] = {"impact": run.impact, "free": run.free}
+        return {side: self.bodies[name] for side, name in names.items() if name is not None}
 
     def drop(self, label: int) -> list[tuple[float, int, bool]]:
         """Let go: every edge in order of time, as (seconds after fire, channel, blocked)."""
         if is_test(label):
             return []
         run, attempt = self._run(label)
-        hung = self._hung(run, attempt)
-        rng, dials, level = hung.rng, self.dials, self._level(run)
-        paths: dict[Side, tuple[Body, Path]] = {}
-        if run.impact is not None:
-            body = self.bodies[run.impact]
-            start = self.hang_height - level + hung.hang[0]
-            paths["impact"] = (
-                body, self._impact_path(body, run, hung.release_s, start, rng),
-            )  # fmt: skip
-        if run.free is not None:
-            start = self.hang_height - level + hung.hang[1]
-            gravity = self.protocol.gravity.value
-            paths["free"] = (
-                self.bodies[run.free],
-                Path(hung.release_s + hung.skew_s, start, gravity, kappas=self.air[run.free][:1]),
-            )
-        edges = [
-            edge
-            for gate in self.gates
-            if gate.side in paths
-            for edge in receive(
-                self._shadows(gate, level, *paths[gate.side], rng), gate.channel, dials, rng
-            )
-        ]
+        hung, dials = self._hung(run, attempt), self.dials
+        falls, rng = self._fall(run, attempt, hung), hung.rng
+        lowest = min((gate.height for gate in self.gates if gate.side == "impact"), default=0.0)
+        edges: list[SeenEdge] = []
+        for gate in self.gates:
+            if gate.channel not in falls.shadows:
+                continue
+            seen = [*falls.shadows[gate.channel]]
+            seen += string_shadows(seen, dials.string, rng)
+            if gate.side == "impact" and gate.height == lowest:
+                seen += bounces(falls.strikes_s, dials.bounce, rng)
+            edges += receive(seen, gate.channel, dials, rng)
         edges.sort(key=lambda edge: edge.time_s)
-        self.tell(self._truth(run, attempt, paths, edges, rng))
+        self.tell(
+            self.truth_kind(
+                run=run.number,
+                attempt=attempt,
+                incline_deg=run.incline_deg,
+                impact_chain=run.impact,
+                gravity_m_s2=self.protocol.gravity.value,
+                edges=[(edge.time_s, edge.channel, edge.blocked, edge.rod) for edge in edges],
+                **falls.truth,
+            )
+        )
         return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
 
     def _hung(self, run: Run, attempt: int) -> Hung:
@@ -252,6 +268,32 @@ class ChainLab:
     def make_ahead(self, labels: Sequence[int]) -> None:
         """Make drops before they are asked for: these need no time worth saving."""
 
+    def _fall(self, run: Run, attempt: int, hung: Hung) -> Falls:
+        """Let the chains of a drop fall, by the model."""
+        level = self._level(run)
+        start, hanging = self.hang_height - level, self.hanging(run)
+        paths: dict[Side, Path] = {}
+        for side, body in hanging.items():
+            if side == "impact":
+                paths[side] = self._impact_path(
+                    body, run, hung.release_s, start + hung.hang[0], hung.rng
+                )
+            else:
+                kappas = self.air[body.spec.name].on_legs()[:1]
+                paths[side] = Path(
+                    hung.release_s + hung.skew_s, start + hung.hang[1],
+                    self.protocol.gravity.value, kappas=kappas,
+                )  # fmt: skip
+        shadows = {
+            gate.channel: self._shadows(gate, level, hanging[gate.side], paths[gate.side])
+            for gate in self.gates
+            if gate.side in paths
+        }
+        if "impact" not in paths:
+            return Falls(shadows, {})
+        strikes = [hung.release_s + hit.time_s for hit in paths["impact"].hits]
+        return Falls(shadows, self._truth(run, attempt, paths), strikes)
+
     def _impact_path(
         self, body: Body, run: Run, release: float, start: float, rng: np.random.Generator
     ) -> Path:
@@ -264,14 +306,14 @@ class ChainLab:
             alpha += dials.impact_error * chain.alpha.u * self._rng("alpha").normal()
         alphas = alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
         # What touches the board higher hangs as much lower, as far as its strike goes.
-        strikes = body.offsets - np.array(higher_contacts(self.protocol, incline, body.spec))
+        strikes = body.offsets - np.array(higher_contacts(incline, body.spec))
         strikes[:-1] -= self._contact(run)  # the last one is judged at the level
         bottom = float(strikes[0])
         actual = Chain(chain.masses, tuple((strikes - bottom).tolist()), chain.inertia)
         gains = kicks(actual, alphas.tolist(), impact.gamma)
         gravity = self.protocol.gravity.value
-        air = self.air[body.spec.name]
-        events = drag_hits(actual, gains, air or [0.0] * chain.rods, start + bottom, gravity)
+        air = self.air[body.spec.name].on_legs()
+        events = hits(actual, gains, start + bottom, gravity, leg=air_legs(air))
         return Path(release, start, gravity, events, tuple((-strikes).tolist()), air)
 
     def _contact(self, run: Run) -> float:
@@ -284,80 +326,43 @@ class ChainLab:
         slope = self.beams[gate.channel] * math.tan(math.radians(body.spec.tilt_deg))
         return slope * (-1.0) ** np.arange(body.widths.size)
 
-    def _shadows(
-        self, gate: Gate, level: float, body: Body, path: Path, rng: np.random.Generator
-    ) -> list[Shadow]:
-        """Everything that darkens one beam."""
+    def _shadows(self, gate: Gate, level: float, body: Body, path: Path) -> list[Shadow]:
+        """Every rod that darkens one beam."""
         height = self.heights[gate.channel] - level
         middles = body.offsets + self._shift(body, gate)
-        shadows: list[Shadow] = []
-        for rod, (middle, width) in enumerate(zip(middles, body.widths, strict=True)):
-            if path.start + middle < height:
-                continue  # it hangs below the beam
-            shadows.append(
-                Shadow(
-                    path.time_at(height - middle + width / 2),
-                    path.time_at(height - middle - width / 2),
-                    rod,
-                )
+        return [
+            Shadow(
+                path.time_at(height - middle + width / 2),
+                path.time_at(height - middle - width / 2),
+                rod,
             )
-        shadows += string_shadows(shadows, self.dials.string, rng)
-        if path.hits and gate.height == min(g.height for g in self.gates if g.side == gate.side):
-            for hit in path.hits:
-                if rng.random() < self.dials.bounce:
-                    at = path.release_s + hit.time_s + float(rng.uniform(4e-3, 30e-3))
-                    shadows.append(Shadow(at, at + float(rng.uniform(2e-3, 10e-3)), NOT_A_ROD))
-        return shadows
+            for rod, (middle, width) in enumerate(zip(middles, body.widths, strict=True))
+            if path.start + middle >= height  # else it hangs below the beam
+        ]
 
-    def _began(
-        self, kind: type[AnyTruth], run: Run, attempt: int, edges: Sequence[SeenEdge]
-    ) -> AnyTruth:
-        """Begin to write a drop's truth."""
-        return kind(
-            run=run.number,
-            attempt=attempt,
-            incline_deg=run.incline_deg,
-            impact_chain=run.impact,
-            gravity_m_s2=self.protocol.gravity.value,
-            edges=[(e.time_s, e.channel, e.blocked, e.rod) for e in edges],
-        )
-
-    def _truth(
-        self,
-        run: Run,
-        attempt: int,
-        paths: dict[Side, tuple[Body, Path]],
-        edges: Sequence[SeenEdge],
-        rng: np.random.Generator,
-    ) -> Truth:
-        """Write down what really happened, for the judge of the analysis alone."""
-        truth = self._began(Truth, run, attempt, edges)
-        if "impact" not in paths:
-            return truth
-        body, path = paths["impact"]
-        hit_s = path.release_s + path.hits[-1].time_s
-        truth.speed_m_s = path.hits[-1].speed_before
-        truth.fall_time_s = path.hits[-1].time_s
+    def _truth(self, run: Run, attempt: int, paths: dict[Side, Path]) -> dict[str, Any]:
+        """Return what really happened, for the judge of the analysis alone."""
+        path, dials, hanging = paths["impact"], self.dials, self.hanging(run)
+        hit = path.hits[-1]
         # The top rod falls on, from where it passes the level or not so far.
         above = self.protocol.contact.strike.value + self._contact(run)
-        above += self.dials.strike_sd * float(self._drop_rng("strike", run, attempt).normal())
-        late, truth.speed_strike_m_s = path.last_at(above)
+        above += dials.strike_sd * float(self._drop_rng("strike", run, attempt).normal())
+        late, speed_strike = path.last_at(above)
+        truth = {
+            "speed_m_s": hit.speed_before,
+            "fall_time_s": hit.time_s,
+            "speed_strike_m_s": speed_strike,
+        }
         if "free" not in paths:
             return truth
-        free_body, fallen = paths["free"]
-        top = float(free_body.offsets[-1])
-        skew = fallen.release_s - path.release_s
-        truth.release_skew_s = skew
-        truth.separation_raw_m = fallen.height_at(hit_s) + top
-        truth.separation_m = fallen.height_at(hit_s + skew) + top
-        truth.separation_strike_m = fallen.height_at(hit_s + late + skew) + top - above
-        truth.camera_separation_m, truth.camera_speed_m_s = camera_reading(
-            lambda t: path.height_at(t) + float(body.offsets[-1]),
-            lambda t: fallen.height_at(t) + top,
-            hit_s,
-            rng,
-        )
-        return truth
+        free, top = paths["free"], float(hanging["free"].offsets[-1])
+        skew, hit_s = free.release_s - path.release_s, path.release_s + hit.time_s
+        return truth | {
+            "release_skew_s": skew,
+            "separation_raw_m": free.height_at(hit_s) + top,
+            "separation_m": free.height_at(hit_s + skew) + top,
+            "separation_strike_m": free.height_at(hit_s + late + skew) + top - above,
+        }
 
 
 def is_test(label: int) -> bool:

@@ -41,10 +41,8 @@ class LineFaults:
             chance = self._random.random()
             if chance < self._lose:
                 continue
-            if chance < self._lose + self._corrupt:
-                out.append(byte ^ self._random.randrange(1, 256))
-            else:
-                out.append(byte)
+            hurt = chance < self._lose + self._corrupt
+            out.append(byte ^ self._random.randrange(1, 256) if hurt else byte)
         return bytes(out)
 
 
@@ -65,7 +63,7 @@ class BadLine:
         self._ways = tuple(LineFaults(corrupt, lose, 2 * seed + n) for n in (0, 1))
         self._both = LineFaults(corrupt=busy, seed=seed)
 
-    def passed(self, to_host: bytes, to_board: bytes) -> tuple[bytes, bytes]:
+    def transfer(self, to_host: bytes, to_board: bytes) -> tuple[bytes, bytes]:
         """Pass on what is sent both ways at the same time."""
         towards_board, towards_host = self._ways
         to_host, to_board = towards_host.damage(to_host), towards_board.damage(to_board)

@@ -3,8 +3,8 @@
 ``sim://?protocol=FILE&seed=N&truth=FILE&pace=1&<dial>=<value>…``, for example
 ``sim://?protocol=protocols/inclined-uniform.yaml&seed=3&missed=2%25&skew_sd=4ms``. ``quiet=1``
 switches all disturbances off. The truth file gets one line of JSON a drop. With
-``dynamics=resolved`` chains fall in the resolved world; its drops are made a dozen at a time, for
-which the first of them waits some seconds. ``series=1`` has other drops fall on the rig of a seed.
+``dynamics=resolved`` chains fall in the resolved world. ``series=1`` has other drops fall on the
+rig of a seed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Serial(SimulatedSerial):
         """Hang the chains of the protocol that the URL names."""
         scene = set_scene("sim", read_settings(str(self.port)))
         self.clock = VirtualClock(scene.pace)
-        scene.disturb(self)
+        self.disturb(scene.seed, scene.dials)
         dials = scene.dials
         board = VirtualBoard(
             scene.lab,

@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from rig.errors import RigError
-from rig.link.messages import Phase
+from rig.link.messages import Phase, pack_label
 
 from .board import VirtualBoard
-from .board_interface import Board
+from .interfaces import Board
 from .line import BadLine
 from .scene import set_scene
 from .terminal import Terminal
@@ -38,8 +38,6 @@ DEAF_S = 0.065
 """So long an Arduino's reset pin is held low when its port is opened."""
 _TICK_S = 4e-3
 _CHUNK = 4096
-HELD = ("label", "fire_tick", "events", "crc32", "overflows")
-"""What the log tells of a drop's certificate."""
 
 
 class GlassBoard(Board, Protocol):
@@ -60,24 +58,6 @@ class GlassBoard(Board, Protocol):
     def held(self) -> tuple[dict[str, int], list[tuple[int, int]]]:
         """Tell what it keeps of the drop it holds: the certificate's main fields, the events."""
         ...
-
-
-class GlassVirtualBoard(VirtualBoard):
-    """A virtual board that can be looked into."""
-
-    def phase(self) -> int:
-        """Tell what it is doing."""
-        return self._controller.phase
-
-    def held(self) -> tuple[dict[str, int], list[tuple[int, int]]]:
-        """Tell what it keeps."""
-        drop = self._controller.drop
-        assert drop is not None
-        events: list[tuple[int, int]] = []
-        while part := drop.part(len(events), 40).snapshots:
-            events += [(event.tick, event.state) for event in part]
-        certificate = drop.certificate()
-        return {name: getattr(certificate, name) for name in HELD}, events
 
 
 class Bench:
@@ -171,7 +151,7 @@ class Bench:
         if self.terminal.look() and self._resets:
             self.board.reset(now_ns)
             self._deaf_until_ns = now_ns + round(DEAF_S * 1e9)
-        sent, heard = self._line.passed(self.board.line.arrived(now_ns), self.terminal.read())
+        sent, heard = self._line.transfer(self.board.line.read(now_ns), self.terminal.read())
         match self._mute:
             case "1":
                 sent = b""
@@ -200,14 +180,9 @@ class Bench:
         self._gap_s = 0.0
 
 
-def virtual(scene: Scene) -> GlassBoard:
-    """Put a virtual board before a scene."""
-    return GlassVirtualBoard(scene.lab, scene.seed, ppm=scene.dials.clock * 1e6)
-
-
 def main(
     arguments: Sequence[str] | None = None,
-    make: Callable[[Scene], GlassBoard] = virtual,
+    make: Callable[[Scene], GlassBoard] | None = None,
     scheme: str = "sim",
 ) -> int:
     """Run until stdin ends.
@@ -217,7 +192,7 @@ def main(
     arguments
         Of the command line.
     make, scheme
-        Which board, and what its URLs begin with.
+        Which board, by default a virtual one, and what its URLs begin with.
 
     Returns
     -------
@@ -243,8 +218,10 @@ def main(
     dials = dict(options.dial)
     try:
         scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
-        scene.get_ready()
-        board = make(scene)
+        # A board that answers in real time makes no drop while it is asked for.
+        scene.lab.make_ahead([pack_label(number, 1) for number in sorted(scene.lab.runs)])
+        ppm = scene.dials.clock * 1e6
+        board = make(scene) if make else VirtualBoard(scene.lab, scene.seed, ppm=ppm)
     except RigError as error:
         print(error, file=sys.stderr)
         return error.exit_code

@@ -41,6 +41,9 @@ class Recording:
         Whether ABORT came since: then the same label may be armed again.
     sense_tick
         When the release-sense input changed, or `None`.
+    release, restarts
+        For the certificate: ticks that the release was on and what ended it; restarts since
+        IDENTIFY.
     """
 
     def __init__(self, order: Arm, fire_tick: int, identity: Identity) -> None:
@@ -55,8 +58,8 @@ class Recording:
         self._overflows = 0
         self._glitches = 0
         self._late = 0
-        self._pulse_ticks = self._restarts = 0
-        self._pulse_end = PulseEnd.ORDERED
+        self.release = (0, PulseEnd.ORDERED)
+        self.restarts = 0
 
     def __len__(self) -> int:
         return len(self._events)
@@ -84,10 +87,6 @@ class Recording:
         self._glitches += state == (self._events[-1].state if self._events else 0)
         self._events.append(Event(tick, state))
 
-    def released(self, ticks: int, by: PulseEnd, restarts: int) -> None:
-        """Note how long the release was on, and what else only the board knows."""
-        self._pulse_ticks, self._pulse_end, self._restarts = ticks, by, restarts
-
     def part(self, first: int, count: int) -> EventsFrame:
         """Give some events, at most a frame full."""
         events = self._events[first : first + min(count, EVENTS_PER_FRAME)]
@@ -107,9 +106,9 @@ class Recording:
             late=self._late,
             sensed=int(self.sense_tick is not None),
             sense_tick=self.sense_tick or 0,
-            pulse_ticks=self._pulse_ticks,
-            pulse_end=self._pulse_end,
-            restarts=self._restarts,
+            pulse_ticks=self.release[0],
+            pulse_end=self.release[1],
+            restarts=self.restarts,
             supply_mv=_SUPPLY_MV,
             lowest_mv=_SUPPLY_MV,
         )

@@ -29,7 +29,7 @@ class Release:
         if now_ns < self._off_ns:
             self._off_ns, self._end = now_ns, by
 
-    def lasted(self) -> tuple[int, PulseEnd]:
+    def latest_pulse(self) -> tuple[int, PulseEnd]:
         """Nanoseconds of the latest pulse, once it is over, and what ended it."""
         return self._off_ns - self._on_ns, self._end
 

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
-from rig.link.messages import pack_label
 from rig.protocol import reader
 
-from .dials import read_dials
+from .dials import ResolvedDials, read_dials
 from .lab import ChainLab
 from .truth import append_truth
 
@@ -22,10 +21,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
     from .dials import Dials
-    from .serial_port import SimulatedSerial
     from .truth import Truth
-
-    Hang = Callable[[Protocol, Dials, int, Callable[[Truth], None]], ChainLab]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,18 +38,6 @@ class Scene:
     dials: Dials
     seed: int
     pace: int
-
-    def get_ready(self) -> None:
-        """Make all planned drops now, for a board that answers in real time."""
-        self.lab.make_ahead([pack_label(number, 1) for number in sorted(self.lab.runs)])
-
-    def disturb(self, port: SimulatedSerial) -> None:
-        """Make a port's line as bad as the dials say."""
-        dials = self.dials
-        port.disturb(
-            self.seed, jitter_s=dials.latency, stalled=dials.stalled, stall_s=dials.stall,
-            corrupt=dials.corrupt, lose=dials.lose,
-        )  # fmt: skip
 
     def second_ns(self) -> int | None:
         """Length of the wired reference's second; `None` where none is wired."""
@@ -82,53 +66,27 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
         raise InputError(
             f"{scheme}:// needs a scene to simulate", f"name one: {scheme}://?protocol=FILE.yaml"
         )
-    seed = _number(scheme, "seed", rest.pop("seed", "0"))
-    pace = _number(scheme, "pace", rest.pop("pace", "0"))
-    series = _number(scheme, "series", rest.pop("series", "0"))
+    numbers = ("seed", "pace", "series")
+    seed, pace, series = (_number(scheme, name, rest.pop(name, "0")) for name in numbers)
     truth = rest.pop("truth", "")
-    hang, rest = choose_world(rest, scheme)
     dials = read_dials(rest, scheme)
-    if truth:
-        _check_writable(scheme, Path(truth))
-
-    def tell(fact: Truth) -> None:
-        if truth:
-            append_truth(Path(truth), fact)
-
-    lab = hang(reader.read(source), dials, seed, tell)
-    lab.filmed, lab.series = bool(truth), series
+    path = Path(truth) if truth else None
+    if path is not None:
+        _check_writable(scheme, path)
+    lab = hang_chains(reader.read(source), dials, seed, partial(append_truth, path))
+    lab.series = series
     return Scene(lab, dials, seed, pace)
 
 
-def choose_world(settings: Mapping[str, str], scheme: str = "sim") -> tuple[Hang, dict[str, str]]:
-    """Find out behind which mechanics chains fall, and what is left for `read_dials`.
+def hang_chains(
+    protocol: Protocol, dials: Dials, seed: int, tell: Callable[[Truth], None]
+) -> ChainLab:
+    """Hang a protocol's chains in the world whose dials these are."""
+    if not isinstance(dials, ResolvedDials):
+        return ChainLab(protocol, dials, seed, tell)
+    from .resolved_lab import ResolvedLab  # noqa: PLC0415 - few ask for it
 
-    Returns
-    -------
-    hang
-        Makes the lab from protocol, dials, seed, and whom to tell the truth.
-    rest
-        Settings that are no dial of this world.
-
-    Raises
-    ------
-    InputError
-        A world that is none, or a dial of the resolved one out of range.
-    """
-    rest = dict(settings)
-    dynamics = rest.pop("dynamics", "model")
-    if dynamics == "model":
-        return ChainLab, rest
-    if dynamics != "resolved":
-        raise InputError(
-            f"{scheme}://: dynamics: {dynamics!r} is not known", "model or resolved is accepted"
-        )
-    from .resolved_dials import NAMES, read_resolved_dials  # noqa: PLC0415 - few ask for it
-    from .resolved_lab import ResolvedLab  # noqa: PLC0415
-
-    world = read_resolved_dials(rest, scheme)
-    others = {name: text for name, text in rest.items() if name not in NAMES}
-    return partial(ResolvedLab, world=world), others
+    return ResolvedLab(protocol, dials, seed, tell)
 
 
 def _check_writable(scheme: str, path: Path) -> None:

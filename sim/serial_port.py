@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from serial import PortNotOpenError, SerialBase, SerialException
 
 from .clock import VirtualClock
+from .dials import Dials
 from .line import LineFaults
 
 if TYPE_CHECKING:
-    from .board_interface import Board
+    from .interfaces import Board
 
 _CALL_NS = 1_000  # a call takes time too: without this, polling would stop the clock
 
@@ -30,7 +32,7 @@ class SimulatedSerial(SerialBase):
     clock
         Virtual time; a new one by default.
     jitter_s
-        See `disturb`.
+        Mean of the exponential delay with which the host sees a byte.
     reset_on_open
         Whether opening restarts the board, as DTR does to a Mega.
     **settings
@@ -50,39 +52,17 @@ class SimulatedSerial(SerialBase):
         self.clock = VirtualClock() if clock is None else clock
         self.board = board
         self.reset_on_open = reset_on_open
-        self.disturb(0, jitter_s=jitter_s)
+        self.disturb(0, replace(Dials.quiet(), latency=jitter_s))
         self._buffer = bytearray()
         self._line_free_ns = 0
         super().__init__(port, **settings)
 
-    def disturb(
-        self,
-        seed: int,
-        *,
-        jitter_s: float = 0.3e-3,
-        stalled: float = 0.0,
-        stall_s: float = 50e-3,
-        corrupt: float = 0.0,
-        lose: float = 0.0,
-    ) -> None:
-        """Choose latencies and line faults.
-
-        Parameters
-        ----------
-        seed
-            Same seed, same bytes.
-        jitter_s
-            Mean of the exponential delay with which the host sees a byte.
-        stalled, stall_s
-            Probability of a read to be held up besides, and for how long.
-        corrupt, lose
-            Probability of each byte, either way, to be changed or lost.
-        """
+    def disturb(self, seed: int, dials: Dials) -> None:
+        """Choose the line's latency, stalls and faults; same seed, same bytes."""
         self._random = random.Random(f"latency {seed}")
-        self._jitter_s = jitter_s
-        self._stalled, self._stall_s = stalled, stall_s
-        self._to_board = LineFaults(corrupt, lose, seed=2 * seed)
-        self._to_host = LineFaults(corrupt, lose, seed=2 * seed + 1)
+        self._dials = dials
+        self._to_board = LineFaults(dials.corrupt, dials.lose, seed=2 * seed)
+        self._to_host = LineFaults(dials.corrupt, dials.lose, seed=2 * seed + 1)
 
     def make_board(self) -> Board:
         """Build the board that `self.port` names; may call `disturb` too."""
@@ -123,7 +103,7 @@ class SimulatedSerial(SerialBase):
             Fewer when the time-out is over.
         """
         board = self._pass(_CALL_NS)
-        clock = self.clock
+        clock, dials = self.clock, self._dials
         end_ns = None if self.timeout is None else clock.now_ns() + round(self.timeout * 1e9)
         while len(self._buffer) < size:
             next_ns, arrives = self.upcoming(board, end_ns)
@@ -134,10 +114,10 @@ class SimulatedSerial(SerialBase):
                 self._pass(0)
                 break
             clock.advance_to(next_ns or 0)
-            if arrives and self._jitter_s > 0:
-                clock.sleep(self._random.expovariate(1 / self._jitter_s))
-            if arrives and self._stalled > 0 and self._random.random() < self._stalled:
-                clock.sleep(self._stall_s)
+            if arrives and dials.latency > 0:
+                clock.sleep(self._random.expovariate(1 / dials.latency))
+            if arrives and dials.stalled > 0 and self._random.random() < dials.stalled:
+                clock.sleep(dials.stall)
             self._pass(0)
         data = bytes(self._buffer[:size])
         del self._buffer[:size]
@@ -194,7 +174,7 @@ class SimulatedSerial(SerialBase):
             self.clock.advance_to(self.clock.now_ns() + ns)
         now_ns = self.clock.now_ns()
         self.board.advance(now_ns)
-        self._buffer += self._to_host.damage(self.board.line.arrived(now_ns))
+        self._buffer += self._to_host.damage(self.board.line.read(now_ns))
         return self.board
 
     def _reconfigure_port(self) -> None:

@@ -19,7 +19,7 @@ class Snapshot(NamedTuple):
 
 
 def take_snapshots(
-    changes: Iterable[tuple[float, int, bool]], initial: int, gates: int, hz: float
+    changes: Iterable[tuple[float, int, bool]], gates: int, hz: float
 ) -> list[Snapshot]:
     """Turn changes of single beams into snapshots of all gates.
 
@@ -27,10 +27,8 @@ def take_snapshots(
     ----------
     changes
         Seconds after fire, channel, blocked; in order of time.
-    initial
-        Gate mask before.
     gates
-        Mask of the gates that are watched.
+        Mask of the gates that are watched; all of them are clear before.
     hz
         The device's true tick rate.
 
@@ -40,8 +38,8 @@ def take_snapshots(
         In order of time. A pulse too short to be seen leaves one with the state of the one before.
     """
     snapshots: list[Snapshot] = []
-    state = initial & gates
-    for seconds, flipped in _looks(changes, initial, gates):
+    state = 0
+    for seconds, flipped in _looks(changes, gates):
         state ^= flipped
         ticks = round(seconds * hz)
         if snapshots and snapshots[-1].ticks == ticks:
@@ -50,13 +48,11 @@ def take_snapshots(
     return snapshots
 
 
-def _looks(
-    changes: Iterable[tuple[float, int, bool]], initial: int, gates: int
-) -> list[tuple[float, int]]:
+def _looks(changes: Iterable[tuple[float, int, bool]], gates: int) -> list[tuple[float, int]]:
     """When the interrupt looks, and which gate differs then: none after a glitch."""
     looks: list[tuple[float, int]] = []
     last: dict[int, int] = {}  # index of each channel's last change that was seen
-    state = initial
+    state = 0
     for seconds, channel, blocked in changes:
         bit = 1 << channel
         if not gates & bit or bool(state & bit) == blocked:

@@ -47,9 +47,7 @@ class Terminal:
     @property
     def path(self) -> str:
         """Where other programs find it; empty while it is pulled."""
-        if self._far is None:
-            return ""
-        return str(self.link) if self.link is not None else self._name
+        return "" if self._far is None else str(self.link or self._name)
 
     @property
     def is_in(self) -> bool:
@@ -101,9 +99,7 @@ class Terminal:
             Those of `descriptors` that have something.
         """
         # A line that nobody has open hangs up all the time, and would end each waiting at once.
-        watched = (
-            [*descriptors] if self._far is None or not self.is_open else [*descriptors, self._far]
-        )
+        watched = [*descriptors, *([self._far] if self._far is not None and self.is_open else [])]
         readable, _, _ = select.select(watched, [], [], seconds)
         return [descriptor for descriptor in descriptors if descriptor in readable]
 

@@ -48,7 +48,7 @@ class Transmitter:
         """Say when the host gets the next byte."""
         return self._out[0][0] + self.byte_ns if self._out else None
 
-    def arrived(self, now_ns: int) -> bytes:
+    def read(self, now_ns: int) -> bytes:
         """Take what has reached the host by now."""
         got = b""
         while self._out:

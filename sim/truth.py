@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,12 +33,27 @@ class Truth:
     speed_strike_m_s: float | None = None
     fall_time_s: float | None = None
     release_skew_s: float | None = None
+
+
+@dataclass(slots=True)
+class ResolvedTruth(Truth):
+    """The truth of a resolved drop.
+
+    Where the top rod strikes before the level, on rods that lie there, at level is when it would
+    have passed had it fallen on. ``camera`` is read off as by the paper's camera. ``track`` are
+    heights of both top rods until the strike, each counted from its own release.
+    """
+
     camera_separation_m: float | None = None
     camera_speed_m_s: float | None = None
+    strike_time_s: float | None = None
+    contact_height_m: float | None = None
+    track: dict[str, list[float]] | None = None
 
 
-def append_truth(path: Path, truth: Truth) -> None:
-    """Add one drop's truth as a line of JSON."""
-    row = {spec.name: getattr(truth, spec.name) for spec in fields(truth)}
+def append_truth(path: Path | None, truth: Truth) -> None:
+    """Add one drop's truth as a line of JSON to a file, if there is one."""
+    if path is None:
+        return
     with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row) + "\n")
+        file.write(json.dumps(asdict(truth)) + "\n")

@@ -39,6 +39,11 @@ def texts(tree):
     }
 
 
+def name_of(node):
+    """The last name of what is called, or of what that is of."""
+    return getattr(node, "attr", getattr(node, "id", ""))
+
+
 @cache
 def raised_codes():
     """Codes that calls name, with the file and the call that does."""
@@ -47,8 +52,8 @@ def raised_codes():
         for call in ast.walk(tree):
             if not isinstance(call, ast.Call):
                 continue
-            names = re.findall(r"\w+", ast.unparse(call.func))
-            at = RAISERS.get(names[-1], RAISERS.get(".".join(names[-2:])))
+            last, before = name_of(call.func), name_of(getattr(call.func, "value", None))
+            at = RAISERS.get(last, RAISERS.get(f"{before}.{last}"))
             if at is not None and len(call.args) > at:
                 raised += [(path, text, call) for text in texts(call.args[at])]
     return raised

@@ -48,30 +48,21 @@ def test_every_unit_agrees_with_pint(registry, unit):
 
 
 @pytest.mark.parametrize(
-    ("text", "value", "u"),
-    [
-        ("180 mm", 0.18, 0.0),
-        ("180 ± 2 mm", 0.18, 0.002),
-        ("180 mm ± 2 mm", 0.18, 0.002),
-        ("1.2 m ± 2 mm", 1.2, 0.002),
-        ("1.2 m +/- 0.2 cm", 1.2, 0.002),
-        ("180+-2mm", 0.18, 0.002),
-        ("(180 ± 2) mm", 0.18, 0.002),
-        ("180(2) mm", 0.18, 0.002),
-        ("1.165(12) m", 1.165, 0.012),
-        ("48.5 mm", 0.0485, 0.0),
-        ("−3.5e1 um", -3.5e-5, 0.0),
-        ("12 µm", 1.2e-5, 0.0),
-        ("12 μm", 1.2e-5, 0.0),
-    ],
-)
-def test_lengths_are_read_to_the_last_bit(text, value, u):
-    assert parse(text, Dimension.LENGTH) == Quantity(value, u)
-
-
-@pytest.mark.parametrize(
     ("text", "dimension", "value", "u"),
     [
+        ("180 mm", Dimension.LENGTH, 0.18, 0.0),
+        ("180 ± 2 mm", Dimension.LENGTH, 0.18, 0.002),
+        ("180 mm ± 2 mm", Dimension.LENGTH, 0.18, 0.002),
+        ("1.2 m ± 2 mm", Dimension.LENGTH, 1.2, 0.002),
+        ("1.2 m +/- 0.2 cm", Dimension.LENGTH, 1.2, 0.002),
+        ("180+-2mm", Dimension.LENGTH, 0.18, 0.002),
+        ("(180 ± 2) mm", Dimension.LENGTH, 0.18, 0.002),
+        ("180(2) mm", Dimension.LENGTH, 0.18, 0.002),
+        ("1.165(12) m", Dimension.LENGTH, 1.165, 0.012),
+        ("48.5 mm", Dimension.LENGTH, 0.0485, 0.0),
+        ("−3.5e1 um", Dimension.LENGTH, -3.5e-5, 0.0),
+        ("12 µm", Dimension.LENGTH, 1.2e-5, 0.0),
+        ("12 μm", Dimension.LENGTH, 1.2e-5, 0.0),
         ("0.50 ± 0.05", Dimension.NUMBER, 0.5, 0.05),
         ("5 %", Dimension.NUMBER, 0.05, 0.0),
         ("50 % ± 5 %", Dimension.NUMBER, 0.5, 0.05),
@@ -84,7 +75,7 @@ def test_lengths_are_read_to_the_last_bit(text, value, u):
         ("90 km/h", Dimension.SPEED, 25.0, 0.0),
     ],
 )
-def test_other_dimensions(text, dimension, value, u):
+def test_quantities_are_read_to_the_last_bit(text, dimension, value, u):
     assert parse(text, dimension) == Quantity(value, u)
 
 
@@ -108,7 +99,9 @@ def test_other_dimensions(text, dimension, value, u):
         ("5 mm ± 2 %", Dimension.LENGTH, "is a plain number"),
         ("0.5 ± 10 %", Dimension.NUMBER, "two meanings"),
         ("5(1) ± 1 mm", Dimension.LENGTH, "two uncertainties"),
-        ("1,5 mm", Dimension.LENGTH, "not a comma: 1.5 mm"),
+        ("15,0 cm", Dimension.LENGTH, "not a comma: 15.0 cm"),
+        ("1,5 ± 0,2 cm", Dimension.LENGTH, "not a comma: 1.5 ± 0.2 cm"),
+        ("(1,5 ± 0,2) cm", Dimension.LENGTH, "not a comma: (1.5 ± 0.2) cm"),
         ("", Dimension.LENGTH, "found ''"),
         ("9" * 101, Dimension.NUMBER, "101 characters"),
     ],
@@ -163,9 +156,3 @@ def test_any_text_is_a_quantity_or_a_unit_error(text, dimension):
 )
 def test_formatting(quantity, unit, text):
     assert format_quantity(quantity, unit) == text
-
-
-@pytest.mark.parametrize("text", ["15,0 cm", "1,5 ± 0,2 cm", "(1,5 ± 0,2) cm"])
-def test_a_decimal_comma_is_named(text):
-    with pytest.raises(UnitError, match="write a decimal point, not a comma"):
-        parse(text, Dimension.LENGTH)

@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.analysis.result import DropResult
     from rig.arrays import Array
     from rig.protocol.protocol import Gate, Protocol, Side
     from rig.records import Drop
@@ -149,31 +146,3 @@ def _parabola(times: Array, heights: Array, gravity: float) -> tuple[float, floa
         ::-1
     ]
     return float(height), -float(slope), last
-
-
-def plain_fit(protocol: Protocol, drop: Drop, result: DropResult, hz: float) -> None:
-    """Fit each gate side's matched edges by a plain numpy least-squares fit, for its time alone.
-
-    One row an edge, one column an unknown that the analysis has as well: release, start, a place
-    a rod and a height a gate; linear, solved once.
-    """
-    assert protocol.gates is not None
-    numbers = {gate.channel: n for n, gate in enumerate(protocol.gates.gates)}
-    for side in ("impact", "free"):
-        channels = {gate.channel for gate in protocol.gates.gates if gate.side == side}
-        rows = [(n, rod) for n, rod in result.matches.items() if drop.edges[n].channel in channels]
-        if rows:
-            _solve(drop, rows, numbers, hz)
-
-
-def _solve(drop: Drop, rows: Sequence[tuple[int, int]], numbers: dict[int, int], hz: float) -> None:
-    times = np.array([drop.edges[n].tick for n, _ in rows]) / hz
-    rods = np.array([rod for _, rod in rows])
-    gates = np.array([numbers[drop.edges[n].channel] for n, _ in rows])
-    places = rods.max() + 1
-    design = np.zeros((times.size, 3 + places + gates.max() + 1))
-    design[:, 0], design[:, 1], design[:, 2] = 1.0, times, times**2
-    row = np.arange(times.size)
-    design[row, 3 + rods] = 1.0
-    design[row, 3 + places + gates] = 1.0
-    np.linalg.lstsq(design, times, rcond=None)

@@ -1,28 +1,37 @@
-"""Tables of studies: a heading and how a record fills the cell, as text."""
+"""Tables of studies: which number of a row stands below which heading, and how it is written."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-T = TypeVar("T")
+    from collections.abc import Mapping, Sequence
 
 
-class Column(NamedTuple, Generic[T]):
-    """A heading with its unit, and how a record fills the cell."""
+class Column(NamedTuple):
+    """A heading with its unit, the key of its values, and their format and scale.
+
+    What has no format is words, which begin under each other.
+    """
 
     heading: str
-    cell: Callable[[T], str]
-    numeric: bool = True
+    key: str
+    form: str = ""
+    scale: float = 1
+
+    def cell(self, row: Mapping[str, Any]) -> str:
+        """Write the value of a row; a dash where there is none."""
+        value = row.get(self.key)
+        if value is None or not self.form:
+            return "–" if value is None else str(value)
+        return format(self.scale * value, self.form)
 
 
-def aligned(columns: Sequence[Column[T]], records: Sequence[T]) -> list[str]:
-    """Write records as lines of aligned text below their headings; none of no records."""
-    rows = [[column.cell(record) for column in columns] for record in records]
-    words = {place for place, column in enumerate(columns) if not column.numeric}
+def aligned(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Write rows as lines of aligned text below their headings; none of no rows."""
+    words = {place for place, column in enumerate(columns) if not column.form}
     heading = [column.heading for column in columns]
-    return text_table([heading, *rows], left=words, rule=True) if rows else []
+    cells = [[column.cell(row) for column in columns] for row in rows]
+    return text_table([heading, *cells], left=words, rule=True) if rows else []

@@ -1,4 +1,4 @@
-"""Does U hold the true value? Rigs drawn by a Latin hypercube, each in one of three worlds.
+"""Does U hold the true value? Rigs drawn by a Latin hypercube, each in one of several worlds.
 
 A rig is gates, chains, an incline, drops and dials of its world, and is off by as much as its
 protocol states. Rigs are independent of each other; drops on one rig share its errors.
@@ -8,24 +8,28 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter, defaultdict
+from collections import defaultdict
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from statistics import fmean
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import yaml
 
-from bench.studies.errors import Errors, shares_held
+from bench.studies.columns import Column, aligned
+from bench.studies.falls import Asked, SimulatedDrop, falls, simulation
+from bench.studies.scores import Score, shares_held, total
 from bench.studies.sessions import SimulatedSession, without_device
 from bench.workers import results
+from rig.analysis.comparison import compare
 from rig.analysis.gravity import check_gravity
-from rig.analysis.result import GOOD, Measured
-from rig.bench.falls import Asked, SimulatedDrop, falls, simulation
+from rig.analysis.result import Measured
+from rig.analysis.summary import good_cases
 from rig.bench.findings import Findings
 from rig.commands.output import progress, say
 from rig.errors import InputError
@@ -52,16 +56,12 @@ SHIPPED = (
 GATES = ((1, 1), (1, 3), (2, 2), (3, 5), (4, 4), (5, 5), (8, 8))
 """Gates of the impact side and of the free side, at drawn heights."""
 DROPS = (1, 4, 12)
+"""At each incline."""
 RODS = (16, 36)
 LAYOUTS = (
     *(f"{impact} + {free}" for impact, free in GATES),
     *(Path(name).stem for name in SHIPPED),
 )
-INCLINES = {"model": (0.0, 80.0), "resolved": (35.0, 80.0), "mujoco": (35.0, 80.0)}
-"""°; below some 30° real rods land on a pile, which the model describes by a coefficient."""
-COEFFICIENTS = "coefficients"
-"""The model's world, one drop at each of nine inclines: are β and μ within their U?"""
-WORLDS = (*INCLINES, COEFFICIENTS)
 DIALS = {
     "drag": (0.0, 0.03, ""),
     "string_restitution": (0.1, 0.7, ""),
@@ -69,7 +69,53 @@ DIALS = {
     "swing_sd": (0.0, 5.0, " cm/s"),
     "off_centre_sd": (0.0, 3.0, " mm"),
 }
-"""Ranges of the simulation's dials; the model's world has the first alone."""
+"""Ranges of the simulation's dials."""
+
+
+class World(NamedTuple):
+    """Where rigs are drawn, and how many there are by default.
+
+    Attributes
+    ----------
+    inclines
+        Range of the one incline of each rig, °; where there is none, each rig has nine.
+    dials
+        Those of `DIALS` that are drawn: what the protocol does not know.
+    settings
+        Others of the simulation.
+    repeats
+        Drops at each incline, one of these.
+    layouts
+        Places in `LAYOUTS`.
+    module
+        Of the simulation.
+    """
+
+    rigs: int
+    inclines: tuple[float, float] | None
+    dials: tuple[str, ...] = ()
+    settings: Mapping[str, str] = MappingProxyType({})
+    repeats: tuple[int, ...] = DROPS
+    layouts: range = range(len(LAYOUTS))
+    module: str = "sim.edges"
+
+
+COEFFICIENTS = "coefficients"
+"""The model's world, one drop at each of nine inclines: are β and μ within their U?"""
+_STATED = {"stated": "1"}
+_RESOLVED = {"dynamics": "resolved", **_STATED}
+# Below some 30° real rods land on a pile, which the model describes by a coefficient.
+WORLDS = {
+    "model": World(200, (0.0, 80.0), ("drag",), _STATED),
+    "resolved": World(200, (35.0, 80.0), (*DIALS,), _RESOLVED),
+    "mujoco": World(40, (35.0, 80.0), (*DIALS,), _RESOLVED, module="bench.studies.mujoco_world"),
+    COEFFICIENTS: World(20, None, ("drag",), _STATED | {"impact_error": "0"}, repeats=(1,)),
+    "stated": World(100, None, settings=_STATED, layouts=range(len(GATES), len(GATES) + 1)),
+    "usual": World(10, None, layouts=range(len(GATES), len(GATES) + 1)),
+}
+"""In all but the last each rig is wrong by as much as its protocol states; in the last two all is
+as the model has it, so that it should be refuted as rarely as p says."""
+_NINE = [f"{degrees} deg" for degrees in range(0, 90, 10)]
 _GAP_MM = 1165.0 / 24  # between rods of the paper's chain
 _DROP_MM = 180.0
 _CLEAR_MM = 15.0  # from the lowest rod
@@ -78,18 +124,18 @@ _SEEDS = 10_000  # rigs of one cube at most
 _AVERAGED = ("separation_m", "speed_m_s")
 _STEADY = {"impulse_sd": "0", "hang_sd": "0 mm", "skew_sd": "0 ms"}
 """What differs from drop to drop: a mean over drops estimates the drop without it."""
-MODULES = {"mujoco": "bench.studies.mujoco_world"}
-RIGS = {"model": 200, "resolved": 200, "mujoco": 40, COEFFICIENTS: 20}
 _CHUNK = 4  # rigs for one process of the simulation
 _HEAD = """\
 # Does U hold the true value?
 
 `./run bench coverage`: rigs drawn by a Latin hypercube over layout, rods, incline, drops a session
 and what the protocol does not know: air, and in the resolved world strings, swing and place along
-the beams. Each rig is wrong by as much as its protocol states. 95 % of the intervals should hold
-the true value. ± of a share is from rig to rig. *rms / u*: rms error over the stated standard
-uncertainty. Void shares leave out drops beyond the limit of release skew. The worst tenth of rigs
-stands below each world: the same `--rigs` and `--seed` with `--only NUMBER` draw a rig again."""
+the beams. Each rig is wrong by as much as its protocol states, but in the world *usual*, where it
+is as good as rigs usually are. 95 % of the intervals should hold the true value. ± of a share is
+from rig to rig. *rms / u*: rms error over the stated standard uncertainty. Void shares leave out
+drops beyond the protocol's limits. The worst tenth of rigs stands below each world: the same
+`--rigs` and `--seed` with `--only NUMBER` draw a rig again. Where the model is true, its p should
+be uniform (*KS*: Kolmogorov and Smirnov), and |Eₙ| above 1 in at most 5 %."""
 _TABULATED = (
     "separation_m", "separation_raw_m", "separation_strike_m", "speed_m_s", "speed_strike_m_s",
     "release_skew_s", "fall_time_s",
@@ -131,9 +177,8 @@ class Rig:
         path = folder / f"{self.number}.yaml"
         path.write_text(self.text, encoding="utf-8")
         dials = {name: f"{value:g}{DIALS[name][2]}" for name, value in self.dials.items()}
-        extra = {"dynamics": "resolved"} if "string_strain" in self.dials else {}
-        extra |= {"impact_error": "0"} if self.world == COEFFICIENTS else {}  # true as stated
-        url = simulation(path, dials | extra | dict(settings or {}), "sim://?stated=1")
+        dials |= {**WORLDS[self.world].settings, **(settings or {})}
+        url = simulation(path, dials)
         runs = [run.number for run in planned(reader.parse(self.text))]
         return Asked(url, [self.seed], [runs])
 
@@ -143,72 +188,43 @@ class Rig:
         return {name: getattr(self, name) for name in names} | dict(self.dials)
 
 
-class Interval(NamedTuple):
-    """A result beside the true value."""
-
-    quantity: str
-    measured: Measured
-    true: float
-
-    @property
-    def ratio(self) -> float:
-        """|error| over U."""
-        return abs(self.measured.value - self.true) / self.measured.expanded
-
-
 @dataclass(slots=True)
 class RigResult:
-    """What became of a rig's drops.
+    """What became of a rig's drops, and of what they say together.
 
     Attributes
     ----------
-    intervals, session
-        Of the drops; of what the whole session says.
-    verdicts, beyond
-        How many of each; void drops that truly are beyond the protocol's limit of skew.
-    reasons
-        First ones of the other void and marginal drops.
-    wrong
-        Edges given to another rod than they came from.
-    seconds
-        Processor time of the analysis.
+    agreement
+        Of each quantity with a model that is true: p of χ², and |Eₙ| of each incline.
     """
 
     rig: Rig
-    intervals: list[Interval] = field(default_factory=list)
-    session: list[Interval] = field(default_factory=list)
-    verdicts: Counter[str] = field(default_factory=Counter)
-    beyond: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
-    wrong: int = 0
-    seconds: float = 0.0
+    drops: Score = field(default_factory=Score)
+    session: Score = field(default_factory=Score)
+    agreement: dict[str, tuple[float, list[float]]] = field(default_factory=dict)
 
     @property
-    def void(self) -> int:
-        """Drops that are void without need."""
-        return self.verdicts.total() - sum(self.verdicts[good] for good in GOOD) - self.beyond
+    def ratios(self) -> list[tuple[float, str]]:
+        """|error| over U of every interval, with its quantity."""
+        errors = self.drops.errors
+        return [(ratio, name) for name in errors for ratio in errors[name].ratios]
 
     @property
     def held(self) -> float:
         """Share of the drops' intervals that hold the true value; 1 where there is none."""
-        return fmean(each.ratio <= 1.0 for each in self.intervals) if self.intervals else 1.0
-
-    @property
-    def worst(self) -> Interval | None:
-        """The interval with the largest |error| over U."""
-        return max(self.intervals, key=lambda interval: interval.ratio, default=None)
+        return fmean(ratio <= 1.0 for ratio, _ in self.ratios) if self.ratios else 1.0
 
     def row(self) -> dict[str, Any]:
         """Return a line of the table of rigs."""
-        worst = self.worst
+        ratio, quantity = max(self.ratios, default=(None, None))
         return self.rig.row() | {
-            "void": self.void,
-            "wrong": self.wrong,
-            "intervals": len(self.intervals),
+            "void": self.drops.void,
+            "wrong": self.drops.wrong_edges,
+            "intervals": len(self.ratios),
             "held": self.held,
-            "worst_ratio": worst.ratio if worst else None,
-            "worst_quantity": worst.quantity if worst else None,
-            "ms_per_drop": 1e3 * self.seconds / self.verdicts.total(),
+            "worst_ratio": ratio,
+            "worst_quantity": quantity,
+            "ms_per_drop": 1e3 * self.drops.seconds / self.drops.verdicts.total(),
         }
 
 
@@ -235,25 +251,26 @@ def _draw(
     world: str, number: int, seed: int, shares: Sequence[float], shipped: Sequence[str]
 ) -> Rig:
     """Make a rig from its place on each axis of the cube."""
-    sizes = (len(LAYOUTS), RODS[1] - RODS[0] + 1, len(DROPS))
-    layout, rods, drops = (int(share * size) for share, size in zip(shares, sizes, strict=False))
+    kind = WORLDS[world]
+    axes = kind.layouts, range(RODS[0], RODS[1] + 1), kind.repeats
+    layout, rods, repeats = (
+        axis[int(share * len(axis))] for share, axis in zip(shares, axes, strict=False)
+    )
     scene = yaml.safe_load(shipped[max(0, layout - len(GATES))])
-    incline = round(_scale(shares[3], *INCLINES.get(world, (0.0, 0.0))), 1)
-    scene["plan"] = {"order": "ABBA", "incline": f"{incline:g} deg", "repeats": DROPS[drops]}
-    if world == COEFFICIENTS:
-        scene["plan"] |= {"incline": [f"{deg} deg" for deg in range(0, 90, 10)], "repeats": 1}
-    _hang(scene, RODS[0] + rods)
+    incline = round(_scale(shares[3], *(kind.inclines or (0.0, 0.0))), 1)
+    inclines = f"{incline:g} deg" if kind.inclines else _NINE
+    scene["plan"] = {"order": "ABBA", "incline": inclines, "repeats": repeats}
+    _hang(scene, rods)
     if layout < len(GATES):
         _place_gates(scene, GATES[layout], np.random.default_rng(seed))
     dials = {
         name: round(_scale(share, *DIALS[name][:2]), 5)
         for name, share in zip(DIALS, shares[4:], strict=True)
-        if name == "drag" or world in {"resolved", "mujoco"}
+        if name in kind.dials
     }
     text = json.dumps(scene)
     protocol = reader.parse(text)
-    count = protocol.chains["A"].chain.rods
-    drops = len(planned(protocol))
+    count, drops = protocol.chains["A"].chain.rods, len(planned(protocol))
     heights = _heights(scene)
     return Rig(world, number, seed, LAYOUTS[layout], heights, incline, count, drops, dials, text)
 
@@ -310,87 +327,90 @@ def measure(rigs: Sequence[Rig]) -> list[RigResult]:
     RigError
         The simulation gave up.
     """
-    module = MODULES.get(rigs[0].world, "sim.edges")
+    module = WORLDS[rigs[0].world].module
     protocols = [reader.parse(rig.text) for rig in rigs]
     with TemporaryDirectory() as folder:
         asked = [rig.ask(Path(folder)) for rig in rigs]
         sessions = [*without_device([*zip(protocols, asked, strict=True)], module)]
-        outcomes = [_judge(*pair) for pair in zip(rigs, sessions, strict=True)]
+        outcomes = [_compare(*pair) for pair in zip(rigs, sessions, strict=True)]
         if rigs[0].world == "model":
             steady = falls([rig.ask(Path(folder), _STEADY) for rig in rigs], module)
             for outcome, session in zip(outcomes, sessions, strict=True):
-                outcome.session += _means(session, [*islice(steady, len(session.drops))])
+                _add_means(outcome, session, [*islice(steady, len(session.drops))])
     return outcomes
 
 
-def _judge(rig: Rig, session: SimulatedSession) -> RigResult:
-    """Judge what the drops of a rig and all together say."""
-    limit = session.protocol.accept.release_skew
-    outcome = RigResult(rig, seconds=session.analysis_s)
+def _compare(rig: Rig, session: SimulatedSession) -> RigResult:
+    """Set what the drops of a rig say, and all together, beside what is true."""
+    protocol, analysis, number = session.protocol, session.analysis, rig.number
+    outcome = RigResult(rig)
+    outcome.drops.seconds = session.analysis_s
     for result, fall, _ in session.results():
-        outcome.verdicts[result.verdict] += 1
-        void = result.verdict not in GOOD
-        beyond = void and abs(fall.truth["release_skew_s"]) > limit
-        outcome.beyond += beyond
-        if result.verdict != "accepted" and not beyond:
-            outcome.reasons.update(f"{result.verdict}: {reason}" for reason in result.reasons[:1])
-        if not void:
-            outcome.wrong += fall.rods(result.matches)[0]
-            outcome.intervals += [
-                Interval(name, measured, fall.truth[name])
-                for name, measured in result.quantities.items()
-                if fall.truth.get(name) is not None
-            ]
-    outcome.session += _shared(rig, session)
-    return outcome
-
-
-def _means(session: SimulatedSession, steady: Sequence[SimulatedDrop]) -> Iterator[Interval]:
-    """Yield means over drops beside those of drops that do not scatter."""
-    for line in session.analysis.summary:
-        for name in _AVERAGED:
-            true = fmean(fall.truth[name] for fall in steady)
-            yield Interval(f"mean {name}", line.means[name], true)
-
-
-def _shared(rig: Rig, session: SimulatedSession) -> Iterator[Interval]:
-    """Yield what drops of one rig say together, and what is true: g, κ, and coefficients."""
-    protocol, analysis = session.protocol, session.analysis
+        outcome.drops.add_drop(protocol, result, fall, number)
+    together = outcome.session
     check = check_gravity(protocol, analysis.runs)
     if check is not None:
         true = next(fall.truth for fall, _ in session.drops.values())["gravity_m_s2"]
-        yield Interval("gravity_m_s2", check.measured, true)
+        together.add_error("gravity_m_s2", check.measured, true, number)
     if analysis.joint is not None:
         joint, at = analysis.joint, analysis.joint.shared.blocks["drag"].start
         u = math.sqrt(joint.covariance[at, at]) * float(joint.sd[at])
-        yield Interval("drag_per_m", Measured(float(joint.x[at]), u), rig.dials["drag"])
+        air = Measured(float(joint.x[at]), u)
+        together.add_error("drag_per_m", air, rig.dials.get("drag"), number)
     if rig.world == COEFFICIENTS:
         coefficients = estimate(protocol, analysis).coefficients
         for each in coefficients.parameters if coefficients is not None else ():
             if each.identified:
-                yield Interval(each.name, each.least_squares, each.stated.value)
+                together.add_error(each.name, each.least_squares, each.stated.value, number)
+    if not rig.dials:
+        for comparison in compare(protocol, good_cases(protocol, analysis.runs)):
+            errors = [abs(line.normalized_error or 0.0) for line in comparison.differences]
+            outcome.agreement[comparison.quantity] = comparison.p, errors
+    return outcome
 
 
-def summarize(results: Iterable[RigResult], *, session: bool = False) -> dict[str, Any]:
+def _add_means(
+    outcome: RigResult, session: SimulatedSession, steady: Sequence[SimulatedDrop]
+) -> None:
+    """Set means over drops beside those of drops that do not scatter."""
+    for line in session.analysis.summary:
+        for name in _AVERAGED:
+            true = fmean(fall.truth[name] for fall in steady)
+            outcome.session.add_error(f"mean {name}", line.means[name], true, outcome.rig.number)
+
+
+def summarize(outcomes: Iterable[RigResult]) -> dict[str, Any]:
     """Sum up rigs; shares have standard errors from rig to rig."""
-    rigs = [*results]
-    drops = sum(rig.verdicts.total() for rig in rigs)
-    fair = max(1, drops - sum(rig.beyond for rig in rigs))
-    errors: dict[str, Errors] = defaultdict(Errors)
-    for rig in rigs:
-        for name, measured, true in rig.session if session else rig.intervals:
-            errors[name].add(measured, true, rig.rig.number)
-    return {
-        "rigs": len(rigs),
-        "drops": drops,
-        "beyond": drops - fair,
-        "void_share": sum(rig.void for rig in rigs) / fair,
-        "marginal_share": sum(rig.verdicts["marginal"] for rig in rigs) / fair,
-        "wrong": sum(rig.wrong for rig in rigs),
-        "ms_per_drop": 1e3 * sum(rig.seconds for rig in rigs) / max(1, drops),
-        "quantities": {name: errors[name].json() for name in errors},
-        "reasons": dict(sum((rig.reasons for rig in rigs), Counter[str]()).most_common()),
-    }
+    rigs = [*outcomes]
+    return {"rigs": len(rigs)} | total(rig.drops for rig in rigs).json()
+
+
+def agreement(outcomes: Sequence[RigResult]) -> Iterator[dict[str, Any]]:
+    """Yield how often sessions refute the model that made them, by quantity and drops."""
+    from scipy.stats import kstest  # noqa: PLC0415 - takes a second
+
+    rigs: dict[tuple[str, int], list[tuple[float, list[float]]]] = defaultdict(list)
+    for outcome in outcomes:
+        for quantity, comparison in outcome.agreement.items():
+            rigs[quantity, outcome.rig.drops].append(comparison)
+    for (quantity, drops), comparisons in sorted(rigs.items()):
+        p = np.array([each for each, _ in comparisons])
+        beyond = [np.mean(np.array(errors) > 1.0) for _, errors in comparisons]
+        yield {
+            "quantity": MEASURANDS[quantity].symbol, "drops": drops, "sessions": p.size,
+            "ks_p": float(kstest(p, "uniform").pvalue),
+            **{f"p_below_{level}": float(np.mean(p < level)) for level in (0.01, 0.05, 0.5, 0.95)},
+            "beyond": float(np.mean(beyond)), "beyond_se": float(np.std(beyond) / p.size**0.5),
+        }  # fmt: skip
+
+
+_AGREEMENT = (
+    Column("model", "quantity"), Column("drops", "drops", "d"), Column("sessions", "sessions", "d"),
+    Column("KS", "ks_p", ".2f"), Column("p < 0.01", "p_below_0.01", ".0%"),
+    Column("p < 0.05", "p_below_0.05", ".0%"), Column("p < 0.5", "p_below_0.5", ".0%"),
+    Column("p < 0.95", "p_below_0.95", ".0%"), Column("|Eₙ| > 1", "beyond", ".1%"),
+    Column("±", "beyond_se", ".1%"),
+)  # fmt: skip
 
 
 def groups(results: Sequence[RigResult]) -> dict[str, list[RigResult]]:
@@ -402,8 +422,8 @@ def groups(results: Sequence[RigResult]) -> dict[str, list[RigResult]]:
             (0, LAYOUTS.index(rig.layout), rig.layout),
             (1, rig.drops, f"drops a session: {rig.drops}"),
         ]
-        if rig.world in INCLINES:
-            label = _third(rig.incline_deg, *INCLINES[rig.world])
+        if inclines := WORLDS[rig.world].inclines:
+            label = _third(rig.incline_deg, *inclines)
             keys.append((2, 0, f"incline {label}°"))
         if "string_restitution" in rig.dials:
             label = _third(rig.dials["string_restitution"], *DIALS["string_restitution"][:2])
@@ -423,26 +443,24 @@ def _third(value: float, low: float, high: float) -> str:
 def worst_tenth(results: Sequence[RigResult]) -> dict[str, list[RigResult]]:
     """Return the tenth of rigs that hold fewest intervals, and that with the largest |error|/U."""
     count = math.ceil(len(results) / 10)
-    rigs = [rig for rig in results if rig.intervals]
-
-    def ratio(rig: RigResult) -> float:
-        return rig.worst.ratio if rig.worst else 0.0
-
-    fewest = sorted(rigs, key=lambda rig: (rig.held, -ratio(rig)))[:count]
-    largest = sorted(rigs, key=ratio, reverse=True)[:count]
+    rigs = [rig for rig in results if rig.ratios]
+    fewest = sorted(rigs, key=lambda rig: (rig.held, -max(rig.ratios)[0]))[:count]
+    largest = sorted(rigs, key=lambda rig: max(rig.ratios), reverse=True)[:count]
     tenths = {"worst tenth, fewest held": fewest, "worst tenth, |error| / U": largest}
     return {name: tenth for name, tenth in tenths.items() if tenth}
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:
     """Let chains fall on the rigs of each world."""
-    worlds = arguments.world or [world for world in WORLDS if world not in MODULES]
+    worlds = arguments.world or [world for world in WORLDS if world != "mujoco"]
     if "mujoco" in worlds and find_spec("mujoco") is None:
         raise InputError("the world mujoco needs MuJoCo", ".venv/bin/pip install mujoco")
     record: dict[str, Any] = {}
     lines: list[str] = []
     for world in worlds:
-        rigs = draw_rigs(arguments.protocols, world, arguments.rigs or RIGS[world], arguments.seed)
+        rigs = draw_rigs(
+            arguments.protocols, world, arguments.rigs or WORLDS[world].rigs, arguments.seed
+        )
         rigs = [rig for rig in rigs if rig.number in (arguments.only or [rig.number])]
         if not rigs:
             raise InputError("no rig of the cube has such a number", "give --only up to --rigs")
@@ -463,7 +481,8 @@ def _record(outcomes: Sequence[RigResult]) -> dict[str, Any]:
     worst = worst_tenth(outcomes)
     return {
         "all": summarize(outcomes),
-        "sessions": summarize(outcomes, session=True)["quantities"],
+        "sessions": total(rig.session for rig in outcomes).json()["quantities"],
+        "agreement": [*agreement(outcomes)],
         "groups": {name: summarize(rigs) for name, rigs in (groups(outcomes) | worst).items()},
         "worst": {name: [each.rig.number for each in rigs] for name, rigs in worst.items()},
         "rigs": [outcome.row() for outcome in outcomes],
@@ -484,34 +503,32 @@ def _lines(world: str, outcomes: Sequence[RigResult], record: Record) -> Iterato
         shares = [figures["quantities"].get(name) for name in names]
         rows.append([
             group, str(figures["rigs"]), str(figures["drops"]), f"{figures['void_share']:.1%}",
-            str(figures["wrong"]), f"{figures['ms_per_drop']:.0f}",
+            str(figures["wrong_edges"]), f"{figures['ms_per_drop']:.0f}",
             *(" ".join(shares_held(share, 0)).rstrip() if share else "" for share in shares),
         ])  # fmt: skip
     yield from text_table(rows, left={0}, rule=True)
-    silent = [str(outcome.rig.number) for outcome in outcomes if not outcome.intervals]
+    if record["agreement"]:
+        yield from ("", *aligned(_AGREEMENT, record["agreement"]))
+    silent = [str(outcome.rig.number) for outcome in outcomes if not outcome.ratios]
     if silent:
         yield f"all drops void: rigs {', '.join(silent)}"
     for name, rigs in worst_tenth(outcomes).items():
-        yield from ("", f"{name}:", *_worst([each.row() for each in rigs]))
+        tenth = [each.row() for each in rigs]
+        columns = [column for column in _RIG if column.key in tenth[0]]
+        yield from ("", f"{name}:", *aligned(columns, tenth))
 
 
-def _worst(rows: Sequence[Record]) -> list[str]:
-    """Describe rigs, so that each can be drawn again."""
-    names = [name for name in rows[0] if name not in _HIDDEN]
-    heads = [_HEADINGS.get(name, name) for name in names]
-    return text_table([heads, *([_text(row[name]) for name in names] for row in rows)], rule=True)
-
-
-_HIDDEN = {"world", "heights", "wrong", "ms_per_drop"}
-_HEADINGS = {
-    "number": "rig", "incline_deg": "incline (°)", "drag": "κ (1/m)",
-    "string_restitution": "strings", "string_strain": "strain (%)", "swing_sd": "swing (cm/s)",
-    "off_centre_sd": "off centre (mm)", "worst_ratio": "|error| / U", "worst_quantity": "of",
-}  # fmt: skip
-
-
-def _text(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+_RIG = (
+    Column("rig", "number", "d"), Column("layout", "layout"),
+    Column("incline (°)", "incline_deg", "g"), Column("rods", "rods", "d"),
+    Column("drops", "drops", "d"), Column("κ (1/m)", "drag", ".3g"),
+    Column("strings", "string_restitution", ".3g"), Column("strain (%)", "string_strain", ".3g"),
+    Column("swing (cm/s)", "swing_sd", ".3g"), Column("off centre (mm)", "off_centre_sd", ".3g"),
+    Column("void", "void", "d"), Column("intervals", "intervals", "d"),
+    Column("held", "held", ".3g"), Column("|error| / U", "worst_ratio", ".3g"),
+    Column("of", "worst_quantity"),
+)  # fmt: skip
+"""What describes a rig, so that it can be drawn again; its dials where they are drawn."""
 
 
 def _row(key: str, errors: Record) -> list[str]:

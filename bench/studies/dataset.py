@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from bench.studies.baselines import TimerReading, line_fit, two_gate_timer
+from bench.studies.falls import with_settings
 from bench.studies.sessions import SESSION, SimulatedSession, with_device
 from rig.analysis.result import GOOD
-from rig.bench.falls import with_settings
 from rig.bench.findings import Findings
 from rig.bundle.archive import list_hashes, pack, to_json
 from rig.bundle.tables import data_package

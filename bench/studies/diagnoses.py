@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from bench.studies.falls import Asked, falls, simulation
 from bench.studies.layout_catalogue import (
     FENCE,
     KINDS,
@@ -23,7 +24,6 @@ from bench.studies.time_scales import time_scale
 from bench.studies.wrong_rigs import WRONG_RIGS
 from bench.workers import results
 from rig.analysis.drop import DropCase
-from rig.bench.falls import Asked, falls, simulation
 from rig.bench.findings import Findings
 from rig.clock.calibration import TimeScale
 from rig.commands.output import say

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.resolved.compiled import compiled
+from sim.resolved.compiled import jit
 from sim.resolved.fall import skip
 from sim.resolved.hanging import hang
 from sim.resolved.motion import LONGEST, SAMPLE, act_here, drift
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Follow = Callable[[World, float, float], None]
 
 # What these call is compiled elsewhere, so they may not be kept.
-_anew = partial(compiled, keep=False)
+_anew = partial(jit, keep=False)
 
 
 def strike(chain: Chain, follow: Follow, step: float) -> tuple[float, float]:
@@ -32,7 +32,7 @@ def strike(chain: Chain, follow: Follow, step: float) -> tuple[float, float]:
     return float(world.record.touched[-1]), float(world.record.height[-1])
 
 
-@compiled
+@jit
 def _slopes(world: World) -> Numbers:
     """Rates of place, axis, velocity and spin; shape (4, N, 3)."""
     bodies = world.bodies

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -21,14 +20,10 @@ from sim.resolved.fall import fall as resolved_fall
 from sim.resolved.hanging import hang
 from sim.resolved.motion import LONGEST, SAMPLE
 from sim.resolved.scene import Fall
-from sim.resolved_dials import NAMES, read_resolved_dials
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from sim.resolved.motion import World
     from sim.resolved.scene import Bounce, Chain, Numbers
-    from sim.scene import Hang
 
 mujoco: Any = import_module("mujoco")  # no dependency of the package
 
@@ -170,23 +165,15 @@ def fall(chain: Chain, longest_step: float = STEP) -> Fall:
         slopes=np.concatenate([still + np.tan(chain.rods.tilts) / np.cos(chain.rods.yaws), slopes]),
         frames_s=nothing, places=nothing, axes=nothing, touched_s=touched, touched_height=height,
         top_speed=top_speed, pulled=unknown, board_impulse=np.full(3, math.nan), lost={},
-        energy=nothing, momentum=nothing, slack=math.nan,
+        energy=nothing, momentum=nothing,
     )  # fmt: skip
 
 
 class MujocoLab(resolved_lab.ResolvedLab):
-    """The resolved lab with MuJoCo's falls; none is kept on the disk."""
+    """The resolved lab with MuJoCo's falls."""
 
-    def _make(self, label: int) -> dict[str, Any]:
-        chains = self._hang_safely(label)
-        return self._seen(label, {side: fall(chain) for side, chain in chains.items()})
-
-
-def choose(settings: Mapping[str, str]) -> tuple[Hang, dict[str, str]]:
-    """As `sim.scene.choose_world`, with MuJoCo in the resolved world's place."""
-    rest = {name: text for name, text in settings.items() if name not in {*NAMES, "dynamics"}}
-    return partial(MujocoLab, world=read_resolved_dials(settings)), rest
+    let_fall = staticmethod(fall)
 
 
 if __name__ == "__main__":
-    edges.main(choose)
+    edges.main(MujocoLab)

@@ -1,4 +1,4 @@
-"""What others published, as resolved falls; run as a module, it prints JSON lines.
+"""What others published, as resolved falls.
 
 Grewal, Johnson and Ruina (2011) dropped chains of tilted rods from 75 cm onto a table; how many
 rods is not known here, so there are several. Calkin and March (1989) let a folded chain fall with
@@ -9,7 +9,6 @@ guess of this world that might have been another.
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from functools import partial
@@ -137,8 +136,3 @@ def _friction(incline: float, seed: int) -> float:
     given = fall(chain, until=first + 0.6e-3).board_impulse
     sin, cos = math.sin(math.radians(incline)), math.cos(math.radians(incline))
     return float(-(given[1] * cos - given[2] * sin) / (MU * (given[1] * sin + given[2] * cos)))
-
-
-if __name__ == "__main__":
-    for line in results():
-        print(json.dumps(line), flush=True)

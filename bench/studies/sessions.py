@@ -9,21 +9,21 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from bench.studies.falls import SimulatedDrop, falls
 from bench.studies.time_scales import time_scale
 from rig.analysis.session import analyze
-from rig.bench.falls import SimulatedDrop, falls
 from rig.errors import InputError
 from rig.ports import is_simulated, truth_file
-from rig.results import detailed, protocol_of
+from rig.results import calibration, complete_analysis, protocol_of
 from rig.runner import Operator, run_protocol
 from rig.session.store import Session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from bench.studies.falls import Asked
     from rig.analysis.result import DropResult
     from rig.analysis.session import Analysis
-    from rig.bench.falls import Asked
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol
 
@@ -83,7 +83,7 @@ def with_device(
     truths = {(truth["run"], truth["attempt"]): truth for truth in map(json.loads, lines)}
     with Session.open(path, readonly=True) as session:
         begin = time.process_time()
-        analysis, clock = detailed(session)
+        analysis, clock = complete_analysis(session), calibration(session)
         analysis_s = time.process_time() - begin
         drops = {
             (drop.run, drop.attempt): (
@@ -95,7 +95,7 @@ def with_device(
 
 
 def without_device(
-    requests: Sequence[tuple[Protocol, Asked]], module: str = ""
+    requests: Sequence[tuple[Protocol, Asked]], module: str = "sim.edges"
 ) -> Iterator[SimulatedSession]:
     """Let chains fall straight from the simulation into the analysis: a session a rig.
 
@@ -104,7 +104,7 @@ def without_device(
     requests
         Simulations with the protocols that their rigs state.
     module
-        Of the simulation, see `rig.bench.falls.falls`.
+        Of the simulation, see `bench.studies.falls.falls`.
 
     Raises
     ------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rig.bench.falls import HZ
+from bench.studies.falls import HZ
 from rig.clock.calibration import TimeScale
 
 CLOCK_U = 1e-6

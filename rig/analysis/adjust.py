@@ -1,4 +1,4 @@
-"""Least squares with prior knowledge, and the uncertainties that follow."""
+"""Robust non-linear least squares with priors, and the covariance of the estimates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.equations import Linearization, linearize, scaled
+from rig.analysis.equations import Linearization, linearize, standardise
 from rig.analysis.square_root import square_root
 
 if TYPE_CHECKING:
@@ -22,26 +22,26 @@ if TYPE_CHECKING:
     Matches = Mapping[str, Sequence[Index]]
 
 STEPS = 60
-"""Of an adjustment, which a good one never needs."""
+"""Greatest number of steps of a fit; a good fit needs far fewer."""
 DONE = 1e-3
-"""Of a standard uncertainty: a step so short is the last, for the next one is shorter again."""
+"""Step length in standard uncertainties that ends a fit, as the next step is shorter again."""
 PATIENT = 4
-"""Short steps in a row that are no part of finding the way any more: an edge at the very moment of
-an impact has a slope on either side, and the best place lies between them."""
-_DAMPED = 1e-3  # λ of Levenberg and Marquardt with which shorter steps begin
-_FAINT = 1e-12  # λ that does nothing in a double's digits
-_FASTER = 10.0  # by which λ grows with each step taken back
-_SLOWER = 3.0  # and shrinks with each other one
-_FORGOTTEN = 0.5  # of a column's length, with each step: by these lengths steps are measured
-_GAIN = 0.25  # of what the slopes promise, which a step has to bring
-_TRIED = 0.01  # of a step, after which its bend is looked at
-_BENT = 0.75  # of a step's length: what bends more is shortened
-_MORE = 1.05  # times as much scatter as assumed, below which edges are weighed as they were
+"""Short steps in a row after which a fit has converged. An edge at the moment of an impact has a
+different slope on either side, and steps may alternate between them."""
+_DAMPED = 1e-3  # first λ of Levenberg and Marquardt
+_FAINT = 1e-12  # λ below double precision
+_FASTER = 10.0  # factor by which λ grows with each rejected step
+_SLOWER = 3.0  # factor by which λ shrinks with each accepted step
+_FORGOTTEN = 0.5  # share of a column's largest length kept at each step, to scale the damping
+_GAIN = 0.25  # least share of the linear prediction by which a step reduces the loss
+_TRIED = 0.01  # share of a step at which its second derivative is evaluated
+_BENT = 0.75  # largest ratio of second-order to first-order step; above, a step is rejected
+_MORE = 1.05  # least change of the scatter with which edges are weighed anew
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Unknowns after adjustment.
+    """Result of a fit.
 
     Attributes
     ----------
@@ -52,11 +52,11 @@ class Estimate:
     chi2, edges
         Weighted sum of squares of the edges, and their number.
     scatter
-        How much more the edges scatter than assumed; at least 1, and already allowed for.
+        Scatter of the edges relative to the assumed scatter; at least 1, and included in `root`.
     settled
-        Whether the steps came to an end.
+        Whether the fit converged.
     rows
-        What the edges leave over, and its slopes, of each side.
+        Residuals of each side and their derivatives.
     """
 
     x: Array
@@ -70,7 +70,7 @@ class Estimate:
 
     @cached_property
     def inverse(self) -> Array:
-        """R⁻¹."""
+        """R⁻¹, a square root of the covariance in units of the prior uncertainties."""
         return np.linalg.inv(self.root).astype(float, copy=False)
 
     @cached_property
@@ -79,7 +79,7 @@ class Estimate:
         return np.asarray(np.linalg.norm(self.inverse, axis=1) * self.sd)
 
     def u(self, gradient: Array) -> float:
-        """Return the standard uncertainty of a function with these derivatives."""
+        """Return the standard uncertainty of a function with this gradient."""
         return float(np.linalg.norm((gradient * self.sd) @ self.inverse))
 
     @cached_property
@@ -95,34 +95,37 @@ def adjust(
     centre: Array | None = None,
     done: float = DONE,
     *,
+    scatter: float = 1.0,
     rough: bool = False,
 ) -> Estimate:
-    """Find the unknowns that fit all matched edges best.
+    """Fit all unknowns of a drop to its matched edges.
 
     Gauss–Newton on ‖r/σ‖² + ‖(x − centre)/sd‖²; residuals beyond 4 σ weigh less (Huber).
 
     Parameters
     ----------
     matches
-        For each side what `rig.analysis.annealing.Pairing.matched` returned.
+        For each side the result of `rig.analysis.annealing.Pairing.match`.
     x
-        Where to begin.
+        First guess.
     centre
         Prior means of the unknowns, zero if not given.
     done
-        How short a step is the last, see `length`.
+        Length of the last step, see `length`.
+    scatter
+        First guess of the scatter of the edges relative to that of the model.
     rough
-        Whether only the way matters, and edges are weighed as they were.
+        Whether the estimates suffice, and the scatter is not estimated on the way.
     """
 
     def about(at: Array, inflation: float) -> Linearization:
         return linearize(model, matches, at, inflation)
 
     sd = model.unknowns.sd
-    return least_squares(about, sd, x, centre, done, rough=rough)
+    return least_squares(about, sd, x, centre, done, scatter=scatter, rough=rough)
 
 
-@np.errstate(all="ignore")  # a step may lead to where there is no number, and is taken back
+@np.errstate(all="ignore")  # a step to a NaN loss is rejected
 def least_squares(
     linearize: Callable[[Array, float], Linearization],
     sd: Array,
@@ -131,29 +134,33 @@ def least_squares(
     done: float = DONE,
     steps: int = STEPS,
     *,
+    scatter: float = 1.0,
     rough: bool = False,
 ) -> Estimate:
-    """Find the unknowns that fit any observations best, given what is known of them beforehand.
+    """Fit unknowns with normal priors to any observations.
 
-    Steps of Gauss and Newton. One that leads where the observations fit worse, or to no number, is
-    taken back, and shorter ones are tried (Levenberg and Marquardt).
+    Takes Gauss–Newton steps. A step that increases the loss, or makes it NaN, is rejected, and
+    shorter steps are tried (Levenberg–Marquardt).
 
     Parameters
     ----------
     linearize
-        Observations about a point, if they scatter so many times as assumed.
+        Function of a point and a factor of scatter that returns the linearized observations.
     sd
-        Prior standard uncertainties of the unknowns; where 0 the unknown stays as it is.
-    x, centre, done, steps, rough
+        Prior standard uncertainties of the unknowns; 0 holds an unknown fixed.
+    x, centre, done, scatter, rough
         As in `adjust`.
+    steps
+        Greatest number of steps.
 
     Returns
     -------
     Estimate
-        Always of finite numbers; where no further step could be taken it is not settled.
+        Finite estimates; not `settled` if the fit did not converge.
     """
-    search = _Search(linearize, sd, np.zeros_like(x) if centre is None else scaled(centre, sd))
-    point = search.look(scaled(x, sd))
+    prior = np.zeros_like(x) if centre is None else standardise(centre, sd)
+    search = _Search(linearize, sd, prior, scatter)
+    point = search.look(standardise(x, sd))
     if not math.isfinite(point.loss):
         return Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
     damping, previous, step = 0.0, 0.0, np.zeros_like(x)
@@ -162,7 +169,7 @@ def least_squares(
         step = search.step(point, damping)
         moved = length(step, point.root.matrix)
         near = point.size < point.usual
-        # As long as steps get shorter alike, the next one is that of the last times their ratio.
+        # With linear convergence, the next step is shorter by the ratio of the last two.
         shorts = shorts + 1 if moved < done else 0
         last = point.size < done or shorts > PATIENT
         short = near and (last or (not damping and moved**2 < done * previous))
@@ -175,7 +182,7 @@ def least_squares(
                 point, previous = search.weigh(point, factor), 0.0
                 continue
         ahead = search.look(point.y + step)
-        if not ahead.loss <= point.loss - _GAIN * point.promised(step):
+        if not ahead.loss <= point.loss - _GAIN * point.predicted_reduction(step):
             damping = damping * _FASTER or _DAMPED
             continue
         point, previous = ahead, moved
@@ -196,14 +203,14 @@ def least_squares(
 
 @dataclass(frozen=True)
 class _Point:
-    """Where a search is.
+    """A point of a search.
 
     Attributes
     ----------
     y, seen
-        Unknowns in units of their prior uncertainties, and what was linearized there.
+        Unknowns in units of their prior uncertainties, and the linearization there.
     sd, pull
-        These uncertainties, and how far the unknowns are above their prior means, in these units.
+        Prior uncertainties, and deviations of the unknowns from the prior means in these units.
     """
 
     y: Array
@@ -213,32 +220,32 @@ class _Point:
 
     @property
     def loss(self) -> float:
-        """What a step has to make less, priors included."""
+        """Loss that the fit minimizes, priors included."""
         return self.seen.loss + float(self.pull @ self.pull)
 
     @property
     def usual(self) -> float:
-        """How many times as much as assumed observations scatter, if they fit as well as can be."""
+        """Scatter of the observations relative to the assumed scatter; at least 1."""
         return math.sqrt(max(1.0, self.seen.chi2 / max(1, self.seen.size)))
 
     @cached_property
     def root(self) -> Root:
-        """Observations and priors, reduced to a square root."""
+        """Square root of the information of observations and priors."""
         return square_root([*self.seen.rows.values()], self.sd, self.pull)
 
     @property
     def size(self) -> float:
-        """How long the step of Gauss and Newton is, see `length`."""
+        """Length of the Gauss–Newton step, see `length`."""
         return float(np.linalg.norm(self.root.left))
 
-    def promised(self, step: Array) -> float:
-        """By how much a step makes the loss less, if slopes were the same everywhere."""
+    def predicted_reduction(self, step: Array) -> float:
+        """Return the reduction of the loss that the linear model predicts for a step."""
         remainder = self.root.left + self.root.matrix @ step
         return float(self.root.left @ self.root.left - remainder @ remainder)
 
 
 class _Search:
-    """Observations and priors, and how to go on from a point.
+    """Observations and priors of a fit, and its steps.
 
     Parameters
     ----------
@@ -246,44 +253,51 @@ class _Search:
         As in `least_squares`.
     prior
         Prior means of the unknowns, in units of `sd`.
+    inflation
+        Scatter of the observations relative to the assumed scatter.
     """
 
     def __init__(
-        self, linearize: Callable[[Array, float], Linearization], sd: Array, prior: Array
+        self,
+        linearize: Callable[[Array, float], Linearization],
+        sd: Array,
+        prior: Array,
+        inflation: float,
     ) -> None:
         self._linearize, self._sd, self._prior = linearize, sd, prior
-        self.inflation = 1.0
-        self._steepest = np.zeros_like(sd)  # lengths of the root's columns, the largest lately
+        self.inflation = inflation
+        self._steepest = np.zeros_like(sd)  # largest recent lengths of the root's columns
 
     def look(self, y: Array) -> _Point:
-        """Look what observations say about a point."""
+        """Return the point `y` with its linearization."""
         return _Point(y, self._linearize(y * self._sd, self.inflation), self._sd, y - self._prior)
 
     def step(self, point: _Point, damping: float) -> Array:
-        """Step downhill; the more it is damped, the shorter (Marquardt 1963).
+        """Return a damped step (Marquardt 1963) with geodesic acceleration.
 
-        By its second derivative along the way it follows a curve (Transtrum and Sethna 2012).
+        The second derivative along the step corrects it (Transtrum and Sethna 2012). The step is
+        NaN if that correction is too large.
         """
         lengths = np.linalg.norm(point.root.matrix, axis=0)
         self._steepest = np.maximum(_FORGOTTEN * self._steepest, lengths)
         if not damping:
             return point.root.step()
-        root = point.root.damped(damping, self._steepest)
+        root = point.root.damp(damping, self._steepest)
         straight = root.step()
         ahead, gradient = self.look(point.y + _TRIED * straight).seen, np.zeros_like(point.y)
         for role, rows in point.seen.rows.items():
             turn = ahead.rows[role].slopes - rows.slopes
             turned = turn @ (straight * self._sd)[rows.columns]
             gradient[rows.columns] += self._sd[rows.columns] * (turned @ rows.slopes)
-        bend = root.pulled(0.5 / _TRIED * gradient)
+        bend = root.gradient_step(0.5 / _TRIED * gradient)
         long = np.linalg.norm(self._steepest * straight)
         short = 2.0 * np.linalg.norm(self._steepest * bend) <= _BENT * long
         return straight + bend if short else straight * math.nan
 
     def scatter(self, point: _Point) -> float:
-        """How many times as much as thought observations scatter; 1 where that is near enough.
+        """Return the scatter relative to the present assumption; 1 if it is close enough.
 
-        They never scatter less than stated.
+        The total never falls below the stated scatter.
         """
         seen, inverse = point.seen, np.linalg.inv(point.root.matrix)
         degrees = max(1.0, seen.size - len(inverse) + float(np.sum(inverse**2)))
@@ -291,19 +305,19 @@ class _Search:
         return 1.0 if 1.0 / _MORE < factor < _MORE else factor
 
     def weigh(self, point: _Point, factor: float) -> _Point:
-        """Look at a point as if observations scattered so many times as before."""
+        """Return the point linearized anew with the scatter multiplied by `factor`."""
         self.inflation *= factor
         self._steepest = self._steepest / factor
         return self.look(point.y)
 
 
 def length(step: Array, root: Array) -> float:
-    """|R·d|: no function of the unknowns moves by more of its own standard uncertainties.
+    """Return |R·d|: no function of the unknowns changes by more standard uncertainties of its own.
 
     Parameters
     ----------
     step
-        Of the unknowns, in units of their prior uncertainties.
+        Change of the unknowns, in units of their prior uncertainties.
     root
         As in `Estimate`.
     """

@@ -1,13 +1,13 @@
-"""What the air takes from a chain, and from its rods, which may be unlike.
+"""Air drag on a chain and on its rods, which may differ: prior, lags and slack.
 
-What the air takes goes with a rod's width over its mass. Left alone a rod of κ′ would lag behind a
-chain of κ by (κ′ − κ)s²/3 after a way s, to first order. Strings leave it alone until they are
-taut, and hold it from then on: so the lag has a part that grows with s² and one that grows with s,
-and edges tell how much of either there is. In resolved falls of rods of 6 to 32 mm it is 2 mm; left
-out, the free chain's g reads 0.1 to 0.2 % low.
+Drag on a rod is proportional to its width over its mass. By itself, a rod of κ′ would lag behind a
+chain of κ by (κ′ − κ)s²/3 after a distance s, to first order. Strings hold it back, and edges
+determine how much of it is left. In resolved falls of rods of 6 to 32 mm the lag is 2 mm. Without
+it, the free chain's g is 0.1 to 0.2 % too low.
 
-Each rod of a chain that falls freely besides lags on until its own strings are taut. They are not
-at the release: rods hang tilted, and of a rod's two strings one is slack by a part of a millimetre.
+In addition, each rod lags until its own strings are taut. At the release they are not: rods hang
+tilted, and of a rod's two strings one is slack by a fraction of a millimetre. Part of this slack is
+the same for a chain in all drops, and part differs from drop to drop.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 
 SLACK_WAY = 0.5
-"""Within which strings become taut, m: 0.3 to 0.8 cover alike."""
+"""Distance within which strings become taut, m: 0.3 to 0.8 give the same coverage."""
 
 
 def prior_air(protocol: Protocol) -> tuple[float, float]:
-    """κ of the first chain as a whole as it is known beforehand, 1/m, and its uncertainty."""
+    """Return the prior mean and standard uncertainty of κ of the first chain as a whole, 1/m."""
     if protocol.drag is None:
         return 0.0, protocol.priors.drag
     kappa = air_of(protocol, next(iter(protocol.chains)))[0]
@@ -40,17 +40,17 @@ def prior_air(protocol: Protocol) -> tuple[float, float]:
 
 
 def unlike(chain: Chain, shares: Sequence[float]) -> Array:
-    """How much more the air takes from each rod than from its chain, in units of κ.
+    """Return κ of each rod alone less that of its chain, in units of κ.
 
     Parameters
     ----------
     shares
-        κ of each rod with all above it, in the same units.
+        κ of each rod together with all above it, in the same units.
 
     Returns
     -------
     ndarray
-        Shape ``(rods,)``; of one element, zero, where all rods are alike.
+        Shape ``(rods,)``, or a single zero if all rods are alike.
     """
     masses = np.array(chain.masses)
     force = np.array(shares) * np.cumsum(masses[::-1])[::-1]
@@ -59,28 +59,27 @@ def unlike(chain: Chain, shares: Sequence[float]) -> Array:
 
 
 def lags(record: ChainRecord, drop: float, rods: Index, levels: Array) -> Array:
-    """How much higher than in their chain some rods are, by each part for κ = 1/m.
+    """Return the lag of rods behind their chain, for κ = 1/m.
 
     Parameters
     ----------
     drop
-        How high the chain hangs, m.
+        Drop height of the chain, m.
     rods, levels
-        Which, and where the chain's reference point is then, m; shape ``(moments,)``.
+        Rods, and heights of the chain's reference point, m; shape ``(moments,)``.
 
     Returns
     -------
     ndarray
-        m, shape ``(moments, 2)``.
+        m, shape ``(moments,)``.
     """
     way = np.maximum(drop - levels, 0.0)
-    ways = np.stack([way**2, way * record.chain.chain.length], axis=1) / 3.0
-    behind: Array = record.unlike.take(rods, mode="wrap")[:, None] * ways
+    behind: Array = record.unlike.take(rods, mode="wrap") * way**2 / 3.0
     return behind
 
 
 def slack(record: ChainRecord, drop: float, rods: Index, levels: Array) -> Array:
-    """How much higher than in their chain some rods are, for slack strings of 1 m at each rod.
+    """Return the lag of rods behind their chain by slack, for slack of 1 m at each rod.
 
     Parameters
     ----------

@@ -1,11 +1,10 @@
-"""Which edge is which rod: one likelihood of a side's edges, annealed from wide to narrow.
+"""Assignment of edges to rods: a mixture likelihood of a side's edges, annealed.
 
-An edge at a gate is a rod's side of its polarity or clutter, and all sides compete for it: with the
-height h by which an edge misses a side, it belongs to that side with the weight
-(1 − m) N(h; 0, σ) / (λ/v + (1 − m) Σ N). σ halves from a part of the rods' distance to its own
-value over a few Gauss-Newton steps of the unknowns that move a chain as a whole; many falls at once
-are one array. They begin where most edges agree, on a grid of what is not known, the likeliest
-first.
+An edge at a gate is a rod's side of its polarity, or clutter. With the height h between an edge and
+a rod's side, it belongs to that side with the weight (1 − m) N(h; 0, σ) / (λ/v + (1 − m) Σ N).
+σ starts at a part of the rods' spacing and halves to its final value over a few Gauss-Newton steps.
+These fit the unknowns that move a chain as a whole; many falls are fitted as an array. Starts are
+the points of a grid of the unknowns at which most edges agree, the likeliest first.
 """
 
 from __future__ import annotations
@@ -40,52 +39,52 @@ if TYPE_CHECKING:
 Item = TypeVar("Item", bound=np.generic)
 
 MISSED = 0.02
-"""Share of expected edges that leave no trace, as far as one can know beforehand."""
+"""Prior probability that an expected edge is missed."""
 STRAYS = 2.0
-"""Edges of a gate that belong to no rod, 1/s."""
+"""Prior rate of stray edges at a gate, 1/s."""
 ANY_ALPHA = (-0.10, 0.60)
-"""Impact coefficients beyond both ends of what energy allows (½ and 0)."""
+"""Range of the impact coefficient: energy allows 0 to ½, with a margin at both ends."""
 RELEASE, START, CLOCK, PULL, DRAG, ALPHA, GROWTH, UNKNOWNS = range(8)
-"""Unknowns of a fall: when it begins, how high, the clock's rate, g, κ, α, and how much more the
-last impulses are; and how many these are."""
+"""Columns of a fall's unknowns: release time, start height, clock rate, g, κ, α and the growth of
+the last impulses; and their number."""
 PART = 6.0
-"""Of the least distance of two rods: σ of the first step, in which no rod is hidden."""
+"""Least spacing of two rods over σ of the first step: narrow enough to resolve neighbours."""
 _BROADER = 2.0
-"""By which σ of the last step is larger than stated: what is common to a beam or rod is in it."""
+"""Ratio of σ in the last step to its own value: allows for errors common to a beam or rod."""
 _STEPS = 12
 _FAR = 2.5
-"""Prior standard uncertainties within which falls begin: 99 of 100 of what is as stated."""
+"""Radius of the grid of starts in prior standard uncertainties: 99 % of drops as stated."""
 _RECORD = 4.0
-"""What longer a record is, is only searched where most of its edges are, s: no fall is longer."""
+"""Longest part of a record that is searched, s: no fall lasts longer. It has the most edges."""
 _NODES = 400
-_BATCH = 8  # of which are asked together at first
+_BATCH = 8  # grid points of the first batch
 PEAKS = 5
 """Starts of a batch that are annealed."""
 _ALIKE = 0.75
-"""Share of the edges that two starts give to the same rods, above which they end as one fall."""
+"""Share of equally assigned edges above which two starts converge to the same fall."""
 LEAST = 0.6
-"""Share of the expected edges, or of what the best of several falls explains, below which no fall
-is one."""
+"""Least share of the expected edges that a fall must explain. Also the least share of the best
+start's votes with which another start is tried."""
 
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """A fall as the edges might have it.
+    """A first guess of a fall's parameters.
 
     Attributes
     ----------
     release
-        s since the release fired.
+        Time since the release fired, s.
     start
         Height of the reference point before release, m.
     alpha
-        Of all impacts; 0 for a free chain.
+        α of all impacts; 0 for a free chain.
     kappa
-        Of the air, 1/m.
+        κ of the air, 1/m.
     clock
-        By what share the edges' clock is slow.
+        Relative rate by which the edges' clock is slow.
     pull
-        By how much the fall is quicker than with the stated gravity, m/s².
+        Gravity less the stated gravity, m/s².
     """
 
     release: float
@@ -96,29 +95,29 @@ class Guess:
     pull: float = 0.0
 
     @classmethod
-    def stated(cls, protocol: Protocol, record: ChainRecord) -> Guess:
-        """Let a chain begin as stated."""
+    def from_protocol(cls, protocol: Protocol, record: ChainRecord) -> Guess:
+        """Return the guess with the protocol's values."""
         kappa, _ = prior_air(protocol)
         return cls(0.0, protocol.drop.value, record.alpha, kappa)
 
 
 def split(line: NDArray[Item], ends: Index) -> list[NDArray[Item]]:
-    """Cut a line of all trains' values at the end of each; much quicker than numpy does."""
+    """Split an array of all trains' values at the end of each; quicker than `numpy.split`."""
     stops = ends.tolist()
     return [line[begin:end] for begin, end in zip([0, *stops], stops, strict=False)]
 
 
 def log_density(off: Array, sigma: Array | float, speed: Array) -> Array:
-    """Logarithm of how much likelier an edge's time is as a rod's than as a stray, beforehand.
+    """Return the log likelihood ratio of each edge as a rod's edge against a stray.
 
-    Relative to a reading in which all edges are strays and every rod was missed.
+    The reference is a reading in which all edges are strays and every rod was missed.
 
     Parameters
     ----------
     off, sigma
-        By what height it misses the rod's side, and the standard deviation of that, m.
+        Height between edge and rod's side, and its standard deviation, m.
     speed
-        Of the rod, m/s.
+        Speed of the rod, m/s.
     """
     worth = math.log((1.0 - MISSED) / MISSED / STRAYS / math.sqrt(2.0 * math.pi))
     tiny = np.finfo(float).tiny
@@ -126,18 +125,18 @@ def log_density(off: Array, sigma: Array | float, speed: Array) -> Array:
 
 
 class Weights(NamedTuple):
-    """Which sides of rods compete for each edge, two a edge; shape ``(falls, edges, 2)``.
+    """The two rods' sides nearest to each edge, with weights; shape ``(falls, edges, 2)``.
 
     Attributes
     ----------
     side
         Number of the expected edge.
     off
-        By what height the edge misses it, m.
+        Height between the edge and that side, m.
     sigma
-        Standard deviation of that, m.
+        Standard deviation of `off`, m.
     weight
-        How probably the edge is it; 0 where there is none.
+        Probability that the edge belongs to the side; 0 if there is no side of its kind.
     """
 
     side: Index
@@ -148,22 +147,22 @@ class Weights(NamedTuple):
 
 @dataclass(frozen=True)
 class Pairing:
-    """The edges of one side, ready to be matched again and again.
+    """The observed and expected edges of one side, prepared for repeated matching.
 
     Attributes
     ----------
     times, burst
-        Of every observed edge, gate by gate, see `rig.analysis.chain_records.EdgeTrain`.
+        Time and burst of every observed edge, see `rig.analysis.chain_records.EdgeTrain`.
     kind
-        Of each: twice the number of its train, and one more where it darkens the beam.
+        Kind of each: twice the number of its train, plus 1 if it darkens the beam.
     other
-        Of each: the edge at the other end of its shadow, −1 where there is none.
+        Observed edge at the other end of its shadow, −1 if there is none.
     kinds, rods
-        Of every expected edge.
+        Kind and rod of every expected edge.
     widths
-        Of their rods, m.
+        Width of the rod of every expected edge, m.
     begins, ends
-        Number of observed edges before each train, and of expected ones after each.
+        Numbers of observed edges before each train, and of expected edges up to its end.
     """
 
     times: Array
@@ -178,12 +177,12 @@ class Pairing:
 
     @classmethod
     def of(cls, trains: Sequence[EdgeTrain], widths: Sequence[float] = ()) -> Pairing:
-        """Take the edges of a side's trains.
+        """Return the pairing of a side's trains.
 
         Parameters
         ----------
         widths
-            Of the chain's rods, m; without them, shadows may be of any length.
+            Widths of the chain's rods, m; if empty, shadows may be of any length.
         """
         none = np.zeros(0, dtype=np.intp)
         blocked = np.concatenate([none, *(train.blocked for train in trains)])
@@ -207,27 +206,27 @@ class Pairing:
             np.cumsum([train.rods.size for train in trains], dtype=np.intp),
         )
 
-    def observed(self, matches: Sequence[Index]) -> tuple[Index, Index]:
-        """Expected edges that are matched, and the observed edge of each."""
+    def indices(self, matches: Sequence[Index]) -> tuple[Index, Index]:
+        """Return the matched expected edges, and the observed edge of each."""
         match = np.concatenate(matches)
         pick = np.flatnonzero(match >= 0)
         return pick, (match + self._first)[pick]
 
     @cached_property
     def _first(self) -> Index:
-        """Number of the first observed edge in the train of every expected one."""
+        """Number of the first observed edge in the train of every expected edge."""
         return self.begins[self.kinds // 2]
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
-        """Every edge with every expected one that it may be by its gate and polarity."""
+        """All pairs of an observed and an expected edge of the same gate and polarity."""
         edge, side = np.nonzero(self.kind[:, None] == self.kinds)
         return edge, side
 
     def weights(
         self, levels: Array, heights: Array, speeds: Array, sigma: Array | float
     ) -> Weights:
-        """Let the two nearest sides of rods, above and below, compete for each edge.
+        """Return the weights of the two nearest sides of rods, above and below each edge.
 
         Parameters
         ----------
@@ -235,10 +234,10 @@ class Pairing:
             The height of the reference point at every expected edge, m, and its standard deviation;
             shape ``(expected,)``.
         heights, speeds
-            Where chains are when each edge comes, and how fast; shape ``(…, edges)``.
+            Height and speed of the chains at each observed edge; shape ``(…, edges)``.
         """
         low, high = levels.min(initial=np.inf), levels.max(initial=-np.inf)
-        room = high - low + 1.0  # m: kinds in one line, further apart than any two edges of a kind
+        room = high - low + 1.0  # m; separates kinds by more than any two edges of a kind
         line = self.kinds * (3.0 * room) + levels
         order = np.argsort(line)
         heights = np.clip(heights, low - 0.5 * room, high + 0.5 * room)
@@ -248,26 +247,26 @@ class Pairing:
         width = np.broadcast_to(sigma, levels.shape)[side]
         far = np.where(self.kinds[side] == self.kind[:, None], off / width, 40.0)
         far[..., 1] = np.where(side[..., 0] == side[..., 1], 40.0, far[..., 1])
-        # Nothing that hangs still is seen to pass.
+        # A chain at rest causes no edges: its density is zero.
         density = speeds[..., None] * np.exp(-0.5 * far * far) / width
         clutter = STRAYS * math.sqrt(2.0 * math.pi) / (1.0 - MISSED)
         return Weights(side, off, width, density / (clutter + density.sum(-1, keepdims=True)))
 
     def chosen(self, weights: Weights, speeds: Array) -> Index:
-        """Match one to one: each edge and each side of a rod that want each other most, above ½.
+        """Match edges and rods' sides one to one, where the weight is above ½.
 
         Parameters
         ----------
         weights, speeds
-            Of one fall.
+            Weights and speeds of a single fall.
 
         Returns
         -------
         ndarray
-            The edge of every expected one, −1 for a missed one; shape ``(expected,)``.
+            The observed edge of every expected edge, −1 if missed; shape ``(expected,)``.
         """
         edges, which = np.nonzero(weights.weight > 0.5)
-        # In units of σ: of several edges the nearest; written last, it stays.
+        # Of several edges the nearest, in units of σ, is written last and so stays.
         far = np.abs(weights.off[edges, which]) / weights.sigma[edges, which]
         order = np.argsort(-far, kind="stable")
         edge_of = np.full(self.kinds.size, -1)
@@ -275,21 +274,21 @@ class Pairing:
         return self._whole(edge_of, speeds)
 
     def _whole(self, edge_of: Index, speeds: Array) -> Index:
-        """Give back the top rod's ends of shadows longer than it.
+        """Remove matches of the top rod to shadows longer than its width.
 
-        A rod that is thrown back is in them too, and no rod that follows tells whose end it is.
+        A rebounding rod lengthens these shadows, and no later rod helps to separate the two.
         """
         last = self.rods.max(initial=0)
         sides = np.flatnonzero((edge_of >= 0) & (self.rods == last))
         sides = sides[self.other[edge_of[sides]] >= 0]
         edges = edge_of[sides]
         partner = self.other[edges]
-        # At uniform acceleration the mean of both speeds is that of the way between.
+        # At uniform acceleration, distance is time times the mean of both speeds.
         length = np.abs(self.times[edges] - self.times[partner]) * (speeds[edges] + speeds[partner])
         edge_of[sides[0.5 * length > WIDER * self.widths[sides]]] = -1
         return edge_of
 
-    def matched(self, levels: Array, heights: Array, speeds: Array, scale: float) -> list[Index]:
+    def match(self, levels: Array, heights: Array, speeds: Array, scale: float) -> list[Index]:
         """Match the edges to rods.
 
         Parameters
@@ -297,40 +296,39 @@ class Pairing:
         levels
             The height of the reference point at every expected edge of all trains, m.
         heights, speeds
-            Where the chain is believed to be when each edge comes, and how fast.
+            Height and speed of the chain at each observed edge, by the current fit.
         scale
-            Standard deviation of the distance between where a chain is when an edge comes and where
-            it should be, m.
+            Standard deviation of the height between an edge and its level, m.
 
         Returns
         -------
         list of ndarray
-            For each train the index of its edge for every expected edge, −1 for a missed one; shape
-            ``(expected,)``.
+            For each train the index of the observed edge for every expected edge, −1 if missed;
+            shape ``(expected,)``.
         """
         if not levels.size or not self.times.size:
             return split(np.full(levels.size, -1), self.ends)
         weights = self.weights(levels, heights, speeds, scale)
-        return self.numbered(self.chosen(weights, speeds))
+        return self.number_edges(self.chosen(weights, speeds))
 
-    def numbered(self, edge_of: Index) -> list[Index]:
-        """Number edges in their trains, train by train."""
+    def number_edges(self, edge_of: Index) -> list[Index]:
+        """Convert edge numbers to indices in each train, one array for each train."""
         return split(np.where(edge_of >= 0, edge_of - self._first, -1), self.ends)
 
 
-class Annealed(NamedTuple):
-    """A fall whose edges found their rods.
+class FallFit(NamedTuple):
+    """An annealed fall with its matched edges.
 
     Attributes
     ----------
     guess
-        The fall.
+        Parameters of the fall.
     edges
-        Of every expected edge, −1 for a missed one; a list, for there may be several sides.
+        Observed edge of every expected edge, −1 if missed; a list with an array for each side.
     evidence
-        Logarithm of its marginal likelihood, relative to that all edges are strays.
+        Logarithm of the marginal likelihood, relative to all edges being strays.
     scatter
-        Root of the mean square of what the edges are off, in σ.
+        Root mean square of the edges' residuals, in σ.
     """
 
     guess: Guess
@@ -339,31 +337,31 @@ class Annealed(NamedTuple):
     scatter: float
 
     @property
-    def matched(self) -> int:
-        """Number of edges that belong to a rod."""
+    def match_count(self) -> int:
+        """Number of edges matched to a rod."""
         return int(np.count_nonzero(self.edges[0] >= 0))
 
 
 @dataclass(frozen=True)
 class SideFall:
-    """One chain's falls as its edges may tell them, by few unknowns.
+    """Model of a chain's fall with few unknowns, for annealing.
 
-    A fall is an array of these in units of their prior uncertainties, as deviations from what is
-    stated; many falls have the shape ``(falls, UNKNOWNS)``.
+    A fall is an array of the unknowns in units of their prior uncertainties, as deviations from the
+    stated values; many falls have the shape ``(falls, UNKNOWNS)``.
 
     Attributes
     ----------
     record, pairing
         The chain, and the edges of its trains.
     stated
-        Where it begins as stated.
+        Fall with the protocol's values.
     gravity
-        As stated, m/s².
+        Stated gravity, m/s².
     sd
-        Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 for what is known, and
-        1 s for the release, of which nothing is.
+        Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 if known exactly, and
+        1 s for the release, which has no prior.
     sigma
-        By how much every expected edge may be off by itself, m; falls are counted without.
+        Standard deviation of each expected edge from all other errors, m; not needed for votes.
     """
 
     record: ChainRecord
@@ -383,39 +381,39 @@ class SideFall:
         components: Components,
         sigma: Array = ONE,
     ) -> SideFall:
-        """Take a side of a drop that begins as stated."""
+        """Return the model of a side with the protocol's values and priors."""
         sd = np.zeros(UNKNOWNS)
         sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, components.hang)
         sd[CLOCK], (_, sd[DRAG]) = clock_u, prior_air(protocol)
         sd[PULL] = ANY_GRAVITY if protocol.surface is None else protocol.gravity.u
         if record.ratios is not None:
-            # All α are alike that energy allows.
+            # Standard deviation of a uniform distribution over the range of α.
             sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
             sd[GROWTH] = protocol.priors.strings * abs(record.alpha)
-        stated, gravity = Guess.stated(protocol, record), protocol.gravity.value
+        stated, gravity = Guess.from_protocol(protocol, record), protocol.gravity.value
         return cls(record, pairing, stated, gravity, sd, sigma)
 
     @cached_property
     def levels(self) -> Array:
-        """Of every expected edge, m."""
+        """Level of every expected edge, m."""
         return np.concatenate([train.levels for train in self.record.trains])
 
     @cached_property
     def slack(self) -> float:
-        """How far off a rod may be in the first step, m: part of the least distance of two rods.
+        """Standard deviation of the first step, m: a part of the least spacing of two rods.
 
-        A single object's width takes its place.
+        For a single object, a part of its width.
         """
         places, widths = self.record.chain.chain.heights, self.record.chain.widths
         return float(min(np.diff(places) if len(places) > 1 else widths)) / PART
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Within which unknowns stay: air holds back, and something falls."""
+        """Lower and upper bounds of the unknowns: drag and gravity stay positive."""
         low, high = np.full(UNKNOWNS, -np.inf), np.full(UNKNOWNS, np.inf)
         low[START] = LOWEST_START - self.stated.start
         low[PULL] = -0.9 * self.gravity
-        low[DRAG] = FAINT - self.stated.kappa  # formulas for air and for none are not the same
+        low[DRAG] = FAINT - self.stated.kappa  # below FAINT, formulas without drag apply
         low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated.alpha, *ANY_ALPHA)
         exact = self.sd == 0.0
         unit = np.where(exact, 1.0, self.sd)
@@ -423,7 +421,7 @@ class SideFall:
 
     @cached_property
     def _by(self) -> Array:
-        """Derivatives of a trajectory's parameters by the unknowns, but for times."""
+        """Derivatives of a trajectory's parameters by the unknowns, without those of time."""
         rods = 0 if self.record.ratios is None else self.record.ratios.size
         by = np.zeros((COMMON + 2 * rods, UNKNOWNS))
         by[[1, GRAVITY, 3], [START, PULL, DRAG]] = 1.0
@@ -432,7 +430,7 @@ class SideFall:
         return by * self.sd
 
     def path(self, falls: Array) -> Trajectory:
-        """Let the chain fall from a release at zero."""
+        """Return the trajectories of falls released at time zero."""
         off, record = (falls * self.sd).T[..., None], self.record
         start, gravity = self.stated.start + off[START], self.gravity + off[PULL]
         kappa = self.stated.kappa + off[DRAG]
@@ -445,15 +443,16 @@ class SideFall:
         )
 
     def since(self, falls: Array, times: Array) -> Array:
-        """How long after the release some times of the edges' clock are, s.
+        """Return the true time since the release for stamped times, s.
 
-        The clock's rate counts from there: hours after the fire it is not told from it.
+        The clock's rate counts from the release: over hours since the fire, rate and release time
+        could not be separated.
         """
         rate: Array = 1.0 + falls[:, CLOCK, None] * self.sd[CLOCK]
         return (times - falls[:, RELEASE, None]) * rate
 
     def sights(self, falls: Array) -> tuple[Array, Array, Array]:
-        """Where falls are as each edge comes, how fast, and the derivatives by all unknowns.
+        """Return heights and speeds at each edge, and derivatives by all unknowns.
 
         Returns
         -------
@@ -462,19 +461,19 @@ class SideFall:
         """
         since = self.since(falls, self.pairing.times)
         height, speed, slopes = self.path(falls).sights(since, self._by)
-        # A clock's rate is 1 to the digits that count here.
+        # The clock's rate may be taken as 1 in these derivatives.
         slopes[..., RELEASE], slopes[..., CLOCK] = speed, -speed * since * self.sd[CLOCK]
         return height, speed, slopes
 
-    def anneal(self, falls: Array, close: float = np.inf) -> list[Annealed]:
-        """Let falls find their edges, σ from wide to narrow.
+    def anneal(self, falls: Array, close: float = np.inf) -> list[FallFit]:
+        """Anneal falls and match their edges.
 
         Parameters
         ----------
         falls
-            Where they start.
+            Starting points.
         close
-            Log odds behind the best one beyond which a fall is given up.
+            Log odds behind the best fall beyond which a fall is dropped.
         """
         own, (low, high) = np.minimum(_BROADER * self.sigma, self.slack), self.bounds
         prior = np.diag(np.where(np.arange(UNKNOWNS) == RELEASE, 1e-9, 1.0))
@@ -487,32 +486,32 @@ class SideFall:
             across = np.swapaxes(slopes, 1, 2)
             matrix = (across * part.sum(axis=2)[:, None, :]) @ slopes + prior
             gradient = (across @ (part * weights.off).sum(axis=2)[..., None])[..., 0] + y @ prior
-            change = _bounded(matrix, gradient, y - high, y - low)
+            change = _solve_bounded(matrix, gradient, y - high, y - low)
             lasting, done = np.ones(len(y), dtype=np.bool_), False
-            if (width <= own).all():  # before that a fall may be on its way
+            if (width <= own).all():  # at wider σ a fall may still converge
                 likely = -np.log1p(-np.minimum(taken, 1.0 - 1e-12)).sum(axis=1)
                 lasting = likely >= likely.max() - close
                 size = (change[:, None] @ matrix @ change[..., None])[:, 0, 0]
                 done = bool((size[lasting] < 1.0).all())
             if done or step == _STEPS - 1:
                 break
-            # No chain moves on by more than its rods are sought within.
+            # Limit a step to the current σ.
             moved = (slopes @ change[..., None])[..., 0] * (taken > 0.5)
             longest = np.abs(moved).max(axis=1, initial=1e-9)
             change *= np.minimum(1.0, width.max() / longest)[:, None]
             y = np.clip(y - change, low, high)[lasting]
         lost = 0.5 * ((y @ prior) * y).sum(axis=1) + 0.5 * np.linalg.slogdet(matrix)[1]
         return [
-            self._judged(
+            self._match_fall(
                 y[n], Weights(*(part[n] for part in weights)), height[n], speed[n], lost[n]
             )
             for n in np.flatnonzero(lasting)
         ]
 
-    def _judged(
+    def _match_fall(
         self, fall: Array, weights: Weights, height: Array, speed: Array, lost: float
-    ) -> Annealed:
-        """Match one fall's edges one to one, and weigh what that explains."""
+    ) -> FallFit:
+        """Match a fall's edges one to one, and compute its evidence."""
         edges = self.pairing.chosen(weights, speed)
         sides = np.flatnonzero(edges >= 0)
         sigma = np.minimum(_BROADER * self.sigma, self.slack)[sides]
@@ -528,13 +527,13 @@ class SideFall:
             x[CLOCK],
             x[PULL],
         )
-        return Annealed(guess, [edges], evidence if math.isfinite(evidence) else -math.inf, scatter)
+        return FallFit(guess, [edges], evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self) -> Array:
-        """Falls to begin with, the likeliest first.
+        """Return the grid of starting points, the likeliest first.
 
-        Along each unknown they are so near that none between them is missed: with the release
-        free, none is off by more than the first step allows.
+        The grid is fine enough that, with the release free, every fall is within the first step's
+        σ of a grid point.
         """
         low, high = self.bounds
         stated = np.clip(np.zeros((1, UNKNOWNS)), low, high)
@@ -550,42 +549,42 @@ class SideFall:
                 axis = np.arange(-steps, steps + 1) / max(effects[name], steps / _FAR)
                 grid = np.repeat(grid, axis.size, axis=0)
                 grid[:, name] += np.tile(axis, len(grid) // axis.size)
-                # What is unlikely for one unknown will not be likelier with another.
+                # Points outside the radius cannot come back inside with further unknowns.
                 unlikely = (grid * grid).sum(axis=1)
                 order = np.argsort(unlikely, kind="stable")[:_NODES]
                 grid = grid[order[unlikely[order] <= _FAR**2 + 1e-9]]
         return np.asarray(grid[((grid >= low) & (grid <= high)).all(axis=1)])
 
     def starts(self, earliest: float, least: float) -> Iterator[Array]:
-        """Yield falls where most edges agree, batch by batch of the grid.
+        """Yield starting points on which most edges agree, one array for each batch of the grid.
 
         Parameters
         ----------
         earliest
-            When chains were let go at the earliest, s.
+            Earliest possible release, s.
         least
-            Votes without which nothing begins.
+            Least number of votes of a start.
 
         Yields
         ------
         ndarray
-            Falls, those first for which most edges vote.
+            Falls in descending order of votes.
         """
         nodes, size = self.nodes(), _BATCH
         while len(nodes):
             batch, nodes = nodes[:size], nodes[size:]
             size *= 2
-            falls, votes = self._voted(batch, earliest)
+            falls, votes = self._count_votes(batch, earliest)
             enough = (votes > 0) & (votes >= max(least, LEAST * votes.max(initial=0)))
             order = np.flatnonzero(enough)[np.argsort(-votes[enough], kind="stable")][: 4 * PEAKS]
             yield falls[order[self._unlike(falls[order])] if order.size else order]
 
     def most_votes(self) -> int:
-        """Count the edges that agree on one of the likeliest falls of the grid, at most."""
-        return int(self._voted(self.nodes()[:_BATCH])[1].max(initial=0))
+        """Return the most votes for any fall of the grid's first, likeliest batch."""
+        return int(self._count_votes(self.nodes()[:_BATCH])[1].max(initial=0))
 
-    def _voted(self, nodes: Array, earliest: float = -np.inf) -> tuple[Array, Index]:
-        """Let every edge vote, for each node, for the releases from which it would be a rod's.
+    def _count_votes(self, nodes: Array, earliest: float = -np.inf) -> tuple[Array, Index]:
+        """Count, for each grid point, the edges that agree on a release time (Hough transform).
 
         Returns
         -------
@@ -597,14 +596,14 @@ class SideFall:
         times, lasts = np.sort(self.pairing.times), (late - early)[late > early]
         if not times.size or not lasts.size:
             return nodes[:0], np.zeros(0, dtype=np.intp)
-        # A record may last hours: a fall is where most of the edges are.
+        # A record may last hours: search the window with most edges.
         until = np.searchsorted(times, times + _RECORD, side="right")
         first = int(np.argmax(until - np.arange(times.size)))
         begin = max(float(times[first] - late.max()), earliest)
         end = float(times[until[first] - 1] - early.min())
         if end < begin:
             return nodes[:0], np.zeros(0, dtype=np.intp)
-        # At the fastest passages votes are two steps wide.
+        # Two bins for each vote at the fastest passage.
         step = float(lasts.min()) / 2.0
         bins = int((end - begin) / step) + 2
         came = np.rint(np.clip((self.pairing.times - begin) / step, -1e9, 1e9)).astype(np.intp)
@@ -616,13 +615,13 @@ class SideFall:
             place += (bins + 1) * np.arange(len(nodes))[:, None]
             votes += sign * np.bincount(place.ravel(), minlength=votes.size)
         table = np.cumsum(votes.reshape(len(nodes), -1), axis=1)
-        # A rod's distance at the fastest passage apart, no two are the same.
+        # Peaks closer than the rods' spacing at the fastest passage are the same fall.
         row, near = np.arange(len(nodes)), np.arange(-int(PART / 2.0), int(PART / 2.0) + 1)
         falls, counts = np.repeat(nodes[None], PEAKS, axis=0), []
         for peak in falls:
             at = table.argmax(axis=1)
             counts.append(table[row, at])
-            # The middle of a plateau, not its beginning.
+            # Use the middle of a plateau of equal votes.
             ends = [
                 np.argmin(line[n:] == line[n]) for line, n in zip(table, at.tolist(), strict=True)
             ]
@@ -632,7 +631,7 @@ class SideFall:
         return falls.reshape(-1, UNKNOWNS), np.concatenate(counts)
 
     def _unlike(self, falls: Array) -> list[int]:
-        """Return the first falls of which each gives other rods to the edges than all before."""
+        """Return the first falls whose assignment of edges differs from that of all before."""
         chosen: list[int] = []
         height, speed = self.path(falls).heights(self.since(falls, self.pairing.times))
         side, _, _, weight = self.pairing.weights(self.levels, height, speed, self.slack)
@@ -644,8 +643,8 @@ class SideFall:
         return chosen
 
 
-def _bounded(matrix: Array, gradient: Array, low: Array, high: Array) -> Array:
-    """Solve for steps; what would leave its bounds goes there, and the others follow."""
+def _solve_bounded(matrix: Array, gradient: Array, low: Array, high: Array) -> Array:
+    """Solve for Newton steps within bounds: clip those outside, then solve for the others."""
     change = np.linalg.solve(matrix, gradient[..., None])[..., 0]
     held = (change < low) | (change > high)
     if held.any():

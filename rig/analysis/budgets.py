@@ -1,21 +1,19 @@
-"""Uncertainties of functions of the unknowns, and where they come from.
+"""Uncertainty budgets of functions of the unknowns.
 
 With M the normal matrix of all drops, prior included, and unknowns in units of their prior
-uncertainties, a function with the gradient g has the variance gᵀM⁻¹g = wᵀ(N + P)w with w = M⁻¹g: N
-is the edges' line of the budget and each group of priors has its own, and they add up. With the
-drops' own unknowns eliminated, w_c = C h with h = g_c − Gᵀg_o for the common ones, G C h for the
-other drops' own, and A⁻¹g_o − G C h for this drop's own. A drop by itself has nothing in common
-with others.
+uncertainties, a function with the gradient g has the variance gᵀM⁻¹g = wᵀ(N + P)w with w = M⁻¹g.
+N gives the edges' line of the budget, and each group of priors in P a line of its own. With the
+drops' own unknowns eliminated, w_c = C h with h = g_c − Gᵀg_o for the shared unknowns, G C h for
+the other drops' own, and A⁻¹g_o − G C h for this drop's own. A single drop has no shared unknowns.
 
-How far a result may be from a prediction that holds follows from the same w: the true value moves
-by g·x and the result's error is −w·x, and what the edges' scatter adds. The variance of result less
-prediction is therefore g·g − g·w for what has a prior. Of what the edges alone tell, such as α, the
-prediction knows the value: it has no share in g·g, and leaves 2 e·w with e its part of g.
+The deviation of a result from a valid prediction follows from the same w. The true value changes
+by g·x, and the result's error is −w·x plus the contribution of the edges' scatter. The variance of
+result less prediction is therefore g·g − g·w for unknowns with priors. For unknowns without, such
+as α, the prediction has the true value: they add nothing to g·g, but 2 e·w with e their part of g.
 """
 
 from __future__ import annotations
 
-import math
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,12 +21,14 @@ import numpy as np
 
 from rig.analysis.distributions import COVERAGE_95, coverage_factor
 from rig.analysis.gate_passages import gate_passages
-from rig.analysis.quantities import BUDGET, COMMON, Adjusted, effective_degrees, measurands
+from rig.analysis.quantities import BUDGET, COMMON, AdjustedDrop, effective_degrees, measurands
 from rig.analysis.result import Deviation, Measured
 from rig.analysis.unknowns import Side
 from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rig.analysis.drop_model import DropModel
     from rig.analysis.dual import Dual
     from rig.analysis.gate_passages import GatePassage
@@ -39,47 +39,48 @@ if TYPE_CHECKING:
 
 _LINES = {name: place for place, name in enumerate(BUDGET)}
 _GUESSED = [_LINES[name] for name in ("side", "contact")]
-"""Lines of a guessed size that no number of drops tells."""
+"""Lines of a guessed size that no number of drops determines."""
 _SHARED = [_LINES[name] for name in COMMON]
 
 
 class Budgets:
-    """Uncertainties from a joint solution.
+    """Uncertainty budgets from a joint fit.
 
     Parameters
     ----------
     joint
-        Of all drops; for a drop by itself see `rig.analysis.joint_fit.by_itself`.
+        Joint fit of all drops; for a single drop see `rig.analysis.joint_fit.by_itself`.
     """
 
     def __init__(self, joint: JointFit) -> None:
         self.joint = joint
-        self._common = np.zeros(len(joint.shared), dtype=np.intp)
-        for name, block in joint.shared.blocks.items():
-            self._common[block] = _LINES[joint.shared.rows[name].line]
+        shared = joint.shared
+        self._common = np.zeros((len(shared), len(_LINES)))
+        for name, block in shared.blocks.items():
+            self._common[block, _LINES[shared.rows[name].line]] = 1.0
 
     @cached_property
     def _gains(self) -> dict[int, Array]:
-        """GᵀG of all drops' own unknowns, by the line of the budget that they belong to."""
-        size = self._common.size
+        """Sum of GᵀG over all drops' own unknowns, by line of the budget."""
+        size = len(self._common)
         gains: dict[int, Array] = {}
         for drop in self.joint.drops if size else ():
-            lines = _supposed(drop.model).line[drop.own]
+            lines = _prior_info(drop.model).line[drop.own]
             for line in sorted(set(lines.tolist())):
                 gain = drop.gain[lines == line]
                 total = gains.setdefault(line, np.zeros((size, size)))
                 total[np.ix_(drop.here, drop.here)] += gain.T @ gain
         return gains
 
-    def measured(self, drop: JointDrop) -> dict[str, Measured]:
-        """Everything the scene lets one measure, by its JSON name."""
+    def measure_all(self, drop: JointDrop) -> dict[str, Measured]:
+        """Return all measurands of the scene with budgets, by JSON name."""
         values = measurands(drop.model, drop.x)
-        return {name: self.measure(drop, value) for name, value in values.items()}
+        return dict(zip(values, self._measure(drop, [*values.values()]), strict=True))
 
     def gates(self, drop: JointDrop) -> tuple[GatePassage, ...]:
-        """How one object passed each gate."""
-        adjusted = Adjusted(drop.model, drop.x)
-        return gate_passages(drop, adjusted, lambda value: self.measure(drop, value))
+        """Return the passages of a single object through each gate."""
+        adjusted = AdjustedDrop(drop.model, drop.x)
+        return gate_passages(drop, adjusted, lambda value: self._measure(drop, [value])[0])
 
     def roots(self, drop: JointDrop, slopes: Array) -> tuple[Array, Array, Array]:
         """Return vectors whose squared lengths add up to the variance of functions of a drop.
@@ -87,92 +88,96 @@ class Budgets:
         Parameters
         ----------
         slopes
-            By its unknowns, shape ``(…, unknowns)``.
+            Derivatives by the drop's unknowns, shape ``(…, unknowns)``.
 
         Returns
         -------
         gradient, own, shared
-            The slopes in units of prior uncertainties; and both vectors. Products of those that are
-            shared are the covariances between drops, in which signs may cancel when chains change
-            places.
+            The slopes in units of prior uncertainties, and both vectors. Products of `shared`
+            vectors are covariances between drops, which may cancel when chains change places.
         """
         gradient = slopes * drop.model.unknowns.sd
         own = gradient[..., drop.own]
-        common = np.zeros((*own.shape[:-1], self._common.size))
-        common[..., drop.here] = gradient[..., drop.common] - own @ drop.gain
-        return gradient, own @ drop.inverse, common @ self.joint.inverse
+        response = gradient[..., drop.common] - own @ drop.gain
+        return gradient, own @ drop.inverse, response @ self.joint.inverse[drop.here]
 
-    def measure(self, drop: JointDrop, result: Dual) -> Measured:
-        """Put a value and its uncertainty together."""
-        gradient, by_root, shared = self.roots(drop, result.slopes)
-        variance = float(by_root @ by_root) + float(shared @ shared)
-        common = self.joint.inverse @ shared
-        behind = drop.gain @ common[drop.here]
-        own = drop.inverse @ by_root - behind
-        place, size = _supposed(drop.model).line[drop.own], len(_LINES)
-        lines = np.bincount(place, own * own, size)
-        lines += np.bincount(self._common, common * common, size)
-        # The sum over all drops was made once; this drop's share is replaced by its own rows.
-        shares = np.bincount(place, behind * behind, size)
-        for line, gains in self._gains.items():
-            lines[line] += max(0.0, float(common @ gains @ common) - float(shares[line]))
-        # What no prior explains comes from the edges; rounding may leave less than nothing.
-        lines[_LINES["edges"]] += max(0.0, variance - float(lines.sum()))
-        parts = zip(_LINES, np.sqrt(lines).tolist(), strict=True)
-        budget = {name: line for name, line in parts if line > 0.0}
-        u, nu = math.sqrt(variance), self.joint.degrees
+    def _measure(self, drop: JointDrop, values: Sequence[Dual]) -> list[Measured]:
+        """Return values with their uncertainty, degrees of freedom, budget and deviation."""
+        gradient, by_root, shared = self.roots(drop, np.array([value.slopes for value in values]))
+        (line, *_), inner, nu = _prior_info(drop.model), drop.own, self.joint.degrees
+        common, solved = shared @ self.joint.inverse.T, by_root @ drop.inverse.T
+        behind = common[:, drop.here] @ drop.gain.T
+        own, place = solved - behind, np.eye(len(_LINES))[line[inner]]
+        lines = own**2 @ place + common**2 @ self._common
+        # `_gains` is summed over all drops; replace this drop's share by its own rows.
+        shares = behind**2 @ place
+        for n, gains in self._gains.items():
+            lines[:, n] += np.maximum(0.0, np.sum(common @ gains * common, axis=1) - shares[:, n])
+        variances = np.sum(by_root**2, axis=1) + np.sum(shared**2, axis=1)
+        # The rest comes from the edges; rounding may make it negative.
+        lines[:, _LINES["edges"]] += np.maximum(0.0, variances - lines.sum(axis=1))
         line_nu = {name: nu[line.scale] for name, line in BUDGET.items() if line.scale in nu}
-        degrees = effective_degrees(u, budget, line_nu)
-        deviation = self._deviation(drop, gradient, degrees)
-        return Measured(
-            float(result.value), u, degrees, budget, shared if shared.size else None, deviation
-        )
+        parts = self._deviations(drop, gradient, own, solved, shared)
+        measured = []
+        for n, (value, u) in enumerate(zip(values, np.sqrt(variances).tolist(), strict=True)):
+            row = zip(_LINES, np.sqrt(lines[n]).tolist(), strict=True)
+            budget = {name: part for name, part in row if part > 0.0}
+            degrees = effective_degrees(u, budget, line_nu)
+            scatter_nu = nu.get("impulse", degrees) if "impact" in drop.model.records else degrees
+            deviation = Deviation(
+                max(0.0, float(parts[0][n])), scatter_nu, parts[1][n], parts[2][n]
+            )
+            vector = shared[n] if shared.size else None
+            measured.append(Measured(float(value.value), u, degrees, budget, vector, deviation))
+        return measured
 
-    def _deviation(self, drop: JointDrop, gradient: Array, degrees: float) -> Deviation:
-        """Return how far a result may be from a prediction that holds."""
-        (place, predicted, absent), inner, places = _supposed(drop.model), drop.own, drop.here
-        if self._common.size:  # what is guessed counts for as much as its expanded uncertainty says
+    def _deviations(
+        self, drop: JointDrop, gradient: Array, moved: Array, solved: Array, shared: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return `Deviation.own`, `plus` and `minus` of each value.
+
+        Parameters
+        ----------
+        gradient, shared
+            As from `roots`.
+        moved, solved
+            w of the drop's own unknowns, and the same with the shared ones given.
+        """
+        (line, predicted, absent), inner = _prior_info(drop.model), drop.own
+        root = self.joint.inverse  # R⁻¹, a square root of the shared covariance
+        if root.size:  # widen guessed lines to their expanded uncertainty
             wider = (coverage_factor(GUESSED) / COVERAGE_95) ** 2
-            absent = np.where(np.isin(place, _GUESSED), 1.0 - wider, absent)
+            absent = np.where(np.isin(line, _GUESSED), 1.0 - wider, absent)
         true = np.where(predicted, 0.0, gradient)
-        direct = gradient[inner] - true[inner]
-        moves, response, without, lost = (np.zeros(self._common.size) for _ in range(4))
-        moves[places], lost[places] = true[drop.common], absent[drop.common]
-        response[places] = gradient[drop.common] - drop.gain.T @ gradient[inner]
-        without[places] = drop.gain.T @ direct
-        root = self.joint.inverse  # whose product with its transpose is the common covariance
-        common = root @ (response @ root)
-        solved = drop.inverse @ (gradient[inner] @ drop.inverse)
-        error = true[inner] - np.where(predicted[inner], 0.0, solved - drop.gain @ common[places])
-        own = true[inner] @ true[inner] - gradient[inner] @ solved + 2.0 * direct @ solved
-        own -= absent[inner] @ error**2
-        less, surplus = (
-            np.sqrt(np.maximum(0.0, sign * lost)) * (moves - common) for sign in (1.0, -1.0)
-        )
-        # hCh + h(Ce) + (eC)h is what h + e make, less what e makes; e = −Gᵀ of what is known.
-        plus = np.concatenate([moves, without @ root, surplus])
-        minus = np.concatenate([(response + without) @ root, less])
-        if not self._common.size:  # what drops have in common is known by its line alone
-            part = (1.0 - absent[inner]) * error**2
-            shared = float(part[np.isin(place[inner], _SHARED)].sum())
-            own, plus, minus = own - shared, np.array([math.sqrt(shared)]), np.zeros(1)
-        if "impact" in drop.model.records:
-            degrees = self.joint.degrees.get("impulse", degrees)
-        return Deviation(max(0.0, float(own)), degrees, plus, minus)
+        direct = gradient[:, inner] - true[:, inner]
+        error = true[:, inner] - np.where(predicted[inner], 0.0, moved)
+        own = np.sum(true[:, inner] ** 2 - absent[inner] * error**2, axis=1)
+        own += np.sum((2.0 * direct - gradient[:, inner]) * solved, axis=1)
+        if not root.size:  # only budget lines say what drops share
+            common = np.isin(line[inner], _SHARED) * (1.0 - absent[inner])
+            part = np.sum(common * error**2, axis=1, keepdims=True)
+            return own - part[:, 0], np.sqrt(part), 0.0 * part
+        moves, lost = np.zeros(shared.shape), np.zeros(len(root))
+        moves[:, drop.here], lost[drop.here] = true[:, drop.common], absent[drop.common]
+        without = direct @ drop.gain @ root[drop.here]
+        off = moves - shared @ root.T
+        surplus, less = (off * np.sqrt(np.maximum(0.0, part)) for part in (-lost, lost))
+        # hCh + h(Ce) + (eC)h is the form of h + e less that of e; e = −Gᵀ of the predicted ones.
+        return own, np.hstack([moves, without, surplus]), np.hstack([shared + without, less])
 
 
-class _Supposed(NamedTuple):
-    """What is known of a drop's unknowns, shape ``(unknowns,)`` each.
+class _PriorInfo(NamedTuple):
+    """Properties of a drop's unknowns, shape ``(unknowns,)`` each.
 
     Attributes
     ----------
     line
-        Of the budget, by its place there.
+        Number of the budget line.
     known
-        Whether only the edges tell it, and a prediction knows it.
+        Whether only edges determine the unknown, and a prediction has its true value.
     absent
-        Share of the prior variance that is none where the prediction's equations hold: what strings
-        do besides, and air of which the protocol says nothing.
+        Share of the prior variance that vanishes where the prediction's equations hold: effects of
+        strings beyond the model, and drag that the protocol does not state.
     """
 
     line: Index
@@ -180,8 +185,8 @@ class _Supposed(NamedTuple):
     absent: Array
 
 
-@lru_cache(maxsize=1)  # all results of a drop ask for it
-def _supposed(model: DropModel) -> _Supposed:
+@lru_cache(maxsize=1)  # the same for all results of a drop
+def _prior_info(model: DropModel) -> _PriorInfo:
     at = model.unknowns
     line, predicted = np.zeros(len(at), dtype=np.intp), np.zeros(len(at), dtype=np.bool_)
     absent = np.zeros(len(at))
@@ -190,4 +195,4 @@ def _supposed(model: DropModel) -> _Supposed:
         line[at[name]], predicted[at[name]] = _LINES[row.line], row.name in {"release", measured}
         record = model.records["impact" if row.of == "impact" else next(iter(model.records))]
         absent[at[name]] = row.absent(Side(model, record))
-    return _Supposed(line, predicted, absent)
+    return _PriorInfo(line, predicted, absent)

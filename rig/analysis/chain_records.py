@@ -1,12 +1,13 @@
 """A drop's edges as times: a train for each gate, a record for each chain.
 
-Beside what each gate reported stands what it should see of the chain that hangs there: down to
-where its rods strike the surface, or others that lie there.
+Beside the observed edges of a gate stand the expected ones: all rods' sides that pass the beam
+before the rod strikes the surface, or rods that lie on it.
 """
 
 from __future__ import annotations
 
 import itertools
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -32,21 +33,24 @@ if TYPE_CHECKING:
 
 
 QUICK = 0.3e-3
-"""Edges of one gate closer than this are no two sides of a rod: the receiver flickered, s."""
+"""Edges of a gate closer than this are a flicker of the receiver, not two sides of a rod, s."""
 SIDES = 2
-"""Edges of a rod, or of one stray pulse."""
+"""Number of edges of a rod, or of a stray pulse."""
 LONGEST = 64
-"""Edges of one flicker from which on its middle says no more: a clean edge has 1, a rod in front of
-a receiver that flickers with the mains some ten. What is fitted takes time with each edge."""
+"""Most edges kept of a flicker, to save time: its middle adds no information. A clean edge has 1,
+a rod in front of a receiver that flickers with the mains about ten."""
 
+_ON_RODS = 2.0
+"""`ChainRecord.uneven` on a pile: in resolved falls, α of single impulses scatters by 0.04 there
+and by 0.02 on a board."""
 WIDER = 1.2
-"""By which a beam may see an object wider or narrower than stated: one that passes half its radius
-off the middle of a beam has a chord that is 13 % shorter."""
+"""Factor by which an object's width in a beam may differ from the stated one: if the beam passes
+half a radius off its middle, the chord is 13 % shorter."""
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeTrain:
-    """What one gate reported, and what it should have.
+    """Observed and expected edges of a gate.
 
     Attributes
     ----------
@@ -55,7 +59,7 @@ class EdgeTrain:
     times, blocked
         Each edge: seconds since the release fired, and the state after it; shape ``(edges,)``.
     burst
-        How long the flicker lasted in which each edge came, s; 0 for a clean edge.
+        Duration of the flicker that each edge is part of, s; 0 for a clean edge.
     edge
         Number of each edge in the drop's own list, shape ``(edges,)``.
     rods, blocks
@@ -65,7 +69,7 @@ class EdgeTrain:
         Height of the chain's reference point at each expected edge by the nominal geometry, m;
         falling.
     thinned
-        How many edges more the gate reported, in the middle of flickers of more than `LONGEST`.
+        Number of observed edges left out, from the middle of flickers longer than `LONGEST`.
     """
 
     gate: int
@@ -83,18 +87,18 @@ class EdgeTrain:
 class EdgeArrays:
     """A drop's edges as arrays, one channel after the other, shape ``(edges,)`` each.
 
-    Of each flicker of more than `LONGEST` edges as many are left, half at either end.
+    Of a flicker of more than `LONGEST` edges that many are kept, half at either end.
 
     Attributes
     ----------
     times, channels, blocked
-        s, and the state after it.
+        Time, s, gate channel, and state after the edge.
     burst
-        How long the flicker of its gate lasts that each edge is part of, s; 0 if clean.
+        Duration of the flicker that each edge is part of, s; 0 if clean.
     numbers
-        Of each in the drop.
+        Number of each edge in the drop.
     received
-        Edges by channel, with those that were left out; shape ``(channels,)``.
+        Number of edges by channel, including those left out; shape ``(channels,)``.
     """
 
     times: Array
@@ -106,7 +110,7 @@ class EdgeArrays:
 
     @classmethod
     def of(cls, edges: Sequence[Sequence[int]] | NDArray[np.int64], hz: float) -> EdgeArrays:
-        """Take edges whose ticks come at a rate in Hz: tick, channel and state of each."""
+        """Return arrays of edges given as rows of tick, channel and state; `hz` in ticks/s."""
         if not isinstance(edges, np.ndarray):
             flat = itertools.chain.from_iterable(edges)  # much faster than an array of rows
             edges = np.fromiter(flat, np.int64, 3 * len(edges)).reshape(-1, 3)
@@ -129,11 +133,11 @@ class EdgeArrays:
         )
 
     def of_channel(self, channel: int) -> slice:
-        """Return where one channel's edges are."""
+        """Return the slice of a channel's edges."""
         return slice(*np.searchsorted(self.channels, [channel, channel + 1]).tolist())
 
     def count_thinned(self, channel: int) -> int:
-        """Count the edges of a channel that were left out."""
+        """Return the number of a channel's edges that were left out."""
         received = int(self.received[channel]) if channel < self.received.size else 0
         return received - int(np.count_nonzero(self.channels == channel))
 
@@ -149,26 +153,28 @@ class ChainRecord:
     chain
         The chain that hangs there.
     trains
-        One a gate.
+        A train for each gate.
     ratios
-        ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, shape ``(rods,)``; `None` for a chain
-        that strikes nothing.
+        ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, shape ``(rods,)``; `None` for a free
+        chain.
     alpha
-        Of its impacts as the model expects it; 0 for a chain that strikes nothing.
+        α that the model predicts for its impacts; 0 for a free chain.
     air
         κ of each leg in units of that of the first chain as a whole, as in
         `rig.analysis.trajectory.Trajectory`.
     unlike
-        How much more the air takes from each rod than from its chain, see `rig.analysis.air`.
+        κ of each rod alone less that of its chain, see `rig.analysis.air.unlike`.
+    uneven
+        Scatter of its single impulses relative to that on a bare board.
     incline_deg
-        Of the surface that it strikes.
+        Inclination of the surface that it strikes.
     condition
-        Under which it strikes, in words; drops of the same one have the contact in common.
+        Name of the condition; drops under the same condition share the contact unknowns.
     higher
-        How high above the contact point each rod's middle is as its impact pulls, m; not given
-        where nothing is struck. Results are at level: the top rod falls on as if nothing lay there.
+        Height of each rod's middle above the contact point as its impact acts, m; empty for a free
+        chain. Results refer to the level: the top rod falls on as if no rod lay there.
     aside
-        Trains of gates that are left out: so low that not every rod passes them.
+        Trains of gates that are left out, too low for every rod to pass.
     """
 
     role: Side
@@ -178,6 +184,7 @@ class ChainRecord:
     alpha: float = 0.0
     air: Array = field(default_factory=lambda: ONE)
     unlike: Array = field(default_factory=lambda: np.zeros(1))
+    uneven: float = 1.0
     incline_deg: float = 0.0
     condition: str = ""
     higher: tuple[float, ...] = ()
@@ -185,18 +192,18 @@ class ChainRecord:
 
     @property
     def strikes(self) -> Array:
-        """How high the reference point is below the contact point as each rod strikes, m."""
+        """Depth of the reference point below the contact point as each rod strikes, m."""
         places = np.array(self.chain.chain.heights)
         return places - self.higher if self.higher else places
 
     @property
-    def crossed(self) -> Sequence[float]:
-        """Widths of rods where others may be thrown back in their way; else nothing."""
+    def rebound_widths(self) -> Sequence[float]:
+        """Widths of the rods if rebounding rods may cross their beams, m; else empty."""
         thrown = self.ratios is not None and self.chain.chain.rods > 1
         return self.chain.widths if thrown else ()
 
     @property
-    def expected(self) -> int:
+    def edge_count(self) -> int:
         """Number of edges that a perfect rig would report."""
         return sum(train.rods.size for train in self.trains)
 
@@ -209,22 +216,22 @@ def edge_train(
     start: float,
     higher: tuple[float, ...] | None,
 ) -> EdgeTrain:
-    """Collect what one gate saw and what it should see.
+    """Return the observed and expected edges of a gate.
 
     Parameters
     ----------
     number
-        Of the gate in the protocol's list.
+        Number of the gate in the protocol's list.
     edges
         All edges of the drop.
     start
         Nominal height of the bottom rod's middle before release, m.
     higher
-        How far above the contact point each rod ends, m: what passes below that is not expected;
-        `None` where nothing is struck.
+        Height above the contact point at which each rod stops, m: no passage is expected below;
+        `None` for a free chain.
     """
     at_gate = edges.of_channel(gate.channel)
-    # Some timers tell nothing but that beams darken.
+    # Some timers record only edges that darken a beam.
     darkening = bool(edges.blocked.size and edges.blocked.all())
     return EdgeTrain(
         number,
@@ -237,7 +244,7 @@ def edge_train(
     )
 
 
-@lru_cache(maxsize=256)  # a session asks for the same few again and again
+@lru_cache(maxsize=256)  # a session needs the same few for every drop
 def _passages(
     height: float,
     chain: RodChain,
@@ -245,7 +252,7 @@ def _passages(
     higher: tuple[float, ...] | None,
     darkening: bool,
 ) -> tuple[Index, Flags, Array]:
-    """Rods, polarities and levels of what a beam should see, as `Train` has them."""
+    """Return rods, polarities and levels of a beam's expected edges, as in `EdgeTrain`."""
     places = np.array(chain.chain.heights)
     widths = np.array(chain.widths)
     # A rod's lower side darkens the beam, its upper side clears it.
@@ -261,8 +268,8 @@ def _passages(
     return passages
 
 
-def thinned(drop: Drop, hz: float) -> Drop:
-    """Return a drop without the middles of long flickers, for what reads it many times."""
+def thin(drop: Drop, hz: float) -> Drop:
+    """Return a drop without the middles of long flickers, for repeated analysis."""
     numbers = np.sort(EdgeArrays.of(drop.edges, hz).numbers)
     return replace(drop, edges=tuple(drop.edges[n] for n in numbers.tolist()))
 
@@ -270,7 +277,7 @@ def thinned(drop: Drop, hz: float) -> Drop:
 def chain_records(
     protocol: Protocol, run: Run, drop: Drop, hz: float, aside: Collection[int] = ()
 ) -> list[ChainRecord]:
-    """Collect each chain with the trains of its gates.
+    """Return a record for each chain, with the trains of its gates.
 
     Parameters
     ----------
@@ -293,28 +300,30 @@ def chain_records(
             tuple(train for train in trains if (train.gate in aside) == left_out)
             for left_out in (False, True)
         )
-        # Behind the last leg nothing falls any more, but edges are asked for all the same.
+        # No rod falls after the last leg, but later edges need a leg too.
         legs = np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1]
-        record = ChainRecord(role, chain, used, air=legs, unlike=more, aside=unused, **impacts)
-        records.append(record)
+        records.append(
+            ChainRecord(role, chain, used, air=legs, unlike=more, aside=unused, **impacts)
+        )
     return records
 
 
 def _impacts(protocol: Protocol, run: Run, role: Side, chain: RodChain) -> dict[str, Any]:
-    """Return what a chain's record has because it strikes; nothing where nothing is struck."""
+    """Return the impact fields of a chain's record; empty for a free chain."""
     if role == "free":
         return {}
     assert protocol.surface is not None
-    # γ is the same at every incline, and level ground always in the domain of Eq. 13.
+    # γ does not depend on the incline, and 0° is always in the domain of Eq. 13.
     gamma = impact_on(protocol.surface, chain.chain, 0.0).gamma
-    try:
-        alpha = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0).alpha
-    except DomainError:
-        alpha = 0.0
+    alpha, uneven = 0.0, 1.0
+    with suppress(DomainError):
+        impact = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0)
+        alpha, uneven = impact.alpha, _ON_RODS if impact.basis == "pile" else 1.0
     return {
         "ratios": np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gamma)),
         "alpha": alpha,
+        "uneven": uneven,
         "incline_deg": run.incline_deg or 0.0,
         "condition": str(protocol.condition(run)),
-        "higher": higher_contacts(protocol, run.incline_deg, chain),
+        "higher": higher_contacts(run.incline_deg or 0.0, chain),
     }

@@ -1,8 +1,8 @@
-"""Whether results agree with the model: the one comparison behind every Eₙ, χ² and p.
+"""Comparison of results with the model: the source of every Eₙ, χ² and p.
 
-What is measured less what is predicted is a measurand of its own. Besides what measuring leaves
-open, and what the model's coefficients do, its uncertainty holds what single falls do otherwise
-than their mean: one fall is off by all of it, the mean of n falls by its share of √n.
+The difference of measured and predicted value is a measurand of its own. Its uncertainty includes
+measurement, the model's coefficients, and the scatter of single falls about their mean, which for
+the mean of n falls is divided by √n.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,9 +34,9 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference(Measured):
-    """A mean less the model, under one condition, m or m/s.
+    """A mean less the model's prediction under a condition, m or m/s.
 
-    Its standard uncertainty holds the scatter of falls.
+    Its standard uncertainty includes the scatter of falls.
 
     Attributes
     ----------
@@ -49,30 +49,30 @@ class Difference(Measured):
 
     @property
     def chi2(self) -> float:
-        """Of this condition alone."""
+        """χ² of this condition alone, with 1 degree of freedom."""
         return (self.value / self.u) ** 2
 
     @property
     def p(self) -> float:
-        """How often chance alone would make χ² as large."""
+        """Probability of a χ² at least as large by chance."""
         return chi2_tail(self.chi2, 1)
 
     def json(self) -> dict[str, Any]:
-        """One of ``inclines``."""
+        """Return a member of ``inclines``."""
         names = ("n", "u", "normalized_error", "chi2", "p")
         return {**self.condition.json(), "difference": self.value, **attributes(self, *names)}
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One measurand against the model.
+    """Comparison of a measurand with the model.
 
     Attributes
     ----------
     quantity
         Its name in JSON.
     chi2
-        Of all conditions together, with what they have in common.
+        χ² of all conditions together, with their covariance.
     """
 
     quantity: str
@@ -86,11 +86,11 @@ class Comparison:
 
     @property
     def p(self) -> float:
-        """How often chance alone would make χ² as large."""
+        """Probability of a χ² at least as large by chance."""
         return chi2_tail(self.chi2, self.degrees)
 
     def json(self) -> dict[str, Any]:
-        """One of ``comparison``."""
+        """Return a member of ``comparison``."""
         fields = attributes(self, "quantity", "chi2", "degrees", "p")
         return fields | {"inclines": plain(self.differences)}
 
@@ -98,114 +98,103 @@ class Comparison:
 def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[Comparison, ...]:
     """Compare means with the protocol's model, all conditions at once.
 
-    Means of different conditions share the rig's errors, and predictions the model's coefficients:
-    both stand in the covariance with which χ² is made, so that one wrong β counts once and not nine
-    times. What is outside the model's domain is left out.
+    Means of different conditions share the rig's errors, and predictions share the model's
+    coefficients. The covariance of χ² includes both, so that a wrong β counts once and not nine
+    times. Conditions outside the model's domain are left out.
 
     Parameters
     ----------
     cases
-        Drops of one condition each, see `rig.analysis.summary.by_case`.
+        Drops of each condition, see `rig.analysis.summary.by_case`.
 
     Returns
     -------
     tuple of Comparison
-        One a measurand that is measured and predicted, and may differ at all.
+        A comparison for each measurand with a prediction, unless the difference is exact.
     """
-    comparisons = []
     models = [predicted_run(protocol, runs[0].run) for runs in cases]
     slopes = [coefficient_slopes(protocol, runs[0].run) for runs in cases]
+    comparisons = []
     for name in (row.name for row in averaged()):
         lines = [
             _Line(
                 protocol.condition(runs[0].run),
-                [run.quantities[name] for run in runs],
-                model[name].value,
+                np.array([run.quantities[name].value - model[name].value for run in runs]),
+                [_deviation(run.quantities[name]) for run in runs],
+                runs[0].quantities[name].u,
                 slope.get(name, {}),
             )
             for runs, model, slope in zip(cases, models, slopes, strict=True)
             if name in model and all(name in run.quantities for run in runs)
         ]
-        comparison = _compare(name, lines) if lines else None
-        if comparison is not None:
-            comparisons.append(comparison)
-    return tuple(comparisons)
+        comparisons += [_compare(name, lines)] if lines else []
+    return tuple(comparison for comparison in comparisons if comparison.differences)
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
-    """Values of one condition, and its prediction with what coefficients move it by."""
+def _deviation(measured: Measured) -> Deviation:
+    """Return the deviation of a value; without a fit, its uncertainty counts as its own."""
+    return measured.deviation or Deviation(measured.u**2, measured.degrees, (0.0,), (0.0,))
+
+
+class _Line(NamedTuple):
+    """Values less their prediction under a condition, and its derivatives by the coefficients."""
 
     condition: Condition
-    values: Sequence[Measured]
-    predicted: float
+    off: Array
+    deviations: Sequence[Deviation]
+    u: float
     slopes: Mapping[str, float]
 
-    @property
-    def difference(self) -> float:
-        return fmean(measured.value for measured in self.values) - self.predicted
 
-    @property
-    def deviations(self) -> list[Deviation]:
-        """Of each value; of what no fit has made its own uncertainty is all that is known."""
-        return [
-            measured.deviation or Deviation(measured.u**2, measured.degrees, (0.0,), (0.0,))
-            for measured in self.values
-        ]
-
-
-def _compare(name: str, lines: Sequence[_Line]) -> Comparison | None:
-    names = list(dict.fromkeys(key for line in lines for key in line.slopes))
+def _compare(name: str, lines: Sequence[_Line]) -> Comparison:
+    names = {key: None for line in lines for key in line.slopes}
     slopes = np.array([[line.slopes.get(key, 0.0) for key in names] for line in lines])
-    own, common = _parts(lines)
-    covariance = np.diag(own) + common + slopes @ slopes.T
-    size = np.diag(slopes @ slopes.T) + [line.values[0].u ** 2 for line in lines]
-    places = np.flatnonzero(np.diag(covariance) > _ROUNDING * size).tolist()
-    if not places:
-        return None
+    size = np.sum(slopes**2, axis=1) + [line.u**2 for line in lines]
+    covariance = _covariance(lines) + slopes @ slopes.T
+    places = np.flatnonzero(covariance.diagonal() > _ROUNDING * size)
     covariance = covariance[np.ix_(places, places)]
-    differences = tuple(
-        Difference(line.difference, math.sqrt(u2), condition=line.condition, n=len(line.values))
-        for line, u2 in zip((lines[n] for n in places), np.diag(covariance).tolist(), strict=True)
-    )
-    off = np.array([difference.value for difference in differences])
-    return Comparison(name, float(off @ np.linalg.solve(covariance, off)), differences)
+    lines = [lines[place] for place in places.tolist()]
+    off = np.array([float(line.off.mean()) for line in lines])
+    differences = [
+        Difference(value, math.sqrt(u2), condition=line.condition, n=line.off.size)
+        for line, value, u2 in zip(lines, off.tolist(), covariance.diagonal().tolist(), strict=True)
+    ]
+    return Comparison(name, float(off @ np.linalg.solve(covariance, off)), tuple(differences))
 
 
-def _parts(lines: Sequence[_Line]) -> tuple[Array, Array]:
-    """Variance of each mean by its own falls, and covariance by what all drops have in common.
+def _covariance(lines: Sequence[_Line]) -> Array:
+    """Return the covariance of the means, by their own falls and by shared errors.
 
-    How far falls scatter is foretold by each one's impulses. How far those of one condition really
-    do is a second opinion, beside which the first one counts as a guessed scale does.
+    The predicted scatter of falls comes from their impulses. The observed scatter within
+    conditions rescales it; the prediction then counts as a scale with `GUESSED` degrees of freedom.
     """
-    own, plus, minus = [], [], []
-    seen, seen_degrees, degrees = 0.0, 0, math.inf
-    alike = len({len(drop.plus) for line in lines for drop in line.deviations}) == 1
+    drops = [drop for line in lines for drop in line.deviations]
+    alike = len({len(drop.plus) for drop in drops}) == 1
+    own, plus, minus, seen, seen_degrees = [], [], [], 0.0, 0
     for line in lines:
-        drops = line.deviations if alike else [_by_size(drop) for drop in line.deviations]
-        gains, losses = (np.array([drop[place] for drop in drops]) for place in (2, 3))
+        deviations = line.deviations if alike else [*map(_by_size, line.deviations)]
+        gains, losses = (np.array([drop[place] for drop in deviations]) for place in (2, 3))
         plus.append(gains.mean(axis=0))
         minus.append(losses.mean(axis=0))
-        single = fmean(drop.own for drop in drops)
-        own.append(single / len(drops))
-        degrees = min(degrees, *(drop.degrees for drop in drops))
-        # Chains that change places bring their own rods: those differ within a condition.
-        foretold = float(gains.var(axis=0).sum() - losses.var(axis=0).sum()) * len(drops)
-        foretold += single * (len(drops) - 1)
+        single, n = fmean(drop.own for drop in deviations), len(deviations)
+        own.append(single / n)
+        # Chains that change places bring their own rods, so these errors vary within a condition.
+        foretold = float(gains.var(axis=0).sum() - losses.var(axis=0).sum()) * n + single * (n - 1)
         if foretold > 0.0:
-            values = np.array([drop.value for drop in line.values])
-            seen += float(values.var()) * len(drops) * (len(drops) - 1) / foretold
-            seen_degrees += len(drops) - 1
+            seen += float(line.off.var()) * n * (n - 1) / foretold
+            seen_degrees += n - 1
     factor = (GUESSED + seen) / (GUESSED + seen_degrees)
-    unsure = 1.0 / degrees + seen_degrees / (GUESSED + seen_degrees) ** 2
-    degrees_together = 1.0 / unsure if unsure else math.inf
-    # A scale that is known from few counts for as much as its expanded uncertainty says.
-    factor *= (coverage_factor(max(1.0, degrees_together)) / coverage_factor(math.inf)) ** 2
+    unsure = max(1.0 / drop.degrees for drop in drops)
+    unsure += seen_degrees / (GUESSED + seen_degrees) ** 2
+    degrees = max(1.0, 1.0 / unsure) if unsure else math.inf
+    # Widen a scale with few degrees of freedom to its expanded uncertainty.
+    factor *= (coverage_factor(degrees) / coverage_factor(math.inf)) ** 2
     gains, losses = np.array(plus), np.array(minus)
-    return factor * np.array(own), gains @ gains.T - losses @ losses.T
+    covariance: Array = np.diag(factor * np.array(own)) + gains @ gains.T - losses @ losses.T
+    return covariance
 
 
 def _by_size(deviation: Deviation) -> Deviation:
-    """Take what drops share as fully common: of drops by themselves no more is known."""
+    """Return a deviation with a fully common part, as for drops fitted alone no more is known."""
     size = float(np.dot(deviation.plus, deviation.plus) - np.dot(deviation.minus, deviation.minus))
     return deviation._replace(plus=(math.sqrt(max(0.0, size)),), minus=(0.0,))

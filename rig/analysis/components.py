@@ -1,4 +1,4 @@
-"""How much each kind of nuisance scatters: stated beforehand, or found by a joint fit."""
+"""Variance components of the nuisance parameters: stated, or estimated by a joint fit."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ import numpy as np
 from rig.protocol.protocol import Priors
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
 
 _DEFAULT = Priors()
 SHARPEST = 1e-6
-"""Of an edge, m: no rod is round to less, and no beam's edge sharper, whatever is stated."""
+"""Least scatter of an edge, m: no rod is rounder and no beam sharper, whatever is stated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,32 +27,32 @@ class Components:
     Attributes
     ----------
     floor
-        What an edge may be off for reasons not in the equations (a rod not quite round), m.
+        Unmodelled scatter of an edge (a rod not quite round), m.
     jitter
-        Scatter of one time stamp, s.
+        Scatter of a time stamp, s.
     hang
-        Scatter of where a chain hangs from run to run, m.
+        Scatter of a chain's start height from run to run, m.
     beam
-        How far off a rod's middle a beam may run, m; times tan(tilt) it shifts edges rod by rod.
+        Sideways offset of a beam from a rod's middle, m; times tan(tilt) it shifts edges.
     departure
-        How far off its chain a rod that passes a beam may be once rods have struck, m: strings
-        bounce, rods turn, and none of that is in the equations.
+        Departure of a rod from its chain once rods have struck, m: strings bounce and rods turn,
+        which the equations leave out.
     few
-        And how far besides where but few rods still fall: over their number. A joint fit keeps it
-        in proportion to `departure`.
+        Further departure, divided by the number of rods still falling, m. A joint fit keeps it in
+        proportion to `departure`.
     impulse, impulse_floor
-        Scatter of single impulses about α: relative to α, and where α is small.
+        Scatter of single impulses about α: relative to α, and a floor for small α.
     bounce
-        What strings that bounce add to the scatter of the last pull, relative to α. One rod alone
-        goes with what its own string does; where M are left it counts by 1/M.
+        Scatter of the last pull by bouncing strings, relative to α; divided by the number of rods
+        above.
     landed
-        By how much rods strike too early to be seen pass: relative to what a drop has beforehand.
+        Scatter of edges of rods that may have struck before, relative to its prior.
     stretch
-        Of what strings do to a chain together: relative to the protocol's own.
+        Stretch of a chain by its strings, relative to the protocol's prior.
     gates, rods
-        Beam heights and rod places: relative to the protocol's own uncertainties.
+        Beam heights and rod places, relative to the protocol's uncertainties.
     swing
-        Of the square of the speed with which chains swing: relative to the protocol's own.
+        Squared speed of a chain's swing, relative to the protocol's prior.
     """
 
     floor: float = _DEFAULT.edge_floor
@@ -71,18 +70,18 @@ class Components:
     landed: float = 1.0
     stretch: float = 1.0
 
-    def ratios(self, others: Components) -> NDArray[np.float64]:
-        """Logarithm of how much larger each of others is, in their order; 0 of what is exact."""
+    def ratios(self, others: Components) -> Array:
+        """Return the log ratio of each component in `others` to this one; 0 for exact ones."""
         pairs = ((getattr(self, name), getattr(others, name)) for name in self.__slots__)
         return np.log([max(b / a, np.finfo(float).tiny) if a else 1.0 for a, b in pairs])
 
-    def times(self, ratios: NDArray[np.float64]) -> Components:
-        """Return them larger by such ratios."""
+    def times(self, ratios: Array) -> Components:
+        """Return the components multiplied by the exponentials of `ratios`."""
         factors = zip(self.__slots__, np.exp(ratios).tolist(), strict=True)
         return Components(**{name: getattr(self, name) * factor for name, factor in factors})
 
-    def departures(self, loose: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Variance of how far rods are off their chain, m².
+    def departures(self, loose: Array) -> Array:
+        """Return the variance of rods' departures from their chain, m².
 
         Parameters
         ----------
@@ -91,31 +90,32 @@ class Components:
         """
         return (loose > 0.0) * self.departure**2 + (self.few * loose) ** 2
 
-    def impulses(self, alpha: float, above: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Scatter of each impulse's α, for an α.
+    def impulses(self, alpha: float, above: Array, uneven: float = 1.0) -> Array:
+        """Return the standard deviation of each impulse's α, for a mean α.
 
         Parameters
         ----------
         above
-            Number of rods above the one that strikes; shape ``(rods,)``.
+            Number of rods above the striking rod; shape ``(rods,)``.
+        uneven
+            See `rig.analysis.chain_records.ChainRecord.uneven`.
         """
-        even = math.hypot(self.impulse * alpha, self.impulse_floor)
+        even = math.hypot(self.impulse * alpha * uneven, self.impulse_floor)
         return np.hypot(even, self.bounce * alpha / above)
 
 
-def above(chain: Chain) -> NDArray[np.float64]:
-    """How many times a rod's mass hangs above it, bottom up.
+def above(chain: Chain) -> Array:
+    """Return the mass above each rod in units of its own, bottom up; at least 1.
 
-    Of rods that are alike it is their number; at least 1, as for the top rod, whose impact pulls
-    nothing.
+    For equal rods this is their number. The top rod, which pulls nothing, has 1.
     """
     masses = np.array(chain.masses)
-    heavier: NDArray[np.float64] = (np.cumsum(masses[::-1])[::-1] - masses) / masses
+    heavier: Array = (np.cumsum(masses[::-1])[::-1] - masses) / masses
     return np.maximum(heavier, 1.0)
 
 
-def stated(protocol: Protocol) -> Components:
-    """How much everything scatters by a protocol's priors."""
+def priors(protocol: Protocol) -> Components:
+    """Return the variance components of a protocol's priors."""
     priors = protocol.priors
     return Components(
         max(priors.edge_floor, SHARPEST),
@@ -131,5 +131,5 @@ def stated(protocol: Protocol) -> Components:
 
 
 LEAST_SHARE = 0.01
-"""Of what is stated, below which nothing is believed: no rod is round to less than a micrometre, no
-stamp better than 20 ns, and a perfect simulation must not make the edges infinitely sure."""
+"""Lower bound of a component as a share of the stated value: no rod is round to less than a
+micrometre, no stamp better than 20 ns, and a perfect simulation must not give zero scatter."""

@@ -1,4 +1,4 @@
-"""The model's curves against inclination, for pictures."""
+"""Predictions against inclination, for figures."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from rig.predictions import beside, predict_incline
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
-_BEYOND = 5.0  # degrees that the curves go on beyond the outermost inclines
+_BEYOND = 5.0  # degrees by which curves extend beyond the outermost inclines
 _STEEPEST = 89.0
 
 
 def model_curves(protocol: Protocol) -> dict[str, Any]:
-    """Predict Δz and V, with their bands, degree by degree; empty where nothing is struck.
+    """Predict Δz and V with their bands for every degree; empty without a surface.
 
     Returns
     -------
     dict
-        As `rig.report.figures.incline_figure` takes it.
+        Argument `curves` of `rig.report.figures.result_figure`.
     """
     surface = protocol.surface
     if surface is None:

@@ -1,11 +1,10 @@
-"""What Eqs. 8 to 13 leave out, smoothly: how strings stretch a chain.
+"""Smooth model discrepancy: the stretch of a chain by its strings, which Eqs. 8 to 13 leave out.
 
-The equations take strings as dead. Real ones throw rods back: 60 ms after the first strike the top
-rod of resolved falls is up to 4 mm ahead of its place, the middle of the chain still in it, alike
-from rod to rod. Taken for independent departures of so many edges it would average away, and draw
-the release along. So each drop has a few smooth modes of its own: powers of a rod's place along the
-chain, which are small but at the top, and the chain as a whole, times a way that grows and one that
-soon stays as it is.
+The equations assume inelastic strings. Real strings rebound: 60 ms after the first strike the top
+rod of resolved falls is up to 4 mm ahead of its place, while the middle of the chain is not, and
+neighbouring rods depart alike. As independent departures of edges this would average out and bias
+the release. So each drop has a few smooth modes: powers of a rod's place along the chain, and the
+chain as a whole, times a function that grows in time and a function that soon becomes constant.
 """
 
 from __future__ import annotations
@@ -19,35 +18,35 @@ from rig.analysis.trajectory import struck_trajectory
 
 if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.equations import Expected
+    from rig.analysis.equations import ExpectedEdges
     from rig.analysis.trajectory import Trajectory
     from rig.arrays import Array, Index
     from rig.protocol.protocol import Protocol
 
 
 LOWEST_START = 1e-3
-"""Where a struck chain hangs at least, m: an adjustment of nonsense tries what is below ground."""
+"""Least drop height of a striking chain, m: a trial step may go below the surface."""
 
 _POWERS = {0.0: 0.5, 2.0: 1.0, 6.0: 1.0}
-"""Of a rod's place, 0 at the bottom and 1 at the top, and the amplitude of each: 0 for a chain that
-is late as a whole, for strings pass a pull on by and by. A quarter to all of it covers as well, and
-a single 3 beside it."""
+"""Powers of a rod's place (0 at the bottom, 1 at the top) with amplitudes. Power 0 is a delay of
+the whole chain, as strings transmit a pull gradually: 0.25 to 1 give the same coverage, as does a
+power 3 in addition."""
 _GROWTH = 3.0
-"""Of the lasting mode until the last strike, in amplitudes of the one that soon stays."""
+"""Growth of the growing mode until the last strike, in amplitudes of the constant mode."""
 _SOON = 6.0
-"""Time constants of the latter from the first strike to the last: 50 of 320 ms."""
+"""Time constants of the constant mode between first and last strike: 50 of 320 ms."""
 MODES = 2 * len(_POWERS)
 STRETCHES = ("stretch", "usual stretch")
-"""Blocks of unknowns: of a drop alone, and of all drops of a condition."""
+"""Blocks of unknowns: of a drop alone, and shared by all drops of a condition."""
 
 
 class StretchModes(NamedTuple):
-    """How much further rods have fallen than their chain, by each mode, at some moments.
+    """Distance of rods ahead of their chain by each mode, at some moments.
 
     Attributes
     ----------
     way, rate
-        In amplitudes, and its derivative by time, 1/s; shape ``(moments, MODES)``.
+        Distance in amplitudes, and its time derivative, 1/s; shape ``(moments, MODES)``.
     """
 
     way: Array
@@ -56,20 +55,20 @@ class StretchModes(NamedTuple):
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """How a chain that strikes leaves the equations, by its nominal fall.
+    """Model discrepancy of a striking chain, evaluated on its nominal fall.
 
-    When the chain is at a level is taken from that fall: which functions the modes are is a choice,
-    and with this one the observation equations are linear in them.
+    Times at levels come from the nominal fall, which keeps the observation equations linear in the
+    modes.
 
     Attributes
     ----------
     nominal
-        The fall, as the protocol has it.
+        The fall by the protocol.
     stretch
         `StretchModes.way` at each expected edge, shape ``(edges, MODES)``.
     late_pull, late_way
-        How much faster all of the last impulse makes the top rod, m/s, and what way is left below
-        the lowest beam, m: what of it comes there, no edge tells.
+        Gain of speed of the top rod by the whole last impulse, m/s, and the distance below the
+        lowest beam, m, where no edge measures that gain.
     """
 
     nominal: Trajectory
@@ -79,9 +78,9 @@ class Discrepancy:
 
     @classmethod
     def of(
-        cls, record: ChainRecord, edges: Expected, protocol: Protocol, kappa: float
+        cls, record: ChainRecord, edges: ExpectedEdges, protocol: Protocol, kappa: float
     ) -> Discrepancy:
-        """Take the chain's nominal fall in air of some κ, 1/m."""
+        """Return the discrepancy on the chain's nominal fall with drag κ, 1/m."""
         assert record.ratios is not None
         assert protocol.gates is not None
         strikes, gains = record.strikes, np.full(record.strikes.size, record.alpha)
@@ -99,22 +98,22 @@ class Discrepancy:
         return cls(nominal, stretch, pull, hidden)
 
     def top(self, levels: Array) -> StretchModes:
-        """Return the modes at the top rod, the reference point being at some levels, m."""
+        """Return the modes of the top rod for levels of the reference point, m."""
         last = self.nominal.time.size - 2
         return stretch_modes(self.nominal, np.full(levels.shape, last), levels)
 
 
 def stretch_modes(nominal: Trajectory, rods: Index, levels: Array) -> StretchModes:
-    """Evaluate the modes of the stretch at some rods; zero where one rod strikes.
+    """Return the stretch modes at some rods and levels; zero for a single rod.
 
     Parameters
     ----------
     nominal
-        A fall with impacts: modes begin at its first one, and are scaled to its last.
+        A fall with impacts: modes begin at the first, and are scaled to the last.
     rods
-        From the bottom up, shape ``(moments,)``.
+        Rods counted from the bottom, shape ``(moments,)``.
     levels
-        Of the reference point, m, shape ``(moments,)``.
+        Levels of the reference point, m, shape ``(moments,)``.
     """
     last = nominal.time.size - 2
     if last < 1:

@@ -1,4 +1,4 @@
-"""One drop, from its edges to its results."""
+"""Analysis of a single drop, from its edges to its results and verdict."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.chain_records import chain_records, thinned
-from rig.analysis.components import stated
+from rig.analysis.chain_records import chain_records, thin
+from rig.analysis.components import priors
 from rig.analysis.diagnoses import FEW_GATES, gates_too_low, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, name_fault
 from rig.analysis.faults import Premise
-from rig.analysis.fit import Matched, timed
+from rig.analysis.fit import DropFit, refit_at_rate
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import identify_drop
 from rig.analysis.joint_fit import by_itself
@@ -29,7 +29,7 @@ from rig.threads import one_thread
 from rig.wordings import Severity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
@@ -43,27 +43,24 @@ if TYPE_CHECKING:
     from rig.records import Drop
 
 
-_SKEW = {"release_skew"}  # no way to pass makes that better
-
-
 @dataclass(frozen=True, slots=True)
 class DropSummary:
-    """What a drop says by itself, without its equations: to be kept, or sent to another process.
+    """Picklable result of a drop's own analysis, without its equations.
 
     Attributes
     ----------
     scale
-        At which.
+        Time scale of the analysis.
     explained
-        Whether it was sought what else would explain it if it is void.
+        Whether set-up faults were searched for if the drop is void.
     identified
-        Which rods its edges are, by the gates that are left out; nothing of a damaged record.
+        Identification of the edges, by the gates left out; empty for a damaged record.
     aside
-        Which are; `None` where no fit came to an end.
+        Numbers of the gates left out; `None` if no fit converged.
     x
-        The unknowns, as they were adjusted; shape ``(unknowns,)``.
+        Fitted unknowns, shape ``(unknowns,)``.
     deviations
-        Those of the result's quantities, which are not kept with them.
+        `Measured.deviation` of each quantity, as a stored result does not contain these.
     """
 
     scale: TimeScale
@@ -75,19 +72,19 @@ class DropSummary:
     deviations: Mapping[str, Deviation | None]
 
     @property
-    def unexplained(self) -> bool:
-        """Whether something else than the protocol might explain it, if it were sought."""
+    def needs_explanation(self) -> bool:
+        """Whether the drop is void, so that a set-up fault might explain its edges."""
         return self.result.verdict == "void" and not self.result.damaged
 
     def whole(self) -> DropSummary:
-        """Return what was kept with its deviations in their places."""
+        """Return a stored summary with the deviations put back into its quantities."""
         values = self.result.quantities.items()
         quantities = {name: replace(m, deviation=self.deviations[name]) for name, m in values}
         return replace(self, result=replace(self.result, quantities=quantities))
 
 
 class DropCase(NamedTuple):
-    """A drop to be read.
+    """A drop to be analysed, with its protocol and time scale.
 
     Attributes
     ----------
@@ -100,7 +97,7 @@ class DropCase(NamedTuple):
     scale
         Calibration of its ticks.
     components
-        How much everything scatters; as the protocol states it if not given.
+        Variance components; those of the protocol if not given.
     aside
         Numbers of the gates that are left out, see `rig.analysis.diagnoses.gates_too_low`.
     """
@@ -114,12 +111,12 @@ class DropCase(NamedTuple):
 
     @one_thread
     def summary(self, before: DropSummary | None = None, *, explain: bool = True) -> DropSummary:
-        """Find out what the drop says by itself.
+        """Analyse the drop by itself.
 
         Parameters
         ----------
         before
-            What was found of it at any time scale. Results are the same without it.
+            Earlier summary at any time scale, to save time. Results are the same without it.
         explain
             As for `read`.
         """
@@ -136,51 +133,47 @@ class DropCase(NamedTuple):
         return DropSummary(self.scale, explain, result, readings, aside, x, deviations)
 
     @one_thread
-    def adjusted(self, summary: DropSummary) -> Matched | None:
-        """Return where a summary left the drop; `None` where no fit of it came to an end."""
+    def restore_drop(self, summary: DropSummary) -> DropFit | None:
+        """Return the fitted drop of a summary; `None` if its fit did not converge."""
         aside = summary.aside
         if aside is None:
             return None
         case = self._at_contact()._replace(aside=aside)
         begun = summary.identified[aside].begun
         assert begun is not None
-        return Matched(case._model(case._records(), begun), begun.matches, summary.x)
+        return DropFit(case._model(case._records(), begun), begun.matches, summary.x)
 
     @one_thread
     def read(
         self, readings: dict[tuple[int, ...], DropIdentity] | None = None, *, explain: bool = True
     ) -> tuple[DropResult, Fit | None]:
-        """Read the drop, without the low gates that not all rods pass.
+        """Return the drop's result and fit; low gates that not all rods pass may be left out.
 
         Parameters
         ----------
         readings
-            What its edges are where some gates are left out, as far as it is known, and will be.
+            Cache of identifications by the gates left out; updated in place.
         explain
-            Whether to seek what else than the protocol would explain a drop that is void as it is:
-            it takes many times as long as all the rest. Of others it is sought where they ask.
+            Whether to search for set-up faults if the drop is void, which takes many times as long
+            as the rest. For other drops they are searched for if the fit suggests it.
         """
         drop, readings = self.drop, {} if readings is None else readings
-        if drop.damage:  # the file's, and no finding about chains or gates
+        if drop.damage:  # a damaged file says nothing about chains or gates
             reasons = (make_reason("record_damaged", text=drop.damage),)
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
-        stated = self._at_contact()
-        result, fit = stated._read(readings, explain=False)
-        wrong = _void_by(result) - _SKEW
-        case, last = stated, fit
-        while low := gates_too_low(
-            self.protocol, last.model.records.values() if last else case._records(), last
-        ):
-            before = readings[case.aside].begun
+        case = stated = self._at_contact()
+        begun = stated._identify(readings).begun
+        while low := gates_too_low(self.protocol, case._records(), begun):
             case = case._replace(aside=(*case.aside, *low))
-            without = reading, last = case._read(readings, before, explain=False)
-            if not _void_by(reading) - _SKEW:
+            begun = case._identify(readings, begun).begun
+            without = result, _ = case._judge(readings, explain=False)
+            if not _wrong(result.reasons):
                 return without
-        return stated._read(readings, explain=True) if wrong and explain else (result, fit)
+        return stated._judge(readings, explain=explain)
 
     def _at_contact(self) -> DropCase:
         run, protocol = self.run, self.protocol
-        components = self.components or stated(protocol)
+        components = self.components or priors(protocol)
         protocol = at_contact(protocol, run.incline_deg, run.impact)
         return self._replace(protocol=protocol, components=components)
 
@@ -190,22 +183,25 @@ class DropCase(NamedTuple):
     def _model(self, records: Sequence[ChainRecord], begun: Begun) -> DropModel:
         return DropModel.of(self.protocol, records, begun.guesses, self.scale.u, self.components)
 
-    def _read(
-        self,
-        readings: dict[tuple[int, ...], DropIdentity],
-        before: Begun | None = None,
-        *,
-        explain: bool,
-    ) -> tuple[DropResult, Fit | None]:
-        """Read a drop whose rods strike where the protocol, from the contact point, has them."""
+    def _identify(
+        self, readings: dict[tuple[int, ...], DropIdentity], before: Begun | None = None
+    ) -> DropIdentity:
+        """Return the identification without the gates `aside`, at a rounded time scale."""
         protocol, run, drop, scale, components, aside = self
         assert components is not None
-        records = self._records()
-        audit = _blank_audit(drop, records)
         rough, reading = scale.coarse(), readings.get(aside)
         if reading is None or reading.scale != rough:
             reading = identify_drop(protocol, run, drop, rough, components, aside, before)
             readings[aside] = reading
+        return reading
+
+    def _judge(
+        self, readings: dict[tuple[int, ...], DropIdentity], *, explain: bool
+    ) -> tuple[DropResult, Fit | None]:
+        """Return the result and fit of an identified drop."""
+        protocol, run, drop, scale, _, aside = self
+        records, reading = self._records(), readings[aside]
+        audit = _blank_audit(drop, records)
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()
         reasons = (*judge_record(drop, audit), *unlike, *doubts)
@@ -213,17 +209,17 @@ class DropCase(NamedTuple):
         if verdict == "void" or reading.begun is None:
             if reading.unlike and explain:
                 if reading.explained is None:
-                    reading = replace(reading, explained=self._unlike_fall(reading, rough))
+                    reading = replace(reading, explained=self._unlike_fall(reading))
                     readings[aside] = reading
                 reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
         begun = reading.begun
-        fit = timed(self._model(records, begun), begun, scale.hz / reading.scale.hz)
+        fit = refit_at_rate(self._model(records, begun), begun, scale.hz / reading.scale.hz)
         unmatched = unmatched_edges(fit)
-        audit = audit.count(fit.matched, count_unexplained(unmatched))
+        audit = audit.count(fit.match_count, count_unexplained(unmatched))
         joint = by_itself(fit)
         budgets = Budgets(joint)
-        measured = budgets.measured(joint.drops[0])
+        measured = budgets.measure_all(joint.drops[0])
         if not all(
             math.isfinite(number)
             for value in measured.values()
@@ -234,9 +230,9 @@ class DropCase(NamedTuple):
         by_passages = last_passages(fit)
         end = judge(protocol, run, drop, audit, measured, fit, by_passages, unmatched)
         reasons = end.reasons
-        if not end.known and (explain or verdict_of(end.reasons) != "void"):
+        if not end.known and (explain if _wrong(reasons) else verdict_of(reasons) != "void"):
             explainer = self._explainer(scale, end.suspects)
-            if end.odd or explainer.asked(fit):
+            if end.odd or explainer.suggests_fault(fit):
                 causes = [cause for cause in explainer.explain(fit) if cause.whole]
                 if why := name_fault(causes, protocol.vocabulary, end.accused):
                     reasons = (*(one for one in reasons if one not in end.accused), *why)
@@ -255,32 +251,33 @@ class DropCase(NamedTuple):
         )
         return result, fit
 
-    def _unlike_fall(self, reading: DropIdentity, scale: TimeScale) -> tuple[Reason, ...]:
-        """Seek what else than the protocol would explain edges that are like no fall."""
+    def _unlike_fall(self, reading: DropIdentity) -> tuple[Reason, ...]:
+        """Return set-up faults that would explain edges that match no fall."""
         assert self.protocol.gates is not None
         gates = self.protocol.gates.gates
         strange = [n for n, gate in enumerate(gates) if gate.side in reading.poor]
         if not strange and len(gates) <= FEW_GATES:
-            strange = [*range(len(gates))]  # each may see nearly what another should
-        causes = self._explainer(scale, strange).explain(None)
+            strange = [*range(len(gates))]  # gates may see nearly the same edges
+        causes = self._explainer(reading.scale, strange).explain(None)
         return tuple(name_fault(causes, self.protocol.vocabulary))
 
     def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
         assert self.components is not None
         premise = Premise(self.protocol, self.run, scale.hz, self.aside)
-        return Explainer(premise, thinned(self.drop, scale.hz), scale.u, self.components, suspects)
+        return Explainer(premise, thin(self.drop, scale.hz), scale.u, self.components, suspects)
 
 
-def _void_by(result: DropResult) -> set[str]:
-    """Return the codes of the reasons for which a drop is void."""
-    return {reason.code for reason in result.reasons if reason.severity is Severity.VOID}
+def _wrong(reasons: Iterable[Reason]) -> bool:
+    """Whether a drop is void for more than its release skew, which other gates would not mend."""
+    void = {reason.code for reason in reasons if reason.severity is Severity.VOID}
+    return bool(void - {"release_skew"})
 
 
 def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:
-    """Count the edges of a drop of which none is any rod's yet."""
+    """Return the edge counts of a drop before any edge is matched."""
     trains = [part for record in records for part in (*record.trains, *record.aside)]
     left_out = sum(part.thinned for part in trains)
     seen = sum(part.times.size for part in trains)
-    expected = sum(record.expected for record in records)
+    expected = sum(record.edge_count for record in records)
     lost = 0 if drop.certificate is None else drop.certificate.overflows
     return Audit(seen + left_out, 0, expected, seen + left_out, lost, seen, left_out)

@@ -1,4 +1,4 @@
-"""The observation equations: where the matched edges should be, given all unknowns."""
+"""The forward model of a drop: expected edges, residuals and derivatives given all unknowns."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 
 from rig.analysis.air import prior_air
 from rig.analysis.annealing import PART, Guess, Pairing, SideFall
-from rig.analysis.components import SHARPEST, Components, stated
+from rig.analysis.components import SHARPEST, Components, priors
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
-from rig.analysis.equations import STRAY, Equations, Expected, Residuals, Seen
+from rig.analysis.equations import STRAY, Equations, ExpectedEdges, Residuals, Seen
 from rig.analysis.trajectory import (
     COMMON,
     DRAG,
@@ -40,33 +40,33 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 _TOLD = 0.5
-"""Of the prior uncertainty of where a rod strikes, what edges leave of it on the way to the best
-fit: with 0.3 or 0.7 a joint fit takes as many rounds, with none or all of it twice as many."""
+"""Share of the prior uncertainty of strike heights that is assumed to remain during a fit. With
+0.3 or 0.7 a joint fit takes as many rounds, with 0 or 1 twice as many."""
 
 
 class DropModel:
-    """One drop: its unknowns, and the equations that tie them to edges.
+    """One drop: its unknowns and the observation equations of its edges.
 
     Parameters
     ----------
     protocol
         The scene.
     records
-        The chains with their trains.
+        The chains with their edges.
     guesses
         First guess for each side, by role.
     clock_u
         Relative standard uncertainty of the time scale.
     components
-        How much everything scatters; as the protocol states it if not given.
+        Variance components; those of the protocol if not given.
 
-    See `DropModel.of`, which is quicker where many drops are alike.
+    See `DropModel.of`, which is quicker for many drops under the same conditions.
 
     Attributes
     ----------
     owners
-        What follows the names of common unknowns, by whose they are, where not all drops that are
-        fitted together have the same rig: see `rig.analysis.several`.
+        Suffixes of the names of shared unknowns, by owner, if the drops of a joint fit come from
+        different rigs: see `rig.analysis.several`.
     """
 
     def __init__(
@@ -85,11 +85,11 @@ class DropModel:
         self.records: dict[str, ChainRecord] = {record.role: record for record in records}
         self.guesses = guesses
         self.clock_u: float = clock_u
-        self.components: Components = components or stated(protocol)
+        self.components: Components = components or priors(protocol)
         self.suspects: tuple[Unknown, ...] = ()
         self.owners: Mapping[str, str] = {}
-        self.expected: dict[str, Expected] = {
-            role: Expected.of(record, protocol) for role, record in self.records.items()
+        self.expected: dict[str, ExpectedEdges] = {
+            role: ExpectedEdges.of(record, protocol) for role, record in self.records.items()
         }
         self.pairings: dict[str, Pairing] = _pairings(records)
         if "impact" in self.records:
@@ -108,24 +108,24 @@ class DropModel:
         clock_u: float,
         components: Components | None = None,
     ) -> DropModel:
-        """Return a drop's model; what all drops of its condition have in common is made once.
+        """Return a drop's model; parts that depend only on the condition are cached.
 
         Parameters
         ----------
         guesses
-            `None` for a drop that begins as stated.
+            `None` to start from the protocol's values.
         """
         content = tuple(map(_expectations, records))
-        return _model_of(_Condition(protocol, content, tuple(records))).changed(
+        return _model_of(_Condition(protocol, content, tuple(records))).copy_with(
             records={record.role: record for record in records},
             pairings=_pairings(records),
             guesses=_stated_guesses(protocol, records) if guesses is None else guesses,
             clock_u=clock_u,
-            components=components or stated(protocol),
+            components=components or priors(protocol),
         )
 
-    def changed(self, **attributes: Any) -> DropModel:
-        """Return the same drop with something else about it, and priors that follow."""
+    def copy_with(self, **attributes: Any) -> DropModel:
+        """Return a copy with these attributes, and with priors recomputed from them."""
         model = copy(self)
         vars(model).update(attributes, _held={})
         model.unknowns = Unknowns(model)
@@ -133,23 +133,23 @@ class DropModel:
             model.slopes = {role: side_slopes(model, role) for role in model.records}
         return model
 
-    def informed(self, components: Components, clock_u: float, x: Array) -> DropModel:
-        """Return the same drop with other priors, that of impulses relative to the α found.
+    def with_priors(self, components: Components, clock_u: float, x: Array) -> DropModel:
+        """Return a copy with other priors; the prior of impulses is relative to the fitted α.
 
         Parameters
         ----------
         x
-            Unknowns; α becomes part of the guess, so that its unknown is set to zero in place.
+            Unknowns; α moves into the guess, and its unknown is set to zero in place.
         """
         guesses = dict(self.guesses)
         if "impact" in guesses:
             at, struck = self.unknowns["alpha"], guesses["impact"]
             guesses["impact"] = replace(struck, alpha=struck.alpha + float(x[at][0]))
             x[at] = 0.0
-        return self.changed(components=components, clock_u=clock_u, guesses=guesses)
+        return self.copy_with(components=components, clock_u=clock_u, guesses=guesses)
 
     def side(self, role: str) -> SideFall:
-        """Take a side as it begins, with what else moves its edges as their scatter."""
+        """Return a side for annealing; all other unknowns count as scatter of its edges."""
         record, scales = self.records[role], self.components
         sd = np.hypot(scales.floor, scales.departure if record.ratios is not None else 0.0)
         variance = sd**2 + (self.slopes[role].levels ** 2) @ self.unknowns.sd**2
@@ -157,14 +157,14 @@ class DropModel:
         return SideFall.of(*about, np.sqrt(variance))
 
     def under(self, protocol: Protocol) -> DropModel:
-        """Return the same drop with the priors of another protocol, alike but for these."""
-        # Its heights stay: they may be counted from a contact point that is this drop's own.
+        """Return a copy with the priors of a protocol that differs in nothing else."""
+        # Heights stay: they may be relative to a contact point of this drop alone.
         current, gates, level = self.protocol, self.protocol.gates, protocol.contact.level
         assert protocol.gates is not None
         assert gates is not None
         kappa, kappa_u = prior_air(protocol)
-        return self.changed(
-            components=stated(protocol),
+        return self.copy_with(
+            components=priors(protocol),
             protocol=replace(
                 protocol,
                 drop=Quantity(current.drop.value, protocol.drop.u),
@@ -174,7 +174,7 @@ class DropModel:
             ),
             _kappa=kappa,
             kappa_u=kappa_u,
-            # Widths of rods and their places have priors of their own.
+            # Rod widths and places carry their priors in the chain.
             records={
                 role: replace(record, chain=protocol.chains[record.chain.name])
                 for role, record in self.records.items()
@@ -182,8 +182,8 @@ class DropModel:
         )
 
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
-        """Return the same drop with its edges moved in time, by so many seconds each."""
-        return self.changed(
+        """Return a copy with each edge shifted in time, s, by role."""
+        return self.copy_with(
             pairings={
                 role: replace(pairing, times=pairing.times + shifts[role])
                 for role, pairing in self.pairings.items()
@@ -191,30 +191,27 @@ class DropModel:
         )
 
     def first(self) -> Array:
-        """Unknowns as the first guess has them, shape ``(unknowns,)``."""
-        x = np.zeros(len(self.unknowns))
-        starts = [guess.start for guess in self.guesses.values()]
-        # Their mean: how much lower each one hangs begins at zero.
-        x[self.unknowns["drop"]] = sum(starts) / len(starts) - self.protocol.drop.value
-        clocks = [guess.clock for guess in self.guesses.values()]
-        x[self.unknowns["clock"]] = sum(clocks) / len(clocks)
+        """Return the unknowns of the first guess, shape ``(unknowns,)``."""
+        x, guesses = np.zeros(len(self.unknowns)), self.guesses.values()
+        # The mean of both sides: each chain's own start height deviation begins at zero.
+        start = np.mean([guess.start for guess in guesses])
+        x[self.unknowns["drop"]] = start - self.protocol.drop.value
+        x[self.unknowns["clock"]] = np.mean([guess.clock for guess in guesses])
         if "free" in self.guesses and self.protocol.surface is None:
             x[self.unknowns["gravity"]] = self.guesses["free"].pull
-        if "drag" in self.unknowns:
-            kappa = max(guess.kappa for guess in self.guesses.values())
-            x[self.unknowns["drag"]] = kappa - self._kappa
+        x[self.unknowns["drag"]] = max(guess.kappa for guess in guesses) - self._kappa
         return x
 
     def rate(self, x: Array) -> float:
-        """How much later each moment is than it was stamped, as a factor."""
+        """Return the factor from stamped times to true times."""
         return 1.0 + float(self.unknowns.rate @ x)
 
     def kappa(self, x: Array) -> float:
-        """κ of the first chain as a whole, 1/m."""
+        """Return κ of the first chain as a whole, 1/m."""
         return self._kappa + float(x[self.unknowns["drag"]][0])
 
     def _last(self, kind: str, role: str, key: object, make: Callable[[], T]) -> T:
-        """Return what was last made, where it is asked for again: matching and adjusting do so."""
+        """Return the last result if its key is the same: matching and fitting ask twice."""
         held = self._held.get((kind, role))
         if held is None or held[0] != key:
             held = self._held[kind, role] = key, make()
@@ -222,7 +219,7 @@ class DropModel:
         return value
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
-        """Path of one side for given unknowns."""
+        """Return the trajectory of one side for given unknowns."""
         return self._last("path", role, x.tobytes(), lambda: self._trajectory(role, x))
 
     def _trajectory(self, role: str, x: Array) -> Trajectory:
@@ -233,7 +230,7 @@ class DropModel:
         parameters[DRAG] += self._kappa
         release, start, gravity, kappa = parameters[:COMMON].tolist()
         if not gravity > 0.0:
-            gravity = math.nan  # nothing falls: no number, so that no fit ends there
+            gravity = math.nan  # nothing falls: NaN keeps a fit from ending here
         if record.ratios is None:
             return free_trajectory(release, start, gravity, kappa, record.air)
         start = max(start, LOWEST_START)
@@ -245,49 +242,49 @@ class DropModel:
         )
 
     def stretch(self, x: Array) -> Array:
-        """Size of each mode of the stretch, m."""
+        """Return the amplitude of each stretch mode, m."""
         own, usual = (x[self.unknowns[name]] for name in STRETCHES)
         return own + usual
 
     def all_levels(self, role: str, x: Array) -> Array:
-        """Where the reference point should be at every expected edge of all trains, m."""
+        """Return the height of the reference point at every expected edge of a side, m."""
 
         def levels() -> Array:
             return self.expected[role].levels + self.slopes[role].levels @ x
 
         return self._last("levels", role, x.tobytes(), levels)
 
-    def _matched(self, role: str, matches: Sequence[Index]) -> Seen:
-        """Collect the matched edges; a matching stays for many steps of an adjustment."""
+    def _matched_edges(self, role: str, matches: Sequence[Index]) -> Seen:
+        """Collect the matched edges; cached, as a matching lasts for many steps of a fit."""
 
         def seen() -> tuple[Sequence[Index], Seen]:
             pairing = self.pairings[role]
-            pick, edge = pairing.observed(matches)
+            pick, edge = pairing.indices(matches)
             seen = self.expected[role].seen(pick, pairing.times[edge], pairing.burst[edge])
-            return matches, seen  # held, so that no other is the same
+            return matches, seen  # keeps the list alive, so that its id stays unique
 
         return self._last("matched", role, id(matches), seen)[1]
 
     def residuals(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
-        """What the unknowns leave over of one side's matched edges."""
-        seen = self._matched(role, matches)
+        """Return the residuals of one side's matched edges."""
+        seen = self._matched_edges(role, matches)
         times = seen.times * self.rate(x)
         height, speed = self.trajectory(role, x).heights(times)
         values = height - self.all_levels(role, x)[seen.pick]
         loose = _loose(self.trajectory(role, x), times, seen)
         return Residuals(values, self._sigma(seen, speed, loose), speed, seen.burst == 0.0, loose)
 
-    def parted(self, role: str, rows: Residuals, matches: Sequence[Index]) -> Residuals:
-        """Take from some residuals of each what the one before tells of it."""
+    def decorrelate(self, role: str, rows: Residuals, matches: Sequence[Index]) -> Residuals:
+        """Return residuals made independent: both edges of a rod share a departure."""
         rows = rows._replace(values=rows.values.copy(), sigma=rows.sigma.copy())
-        self._part(self._matched(role, matches), rows.loose > 0.0, rows.values, rows.sigma)
+        self._part(self._matched_edges(role, matches), rows.loose > 0.0, rows.values, rows.sigma)
         return rows
 
     def _part(self, seen: Seen, struck: Flags, values: Array, sigma: Array) -> Array:
-        """Make both sides of a rod independent, in place; return `Equations.told`.
+        """Decorrelate both edges of a rod, in place; return `Equations.told`.
 
-        They are off together at a beam: of the second what the first tells is taken away (Cholesky
-        of two by two).
+        They share a departure at a beam: the part of the second that the first predicts is
+        subtracted (Cholesky of a 2 × 2 covariance).
         """
         together = seen.paired[:-1] & struck[:-1] & struck[1:]
         first, shared = np.flatnonzero(together), self.components.departure**2
@@ -298,7 +295,7 @@ class DropModel:
         return carried
 
     def _sigma(self, seen: Seen, speed: Array, loose: Array) -> Array:
-        """Standard deviation of where each edge was seen, m."""
+        """Return the standard deviation of each edge's height, m."""
         scales = self.components
         variance = scales.floor**2 + speed**2 * (scales.jitter**2 + seen.burst**2)
         variance += (scales.landed * np.where(seen.alone, 0.0, seen.landed)) ** 2
@@ -306,9 +303,9 @@ class DropModel:
         return sigma
 
     def _stamps(self, role: str, x: Array, seen: Seen) -> tuple[Array, Array, Array, Array]:
-        """When each edge should have been stamped, by how much later that is than it was, s.
+        """Return each edge's expected time and its excess over the stamp, s.
 
-        Then the level that it is of, and how loose the chain was.
+        Then its level, m, and how loose the chain was (`Trajectory.loose`).
         """
         path = self.trajectory(role, x)
         levels = self.all_levels(role, x)[seen.pick]
@@ -321,22 +318,25 @@ class DropModel:
         return stamps + late, late, levels, loose
 
     def _strike_u(self, role: str) -> Array:
-        """How well it is known at which height each rod strikes, see `Trajectory.sights`.
+        """Return the uncertainty of each rod's strike height, see `Trajectory.sights`, m.
 
-        To a part of a rod's width at least, whatever is stated: further off no step leads.
+        At most a part of a rod's width, as no step leads further.
         """
-        _, places = np.split(self.slopes[role].path[COMMON:], 2)
-        sd, width = np.sqrt(places**2 @ self.unknowns.sd**2), min(self.records[role].chain.widths)
-        return np.clip(_TOLD * sd, SHARPEST, width / PART)
+
+        def strike_u() -> Array:
+            _, places = np.split(self.slopes[role].path[COMMON:], 2)
+            sd = np.sqrt(places**2 @ self.unknowns.sd**2)
+            return np.clip(_TOLD * sd, SHARPEST, min(self.records[role].chain.widths) / PART)
+
+        return self._last("strike u", role, None, strike_u)
 
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
-        """Observation equations of one side for its matched edges.
+        """Return the observation equations of one side's matched edges.
 
-        They are set up where an edge should have been stamped, not where it was: derivatives that
-        knew of a stamp's own error would make a slow clock, with which all errors are smaller,
-        look likelier.
+        Derivatives are taken at the expected time of an edge, not at its stamp. Otherwise they
+        would depend on the stamp's error, and bias the clock rate towards a slow clock.
         """
-        acts, seen = self.slopes[role], self._matched(role, matches)
+        acts, seen = self.slopes[role], self._matched_edges(role, matches)
         path = self.trajectory(role, x)
         times, late, levels, loose = self._stamps(role, x, seen)
         moving = acts.path[:, acts.columns[: acts.moving]]
@@ -345,7 +345,7 @@ class DropModel:
         sigma = self._sigma(seen, speed, loose)
         slopes = -acts.levels[seen.pick[:, None], acts.columns]
         slopes[:, : acts.moving] += moved
-        # Of a slow clock the true time is later, and the chain lower by then.
+        # With a slow clock the true time is later, and the chain is lower.
         rates = self.unknowns.rate[acts.columns[acts.clocks]]
         slopes[:, acts.clocks] -= np.outer(speed * times / self.rate(x), rates)
         carried = self._part(seen, loose > 0.0, values, sigma)
@@ -357,7 +357,7 @@ class DropModel:
 
 @dataclass(frozen=True)
 class _Condition:
-    """What a model depends on, but for the edges that came; `records` are of any such drop."""
+    """Cache key: all that a model depends on but its edges; `records` of any drop like it."""
 
     protocol: Protocol
     content: tuple[object, ...]
@@ -371,7 +371,7 @@ def _model_of(condition: _Condition) -> DropModel:
 
 
 def _expectations(record: ChainRecord) -> tuple[object, ...]:
-    """Everything that a record has but its edges."""
+    """Return the hashable content of a record without its edges."""
     arrays = [record.air, record.unlike, *(() if record.ratios is None else (record.ratios,))]
     arrays += [part for train in record.trains for part in (train.rods, train.blocks, train.levels)]
     gates = *(train.gate for train in record.trains), *(train.gate for train in record.aside)
@@ -386,13 +386,13 @@ def _expectations(record: ChainRecord) -> tuple[object, ...]:
 
 
 def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
-    return {record.role: Guess.stated(protocol, record) for record in records}
+    return {record.role: Guess.from_protocol(protocol, record) for record in records}
 
 
 def _pairings(records: Sequence[ChainRecord]) -> dict[str, Pairing]:
-    return {record.role: Pairing.of(record.trains, record.crossed) for record in records}
+    return {record.role: Pairing.of(record.trains, record.rebound_widths) for record in records}
 
 
 def _loose(path: Trajectory, times: Array, seen: Seen) -> Array:
-    """How loose a chain is at each edge, see `Trajectory.loose`; the top rod alone is no chain."""
+    """Return `Trajectory.loose` at each edge, 0 where the top rod falls alone."""
     return np.where(seen.alone, 0.0, path.loose(times))

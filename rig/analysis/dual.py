@@ -1,4 +1,4 @@
-"""Quantities with their derivatives: arithmetic carries both, so that nothing is derived by hand.
+"""Dual numbers: quantities with their derivatives, carried through arithmetic.
 
 Forward-mode automatic differentiation (Griewank and Walther 2008, chapter 3).
 """
@@ -28,7 +28,7 @@ class Dual:
 
     value: Any
     slopes: Array
-    __array_ufunc__ = None  # of an array on the left, too
+    __array_ufunc__ = None  # an array on the left must not absorb the dual number
 
     def __getitem__(self, place: int) -> Dual:
         return Dual(float(self.value[place]), self.slopes[place])
@@ -63,12 +63,12 @@ class Dual:
         return Dual(ratio, _times(slopes, 1.0 / other.value))
 
     def root(self) -> Dual:
-        """Return the square root of what is above zero."""
+        """Return the square root of a positive quantity."""
         root = np.sqrt(self.value)
         return Dual(root, _times(self.slopes, 0.5 / root))
 
 
 def _times(slopes: Array, factor: Any) -> Array:
-    """Multiply the slopes of each of several quantities by its own factor, or of one by one."""
+    """Return the derivatives of each quantity multiplied by its own factor."""
     product: Array = slopes * np.asarray(factor)[..., None]
     return product

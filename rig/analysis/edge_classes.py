@@ -1,9 +1,8 @@
-"""Every edge that is not as it should be, named one by one.
+"""Classification of unmatched edges.
 
-What an edge is depends on its neighbours: an expected one that nobody reported left no trace, or
-drowned in a shadow that ran into the next; a reported one that belongs to no rod is part of a
-flicker, a string in a gap, a rod that bounced back, a later passage of what came back, or
-unexplained.
+The class of an edge depends on its neighbours. An expected edge without a match was missed, or its
+shadow merged with the next. An observed edge without a rod is part of a flicker, a string in a gap,
+a rebounding rod, a later passage of the object, or unexplained.
 """
 
 from __future__ import annotations
@@ -40,37 +39,37 @@ EdgeClass = Literal[
     "extra",
 ]
 ABSENT = -math.log(MISSED)
-"""Cost of an expected edge that did not come: −ln of how probable that is beforehand."""
+"""Cost of a missed edge: −ln of its prior probability."""
 SURPLUS = -math.log(STRAYS * QUICK)
-"""Cost of an edge that belongs to no rod: the same of one within the time of a flicker."""
+"""Cost of a stray edge: −ln of its prior probability within the time of a flicker."""
 UNEXPLAINED: EdgeClass = "extra"
-"""The class of what nothing explains; ``accept`` of a protocol limits it."""
+"""Class of unexplained edges; ``accept`` of a protocol limits their share."""
 
 
 @dataclass(frozen=True, slots=True)
 class UnmatchedEdge:
-    """One edge that is missing or belongs to no rod.
+    """An edge that is missing or belongs to no rod.
 
     Attributes
     ----------
     kind
-        ``missed``: the rod left no trace; ``merged``: its shadow ran into a neighbour's; ``dead
-        gate``: nothing came from there. ``chatter``: of a flicker about a rod's edge; ``string``: a
-        flicker between rods; ``bounce``: a shadow in the lowest beam after a rod has struck;
-        ``later passage``: what had passed came back, and perhaps fell once more; ``left out``: of a
-        gate that not every rod passes; ``extra``: none of these, so nothing explains it.
+        ``missed``: no edge of the rod; ``merged``: its shadow overlaps a neighbour's; ``dead
+        gate``: the gate gave no edges. ``chatter``: flicker about a rod's edge; ``string``: flicker
+        between rods; ``bounce``: shadow in the lowest beam after a rod has struck; ``later
+        passage``: the object came back, and perhaps fell again; ``left out``: edge of a gate that
+        not every rod passes; ``extra``: none of these, unexplained.
     channel
-        Of the gate.
+        Channel of the gate.
     time_s
-        When it came or should have come, s since the release fired.
+        Observed or expected time, s since the release fired.
     blocked
-        The state after it.
+        State after the edge.
     rod
-        Whose edge it is; `None` for what is no rod.
+        Rod of the edge; `None` if it belongs to no rod.
     edge
-        Its number in the drop; `None` for what did not come.
+        Its number in the drop; `None` for an edge that was not observed.
     cost
-        What it costs the likelihood: `ABSENT` or `SURPLUS`; nothing where the gate is left out.
+        Cost in the log likelihood: `ABSENT` or `SURPLUS`; 0 if the gate is left out.
     """
 
     kind: EdgeClass
@@ -82,17 +81,17 @@ class UnmatchedEdge:
     cost: float
 
     def json(self) -> dict[str, Any]:
-        """One member of ``causes``."""
+        """Return a member of ``causes``."""
         return attributes(self, *self.__slots__)
 
 
 def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
-    """Name everything that is not as it should be, in order of time.
+    """Return all missing and surplus edges of a drop with their classes, in order of time.
 
     Parameters
     ----------
     drop
-        As adjusted, by itself or with the session.
+        Fitted drop, by itself or with the session.
     """
     model, x = drop.model, drop.x
     assert model.protocol.gates is not None
@@ -104,7 +103,7 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
         by_gate = split(model.all_levels(role, x), model.expected[role].ends)
         for train, levels, match in zip(record.trains, by_gate, drop.matches[role], strict=True):
             gate = gates[train.gate]
-            # Only the lowest beam is near enough to what bounces.
+            # Only the lowest beam is within reach of rebounding rods.
             near = gate.height == lowest and record.ratios is not None
             hit = float(path.time[1]) / clock if near else np.inf
             if (match < 0).any():
@@ -114,21 +113,21 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
                 unmatched += _surplus(gate.channel, train, match, hit, back)
         for train in record.aside:
             channel, edges = gates[train.gate].channel, range(train.times.size)
-            unmatched += [_received("left out", channel, train, at, None, 0.0) for at in edges]
+            unmatched += [_received_edge("left out", channel, train, at, None, 0.0) for at in edges]
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
 def count_unexplained(unmatched: Iterable[UnmatchedEdge]) -> int:
-    """Count the received edges that nothing explains."""
+    """Return the number of unexplained edges."""
     return sum(edge.kind == UNEXPLAINED for edge in unmatched)
 
 
 def _absent(
     channel: int, train: EdgeTrain, match: Index, expected: Array
 ) -> Iterator[UnmatchedEdge]:
-    """Expected edges that nobody reported, explained by the level that the gate kept.
+    """Yield the missing edges of a gate, with classes from the state of its beam.
 
-    While a rod leaves no trace the beam stays bright, while a gap leaves none it stays dark.
+    If a rod is missed the beam stays bright; if a gap between rods is missed it stays dark.
     """
     for at in np.flatnonzero(match < 0).tolist():
         when, before = float(expected[at]), int(np.searchsorted(train.times, expected[at]))
@@ -138,10 +137,10 @@ def _absent(
         yield UnmatchedEdge(kind, channel, when, blocks, rod, None, ABSENT)
 
 
-def _received(
+def _received_edge(
     kind: EdgeClass, channel: int, train: EdgeTrain, at: int, rod: int | None, cost: float = SURPLUS
 ) -> UnmatchedEdge:
-    """Name one edge of a train, by its number there."""
+    """Return the unmatched edge for number `at` of a train."""
     when, blocked, edge = float(train.times[at]), bool(train.blocked[at]), int(train.edge[at])
     return UnmatchedEdge(kind, channel, when, blocked, rod, edge, cost)
 
@@ -149,10 +148,10 @@ def _received(
 def _surplus(
     channel: int, train: EdgeTrain, match: Index, hit: float, back: set[int]
 ) -> Iterator[UnmatchedEdge]:
-    """Reported edges that belong to no rod."""
+    """Yield the observed edges of a gate that belong to no rod."""
     rods = np.full(train.times.size, -1)
     rods[match[match >= 0]] = train.rods[match >= 0]
-    # Edges that follow each other so quickly are of one flicker, and share its number.
+    # Edges within `QUICK` of each other belong to the same flicker, and share its number.
     flicker = np.cumsum(np.diff(train.times, prepend=-np.inf) > QUICK)
     for at in np.flatnonzero(rods < 0).tolist():
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
@@ -163,42 +162,42 @@ def _surplus(
             "bounce": bool(train.times[at] > hit),
         }
         kind = next((kind for kind, holds in kinds.items() if holds), UNEXPLAINED)
-        yield _received(kind, channel, train, at, int(near[0]) if near.size else None)
+        yield _received_edge(kind, channel, train, at, int(near[0]) if near.size else None)
 
 
 def later_passages(
     record: ChainRecord, train: EdgeTrain, match: Index, path: Trajectory, gravity: float
 ) -> set[int]:
-    """Find the edges of what came back after it had passed a gate, and perhaps fell once more.
+    """Return the edges of a single object's later passages of a gate after it rebounded.
 
-    It rises through a gate and falls through it again, with at most the energy with which it first
-    passed at speed v. So each shadow lasts at least width/v, and the second of a pair follows the
-    first within the flight 2v/g. Neither holds for a pendulum, whose half period is longer than
-    that, nor for edges of lower gates on the same channel. The last shadow may stand alone: of a
-    turn in the beam, or because the recording ends.
+    The object rises through a gate and falls through it again, with at most the energy of its first
+    passage at speed v. So each shadow lasts at least width/v, and the second of a pair follows the
+    first within the flight time 2v/g. Neither holds for a pendulum, whose half period is longer,
+    nor for edges of lower gates on the same channel. The last shadow may be single: the object
+    turned in the beam, or the recording ended.
 
     Parameters
     ----------
     record, train, match
-        The chain, one of its gates, and which of its edges is which expected one (-1: none).
+        The chain, a gate of it, and its observed edge for every expected edge (−1: none).
     path
-        The chain's motion.
+        Trajectory of the chain.
     gravity
         Acceleration of a free fall, or down the track, m/s².
 
     Returns
     -------
     set of int
-        Numbers of the edges in the train; empty for a chain, whose rods too many would look alike.
+        Numbers of the edges in the train; empty for a chain, where surplus rods would look alike.
     """
     if record.ratios is not None or record.chain.chain.rods > 1 or not (match >= 0).any():
         return set()
     times, later = train.times, np.arange(int(match.max()) + 1, train.times.size)
     speed = float(path.heights(times[[match.max()]])[1][0])
-    if train.blocked.all():  # a timer that tells no ends of shadows
+    if train.blocked.all():  # the timer records no ends of shadows
         begins = ends = later
     else:
-        # Each shadow begins as the beam darkens and ends with the very next edge.
+        # Each shadow begins as the beam darkens and ends with the next edge.
         begins = later[:-1][train.blocked[later[:-1]] & ~train.blocked[later[1:]]]
         slow = np.diff(times)[begins] * speed * WIDER >= min(record.chain.widths)
         begins = begins[slow]

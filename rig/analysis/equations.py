@@ -1,4 +1,4 @@
-"""One chain's observation equations, the edges they are made of, and a drop's linearization."""
+"""Observation equations of a chain, its expected and matched edges, and their linearization."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ if TYPE_CHECKING:
     Matches = Mapping[str, Sequence[Index]]
 
 HUBER = 4.0
-"""Standard deviations beyond which an edge counts less."""
+"""Standard deviations beyond which an edge is given less weight."""
 STRAY = 6.0
-"""Standard deviations: no rod is that far off once everything was adjusted."""
+"""Standard deviations beyond which an edge belongs to no rod after the fit."""
 SLOWED = 0.5
-"""Share of its speed that a rod loses at most whose one end strikes: that of a uniform rod which
-turns about its middle, thrown back as fast as it came (Eq. 5 with β = 1 and ξ = ⅓)."""
+"""Largest share of its speed that a rod loses when one end strikes: a uniform rod that turns
+about its middle and rebounds elastically (Eq. 5 with β = 1 and ξ = ⅓)."""
 
 
 class Residuals(NamedTuple):
-    """What is left over of one side's matched edges, shape ``(edges,)`` each.
+    """Residuals of one side's matched edges, shape ``(edges,)`` each.
 
     Attributes
     ----------
     values
-        Where the beam saw the rod's side less where the beam is, m.
+        Height of the rod's side at the edge by the model, less that of the beam, m.
     sigma
-        Standard deviation of each, m.
+        Standard deviation of each residual, m.
     speed
-        Of the chain at each edge, m/s.
+        Speed of the chain at each edge, m/s.
     clean
-        Whether each edge is no part of a flicker.
+        Whether each edge is outside any flicker.
     loose
-        How loose the chain was, see `rig.analysis.trajectory.Trajectory.loose`.
+        See `rig.analysis.trajectory.Trajectory.loose`.
     """
 
     values: Array
@@ -55,19 +55,19 @@ class Residuals(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """Observation equations of one side, one a matched edge, independent of each other.
+    """Independent observation equations of one side, one for each matched edge.
 
     Attributes
     ----------
     residuals
-        Their left sides.
+        Residual of each equation.
     told
-        Which share of the equation before was taken away from each, shape ``(edges,)``: both sides
-        of a rod are off together.
+        Share of the previous equation that was subtracted from each, shape ``(edges,)``: both
+        edges of a rod are correlated.
     slopes
-        Derivatives by the unknowns that this side knows of, shape ``(edges, columns)``.
+        Derivatives by the unknowns that act on this side, shape ``(edges, columns)``.
     columns
-        Which unknowns these are; shape ``(columns,)``.
+        Places of these unknowns in the drop's vector; shape ``(columns,)``.
     """
 
     residuals: Residuals
@@ -77,12 +77,12 @@ class Equations(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """The matched edges of a side, shape ``(edges,)`` each; see `Expected`.
+    """The matched edges of a side, shape ``(edges,)`` each; see `ExpectedEdges`.
 
     Attributes
     ----------
     pick
-        Which of the expected edges each is.
+        Number of the expected edge that each is matched to.
     paired
         Whether the next edge is the other side of the same rod at the same gate.
     """
@@ -95,25 +95,25 @@ class Seen(NamedTuple):
     paired: Flags
 
 
-class Expected(NamedTuple):
-    """All gates of a side one after another.
+class ExpectedEdges(NamedTuple):
+    """The expected edges of a side, gate by gate; shape ``(edges,)`` each but for `ends`.
 
     Attributes
     ----------
     rods, gate, levels
-        Of every expected edge.
+        Rod, gate and height of the reference point, m, at every expected edge.
     sign
-        By how much its height follows the rods' width: −½ where it darkens the beam, else ½.
+        Derivative of its height by the rod's width: −½ for an edge that darkens the beam, else ½.
     turn
-        Which way its rod is tilted: +1 for even rods, −1 for odd ones.
+        Sense of its rod's tilt: +1 for even rods, −1 for odd rods.
     drawn
-        See `rig.analysis.swing.drawn`, of its rod.
+        Derivative of its height by swing, see `rig.analysis.swing.drawn`.
     alone
-        Whether all rods below have struck: only the top rod falls.
+        Whether the top rod falls alone, all rods below having struck.
     landed
-        How much higher its rod may be there because it struck before, m; one standard deviation.
+        Standard deviation of its rod's height from a possible earlier strike, m.
     ends
-        Number of expected edges after each gate.
+        Cumulative number of expected edges after each gate.
     """
 
     rods: Index
@@ -127,8 +127,8 @@ class Expected(NamedTuple):
     ends: Index
 
     @classmethod
-    def of(cls, record: ChainRecord, protocol: Protocol) -> Expected:
-        """Join the gates of a side."""
+    def of(cls, record: ChainRecord, protocol: Protocol) -> ExpectedEdges:
+        """Return the expected edges of a side at all its gates."""
         trains, strikes = record.trains, record.strikes
         expected = [train.rods.size for train in trains]
         rods = np.concatenate([train.rods for train in trains])
@@ -139,10 +139,10 @@ class Expected(NamedTuple):
         )
         u = np.full(rods.size, protocol.contact.strike.u)
         if record.chain.diameters and protocol.contact.strike.u:
-            # Others but the top rod may strike the one before, which may be thicker.
+            # Rods below the top rod may strike the previous rod, which may be thicker.
             before = np.append(0.0, record.chain.diameters[:-1])[rods]
             u = np.where(rods < strikes.size - 1, np.maximum(u, before), u)
-        to_strike = np.full(rods.size, np.inf)  # of each rod's way until it strikes
+        to_strike = np.full(rods.size, np.inf)  # distance of each rod to its strike, m
         if record.ratios is not None:
             if strikes.size > 1:
                 u = np.hypot(u, protocol.priors.swing * strike_shifts(record, protocol)[rods])
@@ -155,12 +155,12 @@ class Expected(NamedTuple):
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             last_falling,
-            _landed(u, to_strike),
+            _landing_sd(u, to_strike),
             np.cumsum(expected),
         )
 
     def seen(self, pick: Index, times: Array, burst: Array) -> Seen:
-        """Join the expected edges that are matched and what was observed of each."""
+        """Return the matched edges: expected numbers `pick` with observed times and bursts."""
         paired = np.zeros(pick.size, dtype=np.bool_)
         rods, gate = self.rods[pick], self.gate[pick]
         paired[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
@@ -168,8 +168,8 @@ class Expected(NamedTuple):
         return Seen(pick, times, burst, last_falling, landed, paired)
 
 
-def _landed(u: Array, to_strike: Array) -> Array:
-    """See `Expected.landed`: normally distributed strikes, from which on a rod is slower."""
+def _landing_sd(u: Array, to_strike: Array) -> Array:
+    """Return `ExpectedEdges.landed` for normally distributed strikes, which slow their rods."""
     sd = np.zeros_like(to_strike)
     for place in np.flatnonzero(np.isfinite(to_strike) & (u > 0.0)):
         z = float(to_strike[place] / u[place])
@@ -180,35 +180,35 @@ def _landed(u: Array, to_strike: Array) -> Array:
 
 
 def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
-    """What the square of each standardized residual counts: less beyond 4 σ (Huber 1964).
+    """Return the weights of squared standardized residuals, below 1 beyond 4 σ (Huber 1964).
 
     Parameters
     ----------
     cut
-        Standard deviations beyond which an edge does not count at all.
+        Standard deviations beyond which the weight is 0.
     """
     far = np.abs(residuals)
     weights: Array = np.where(far > cut, 0.0, HUBER / np.maximum(far, HUBER))
     return weights
 
 
-def scaled(x: Array, sd: Array) -> Array:
-    """In units of the prior uncertainty; what is known exactly stays."""
+def standardise(x: Array, sd: Array) -> Array:
+    """Return unknowns in units of their prior uncertainties; 0 for those known exactly."""
     return np.divide(x, sd, out=np.zeros_like(x), where=sd > 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Linearization:
-    """Observations about a point, to first order, in standard deviations.
+    """Observations linearized about a point, in standard deviations.
 
     Attributes
     ----------
     rows
-        What they leave over and their slopes, in the unknowns' own units; one block a side.
+        Residuals and their derivatives by the unknowns in SI units, one block for each side.
     chi2, size
         Weighted sum of squares, and number of observations.
     loss
-        Sum of Huber's losses, twice: what a step has to make less.
+        Twice the sum of Huber's losses, which the fit minimizes.
     """
 
     rows: Mapping[str, EquationRows]
@@ -222,14 +222,14 @@ def linearize(
 ) -> Linearization:
     """Linearize the matched edges about a point; residuals beyond 4 σ weigh less (Huber).
 
-    A side knows nothing of the other's unknowns.
+    Each side has rows only for the unknowns that act on it.
 
     Parameters
     ----------
     inflation
-        How much more the edges scatter than the model assumes.
+        Scatter of the edges relative to that of the model.
     cut
-        Standard deviations beyond which an edge does not count.
+        Standard deviations beyond which an edge has no weight.
     """
     rows: dict[str, EquationRows] = {}
     chi2, loss, size = 0.0, 0.0, 0
@@ -239,11 +239,11 @@ def linearize(
         residuals = side.values / sigma
         root = np.sqrt(robust_weights(residuals, cut))
         residuals *= root
-        slopes *= (root / sigma)[:, None]  # in place: nobody else has them
+        slopes *= (root / sigma)[:, None]  # in place: no other reference exists
         rows[role] = EquationRows(slopes, residuals, columns)
         squares = residuals * residuals
         chi2 += float(squares.sum())
-        # Huber's losses, twice: 2·4|r| − 4² beyond 4 σ.
+        # Twice Huber's loss: 2·4|r| − 4² beyond 4 σ.
         loss += float(squares.sum()) + float((squares - HUBER**2)[root < 1.0].sum())
         size += residuals.size
     return Linearization(rows, chi2, size, loss)

@@ -1,15 +1,13 @@
-"""How much each kind of nuisance scatters, by what was found (empirical Bayes).
+"""Estimation of variance components of the nuisance parameters (empirical Bayes).
 
-A kind with prior uncertainty s and estimates x_i ± √v_i (posterior) has determined
-γ = Σ(1 − v_i/s²) of its members by the edges; s² = Σx_i²/γ is then where the evidence for s is
-largest (MacKay 1992). An estimate and its v say what the edges alone know of a member, so that for
-any other s its x_i and v_i follow at once, and s is found in one round where round by round it
-would take dozens. What was stated, S, is the scale of a half-Cauchy prior of s (Gelman 2006), by an
-EM step: two more members, whose square is the harmonic mean of S² and s². Where nothing is
-determined, s stays as stated, and the less is, the nearer it stays; but what is stated much too
-large draws no scatter up that many members tell. Where several components make up one variance,
-each is multiplied by the share of Σx² that it explains (an EM step too), which keeps all of them
-positive. Nothing becomes less than a share of what was stated.
+For a component s with posterior estimates x_i ± √v_i, the edges determine γ = Σ(1 − v_i/s²)
+members. The evidence for s is largest at s² = Σx_i²/γ (MacKay 1992). An estimate and its v give
+the likelihood of a member by the edges alone. So x_i and v_i follow for any other s, and s is found
+in a single round instead of dozens. The stated value S is the scale of a half-Cauchy prior of s
+(Gelman 2006). By an EM step this prior acts as two more members, whose square is the harmonic mean
+of S² and s². With few determined members s stays near S; with many, a much too large S has little
+influence. If several components add up to a variance, each is multiplied by the share of Σx² that
+it explains (also an EM step), which keeps all positive. No component falls below a share of S.
 """
 
 from __future__ import annotations
@@ -32,36 +30,36 @@ if TYPE_CHECKING:
 
 
 STATED_WEIGHT = 2.0
-"""Members that a stated uncertainty counts for: a scale known to half of itself (GUM G.4.2)."""
+"""Members that a stated uncertainty counts for: a scale known to 50 % (GUM G.4.2)."""
 _KINDS = ("stretch", "gates", "rods", "beam", "hang", "swing")
 _IMPULSES = ("impulse", "impulse_floor", "bounce")
 _EDGES = ("jitter", "floor", "departure")
-_LEAVES = {"departure", "stretch"}  # how far chains leave the equations
+_LEAVES = {"departure", "stretch"}  # departures of chains from the model's equations
 _DOUBTED = 2.0
-"""Times the share of the stated departures that is found is the least share of every other scale:
-once or thrice this moves no coverage by more than a point."""
-_INNER = 40  # steps; the next round of the joint fit goes on from there
-_SETTLED = 1e-3  # relative change of variances, after which there is none
+"""Least share of every other component, in units of the estimated share of the stated departures;
+half or three halves of this factor change no coverage by more than a percentage point."""
+_INNER = 40  # steps; the next round of the joint fit continues
+_SETTLED = 1e-3  # relative change of variances at convergence
 _BINS = 64
-_MANY = 9  # rods that still fall: so many are as good as more
+_MANY = 9  # rods still falling; more are counted as this many
 
 
 class Evidence:
-    """Sums over a session, and the components that follow.
+    """Accumulator of a session's estimates and residuals, for new variance components.
 
     Parameters
     ----------
     components
-        With which the sums are made.
+        Components of the current solution.
     stated
-        Those of the protocol.
+        Components of the protocol.
 
     Attributes
     ----------
     components
-        After `settled`, the new ones.
+        After `estimate_components`, the new components.
     degrees
-        Degrees of freedom of each.
+        Degrees of freedom of each component.
     """
 
     def __init__(self, components: Components, stated: Components) -> None:
@@ -72,14 +70,14 @@ class Evidence:
         self._edges: list[tuple[Array, Array, Array]] = []
 
     def members(self, kind: str, y: Array, root: Array) -> None:
-        """Count a block of unknowns, in units of their prior uncertainties.
+        """Add a block of unknowns, in units of their prior uncertainties.
 
         Parameters
         ----------
         kind
-            Which scale they tell; none of what is one number, which has no scatter.
+            Component that scales their prior; empty for a block without a variance component.
         y, root
-            Estimates, and R of their covariance RRᵀ: of such sums of them as are independent.
+            Estimates, and R of their covariance RRᵀ, which is diagonalized here.
         """
         if kind and y.size:
             variances, sums = np.linalg.eigh(root @ root.T)
@@ -89,26 +87,27 @@ class Evidence:
             self._members.setdefault((kind,), []).append(np.stack(rows))
 
     def drop(self, model: DropModel, y: Array, root: Array) -> None:
-        """Count a drop's own unknowns, likewise."""
+        """Add a drop's own unknowns; `y` and `root` as in `members`."""
         at = model.unknowns
         for name, row in at.rows.items():
-            # Once rods have struck, what a chain does else looks like its swing.
+            # After the first strike, other departures of a chain look like swing.
             if row.shared == "drop" and name in at and name != "impact swing":
                 self.members(row.scale, y[at[name]], root[at[name]])
         if "impulses" in at:
-            # Back to α², for drops of different α have different units.
+            # Convert to units of α², as drops may differ in α.
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
             squares = (y[block] * at.sd[block]) ** 2
-            size = np.full(squares.size, alpha**2)
-            single = size / above(model.records["impact"].chain.chain) ** 2
+            record, size = model.records["impact"], np.full(squares.size, alpha**2)
+            single = size / above(record.chain.chain) ** 2
             told = 1.0 - np.sum(root[block] ** 2, axis=1)
-            rows = [size, np.ones_like(size), single, squares, np.zeros_like(size), told]
+            even = size * record.uneven**2
+            rows = [even, np.ones_like(size), single, squares, np.zeros_like(size), told]
             self._members.setdefault(_IMPULSES, []).append(np.stack(rows))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:
-        """Count what is left over of the edges that are no part of a flicker.
+        """Add residuals of edges outside flickers.
 
-        Nor of rods that may have struck: most of what these are off is of another kind.
+        Edges of rods that may have struck are left out: other components dominate these.
         """
         sizes = self.components
         for row in residuals:
@@ -117,43 +116,43 @@ class Evidence:
             good &= row.sigma**2 <= 2.0 * usual
             self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.loose[good]))
 
-    def settled(self, parameters: float, struck: float = 0.0) -> Evidence:
+    def estimate_components(self, parameters: float, struck: float = 0.0) -> Evidence:
         """Estimate the components.
 
         Parameters
         ----------
         parameters
-            Number of unknowns that all edges together have determined.
+            Number of unknowns that the edges determine.
         struck
-            How many of them only the edges after a first impact can have told.
+            Number of these that only edges after a first impact can determine.
         """
         new: dict[str, float] = {}
-        self._share(_EDGES, self._binned(parameters, struck), new)
+        self._share(_EDGES, self._bin_squares(parameters, struck), new)
         for names, members in self._members.items():
             self._share(names, np.concatenate(members, axis=1), new)
-        # Where chains leave the equations, whatever else is found may be how they do that.
+        # If chains depart from the equations, that may bias every other component.
         parted = new["departure"] / self.stated.departure if self.stated.departure else 0.0
         if "stretch" in new:
-            new["stretch"] = max(new["stretch"], _doubted(parted - LEAST_SHARE))
-        least = _doubted(max(parted, new.get("stretch", 0.0)))
+            new["stretch"] = max(new["stretch"], _least_share(parted - LEAST_SHARE))
+        least = _least_share(max(parted, new.get("stretch", 0.0)))
         for name in new.keys() - _LEAVES:
             new[name] = max(new[name], least * getattr(self.stated, name))
         new["few"] = parted * self.stated.few
         self.components = replace(self.components, landed=least, **new)
         return self
 
-    def _binned(self, parameters: float, struck: float) -> Array:
-        """Sort edges by what scatters alike: at about the same speed, with as many rods falling.
+    def _bin_squares(self, parameters: float, struck: float) -> Array:
+        """Bin edges of equal variance: similar speed, same number of falling rods.
 
         Returns
         -------
         ndarray
-            By how much each component counts in each bin, three rows; sums of squares, nothing that
-            they are uncertain by, and their degrees of freedom; shape ``(6, bins)``.
+            Three rows with the coefficient of each component in each bin, then sums of squares,
+            their variances (zero) and degrees of freedom; shape ``(6, bins)``.
         """
         parts = zip(*self._edges, strict=True)
         squares, speeds, loose = (np.concatenate(part) for part in parts)
-        # Few bins do as well as all edges.
+        # A few bins give the same result as all edges.
         edges = np.linspace(speeds.min(), speeds.max(), _BINS + 1)[1:-1]
         after = loose > 0.0
         falling = np.minimum(np.divide(1.0, loose, out=np.zeros_like(loose), where=after), _MANY)
@@ -166,7 +165,7 @@ class Evidence:
         stated = self.stated.departures(loose)
         departed = np.bincount(place, stated, bins) / np.maximum(counts, 1)
         departed /= self.stated.departure**2 or 1.0
-        # Every unknown that the edges determine takes one degree of freedom, at all speeds alike.
+        # Each determined unknown uses a degree of freedom, spread evenly over all speeds.
         total, behind = max(1, squares.size), max(1, int(after.sum()))
         taken = (parameters - struck) / total + late * struck / behind
         full = counts > 0
@@ -175,22 +174,22 @@ class Evidence:
         return np.stack([*kinds, sums, np.zeros_like(sums), degrees])[:, full]
 
     def _share(self, names: Sequence[str], members: Array, new: dict[str, float]) -> None:
-        """Estimate components that make up one variance.
+        """Estimate the components a of a variance s² = Σ kinds·a².
 
-        A member x ± e, of which they make the variance s² = Σ kinds·a², is found to be x·s²/(s² +
-        e²) with as large a share of a degree of freedom. Variances are fitted to these squares: the
-        maximum of the χ² likelihood above the least a, by multiplicative steps.
+        A member x ± e has the posterior mean x·s²/(s² + e²) and the share s²/(s² + e²) of a degree
+        of freedom. The variances maximize the χ² likelihood of the squares, above the lower bounds
+        of a, by multiplicative steps.
         """
         kinds, (squares, unsure, counts) = members[:-3], members[-3:]
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
         variances = np.array([getattr(self.components, name) ** 2 for name in names])
-        # The stated member is spread over all sizes, so that it pulls no component alone.
+        # Spread the prior's members over all rows, so that no component is favoured.
         beforehand = STATED_WEIGHT / squares.size
         tiny = np.finfo(float).tiny
         for _ in range(_INNER):
             total = variances @ kinds
             share = total / (total + unsure)
-            member = 2.0 * stated * variances / (stated + variances + tiny)  # 0 of what is exact
+            member = 2.0 * stated * variances / (stated + variances + tiny)  # 0 if exact
             estimates = squares * share**2 + beforehand * (member @ kinds)
             degrees = counts * share + beforehand
             grown = kinds @ (estimates / total**2) / np.maximum(kinds @ (degrees / total), tiny)
@@ -202,6 +201,6 @@ class Evidence:
             self.degrees[name] = max(STATED_WEIGHT, float(degrees[sizes > 0.0].sum()))
 
 
-def _doubted(parted: float) -> float:
-    """Share of what is stated that a scale has at least, for that by which chains are parted."""
+def _least_share(parted: float) -> float:
+    """Return the least share of a stated component, given the share of estimated departures."""
     return max(LEAST_SHARE, min(1.0, _DOUBTED * parted))

@@ -1,20 +1,19 @@
-"""What may be otherwise at a rig than its protocol says: one thing each, of some size.
+"""Set-up faults: ways in which a rig may differ from its protocol.
 
-A fault is a change of what a drop is read with, and the reason that names it.
-`rig.analysis.explanations` weighs faults against each other.
+A fault is a change of the premise with which a drop is analysed, and the reason that names it.
+`rig.analysis.explanations` compares faults.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import combinations, repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.unknowns import Unknown
-from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -25,11 +24,11 @@ if TYPE_CHECKING:
 
 
 _MORE = 3  # rods by which a chain may differ
-_WIDER = 0.5  # of its thinnest rod, by which rods may look thicker or thinner
+_WIDER = 0.5  # share of the thinnest rod by which rods may differ in thickness
 
 
 class Premise(NamedTuple):
-    """What a drop is read with, see `rig.analysis.chain_records.chain_records`."""
+    """Assumptions of a drop's analysis: arguments of `chain_records`."""
 
     protocol: Protocol
     run: Run
@@ -39,18 +38,18 @@ class Premise(NamedTuple):
 
 @dataclass(frozen=True)
 class Shift:
-    """What a fault of size 1 does to what a protocol states.
+    """Change of a protocol's values by a fault of size 1.
 
     Attributes
     ----------
     drop, clock, gravity
-        To the drop height, m, the rate of the clock, relative, and gravity, m/s².
+        Change of the drop height, m, of the clock's relative rate, and of gravity, m/s².
     gates
-        To the height of each gate, m; none where it leaves them.
+        Change of each gate's height, m; empty for none.
     chains
         Names of the chains that are longer or thicker.
     length, width
-        To their length, relative, and the width of their rods, m.
+        Relative change of their length, and change of their rods' width, m.
     """
 
     drop: float = 0.0
@@ -62,31 +61,29 @@ class Shift:
     width: float = 0.0
 
     def premise(self, stated: Premise, size: float) -> Premise:
-        """Return what a drop is read with as it is with a fault of some size."""
-        protocol, placed = stated.protocol, _placed(stated.protocol)
+        """Return the stated premise changed by a fault of some size."""
+        protocol, placed = stated.protocol, _gates_of(stated.protocol)
         drop, gravity = protocol.drop, protocol.gravity
-        shifts = self.gates or (0.0,) * len(placed.gates)
-        gates = [
+        gates = tuple(
             replace(gate, height=gate.height + size * shift)
-            for gate, shift in zip(placed.gates, shifts, strict=True)
-        ]
-        chains = {name: self._resized(protocol.chains[name], size) for name in self.chains}
+            for gate, shift in zip(placed.gates, self.gates or repeat(0.0), strict=False)
+        )
         changed = replace(
             protocol,
-            drop=Quantity(drop.value + size * self.drop, drop.u),
-            gravity=Quantity(gravity.value + size * self.gravity, gravity.u),
-            gates=replace(placed, gates=tuple(gates)),
-            chains={**protocol.chains, **chains},
+            drop=replace(drop, value=drop.value + size * self.drop),
+            gravity=replace(gravity, value=gravity.value + size * self.gravity),
+            gates=replace(placed, gates=gates),
         )
-        return stated._replace(protocol=changed, hz=stated.hz * (1.0 - size * self.clock))
+        moved = stated._replace(protocol=changed, hz=stated.hz * (1.0 - size * self.clock))
+        return _with_chains(self.chains, self._resize_chain)(moved, size)
 
-    def _resized(self, chain: RodChain, size: float) -> RodChain:
-        heights = tuple(height * (1.0 + size * self.length) for height in chain.chain.heights)
+    def _resize_chain(self, chain: RodChain, size: float) -> RodChain:
+        heights = [height * (1.0 + size * self.length) for height in chain.chain.heights]
         widths = tuple(width + size * self.width for width in chain.widths)
-        return replace(chain, chain=replace(chain.chain, heights=heights), widths=widths)
+        return replace(_with_rods(chain, range(len(heights)), heights), widths=widths)
 
     def direction(self, model: DropModel) -> Array:
-        """Return what it does to all unknowns of a drop, shape ``(unknowns,)``."""
+        """Return the change of a drop's unknowns by a fault of size 1, shape ``(unknowns,)``."""
         at = model.unknowns
         moved = np.zeros(len(at))
         for name in ("drop", "clock", "gravity"):
@@ -101,25 +98,25 @@ class Shift:
 
 @dataclass(frozen=True)
 class Fault:
-    """One way in which a rig may differ from its protocol.
+    """A way in which a rig may differ from its protocol.
 
     Attributes
     ----------
     code
-        Of the reason that names it.
+        Code of the reason that names the fault.
     where
-        Values of that reason whatever the size: which chain, gate or side.
+        Values of the reason that do not depend on the size: chain, gate or side.
     symbol, unit, scale, offset
-        Under which the reason has the size, its unit as names end with it, by what the size is
-        multiplied for it, and what is added; no symbol where a fault has no size.
+        Name of the size in the reason, the suffix of its unit, and the factor and offset to
+        convert it; no symbol for a fault without a size.
     sizes
-        Tried at first; apart by no more than what a reading tolerates.
+        Sizes tried first, at intervals that identification tolerates.
     shift
-        Where sizes between them count too: what a fault of size 1 does.
+        For a continuous size: the change by a fault of size 1.
     exchange
-        Where they do not: the premise as it is with a fault of some size.
+        For a discrete size: function that returns the changed premise.
     of_air
-        Whether its size is κ, which every drop tells that is not told of the air.
+        Whether the size is κ, which is fitted if the protocol does not state drag.
     """
 
     code: str
@@ -134,7 +131,7 @@ class Fault:
     of_air: bool = False
 
     def values(self, size: float, u: float) -> dict[str, Any]:
-        """Return the values of the reason that names it; no uncertainty of what is counted."""
+        """Return the values of the reason that names the fault; `u` is 0 for a count."""
         values = dict(self.where)
         if self.symbol:
             values[f"{self.symbol}{self.unit}"] = self.offset + self.scale * size
@@ -143,14 +140,14 @@ class Fault:
         return values
 
     def premise(self, stated: Premise, size: float) -> Premise:
-        """Return what a drop is read with as it is with a fault of some size."""
+        """Return the stated premise changed by a fault of some size."""
         return (self.shift.premise if self.shift else self.exchange)(stated, size)
 
     def suspect(self, model: DropModel) -> Unknown:
-        """Return its size as one thing more that is not known of a drop, in the range of its sizes.
+        """Return the size as a further unknown, with a normal prior for the range of sizes.
 
-        At its mean a normal distribution has the density of an even one √(2π) times as wide as its
-        standard deviation.
+        The prior's density at its mean is that of a uniform distribution over the range, whose
+        width is √(2π) standard deviations.
         """
         assert self.shift is not None
         direction = self.shift.direction(model)
@@ -167,23 +164,23 @@ class Fault:
 
 
 def faults(protocol: Protocol, run: Run, suspect: Sequence[int]) -> list[Fault]:
-    """All faults that a scene may have and that could be told from each other.
+    """Return all distinguishable faults of a scene.
 
     Parameters
     ----------
     suspect
         Numbers of the gates of which any two may be exchanged.
     """
-    gates = _placed(protocol).gates
+    gates = _gates_of(protocol).gates
     exchanges = [_exchange(gates, a, b) for a, b in combinations(suspect, 2)]
     chains, rig = _chain_faults(protocol, run), _rig_faults(protocol)
     return [*chains, *rig, *_gate_faults(gates), *exchanges]
 
 
-def _sized(
+def _sized_fault(
     code: str, shift: Shift, limit: float, step: float, *names: str, scale: float = 1, **where: Any
 ) -> Fault:
-    """A fault of any size up to a limit, tried in steps; named as a length if not otherwise."""
+    """Return a fault of any size up to ±`limit`, tried in steps; by default a length."""
     count = math.ceil(limit / step)
     sizes = tuple(step * n for n in range(-count, count + 1) if n)
     symbol, unit = names or ("size", "_m")
@@ -191,7 +188,7 @@ def _sized(
 
 
 def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
-    """Faults of each chain, of both where they are alike, and of their places."""
+    """Yield the faults of each chain, of both chains together, and of their places."""
     names = {role: name for role, name in (("impact", run.impact), ("free", run.free)) if name}
     groups = [(frozenset({name}), name) for name in names.values()]
     if len(names) > 1:
@@ -199,9 +196,9 @@ def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
     for group, name in groups:
         chain = protocol.chains[min(group)]
         top, rods = chain.chain.heights[-1], chain.chain.rods
-        if rods > 1:  # one object has no length, and is no chain with rods missing
+        if rods > 1:  # a single object has neither length nor missing rods
             longer = Shift(chains=group, length=1.0)
-            yield _sized("chain_length", longer, 0.06, 0.015, scale=top, name=name)
+            yield _sized_fault("chain_length", longer, 0.06, 0.015, scale=top, name=name)
             yield Fault(
                 "rod_count",
                 {"name": name, "stated": rods},
@@ -211,7 +208,7 @@ def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
                 exchange=_with_chains(group, _with_more),
             )
         limit = _WIDER * min(chain.widths)
-        yield _sized("thickness", Shift(chains=group, width=1.0), limit, limit, name=name)
+        yield _sized_fault("thickness", Shift(chains=group, width=1.0), limit, limit, name=name)
     for role, name in names.items():
         if upside_down(protocol.chains[name]) is not None:
             turned = _with_chains({name}, lambda chain, _: upside_down(chain) or chain)
@@ -227,9 +224,9 @@ def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
 
 
 def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
-    """Faults of everything that both chains share."""
-    yield _sized("drop_height", Shift(drop=1.0), 60e-3, 10e-3)
-    yield _sized("clock", Shift(clock=1.0), 0.05, 0.01, "share", "")
+    """Yield the faults of everything that both chains share."""
+    yield _sized_fault("drop_height", Shift(drop=1.0), 60e-3, 10e-3)
+    yield _sized_fault("clock", Shift(clock=1.0), 0.05, 0.01, "share", "")
     if protocol.drag is not None:
         yield Fault(
             "air",
@@ -240,30 +237,30 @@ def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
             of_air=True,
         )
     if protocol.surface is not None:
-        # From beam to beam nobody knows the contact point, and gravity is what is measured.
-        gates = _placed(protocol).gates
-        yield _raised("all_gates", gates, gates)
+        # Without a surface there is no contact point, and gravity is the measurand.
+        gates = _gates_of(protocol).gates
+        yield _height_fault("all_gates", gates, gates)
         gravity = Shift(gravity=protocol.gravity.value)
-        yield _sized("gravity", gravity, 0.10, 0.02, "share", "")
+        yield _sized_fault("gravity", gravity, 0.10, 0.02, "share", "")
 
 
 def _gate_faults(gates: Sequence[Gate]) -> Iterator[Fault]:
-    """Faults of the post of several gates, and of each gate."""
+    """Yield the faults of each post with several gates, and of each gate."""
     sides = [gate.side for gate in gates]
     for side in dict.fromkeys(sides):
         if 1 < sides.count(side) < len(sides):
             post = [gate for gate in gates if gate.side == side]
-            yield _raised("post", gates, post, side=side)
+            yield _height_fault("post", gates, post, side=side)
     for gate in gates if len(gates) > 1 else ():
-        yield _raised("gate_height", gates, [gate], **gate_values(gate))
+        yield _height_fault("gate_height", gates, [gate], **gate_values(gate))
 
 
-def _raised(code: str, gates: Sequence[Gate], wrong: Collection[Gate], **where: Any) -> Fault:
+def _height_fault(code: str, gates: Sequence[Gate], wrong: Collection[Gate], **where: Any) -> Fault:
     shift = Shift(gates=tuple(float(gate in wrong) for gate in gates))
-    return _sized(code, shift, 40e-3, 10e-3, **where)
+    return _sized_fault(code, shift, 40e-3, 10e-3, **where)
 
 
-def _placed(protocol: Protocol) -> Gates:
+def _gates_of(protocol: Protocol) -> Gates:
     assert protocol.gates is not None
     return protocol.gates
 
@@ -273,7 +270,7 @@ def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
         protocol, changed = stated.protocol, [*gates]
         changed[a] = replace(gates[a], channel=gates[b].channel)
         changed[b] = replace(gates[b], channel=gates[a].channel)
-        placed = replace(_placed(protocol), gates=tuple(changed))
+        placed = replace(_gates_of(protocol), gates=tuple(changed))
         return stated._replace(protocol=replace(protocol, gates=placed))
 
     both = [gate_values(gates[a]), gate_values(gates[b])]
@@ -281,7 +278,7 @@ def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
 
 
 def gate_values(gate: Gate) -> dict[str, Any]:
-    """Return the values by which a reason names a gate, so that one can find it."""
+    """Return the values by which a reason names a gate: channel, side and stated height."""
     height = gate.height if gate.stated is None else gate.stated
     return {"channel": gate.channel, "side": gate.side, "height_m": height}
 
@@ -300,7 +297,7 @@ def _with_chains(
 
 
 def _with_rods(chain: RodChain, order: Sequence[int], heights: Sequence[float]) -> RodChain:
-    """Hang rods of a chain, by their numbers, at other heights above the lowest one."""
+    """Return a chain of the rods numbered `order`, at other heights above the lowest, m."""
 
     def chosen(values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(values[n] for n in order)
@@ -311,7 +308,7 @@ def _with_rods(chain: RodChain, order: Sequence[int], heights: Sequence[float]) 
 
 
 def _with_more(chain: RodChain, count_more: float) -> RodChain:
-    """Add rods like the top one at the top, or take some off."""
+    """Return a chain with rods like the top rod added at the top, or with rods removed."""
     heights, count = chain.chain.heights, chain.chain.rods + round(count_more)
     top, pitch = len(heights) - 1, heights[-1] - heights[-2] if len(heights) > 1 else 0.0
     order = [min(n, top) for n in range(count)]
@@ -319,7 +316,7 @@ def _with_more(chain: RodChain, count_more: float) -> RodChain:
 
 
 def upside_down(chain: RodChain) -> RodChain | None:
-    """Turn a chain round; `None` where that makes no difference."""
+    """Return a chain upside down; `None` if that makes no difference."""
     heights = chain.chain.heights
     turned = [heights[-1] - height for height in heights[::-1]]
     alike = all(abs(a - b) < 1e-3 for a, b in zip(turned, heights, strict=True))

@@ -1,4 +1,4 @@
-"""One drop matched and adjusted by itself, ready to be judged, or to be fitted with others."""
+"""Fit of a single drop: matching and least squares in turn."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ if TYPE_CHECKING:
 
     Matches = dict[str, list[Index]]
 
-CLOSE = 0.05
-"""Of a standard uncertainty: after a step so short a drop's readings are weighed, for that is near
-enough by its square."""
-_FINE = 0.8e-3  # m: how far off an adjusted trajectory may, one standard deviation
-_NEAR = 10.0  # standard uncertainties: after a step so short all edges can be matched again
-_ROUNDS = 6
+CLOSE = 0.1
+"""Length of a drop's last step in standard uncertainties; convergence is quadratic. With half of it
+no result changes by 0.001 standard uncertainties."""
+_FINE = 0.8e-3  # m, standard deviation of an edge about a fitted trajectory, for matching
+_NEAR = 10.0  # standard uncertainties: step length after which edges are matched again
+_ROUNDS = 7
 _MEDIANS = 2.2
-"""1/0.6745 standard deviations, by half as much more as few edges may happen to scatter."""
+"""Standard deviations for a median: 1/0.6745, times 1.5 for the scatter of few edges."""
 
 
 def count_matched(side: Sequence[Index]) -> int:
-    """Count the edges of a side that belong to a rod."""
+    """Return the number of matched edges of a side."""
     return int(np.count_nonzero(np.concatenate(side) >= 0))
 
 
 @dataclass(frozen=True, slots=True)
-class Matched:
-    """A drop's unknowns, and which edge is which rod.
+class DropFit:
+    """A drop with matched edges and fitted unknowns.
 
     Attributes
     ----------
     x
-        The unknowns, as they were adjusted; shape ``(unknowns,)``.
+        Fitted unknowns, shape ``(unknowns,)``.
     """
 
     model: DropModel
@@ -50,13 +50,13 @@ class Matched:
     x: Array
 
     @property
-    def matched(self) -> int:
-        """Number of edges that belong to a rod."""
+    def match_count(self) -> int:
+        """Number of matched edges."""
         return sum(map(count_matched, self.matches.values()))
 
     @property
     def rods(self) -> dict[int, int]:
-        """Rod of every matched edge of the drop."""
+        """Rod of every matched edge, by its number in the drop."""
         return {
             edge: rod
             for role, record in self.model.records.items()
@@ -68,84 +68,92 @@ class Matched:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit(Matched):
-    """A drop adjusted by itself."""
+class Fit(DropFit):
+    """A drop fitted by itself."""
 
     estimate: Estimate
 
+    @property
+    def begun(self) -> Begun:
+        """What another fit of the drop begins with."""
+        return Begun(self.model.guesses, self.matches, self.x, self.estimate.scatter)
+
 
 def settle(model: DropModel, matches: Matches | None = None, x: Array | None = None) -> Fit:
-    """Match and adjust in turn until that moves the chain no more, to a part of its uncertainty.
+    """Match and fit in turn until the matches stay the same, and return the fit.
 
     Parameters
     ----------
     matches
-        To begin with; `None` where nothing is matched yet.
+        Matches to begin with, if any.
     x
-        Unknowns to begin with, if not as the guesses have them.
+        Unknowns to begin with; those of the guesses if not given.
     """
-    x = model.first() if x is None else x
+    x, rough, scatter = model.first() if x is None else x, True, 1.0
     matches = match(model, x) if matches is None else matches
-    # Not to the end where the matches are about to change.
-    estimate = adjust(model, matches, x, done=_NEAR, rough=True)
     for _ in range(_ROUNDS):
-        again = without_strays(model, estimate.x, match(model, estimate.x), estimate.scatter)
+        # The first fit need not converge, as matches will change.
+        done = _NEAR if rough else CLOSE
+        estimate = adjust(model, matches, x, done=done, scatter=scatter, rough=rough)
+        used, x, scatter = matches, estimate.x, estimate.scatter
+        again = without_strays(model, x, match(model, x), scatter)
         alike = all(
             np.array_equal(np.concatenate(side), np.concatenate(again[role]))
-            for role, side in matches.items()
+            for role, side in used.items()
         )
-        matches = matches if alike else again  # what was made for the same is at hand
-        estimate = adjust(model, matches, estimate.x, done=CLOSE)
-        if alike:
+        if alike and not rough:
             break
-    return Fit(model, matches, estimate.x, estimate)
+        # Keep the same object if the matches are equal, as results are cached for it.
+        matches, rough = used if alike else again, False
+    return Fit(model, used, x, estimate)
 
 
 class Begun(NamedTuple):
-    """A drop adjusted at some time scale: all that is needed to adjust it at another."""
+    """State of a drop's fit at a time scale, to fit it again at another."""
 
     guesses: Mapping[str, Guess]
     matches: Matches
     x: Array
+    scatter: float
 
 
-def timed(model: DropModel, begun: Begun, rate: float) -> Fit:
-    """Adjust once more at a time scale that is near by, each edge staying the rod it is.
+def refit_at_rate(model: DropModel, begun: Begun, rate: float) -> Fit:
+    """Fit a drop again at a slightly different time scale, with the same matches.
 
     Parameters
     ----------
     model
-        At that time scale, with the guesses of `begun`.
+        Model at the new time scale, with the guesses of `begun`.
     rate
-        Ticks in a second by it, over those by the other one.
+        Ratio of the new tick rate to the old.
     """
     x, clock = begun.x.copy(), model.unknowns["clock"]
     x[clock] = (1.0 + x[clock]) * rate - 1.0
-    return alone(Matched(model, begun.matches, x))
+    return alone(DropFit(model, begun.matches, x), begun.scatter)
 
 
-def alone(drop: Matched) -> Fit:
-    """Adjust a drop by itself from where it is, each edge staying the rod it is."""
-    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE)
+def alone(drop: DropFit, scatter: float = 1.0) -> Fit:
+    """Fit a drop by itself from its present unknowns, with the same matches."""
+    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE, scatter=scatter)
     return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 
 def match(model: DropModel, x: Array) -> Matches:
-    """Match all edges to rods, given where the chains are."""
+    """Match all edges to rods, given the unknowns."""
     matches: Matches = {}
     for role, pairing in model.pairings.items():
         heights, speeds = model.trajectory(role, x).heights(pairing.times * model.rate(x))
-        matches[role] = pairing.matched(model.all_levels(role, x), heights, speeds, _FINE)
+        matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, _FINE)
     return matches
 
 
 def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float = 1.0) -> Matches:
-    """Take back matches far off the adjusted motion: a bounce where a rod's edge was missed.
+    """Return matches without those far off the fitted motion, such as a bounce for a missed edge.
 
     Parameters
     ----------
     scatter
-        How much more the edges scatter than the model assumes.
+        Scatter of the edges relative to that of the model.
     """
     return {role: _kept(model, role, x, side, scatter) for role, side in matches.items()}
 
@@ -153,13 +161,13 @@ def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float 
 def _kept(model: DropModel, role: str, x: Array, side: list[Index], scatter: float) -> list[Index]:
     rows = model.residuals(role, x, side)
     far = np.abs(rows.values) / rows.sigma
-    # A few strays enlarge the scatter, and would hide behind it: most edges tell how much it is.
+    # Strays enlarge the scatter, so the limit also uses the median, which is robust.
     usual = max(1.0, _MEDIANS * float(np.sort(far)[far.size // 2])) if far.size else 1.0
     limit = STRAY * min(scatter, usual)
     stray = far > limit
-    # Of a rod's two sides that do not go together one is wrong, or both: the one that is further
-    # off, and the other if it is far off too.
-    parted = model.parted(role, rows, side)
+    # If a rod's two edges are inconsistent, remove the one further off, and the other too if it is
+    # beyond half the limit.
+    parted = model.decorrelate(role, rows, side)
     second = np.flatnonzero(np.abs(parted.values) > limit * parted.sigma)
     second = second[parted.sigma[second] < rows.sigma[second]]
     stray[second - (far[second - 1] > far[second])] = True

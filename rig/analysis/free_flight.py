@@ -1,7 +1,7 @@
-"""One leg of a fall with the acceleration g − κv², for arrays of legs, and its derivatives.
+"""Legs of a fall with the acceleration g − κv², and their derivatives, for arrays of legs.
 
-The formulas are those of `rig.model.drag`, and hold below κ = 0 too, for an adjustment tries what
-no air does. κ may differ from leg to leg, its sign never, and it is nowhere 0: see `some_air`.
+The formulas are those of `rig.model.drag`, extended to κ < 0, which a trial step of a fit may
+reach. κ may differ from leg to leg but not in sign, and is never 0: see `some_air`.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
 
 NONE = 1e-15
-"""κ in place of none, 1/m: of a metre it takes less than an atom's width, and no digit."""
+"""κ used in place of 0, 1/m: its effect over a metre is below an atom's width."""
 FAINT = 1e-5
-"""κ below which its first orders are exact to 1e-10 while a difference over κ is not, 1/m."""
+"""κ below which series in κ replace differences divided by κ, 1/m; exact to 1e-10."""
 
 
 def some_air(kappa: float | Array) -> Array:
-    """Return κ, or what does nothing in its place where it is zero."""
+    """Return κ with zeros replaced by `NONE`."""
     return np.asarray(kappa + NONE * (np.abs(kappa) < NONE), dtype=np.float64)
 
 
 def _rate(gravity: float | Array, kappa: float | Array) -> float | Array:
-    """√(|κ|g), 1/s; no number where nothing falls."""
+    """Return √(|κ|g), 1/s; NaN for g < 0."""
     rate: float | Array = np.sqrt(np.abs(kappa) * gravity)
     return rate
 
@@ -42,18 +42,18 @@ def _is_positive(kappa: float | Array) -> bool:
 def fall_for(
     since: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> tuple[Array, Array, Array]:
-    """Way z fallen and speed, a time t after the beginning of a leg at speed v, and ∂z/∂v.
+    """Return distance z and speed at a time t after the start of a leg at speed v, and ∂z/∂v.
 
     z is ln(1 + κw)/κ with w = 2g S(t/2)² + v S(t) and S(t) = sinh(√(κg) t)/√(κg), as in
     `rig.model.drag.fallen`; below κ = 0 with the sine.
     """
     rate = _rate(gravity, kappa)
-    # An edge long after the fall overflows no sinh, and meets no second period of the sine.
+    # Clip for edges long after the fall: sinh must not overflow, nor the sine repeat.
     sinus, largest = (np.sinh, 300.0) if _is_positive(kappa) else (np.sin, 1.2)
     half = sinus(np.minimum((0.5 * rate) * since, largest)) / rate
     square = gravity * half * half
     sine = 2.0 * half * np.sqrt(1.0 + kappa * square)
-    # An adjustment may try what no air does: a chain that falls for ever.
+    # Clip for trial steps with κ < 0, where a chain reaches infinite speed.
     grown = np.maximum(kappa * (2.0 * square + speed * sine), -0.9)
     shrunk = 1.0 / (1.0 + grown)
     end = (gravity * sine + speed * (1.0 + 2.0 * kappa * square)) * shrunk
@@ -67,9 +67,9 @@ def fall_slopes(
     gravity: float | Array,
     kappa: float | Array,
 ) -> tuple[Array, Array]:
-    """Derivatives by g and by κ of the way z that `fall_for` returns.
+    """Return the derivatives by g and by κ of the distance z that `fall_for` returns.
 
-    As z(λt; v/λ, g/λ², κ) and z(t; λv, λg, κ/λ)/λ are z, they follow from the others:
+    As z(λt; v/λ, g/λ², κ) and z(t; λv, λg, κ/λ)/λ equal z, they follow from the others:
     2g ∂z/∂g = t ∂z/∂t − v ∂z/∂v, and κ ∂z/∂κ = v ∂z/∂v + g ∂z/∂g − z.
     """
     fallen, end, by_speed = fall
@@ -82,13 +82,13 @@ def fall_slopes(
 
 
 def reach_of(distance: Array, kappa: float | Array) -> Array:
-    """(1 − e^(−2κd))/κ, which is twice the distance d where no air is."""
+    """Return (1 − e^(−2κd))/κ, which is twice the distance d without drag."""
     reach: Array = -np.expm1(-2.0 * kappa * distance) / kappa
     return reach
 
 
 def reach_slopes(distance: Array, reach: Array, kappa: float | Array) -> Array:
-    """Return the derivative of a leg's reach by κ."""
+    """Return the derivative of `reach_of` by κ."""
     y = 2.0 * kappa * distance
     if _is_faint(kappa):
         return np.asarray(-4.0 * distance**2 * (0.5 - y / 3.0 + y * y / 8.0))
@@ -98,7 +98,7 @@ def reach_slopes(distance: Array, reach: Array, kappa: float | Array) -> Array:
 def speed_slope(
     since: Array, distance: Array, gravity: float | Array, kappa: float | Array
 ) -> Array:
-    """Return ∂z/∂v of a leg that takes a time t for a way z: S(t) e^(−κz), see `fall_for`."""
+    """Return ∂z/∂v of a leg of duration t and distance z: S(t) e^(−κz), see `fall_for`."""
     rate = _rate(gravity, kappa)
     sinus = np.sinh if _is_positive(kappa) else np.sin
     return np.asarray(sinus(rate * since) / rate * np.exp(-kappa * distance))
@@ -107,11 +107,11 @@ def speed_slope(
 def lasting(
     reach: Array, speed: Array, arrival: Array, gravity: float | Array, kappa: float | Array
 ) -> Array:
-    """How long a leg takes, by its `reach_of` and the speeds at both ends."""
+    """Return the duration of a leg, s, from its `reach_of` and the speeds at both ends."""
     rate = _rate(gravity, kappa)
     begin = arrival + (1.0 - kappa * reach) * speed
     slow = rate * reach / np.maximum(begin, np.finfo(float).tiny)
     if not _is_positive(kappa):
         return np.asarray(np.arctan(slow) / rate)
-    never = 1.0 - np.finfo(float).eps  # nothing falls longer
+    never = 1.0 - np.finfo(float).eps  # arctanh must stay finite
     return np.asarray(np.arctanh(np.clip(slow, -never, never)) / rate)

@@ -1,9 +1,8 @@
-"""One object at each gate: how fast it passed, and how long after the gate before."""
+"""Passages of a single object through the gates: speed, and interval since the previous gate."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,24 +13,24 @@ from rig.analysis.plain_data import attributes
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rig.analysis.fit import Matched
-    from rig.analysis.quantities import Adjusted
+    from rig.analysis.fit import DropFit
+    from rig.analysis.quantities import AdjustedDrop
     from rig.analysis.result import Measured
     from rig.protocol.protocol import Gate
 
 
 @dataclass(frozen=True, slots=True)
 class GatePassage:
-    """One object's middle in one beam.
+    """Passage of an object's middle through a beam.
 
     Attributes
     ----------
     channel, height_m
-        Of the gate, as the protocol has them.
+        Channel and height of the gate by the protocol.
     speed
-        Down its way, m/s.
+        Speed along its path, m/s.
     interval
-        Since it passed the gate before, s; `None` at the first one, and where that one saw nothing.
+        Time since the previous gate, s; `None` at the first, or if the previous saw nothing.
     """
 
     channel: int
@@ -40,29 +39,29 @@ class GatePassage:
     interval: Measured | None
 
     def json(self) -> dict[str, Any]:
-        """One member of ``gates`` of a run."""
+        """Return a member of ``gates`` of a run."""
         fields = attributes(self, "channel", "height_m") | {"speed_m_s": self.speed.json()}
         return fields if self.interval is None else fields | {"interval_s": self.interval.json()}
 
 
 def gate_passages(
-    fit: Matched, drop: Adjusted, measured: Callable[[Dual], Measured]
+    fit: DropFit, drop: AdjustedDrop, measured: Callable[[Dual], Measured]
 ) -> tuple[GatePassage, ...]:
-    """Say of every gate that saw the object how it passed, in the order of its way.
+    """Return the passage of every gate that saw the object, from the top down.
 
     Parameters
     ----------
     fit
-        Of one drop.
+        Fit of the drop.
     drop
-        The same, with its unknowns.
+        The same drop with its unknowns.
     measured
-        Makes a result of a value and its derivatives by the unknowns.
+        Function that returns a result for a value with its derivatives.
 
     Returns
     -------
     tuple of GatePassage
-        Empty for chains, whose rods pass a gate many times, and for what strikes.
+        Empty for chains, whose rods pass a gate many times, and for a striking object.
     """
     model = fit.model
     if not model.protocol.one_object or "free" not in model.records:
@@ -70,26 +69,23 @@ def gate_passages(
     gates = model.protocol.gates
     assert gates is not None
     seen = {
-        gates.gates[train.gate]
+        train.gate
         for train, match in zip(model.records["free"].trains, fit.matches["free"], strict=True)
         if (match >= 0).any()
     }
-    ordered = sorted(gates.gates, key=lambda gate: -gate.height)
-    moments = [(gate, *moment(drop, gate)) if gate in seen else None for gate in ordered]
-    return tuple(
-        GatePassage(
-            passage[0].channel,
-            passage[0].height,
-            measured(passage[2]),
-            measured(passage[1] - last[1]) if last else None,
-        )
-        for last, passage in pairwise([None, *moments])
-        if passage is not None
-    )
+    passages: list[GatePassage] = []
+    before: Dual | None = None
+    for n, gate in sorted(enumerate(gates.gates), key=lambda numbered: -numbered[1].height):
+        when, speed = moment(drop, gate) if n in seen else (None, None)
+        if when is not None and speed is not None:
+            interval = None if before is None else measured(when - before)
+            passages.append(GatePassage(gate.channel, gate.height, measured(speed), interval))
+        before = when
+    return tuple(passages)
 
 
-def moment(drop: Adjusted, gate: Gate) -> tuple[Dual, Dual]:
-    """When the object's middle is in a beam, where that beam really is, and how fast it is."""
+def moment(drop: AdjustedDrop, gate: Gate) -> tuple[Dual, Dual]:
+    """Return the time and speed of the object's middle at the fitted height of a beam."""
     model, gates = drop.model, drop.model.protocol.gates
     assert gates is not None
     beam, post = np.eye(len(gates.gates)), np.eye(len(gates.posts))

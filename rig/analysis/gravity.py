@@ -1,28 +1,28 @@
-"""Gravity from the free chain, as a check of the clock: its rods fall past beams of known height.
+"""Gravity from the free chain as a check of clock and beam heights.
 
-This is no result. In g = 2·length/time² an error of the time scale counts twice, so a g that is not
-the place's says that the clock, a beam's height or the protocol's gravity is not what it is said
-to be. The free chain's edges are asked alone, as those of the calibration drop that it is. What the
-air takes is unknown beside it: a light chain would read several per cent less.
+This is not a result. In g = 2·length/time² an error of the time scale counts twice. A g that
+differs from the local value means that the clock, a beam's height or the protocol's gravity is
+wrong. Only the free chain's edges are used, like those of a calibration drop. Drag is a further
+unknown: without it, a light chain would give a g several per cent too low.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.averages import average
-from rig.analysis.equations import scaled
+from rig.analysis.averages import mean
+from rig.analysis.equations import standardise
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import count_matched
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY
+from rig.measurands import GRAVITY
 from rig.reasons import make_reason
 
 if TYPE_CHECKING:
@@ -39,16 +39,16 @@ _FEWEST = 8  # edges
 
 @dataclass(frozen=True, slots=True)
 class GravityCheck:
-    """Gravity as the free chain falls and as the protocol says.
+    """Gravity from the free chain, compared with the protocol's.
 
     Attributes
     ----------
     measured
         Mean over drops, m/s².
     stated
-        The protocol's, m/s².
+        Value of the protocol, m/s².
     drops
-        How many.
+        Number of drops.
     """
 
     measured: Measured
@@ -57,18 +57,18 @@ class GravityCheck:
 
     @property
     def normalized_error(self) -> float:
-        """Of what is measured against what is stated."""
+        """E_n of the measured against the stated value."""
         stated = Measured(self.stated.value, self.stated.u)
         return self.measured.less(stated).normalized_error or 0.0
 
     @property
     def agrees(self) -> bool:
-        """Whether they do."""
+        """Whether both values agree, |E_n| ≤ 1."""
         return abs(self.normalized_error) <= 1.0
 
     @property
     def doubts(self) -> tuple[Reason, ...]:
-        """Where they do not, that something is not as stated."""
+        """Reason for a disagreement; empty if both values agree."""
         if self.agrees:
             return ()
         found = {
@@ -79,7 +79,7 @@ class GravityCheck:
         return (make_reason("gravity_unlike", stated=self.stated.value, **found),)
 
     def json(self) -> dict[str, Any]:
-        """A member of ``calibration``."""
+        """Return ``gravity`` of ``calibration``."""
         fields = {"gravity_m_s2": self.measured.json(), "stated_m_s2": self.stated.value}
         return fields | attributes(self, "drops", "normalized_error", "agrees")
 
@@ -90,39 +90,33 @@ def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityC
     Parameters
     ----------
     results
-        Of drops; those that are void or rejected do not count.
+        Results of drops; void and rejected drops do not count.
 
     Returns
     -------
     GravityCheck or None
-        `None` where no free chain passes gates.
+        `None` if no free chain passes gates.
     """
-    # Without a surface it is what is measured, and a joint fit knows it better.
-    candidates = [
-        result.quantities.get("gravity_m_s2", result.gravity)
+    gravities = [
+        gravity
         for result in results
         if result.verdict in GOOD
+        and (gravity := result.quantities.get(GRAVITY.name, result.gravity)) is not None
     ]
-    gravities = [gravity for gravity in candidates if gravity is not None]
     if not gravities:
         return None
-    # Beams, rods and clock are the same in every drop, so that no number of drops averages them.
-    common = math.sqrt(fmean(measured.u**2 for measured in gravities))
-    values, n = [measured.value for measured in gravities], len(gravities)
-    seen = stdev(values) / math.sqrt(n) if n > 1 else 0.0
-    mean = average(fmean(values), 0.0, seen, n - 1.0, common, gravities)
-    return GravityCheck(mean, protocol.gravity, len(gravities))
+    return GravityCheck(mean(gravities), protocol.gravity, len(gravities))
 
 
 def free_gravity(fit: Fit) -> Measured | None:
-    """Let the free chain's edges alone say what gravity is, with all else as uncertain as it is.
+    """Return gravity from the free chain's edges alone, with all other unknowns at their priors.
 
-    About the fit of the whole drop one step leads there.
+    A single Gauss–Newton step from the fit of the whole drop suffices.
 
     Returns
     -------
     Measured or None
-        m/s²; `None` where no free chain falls past beams, or gravity is what a scene measures.
+        m/s²; `None` if no free chain passes beams, or gravity is the measurand.
     """
     estimate, model, rows = fit.estimate, fit.model, fit.estimate.rows.get("free")
     if rows is None or model.protocol.surface is None:
@@ -132,9 +126,9 @@ def free_gravity(fit: Fit) -> Measured | None:
         return None
     sd = estimate.sd.copy()
     sd[at] = ANY_GRAVITY
-    pull, share = scaled(estimate.x, sd), 1.0
+    pull, share = standardise(estimate.x, sd), 1.0
     for _ in range(2):
-        # How much edges scatter is seen where they are many; what is stated counts as one more.
+        # Estimate the scatter from the residuals; the stated scatter counts as `STATED_WEIGHT`.
         rows = rows._replace(slopes=rows.slopes / share, left=rows.left / share)
         root = square_root([rows], sd, pull)
         step, inverse = root.step(), np.linalg.inv(root.matrix)
@@ -144,4 +138,6 @@ def free_gravity(fit: Fit) -> Measured | None:
             (STATED_WEIGHT + float(residuals @ residuals)) / (STATED_WEIGHT + degrees)
         )
     value = model.protocol.gravity.value + float(estimate.x[at] + step[at] * sd[at])
-    return Measured(value, float(np.linalg.norm(inverse[at]) * sd[at]))
+    u = float(np.linalg.norm(inverse[at]) * sd[at])
+    # Errors of beams, rods and clock are the same in every drop: averaging does not reduce them.
+    return Measured(value, u, budget={"beam heights": u})

@@ -1,10 +1,9 @@
-"""Which fall a drop's edges are: a few readings, and one judge.
+"""Identification of a drop: the assignment of its edges to rods with the largest evidence.
 
-What annealing (`rig.analysis.annealing`) makes of each side's edges are its readings. Both sides
-are decided together, for they were released together; the best pair, and whatever comes near it, is
-adjusted with every unknown of the rig and weighed by its marginal likelihood (Laplace's method).
-How much more likely the best reading is than the best really different one is the odds of the
-identification.
+Annealing (`rig.analysis.annealing`) gives candidate readings of each side's edges. Both sides are
+identified together, as they were released together. The best pairs of readings are fitted with all
+unknowns of the rig and compared by marginal likelihood (Laplace's method). The odds of the
+identification are those of the best reading against the best different reading.
 """
 
 from __future__ import annotations
@@ -26,8 +25,8 @@ from rig.analysis.annealing import (
 )
 from rig.analysis.chain_records import SIDES, chain_records
 from rig.analysis.drop_model import DropModel
-from rig.analysis.equations import HUBER, STRAY, scaled
-from rig.analysis.fit import Begun, Fit, count_matched, settle
+from rig.analysis.equations import HUBER, STRAY, standardise
+from rig.analysis.fit import Fit, count_matched, settle
 from rig.protocol.gates import CLEARANCE_M
 from rig.reasons import Reason, make_reason
 from rig.vocabulary import ANY_SCENE
@@ -35,9 +34,10 @@ from rig.vocabulary import ANY_SCENE
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    from rig.analysis.annealing import Annealed
+    from rig.analysis.annealing import FallFit
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
+    from rig.analysis.fit import Begun
     from rig.arrays import Index
     from rig.clock.calibration import TimeScale
     from rig.protocol.protocol import Protocol, Run
@@ -45,30 +45,30 @@ if TYPE_CHECKING:
     from rig.vocabulary import Vocabulary
 
 
-AnyReading = TypeVar("AnyReading", "Annealed", "Reading")
+AnyReading = TypeVar("AnyReading", "FallFit", "Reading")
 
 LEAD = math.log(1000.0)
-"""Log odds of a reading against the likeliest really different one, below which neither counts."""
+"""Least log odds of a reading against the likeliest different one; below, a drop is ambiguous."""
 _CLEAR = 0.97
-"""Share of all that could be matched with which no other start is tried."""
+"""Matched share of the matchable edges above which no other start is tried."""
 _FAIR = 0.9
-"""The same with which a reading is good."""
+"""Matched share of the matchable edges above which a reading is good."""
 RESTLESS = 2.0
-"""Scatter of the edges about a motion, relative to the assumed one, that is remarked."""
+"""Scatter of the edges, relative to the assumed scatter, above which a remark is made."""
 _CLOSE = 30.0
-"""Log odds of annealed readings within which they are adjusted: what linear unknowns leave out."""
+"""Log odds within which annealed readings are fitted: annealing leaves unknowns out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One way to read a side's edges, or a whole drop's.
+    """A candidate assignment of a drop's edges to rods, fitted.
 
     Attributes
     ----------
     fit
-        Matched and adjusted.
+        Matches and fit.
     evidence
-        Logarithm of its marginal likelihood, up to what all readings of the same edges share.
+        Logarithm of the marginal likelihood, up to a constant for the same edges.
     """
 
     fit: Fit
@@ -76,7 +76,7 @@ class Reading:
 
     @property
     def edges(self) -> list[Index]:
-        """For each side the edge of every expected one, −1 for a missed one."""
+        """For each side the observed edge of every expected edge, −1 if missed."""
         return [np.concatenate(side) for side in self.fit.matches.values()]
 
 
@@ -87,15 +87,15 @@ class Identification:
     Attributes
     ----------
     fit
-        All sides together; `None` where the edges of a side are like no fall of its chain at all.
+        Fit of all sides; `None` if the edges of a side match no fall of its chain.
     shares
-        Of each side's expected edges, by role, that are matched.
+        Matched share of each side's expected edges, by role.
     log_odds
-        Of that reading against the best different one; infinite where there is none.
+        Log odds against the best different reading; infinite if there is none.
     evidence
         As in `Reading`.
     other
-        That different reading, where it was adjusted: what else the edges may be.
+        Fit of the best different reading, if it was fitted.
     """
 
     fit: Fit | None
@@ -107,23 +107,22 @@ class Identification:
 
 @dataclass(frozen=True, slots=True)
 class DropIdentity:
-    """Which rods a drop's edges are, found out once, at a round time scale.
+    """The identification of a drop, made once at a rounded time scale.
 
-    The session's clock is known a little better with each further drop; which edge is which rod
-    stays.
+    Each further drop changes the session's time scale a little, but not the identification.
 
     Attributes
     ----------
     scale
-        At which.
+        Rounded time scale.
     unlike
-        Why they are not one fall of each chain, by role; empty where they are.
+        Reasons why the edges do not match a fall of each chain, by role; empty if they do.
     poor
-        Roles of chains of which too few edges are where one fall would put them.
+        Roles of chains with too few matched edges.
     begun
-        The fall, as it was adjusted; `None` where there is none.
+        The fitted fall; `None` if the drop was not identified.
     explained
-        What else than the protocol would explain edges that are like no fall; `None` if not sought.
+        Set-up faults that would explain the edges; `None` if not searched for.
     """
 
     scale: TimeScale
@@ -142,25 +141,22 @@ def identify_drop(
     aside: Collection[int] = (),
     before: Begun | None = None,
 ) -> DropIdentity:
-    """Find out which rods a drop's edges are; arguments as in `rig.analysis.drop.DropCase`.
+    """Identify a drop; arguments as in `rig.analysis.drop.DropCase`.
 
     Parameters
     ----------
     before
-        Where the chains were found to be with more gates.
+        Fit of the same drop with more gates.
     """
     earliest = -math.inf if drop.fire_tick is None else 0.0
     records = chain_records(protocol, run, drop, scale.hz, aside)
     if before is not None:
         model = DropModel.of(protocol, records, before.guesses, scale.u, components)
-        same = settle(model, x=before.x)
-        return DropIdentity(scale, {}, begun=Begun(before.guesses, same.matches, same.x))
+        return DropIdentity(scale, {}, begun=settle(model, x=before.x).begun)
     identification = identify(protocol, records, scale.u, components, earliest)
     unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
-    if unlike or fit is None:
-        poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
-        return DropIdentity(scale, unlike, poor)
-    return DropIdentity(scale, unlike, begun=Begun(fit.model.guesses, fit.matches, fit.x))
+    poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
+    return DropIdentity(scale, unlike, poor, None if unlike or fit is None else fit.begun)
 
 
 def identify(
@@ -171,28 +167,28 @@ def identify(
     earliest: float = -math.inf,
     batches: int | None = None,
 ) -> Identification:
-    """Find out which fall the edges are.
+    """Return the best reading of a drop's edges, and its odds.
 
     Parameters
     ----------
     records
-        The chains with their trains.
+        The chains with their edges.
     clock_u
         Relative standard uncertainty of the time scale.
     components
-        How much everything scatters.
+        Variance components.
     earliest
-        When chains were let go at the earliest, s since the release fired.
+        Earliest possible release, s since the release fired.
     batches
-        How many batches of starts are tried at most, the likeliest first.
+        Greatest number of batches of starts, the likeliest first; all if not given.
     """
     model = DropModel.of(protocol, records, None, clock_u, components)
     readings = {role: _read(model.side(role), earliest, batches) for role in model.records}
-    # Likelier than that all edges are strays and every rod was missed.
+    # Evidence is relative to all edges being strays and every rod missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
     matched = {
-        role: max((reading.matched for reading in side), default=0)
+        role: max((reading.match_count for reading in side), default=0)
         for role, side in readings.items()
     }
     return Identification(None, _shares(model, matched))
@@ -201,7 +197,7 @@ def identify(
 def pattern_faults(
     identification: Identification, words: Vocabulary = ANY_SCENE
 ) -> dict[str, Reason]:
-    """Say why the edges are not one fall of each chain, by role; nothing where they are."""
+    """Return reasons why the edges do not match a fall of each chain, by role; empty if they do."""
     reasons = {
         role: make_reason("few_edges_fit", words, side=role, share=share)
         for role, share in identification.shares.items()
@@ -210,23 +206,15 @@ def pattern_faults(
     if not reasons and identification.fit is None:
         return dict.fromkeys(identification.shares, make_reason("no_fall", words))
     if not reasons and identification.log_odds < LEAD:
-        return dict.fromkeys(identification.shares, _ambiguous(words, identification))
+        odds = math.exp(identification.log_odds)
+        return dict.fromkeys(identification.shares, make_reason("two_falls", words, odds=odds))
     return reasons
-
-
-def _ambiguous(words: Vocabulary, identification: Identification) -> Reason:
-    """Say that two falls fit, and with which further gate only one of them would."""
-    odds = math.exp(identification.log_odds)
-    if identification.fit is None or identification.other is None:
-        return make_reason("two_falls", words, odds=odds)
-    side, height = deciding_gate(identification.fit, identification.other)
-    return make_reason("two_falls_gate", words, odds=odds, side=side, height_m=height)
 
 
 def read_quickly(
     protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
 ) -> Reading | None:
-    """Read a drop like `identify`, but only near what is stated."""
+    """Return the best reading near the stated values, or `None`; quicker than `identify`."""
     identification = identify(protocol, records, clock_u, components, batches=1)
     fit = identification.fit
     return None if fit is None else Reading(fit, identification.evidence)
@@ -235,24 +223,24 @@ def read_quickly(
 def most_votes(
     protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
 ) -> int:
-    """Count the expected edges of a side that agree on one fall near the stated one, at most."""
-    pairing = Pairing.of(record.trains, record.crossed)
+    """Return how many of a side's edges agree on a fall near the stated values, at most."""
+    pairing = Pairing.of(record.trains, record.rebound_widths)
     votes = SideFall.of(protocol, record, pairing, clock_u, components).most_votes()
-    return min(votes, possible(record))  # of a flicker many edges vote for one rod
+    return min(votes, possible(record))  # many edges of a flicker vote for the same rod
 
 
 def well_read(reading: Reading) -> bool:
-    """Whether nearly all that could be is matched, with no more scatter or strain than usual."""
+    """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
     fit = reading.fit
     matchable = sum(possible(record) for record in fit.model.records.values())
-    expected = sum(record.expected for record in fit.model.records.values())
-    many = fit.matched >= max(LEAST * max(1, expected), _FAIR * matchable)
-    strain = float(np.abs(scaled(fit.estimate.x, fit.estimate.sd)).max())
+    expected = sum(record.edge_count for record in fit.model.records.values())
+    many = fit.match_count >= max(LEAST * max(1, expected), _FAIR * matchable)
+    strain = float(np.abs(standardise(fit.estimate.x, fit.estimate.sd)).max())
     return many and fit.estimate.scatter < RESTLESS and strain < STRAY
 
 
 def possible(record: ChainRecord) -> int:
-    """Count the edges of a side that could be rods by their gates and polarities alone."""
+    """Return how many edges of a side are matchable by gate and polarity alone."""
     return sum(
         min(
             int(np.count_nonzero(train.blocked == dark)),
@@ -263,23 +251,23 @@ def possible(record: ChainRecord) -> int:
     )
 
 
-def _read(fall: SideFall, earliest: float, batches: int | None) -> list[Annealed]:
-    """Anneal from one batch of starts after another while none explains the edges."""
-    readings: list[Annealed] = []
-    least, matchable = LEAST * fall.record.expected, possible(fall.record)
+def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]:
+    """Anneal batches of starts until a reading explains the edges; the likeliest first."""
+    readings: list[FallFit] = []
+    least, matchable = LEAST * fall.record.edge_count, possible(fall.record)
     if not fall.pairing.times.size or matchable < least:
         return readings
     for starts in itertools.islice(fall.starts(earliest, least), batches):
         if len(starts):
-            readings = _ranked([*readings, *fall.anneal(starts, _CLOSE)])
+            readings = _rank_readings([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
-            if best.scatter < RESTLESS and best.matched >= max(least, _CLEAR * matchable):
+            if best.scatter < RESTLESS and best.match_count >= max(least, _CLEAR * matchable):
                 break
     return readings
 
 
-def _ranked(readings: Iterable[AnyReading]) -> list[AnyReading]:
-    """Order readings, the likeliest first, and leave out what is the same as a likelier one."""
+def _rank_readings(readings: Iterable[AnyReading]) -> list[AnyReading]:
+    """Sort readings, the likeliest first, without those that equal a likelier reading."""
     ranked: list[AnyReading] = []
     for reading in sorted(readings, key=lambda candidate: -candidate.evidence):
         if all(any(map(_unlike, reading.edges, likelier.edges)) for likelier in ranked):
@@ -288,32 +276,32 @@ def _ranked(readings: Iterable[AnyReading]) -> list[AnyReading]:
 
 
 def _unlike(edges: Index, other_edges: Index) -> bool:
-    """Whether two readings differ in more edges than may be strays or missed."""
+    """Whether two readings differ in more edges than strays and missed edges explain."""
     matched = int(np.count_nonzero((edges >= 0) | (other_edges >= 0)))
     return bool(np.count_nonzero(edges != other_edges) > max(SIDES, MISSED * matched))
 
 
 def log_evidence(fit: Fit) -> float:
-    """Logarithm of the marginal likelihood of a reading, up to what depends on the edges alone.
+    """Return the log marginal likelihood of a reading, up to a constant for the same edges.
 
-    A matched edge has the density of its time about the motion; a missed and an extra one what is
-    known of such beforehand. The unknowns are integrated out by Laplace's method: −½‖y‖² −
-    ln |det R| at the best estimate, with y and RᵀR in units of the prior uncertainties.
+    A matched edge contributes the density of its time about the fitted motion; missed edges and
+    strays contribute their prior rates. The unknowns are integrated out by Laplace's method:
+    −½‖y‖² − ln |det R| at the best estimate, with y and RᵀR in units of the prior uncertainties.
     """
     estimate, model = fit.estimate, fit.model
     total = 0.0
     for role, matches in fit.matches.items():
-        rows = model.parted(role, model.residuals(role, estimate.x, matches), matches)
+        rows = model.decorrelate(role, model.residuals(role, estimate.x, matches), matches)
         sigma = rows.sigma * estimate.scatter
         beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
         total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
-    y = scaled(estimate.x, estimate.sd)
+    y = standardise(estimate.x, estimate.sd)
     _, volume = np.linalg.slogdet(estimate.root)
     return total - 0.5 * float(y @ y) - float(volume) + held_back(fit)
 
 
 def held_back(fit: Fit) -> float:
-    """Log of the share of an estimated κ's distribution above zero, twice: air only holds back."""
+    """Return the log of twice the posterior probability of κ > 0, as drag cannot be negative."""
     model, estimate = fit.model, fit.estimate
     at = model.unknowns["drag"].start
     if not estimate.sd[at]:
@@ -322,8 +310,8 @@ def held_back(fit: Fit) -> float:
     return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
 
 
-def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> Identification:
-    """Weigh the readings of all sides against each other, and adjust those that come near."""
+def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Identification:
+    """Fit the likeliest pairs of both sides' readings, and return the best with its odds."""
     pairs = []
     for pair in itertools.product(*readings.values()):
         together = _simultaneous(model.protocol, [side.guess.release for side in pair])
@@ -334,12 +322,12 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
     tried: list[Reading] = []
     for pair in close:
         sides = dict(zip(readings, pair, strict=True))
-        begun = model.changed(guesses={role: side.guess for role, side in sides.items()})
+        begun = model.copy_with(guesses={role: side.guess for role, side in sides.items()})
         matches = {
-            role: model.pairings[role].numbered(side.edges[0]) for role, side in sides.items()
+            role: model.pairings[role].number_edges(side.edges[0]) for role, side in sides.items()
         }
         tried.append(weigh(settle(begun, matches)))
-    best, *rest = _ranked(tried)
+    best, *rest = _rank_readings(tried)
     shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:
         return Identification(None, shares)
@@ -350,11 +338,11 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[Annealed]]) -> I
 
 
 def _shares(model: DropModel, matched: Mapping[str, int]) -> dict[str, float]:
-    return {role: count / max(1, model.records[role].expected) for role, count in matched.items()}
+    return {role: count / max(1, model.records[role].edge_count) for role, count in matched.items()}
 
 
 def weigh(fit: Fit) -> Reading:
-    """Weigh a fit of all sides."""
+    """Return a fit of all sides with its evidence."""
     paths = [fit.model.trajectory(role, fit.x) for role in fit.model.records]
     evidence = log_evidence(fit) + _simultaneous(
         fit.model.protocol, [float(path.time[0]) for path in paths]
@@ -363,17 +351,17 @@ def weigh(fit: Fit) -> Reading:
 
 
 def _simultaneous(protocol: Protocol, releases: Sequence[float]) -> float:
-    """Log prior of how far apart two releases are: a Cauchy of the skew that is accepted."""
+    """Return the log prior of the release skew: a Cauchy density as wide as the accepted skew."""
     apart = (max(releases) - min(releases)) / protocol.accept.release_skew
     return -math.log1p(apart**2)
 
 
 def deciding_gate(likelier: Fit, rival: Fit) -> tuple[str, float]:
-    """Find the beam that would see two falls differ most.
+    """Return the place of a further beam that would best separate two falls.
 
-    A beam tells no rod by itself: of each edge of one fall it is compared how far the chain is from
-    where the other fall has its nearest edge. On average over all edges that is most where rods
-    come by at unlike intervals, or first and last ones at unlike moments.
+    A beam does not identify rods, so each edge of a fall is compared with the nearest edge of the
+    other fall. The beam with the largest mean distance is chosen: there the intervals between
+    rods, or the first and last passages, differ most.
 
     Parameters
     ----------
@@ -383,8 +371,8 @@ def deciding_gate(likelier: Fit, rival: Fit) -> tuple[str, float]:
     Returns
     -------
     role, height
-        On which side, and how high above the zero of the protocol's heights, m. No hanging rod
-        blocks it.
+        Side, and height above the zero of the protocol's heights, m. No hanging rod blocks the
+        beam.
     """
     best = ("", 0.0, -1.0)
     protocol = likelier.model.protocol

@@ -1,12 +1,14 @@
-"""Whether the impacts of a drop are those of another of the plan's inclines than the run's own.
+"""Check whether the impacts of a drop match another incline of the plan.
 
-What a single drop tells is α. It cannot tell a board at another angle from a surface that is not
-as stated, so both are said, and the drop stays good: its Δz and V are what they are.
+A single drop gives only α. That does not separate a board at another angle from a surface that
+differs from the protocol. So the reason mentions both, and the drop stays good: its Δz and V are
+valid.
 """
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
@@ -18,14 +20,14 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Run
 
 CLEAR = math.log(1000.0)
-"""Log odds by which another incline must be likelier."""
-_FITS = 2.0  # standard uncertainties within which α is another incline's
+"""Least log odds of another incline."""
+_FITS = 2.0  # standard uncertainties within which α matches another incline
 _MODEL = 0.15
-"""Of α, one standard deviation of what the model may be off: resolved rods give up to 40 % more."""
+"""Relative standard uncertainty of the model's α: resolved rods give up to 40 % more."""
 
 
 def other_incline(fit: Fit, run: Run) -> tuple[Reason, ...]:
-    """Say of which other incline the impacts are; nothing where they may well be of the run's."""
+    """Return the reason that names a clearly likelier incline; empty if there is none."""
     model, estimate, incline = fit.model, fit.estimate, run.incline_deg
     surface = model.protocol.surface
     if surface is None or incline is None or "alpha" not in model.unknowns:
@@ -33,28 +35,17 @@ def other_incline(fit: Fit, run: Run) -> tuple[Reason, ...]:
     at = model.unknowns["alpha"]
     alpha = model.guesses["impact"].alpha + float(estimate.x[at][0])
     u = float(estimate.own_u[at][0])
-    chain = model.records["impact"].chain.chain
-
-    def off(incline_deg: float) -> tuple[float, float]:
-        """How far α is from that of an incline, relative to the standard deviation; and ln p."""
-        expected = expected_alpha(chain, surface, incline_deg)
-        sd = math.hypot(u, expected.u, _MODEL * expected.value)
-        far = abs(alpha - expected.value) / sd
-        return far, -0.5 * far**2 - math.log(sd)
-
-    likely: dict[float, tuple[float, float]] = {}
-    for angle in dict.fromkeys((incline, *model.protocol.plan.inclines)):
-        try:
-            likely[angle] = off(angle)
-        except DomainError:
-            continue
-    if incline not in likely or len(likely) < 2:
+    likely: dict[float, tuple[float, float]] = {}  # ln p of α, and its deviation in units of sd
+    for angle in (incline, *model.protocol.plan.inclines):
+        with suppress(DomainError):
+            expected = expected_alpha(model.records["impact"].chain.chain, surface, angle)
+            sd = math.hypot(u, expected.u, _MODEL * expected.value)
+            far = abs(alpha - expected.value) / sd
+            likely[angle] = -0.5 * far**2 - math.log(sd), far
+    if incline not in likely:
         return ()
-    best = max(likely, key=lambda angle: likely[angle][1])
-    if likely[best][0] > _FITS or likely[best][1] - likely[incline][1] < CLEAR:
+    best = max(likely, key=lambda angle: likely[angle][0])
+    if likely[best][1] > _FITS or likely[best][0] - likely[incline][0] < CLEAR:
         return ()
-    return (
-        make_reason(
-            "other_incline", alpha=alpha, U95=2.0 * u, likelier_deg=best, stated_deg=incline
-        ),
-    )
+    angles = {"likelier_deg": best, "stated_deg": incline}
+    return (make_reason("other_incline", alpha=alpha, U95=2.0 * u, **angles),)

@@ -1,9 +1,9 @@
-"""All drops of a session fitted together: what they say of the rig, and each in that light.
+"""Joint fit of all drops of a session: the rig's shared unknowns and each drop given these.
 
-All drops together are one least-squares problem: unknowns c of the rig and the chains, the same in
-every drop, and unknowns of each drop alone. The latter are eliminated drop by drop (a Schur
-complement), so its cost grows with the number of drops and not with its cube. How much each kind
-of nuisance scatters is estimated on the way (`rig.analysis.evidence`).
+All drops form a single least-squares problem, with unknowns c of the rig and the chains that all
+drops share, and unknowns of each drop alone. The latter are eliminated drop by drop (a Schur
+complement), so the cost grows linearly with the number of drops. The variance components of the
+nuisance parameters are estimated on the way (`rig.analysis.evidence`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.components import stated
-from rig.analysis.equations import STRAY, scaled
+from rig.analysis.components import priors
+from rig.analysis.equations import STRAY, standardise
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import match, without_strays
 from rig.analysis.joint_step import JointDrop, joint_step, take
@@ -32,38 +32,38 @@ if TYPE_CHECKING:
 
     from rig.analysis.components import Components
     from rig.analysis.equations import Residuals
-    from rig.analysis.fit import Fit, Matched
+    from rig.analysis.fit import DropFit, Fit
     from rig.analysis.likeness import Likeness
     from rig.arrays import Array
 
 
 FEWEST = 4
-"""Drops that a session must have for a joint fit: one block of A, B, B, A."""
+"""Least number of drops for a joint fit: a block of A, B, B, A."""
 IDENTIFIED = 0.5
-"""Share of the prior variance that the edges must take away for an unknown to be found by them."""
-_ROUNDS = 60  # of which few drops need many, for they tell little of the scatter
+"""Least relative reduction of the prior variance for an unknown to count as identified."""
+_ROUNDS = 60  # few drops need many rounds, as they determine the scatter poorly
 _REMATCH = 2
-"""Rounds after which all edges are matched again, for beams and rods are known by then, and a step
-back is no part of finding the way."""
-_DONE = 0.02  # of a standard uncertainty
-_SHORTEST = 1e-6  # share of a step, less of which is none
+"""Rounds after which all edges are matched again with improved beams and rods; from then on,
+alternating steps are damped."""
+_DONE = 0.02  # last step, in standard uncertainties
+_SHORTEST = 1e-6  # least share of a step before the fit fails
 _STEADY = 0.02  # relative change of the components
 _LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
-"""Where others of their kind count for more."""
+"""Components, m, below which others of the same variance dominate."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigEstimate:
-    """What the drops of a session say together of their rig, without the drops.
+    """Results of a joint fit about the rig, without the drops.
 
     Attributes
     ----------
     learned
-        As `JointFit.json` gives it.
+        Result of `JointFit.json`.
     likeness
-        How far the falls are from the model; `None` where too few edges tell it.
+        Agreement of the falls with the model; `None` if there are too few edges.
     drag
-        κ in g − κv², 1/m, where it is an unknown and not stated.
+        κ in g − κv², 1/m, if it is estimated and not stated.
     """
 
     learned: Mapping[str, Any]
@@ -73,21 +73,21 @@ class RigEstimate:
 
 @dataclass(frozen=True)
 class JointFit:
-    """What the drops of a session say together.
+    """Result of a joint fit.
 
     Attributes
     ----------
     shared
-        Names of the common unknowns.
+        Blocks of the shared unknowns.
     x, sd, inverse
         Estimates (deviations from the protocol), prior standard uncertainties, and R⁻¹ of the
         information RᵀR in units of these.
     components, degrees
-        How much everything scatters, and how many degrees of freedom each of these numbers has.
+        Variance components, and the degrees of freedom of each.
     drops
-        In the order given.
+        Fitted drops in the order given.
     settled
-        Whether the steps came to an end; if not, there may be no drops.
+        Whether the fit converged; if not, `drops` may be empty.
     """
 
     shared: SharedUnknowns
@@ -101,33 +101,33 @@ class JointFit:
 
     @cached_property
     def covariance(self) -> Array:
-        """R⁻¹R⁻ᵀ: covariance of the common unknowns in units of `sd`."""
+        """Covariance R⁻¹R⁻ᵀ of the shared unknowns in units of `sd`."""
         return self.inverse @ self.inverse.T
 
     @property
     def rig(self) -> RigEstimate:
-        """What is said of the rig and its falls."""
+        """Results about the rig and the agreement of its falls with the model."""
         block, drag = self.shared.blocks.get("drag"), None
-        # Where air is stated, predictions are made in it.
+        # Predictions already include stated drag.
         if block is not None and self.drops[0].model.protocol.drag is None:
             u = math.sqrt(self.covariance.diagonal()[block][0]) * float(self.sd[block][0])
             drag = Measured(float(self.x[block][0]), u)
         return RigEstimate(self.json(), likeness(self), drag)
 
     def json(self) -> dict[str, Any]:
-        """``learned`` of `rig analyze --json`.
+        """Return ``learned`` of `rig analyze --json`.
 
         Returns
         -------
         dict
-            ``scatter``: each variance component as stated and as found, with its degrees of
+            ``scatter``: each variance component as stated and as estimated, with its degrees of
             freedom; ``gates`` and ``rods`` are relative to the protocol's uncertainties.
-            ``unknowns``: what the drops have in common, as deviations from the protocol in SI
-            units, with the standard uncertainties before and after; what the edges do not tell is
-            marked as not identified.
+            ``unknowns``: shared unknowns as deviations from the protocol in SI units, with prior
+            and posterior standard uncertainties; marked as not identified if the edges do not
+            determine them.
         """
         variance = np.diag(self.covariance)
-        beforehand = attributes(stated(self.drops[0].model.protocol), *self.degrees)
+        beforehand = attributes(priors(self.drops[0].model.protocol), *self.degrees)
         scatter = attributes(self.components, *self.degrees)
         columns = {
             "value": self.x,
@@ -152,7 +152,7 @@ class JointFit:
 
 
 def by_itself(fit: Fit) -> JointFit:
-    """Take a drop that was adjusted by itself for a session that has nothing in common."""
+    """Return the joint fit of a single drop without shared unknowns."""
     shared, x = SharedUnknowns(()), np.zeros(0)
     drop = replace(JointDrop.of(fit, shared), inverse=fit.estimate.inverse)
     degrees = {"jitter": fit.estimate.degrees, "impulse": GUESSED}
@@ -161,37 +161,37 @@ def by_itself(fit: Fit) -> JointFit:
 
 
 @one_thread
-def joint_fit(fits: Sequence[Matched]) -> JointFit:
-    """Adjust all drops of a session together.
+def joint_fit(fits: Sequence[DropFit]) -> JointFit:
+    """Fit all drops of a session together.
 
     Parameters
     ----------
     fits
-        Good drops, each adjusted by itself, or all of them before.
+        Good drops, each fitted by itself or in an earlier joint fit.
     """
     shared = SharedUnknowns(fit.model for fit in fits)
-    # One clock a rig: its error is common, and as large as the least sure calibration allows.
+    # A rig has a single clock: its error is shared, with the largest calibration uncertainty.
     clock_u: dict[str | None, float] = {}
     for model in (fit.model for fit in fits):
         rig = model.owners.get("rig")
         clock_u[rig] = max(model.clock_u, clock_u.get(rig, 0.0))
     drops = [JointDrop.of(fit, shared) for fit in fits]
     x = _average(drops, len(shared))
-    beforehand = stated(fits[0].model.protocol)
+    beforehand = priors(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, moved, size, before = False, 0.0, len(shared), evidence.components
     inverse, previous = np.eye(size), np.zeros(size + len(before.__slots__))
     damping = np.ones_like(previous)
     for round_ in range(_ROUNDS):
         sd, drops = np.zeros(size), [drop.at(x) for drop in drops]
-        # Priors follow the scatter that was found, and impulses the α that was found.
+        # Update priors with the estimated scatter, and those of impulses with the estimated α.
         for n, drop in enumerate(drops):
             u = clock_u[drop.model.owners.get("rig")]
-            model = drop.model.informed(evidence.components, u, drop.x)
+            model = drop.model.with_priors(evidence.components, u, drop.x)
             drops[n], sd[drop.here] = replace(drop, model=model), model.unknowns.sd[drop.common]
         if round_ == _REMATCH:
             drops = [replace(drop, matches=match(drop.model, drop.x)) for drop in drops]
-        # At first the common unknowns are not yet what a drop's own go with: all may be far off.
+        # In the first round shared and own unknowns do not fit together yet: cut no residuals.
         root, drops = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
         step = damping[:size] * root.step()
         moves = _move(drops, x, sd, step) if np.isfinite(step).all() else None
@@ -203,18 +203,18 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
         last, moved = moved, float(np.abs(step / np.sqrt(variance)).max())
         before = evidence.components
         evidence = _weigh(evidence, shared, x, sd, inverse, drops, residuals)
-        # As long as steps get shorter alike, the next one is that of the last times their ratio.
+        # With linear convergence, the next step is shorter by the ratio of the last two.
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, drops):
             break
-        # What flips to and fro, as beside a least scale that is believed, is met half-way.
+        # Halve steps that alternate, as they do next to a lower bound of a component.
         ratios = damping[size:] * before.ratios(evidence.components)
         evidence.components = before.times(ratios)
         ahead = np.concatenate([step, ratios])
         if round_ > _REMATCH:
             damping[ahead * previous < 0.0] *= 0.5
         previous = ahead
-    # Components are those that the solution was made with.
+    # Return the components used for this solution, not the updated ones.
     good = tuple(
         replace(drop, matches=without_strays(drop.model, drop.x, drop.matches)) for drop in drops
     )
@@ -224,13 +224,13 @@ def joint_fit(fits: Sequence[Matched]) -> JointFit:
 def _move(
     drops: Sequence[JointDrop], x: Array, sd: Array, step: Array
 ) -> tuple[Array, list[JointDrop], list[Residuals]] | None:
-    """Take a step, or as much of it as leads to where chains fall.
+    """Take a step, shortened until all residuals are finite.
 
     Returns
     -------
-    x, drops, left
-        The common unknowns, the drops there, and what all edges leave over; nothing where no part
-        of the step will do.
+    x, drops, residuals
+        The shared unknowns, the drops, and the residuals of all edges; `None` if no part of the
+        step gives finite residuals.
     """
     share = 1.0
     while share > _SHORTEST:
@@ -247,7 +247,7 @@ def _move(
 
 
 def _average(drops: Sequence[JointDrop], size: int) -> Array:
-    """Begin at the mean of what the drops say by themselves."""
+    """Return the mean of the drops' own estimates of each shared unknown."""
     places = np.concatenate([drop.here for drop in drops])
     total = np.bincount(places, np.concatenate([drop.x[drop.common] for drop in drops]), size)
     return total / np.bincount(places, minlength=size)
@@ -262,7 +262,7 @@ def _weigh(
     drops: Sequence[JointDrop],
     residuals: Sequence[Residuals],
 ) -> Evidence:
-    """Estimate the components anew from what is left over and what was found."""
+    """Estimate the variance components from residuals and estimates."""
     new = Evidence(evidence.components, evidence.stated)
     remaining = np.sum(inverse**2, axis=1)
     for name, block in shared.blocks.items():
@@ -273,7 +273,7 @@ def _weigh(
     struck = 0.0
     for drop in drops:
         model = drop.model
-        # The variance of an own unknown: with the common ones known, and what these leave open.
+        # Variance of an own unknown: given the shared ones, plus the part that these contribute.
         by_common = drop.gain @ inverse[drop.here]
         root = np.zeros((drop.x.size, drop.own.size + x.size))
         root[drop.own] = np.hstack([drop.inverse, by_common])
@@ -282,16 +282,16 @@ def _weigh(
         parameters += float(np.sum(told[drop.own][own_sd > 0.0]))
         if "impulses" in model.unknowns:
             struck += float(np.sum(told[model.unknowns["impulses"]]))
-        new.drop(model, scaled(drop.x, model.unknowns.sd), root)
+        new.drop(model, standardise(drop.x, model.unknowns.sd), root)
     new.edges(residuals)
-    return new.settled(parameters, struck)
+    return new.estimate_components(parameters, struck)
 
 
 def _steady(old: Components, new: Components, drops: Sequence[JointDrop]) -> bool:
-    """Whether no component changes much; a floor that is not there shrinks for ever.
+    """Whether the components have converged; a component that is absent shrinks for ever.
 
-    Of impulses it is their scatter in these drops that counts: where all have about the same α, it
-    does not tell its two components apart, and nothing depends on them.
+    For impulses the scatter at the drops' α is compared. If all have about the same α, the edges
+    do not separate its components, and no result depends on them.
     """
     names = [name for name in old.__slots__ if name not in ("impulse", "impulse_floor", "bounce")]
     pairs = [(getattr(old, name), getattr(new, name), _LEAST.get(name, 0.0)) for name in names]

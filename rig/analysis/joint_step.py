@@ -1,4 +1,4 @@
-"""One Gauss–Newton step of many drops together, each one's own unknowns eliminated."""
+"""Gauss–Newton steps of a joint fit, with each drop's own unknowns eliminated."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.equations import STRAY, linearize, scaled
-from rig.analysis.fit import Matched
-from rig.analysis.square_root import EquationRows, condensed, eliminate, square_root
+from rig.analysis.equations import STRAY, linearize, standardise
+from rig.analysis.fit import DropFit
+from rig.analysis.square_root import EquationRows, condense, eliminate, square_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,17 +20,18 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class JointDrop(Matched):
-    """One drop among others, on the way to the joint solution or there.
+class JointDrop(DropFit):
+    """A drop of a joint fit.
 
     Attributes
     ----------
     own, common, here
-        Its own unknowns and the common ones in the drop's vector, and the latter in the session's.
+        Places of its own and of the shared unknowns in the drop's vector, and of the latter in the
+        session's vector.
     inverse, gain
-        As in `rig.analysis.square_root.Eliminated`.
+        As in `rig.analysis.square_root.Elimination`.
     target
-        What its own unknowns become for no step of the common ones, likewise.
+        Step of its own unknowns for a zero step of the shared ones: `Elimination.own`.
     centre
         Prior means of its own unknowns, zero if not given.
     """
@@ -44,8 +45,8 @@ class JointDrop(Matched):
     centre: Array | None = None
 
     @classmethod
-    def of(cls, fit: Matched, shared: SharedUnknowns) -> JointDrop:
-        """Take a drop as it was adjusted by itself, or among others before."""
+    def of(cls, fit: DropFit, shared: SharedUnknowns) -> JointDrop:
+        """Return a drop that was fitted by itself, or in an earlier joint fit."""
         common, places = shared.places(fit.model)
         own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
         gain = np.zeros((own.size, places.size))
@@ -53,7 +54,7 @@ class JointDrop(Matched):
         return cls(fit.model, fit.matches, fit.x, own, common, places, gain, gain, nothing)
 
     def at(self, common: Array) -> JointDrop:
-        """Return it with other values of the session's common unknowns."""
+        """Return the drop with other values of the session's shared unknowns."""
         x = self.x.copy()
         x[self.common] = common[self.here]
         return replace(self, x=x)
@@ -66,45 +67,47 @@ def joint_step(
     centre: Array | None = None,
     cut: float = STRAY,
 ) -> tuple[Root, list[JointDrop]]:
-    """Reduce all drops to what they say together of what they have in common.
+    """Eliminate each drop's own unknowns, and return the information on the shared ones.
 
     Parameters
     ----------
     x, sd
-        Common unknowns and their prior uncertainties.
+        Shared unknowns and their prior uncertainties.
     centre
-        Prior means of the common unknowns, zero if not given.
+        Prior means of the shared unknowns, zero if not given.
     cut
         As for `rig.analysis.equations.linearize`.
 
     Returns
     -------
     Root, list of JointDrop
-        In units of `sd`; and the drops with their own unknowns eliminated.
+        Root in units of `sd`, and the drops with their own unknowns eliminated.
     """
     rows: list[EquationRows] = []
     reduced = []
     for drop in drops:
         own_sd, pull = drop.model.unknowns.sd, np.zeros(drop.x.size)
         off = drop.x[drop.own] if drop.centre is None else drop.x[drop.own] - drop.centre
-        pull[drop.own] = scaled(off, own_sd[drop.own])
+        pull[drop.own] = standardise(off, own_sd[drop.own])
         blocks = [*linearize(drop.model, drop.matches, drop.x, cut=cut).rows.values()]
         inverse, gain, target, rest = eliminate(blocks, own_sd, pull, drop.own, drop.common)
-        rows = condensed([*rows, rest._replace(columns=drop.here)], x.size)
+        rows = condense([*rows, rest._replace(columns=drop.here)], x.size)
         reduced.append(replace(drop, inverse=inverse, gain=gain, target=target))
-    pull = scaled(x if centre is None else x - centre, sd)
+    pull = standardise(x if centre is None else x - centre, sd)
     return square_root(rows, np.ones(x.size), pull), reduced
 
 
 def take(
     drops: Sequence[JointDrop], x: Array, sd: Array, step: Array, share: float = 1.0
 ) -> tuple[Array, list[JointDrop]]:
-    """Take a share of a step of the common unknowns, and of what each drop's own do then.
+    """Return unknowns and drops after a share of a step of the shared unknowns.
+
+    Each drop's own unknowns follow.
 
     Parameters
     ----------
     step
-        In units of `sd`.
+        Step in units of `sd`.
     """
     x = x + share * step * sd
     moved = []

@@ -1,8 +1,8 @@
-"""V and Δz from the last passages alone: a second opinion that knows no impacts.
+"""V and Δz from the last passages alone: a cross-check without a model of impacts.
 
 Once every rod below has struck, the top rod falls freely. Its last passages, and those of the free
-chain about that time, are two short falls of known acceleration: with no α, no γ and no release in
-them, they are wrong in other ways than the adjustment of a whole drop.
+chain about that time, are two short falls of known acceleration. They do not involve α, γ or the
+release, so that their errors differ from those of the fit.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.dual import Dual
-from rig.analysis.quantities import Adjusted
+from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.result import Measured
 from rig.analysis.square_root import EquationRows, eliminate
-from rig.measurands import MEASURANDS
+from rig.measurands import MEASURANDS, SPEED
 from rig.reasons import Reason, make_reason
 
 if TYPE_CHECKING:
@@ -26,24 +26,25 @@ if TYPE_CHECKING:
     from rig.arrays import Array
 
 
+SEPARATION_RAW = MEASURANDS["separation_raw_m"]
 _NEAR = 0.02
-"""How far from the moment that is asked for a passage of the free chain may be, s."""
+"""Largest time of a free chain's passage from the strike, s."""
 APART = 3.0
-"""Standard uncertainties beyond which two values are not the same: normal ones are in 1 of 370."""
+"""Standard uncertainties beyond which two values differ: by chance in 1 of 370."""
 
 
 class _Passages(NamedTuple):
-    """When a chain's top rod was where, shape ``(edges,)`` each.
+    """Passages of a chain's top rod, shape ``(edges,)`` each.
 
     Attributes
     ----------
     times, heights
-        s, m above the gates' zero; as nominal, whatever the rod and the beam were off.
+        Time, s, and nominal height above the gates' zero, m.
     slopes
         Derivatives of the heights by the drop's unknowns, in units of their prior uncertainties;
         shape ``(edges, unknowns)``.
     sigma
-        What each edge is off by itself, m.
+        Independent scatter of each edge, m.
     """
 
     times: Array
@@ -53,13 +54,13 @@ class _Passages(NamedTuple):
 
 
 def last_passages(fit: Fit) -> dict[str, Measured]:
-    """Measure V, and Δz as it fell, at the contact level.
+    """Return V and the raw Δz at the contact level from the last passages.
 
     Returns
     -------
     dict
-        By JSON name; nothing where the top rod's last passages are fewer than two edges, and no Δz
-        where the free chain is not seen at that time.
+        Values by JSON name; empty for fewer than two last edges of the top rod, and without Δz if
+        no free chain passes a gate at that time.
     """
     model = fit.model
     if "impact" not in model.records or model.records["impact"].chain.chain.rods < 2:
@@ -68,47 +69,49 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     if last.times.size < 2:
         return {}
     when = float(last.times[np.argmin(last.heights)])
-    for _ in range(3):  # Newton's steps to the moment at which it is at the contact level
+    for _ in range(3):  # Newton's method for the time at the contact level
         (height, speed), covariance = _fall(fit, "impact", last, when)
         when += height / speed
-    values = {"speed_m_s": Measured(speed, _u(covariance, 0.0, 1.0))}
+    values = {SPEED.name: Measured(speed, _u(covariance, 0.0, 1.0))}
     moment_u = _u(covariance, 1.0, 0.0) / speed
     if "free" in model.records:
         near = _passages(fit, "free", when)
         if near.times.size >= 2 and np.ptp(near.times) > 0.0:
             (height, falling), covariance = _fall(fit, "free", near, when)
             u = math.hypot(_u(covariance, 1.0, 0.0), falling * moment_u)
-            values["separation_raw_m"] = Measured(height, u)
+            values[SEPARATION_RAW.name] = Measured(height, u)
     return values
 
 
 def disagreements(fitted: Mapping[str, Measured], direct: Mapping[str, Measured]) -> list[Reason]:
-    """Say what the last passages alone have otherwise than the adjustment of the whole drop."""
+    """Return reasons for values of the last passages that differ from those of the fit."""
     reasons = []
-    codes = {"speed_m_s": "last_speed_differs", "separation_raw_m": "last_separation_differs"}
-    for name, code in codes.items():
-        if name not in fitted or name not in direct:
-            continue
-        adjusted, last = fitted[name], direct[name]
-        # They share their last edges and so the errors of these: they are nearer than that.
-        if abs(adjusted.value - last.value) > APART * math.hypot(adjusted.u, last.u):
-            unit = name.removeprefix(MEASURANDS[name].stem)
-            values = {f"alone{unit}": last.value, f"whole{unit}": adjusted.value}
-            values |= {"alone_U95": last.expanded, "whole_U95": adjusted.expanded}
+    codes = {SPEED: "last_speed_differs", SEPARATION_RAW: "last_separation_differs"}
+    for row, code in codes.items():
+        whole, alone = fitted.get(row.name), direct.get(row.name)
+        # Both share the errors of the last edges, so that this limit is conservative.
+        if (
+            whole
+            and alone
+            and abs(whole.value - alone.value) > APART * math.hypot(whole.u, alone.u)
+        ):
+            unit = row.name.removeprefix(row.stem)
+            values = {f"alone{unit}": alone.value, f"whole{unit}": whole.value}
+            values |= {"alone_U95": alone.expanded, "whole_U95": whole.expanded}
             reasons.append(make_reason(code, **values))
     return reasons
 
 
 def _passages(fit: Fit, role: str, when: float | None = None) -> _Passages:
-    """Collect a side's matched edges about some time, or at last, as passages of its top rod."""
+    """Return a side's matched edges near `when`, or of the top rod alone, as its passages."""
     model = fit.model
-    expected, nominal = model.expected[role], Adjusted(model, np.zeros(fit.x.size))
+    expected, nominal = model.expected[role], AdjustedDrop(model, np.zeros(fit.x.size))
     pairing = model.pairings[role]
-    pick, edge = pairing.observed(fit.matches[role])
+    pick, edge = pairing.indices(fit.matches[role])
     times = pairing.times[edge] * model.rate(fit.x)
     chosen = expected.alone[pick] if when is None else np.abs(times - when) < _NEAR
     pick, times = pick[chosen], times[chosen]
-    # The reference is at the level when the edge comes, and the top rod as much higher.
+    # At an edge the reference point is at its level; the top rod is higher by the chain's length.
     levels = Dual(expected.levels[pick], model.slopes[role].levels[pick])
     top = nominal.top(role, levels)
     sigma = model.residuals(role, fit.x, fit.matches[role]).sigma[chosen]
@@ -116,10 +119,10 @@ def _passages(fit: Fit, role: str, when: float | None = None) -> _Passages:
 
 
 def _fall(fit: Fit, role: str, seen: _Passages, when: float) -> tuple[tuple[float, float], Array]:
-    """Height and speed of a chain's top rod at a moment, and their covariance.
+    """Return height and speed of a chain's top rod at `when`, and their covariance.
 
-    Least squares of z(t) = z − v(t − t₀) − ½(g − κv²)(t − t₀)²: edges are off by themselves, and
-    together by all that the table of unknowns has of beams and rods.
+    Least squares of z(t) = z − v(t − t₀) − ½(g − κv²)(t − t₀)²; edges have independent scatter, and
+    common errors by the priors of beams and rods.
     """
     since = seen.times - when
     path = fit.model.trajectory(role, fit.x)

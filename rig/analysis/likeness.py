@@ -1,4 +1,4 @@
-"""Does a session's fall look like the model? By what a joint fit had to allow for."""
+"""Agreement of a session's falls with the model, from the variance components of a joint fit."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ if TYPE_CHECKING:
     from rig.analysis.joint_fit import JointFit
 
 LIKE_DEPARTURE = 50e-6
-"""Least departure that is remarked, m: half of what an edge may be off anyhow."""
+"""Least departure that counts as a difference, m: half of an edge's unmodelled scatter."""
 ENOUGH = 20.0
-"""Degrees of freedom from which on a scatter that was found means something."""
+"""Least degrees of freedom of a meaningful scatter."""
 LIKE_IMPULSES = 0.1
-"""Scatter of single impulses, relative to α, that is remarked: a tenth of what is explained."""
+"""Least scatter of single impulses, relative to α, that counts as a difference."""
 _LEAST_MM = 0.01  # below the resolution that a sentence states
 
 
 class Likeness(NamedTuple):
-    """How far a session's falls are from Eqs. 8 to 13.
+    """Differences between a session's falls and Eqs. 8 to 13.
 
     Attributes
     ----------
     departure
-        How far off its chain a rod was once rods had struck, one standard deviation, m.
+        Standard deviation of rods from their chain once rods have struck, m.
     impulses
-        Scatter of single impulses, relative to α; `None` where the drops do not tell it.
+        Scatter of single impulses, relative to α; `None` if the drops do not determine it.
     """
 
     departure: float
@@ -36,16 +36,15 @@ class Likeness(NamedTuple):
 
     @property
     def like(self) -> bool:
-        """Whether neither is remarkable."""
+        """Whether both differences are small."""
         return self.departure < LIKE_DEPARTURE and (self.impulses or 0.0) < LIKE_IMPULSES
 
     @property
     def sentence(self) -> str:
         """The comparison in words."""
         size = f"{max(self.departure * 1e3, _LEAST_MM):.2f} mm"
-        impacts = ""
-        if self.impulses is not None:
-            impacts = f"; single impacts vary by {100 * self.impulses:.0f} %"
+        vary = f"{100 * (self.impulses or 0.0):.0f} %"
+        impacts = "" if self.impulses is None else f"; single impacts vary by {vary}"
         if self.like:
             return f"Measured positions match the model to {size}{impacts}."
         return (
@@ -54,19 +53,15 @@ class Likeness(NamedTuple):
         )
 
     def json(self) -> dict[str, Any]:
-        """``{"like_model", "departure_m", "impulses", "sentence"}``."""
+        """Return ``{"like_model", "departure_m", "impulses", "sentence"}``."""
         fields = {"like_model": self.like, "departure_m": self.departure}
         return fields | attributes(self, "impulses", "sentence")
 
 
 def likeness(joint: JointFit) -> Likeness | None:
-    """Judge the falls of a session; `None` where none strikes, or too few edges tell."""
-    alphas = [
-        abs(drop.model.guesses["impact"].alpha)
-        for drop in joint.drops
-        if "impact" in drop.model.guesses
-    ]
-    alpha = median(alphas) if alphas else 0.0
+    """Return the likeness of a session's falls; `None` without strikes, or with too few edges."""
+    guesses = [drop.model.guesses.get("impact") for drop in joint.drops]
+    alpha = median([abs(guess.alpha) for guess in guesses if guess] or [0.0])
     scales, degrees = joint.components, joint.degrees
     if alpha <= 0.0 or degrees.get("departure", 0.0) < ENOUGH:
         return None

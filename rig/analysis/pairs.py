@@ -1,18 +1,19 @@
-"""What it changes which chain strikes: paired differences over blocks of A, B, B, A.
+"""Effects of chains and sides: paired differences over blocks of A, B, B, A.
 
-The mean of runs 1 and 4 less that of runs 2 and 3 is free of any drift that is linear in time, and
-of everything that both chains have in common. Half of the release skew's difference goes with the
-chains; what stays when they change places goes with the sides.
+The mean of runs 1 and 4 less that of runs 2 and 3 is free of linear drift, and of errors that both
+chains share. Half of the release skew's difference is an effect of the chains; the part that
+remains when they change places is an effect of the sides.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.analysis.averages import ABBA, effect
+from rig.analysis.averages import combine
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import GOOD
 from rig.measurands import MEASURANDS
@@ -22,14 +23,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from rig.analysis.result import DropResult, Measured
+    from rig.arrays import Array
     from rig.protocol.protocol import Protocol
 
-Block = list["DropResult"]
+_CHAINS_OWN = ("spacing", "width")  # common lines of a budget that differ between chains
 
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """Effects at one incline.
+    """Effects at an incline.
 
     Attributes
     ----------
@@ -38,10 +40,10 @@ class Effects:
     blocks
         Number of complete blocks of good runs.
     chain
-        By JSON name: the quantity when the first chain strikes less that when the second does.
+        By JSON name: the quantity when the first chain strikes less that when the second strikes.
     side
-        By JSON name: what stays when the chains change places, where without any effect of the
-        sides there would be nothing: how much later the free side lets go.
+        By JSON name: the part that remains when the chains change places, zero without an effect
+        of the sides: the delay of the free side's release.
     """
 
     incline_deg: float
@@ -52,23 +54,23 @@ class Effects:
     side: Mapping[str, Measured]
 
     def json(self) -> dict[str, Any]:
-        """One member of ``effects``."""
+        """Return a member of ``effects``."""
         fields = attributes(self, "incline_deg", "blocks", "chain", "side")
         return fields | {"chains": [self.first, self.second]}
 
 
 def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects, ...]:
-    """Find the effects of chains and sides at each incline.
+    """Return the effects of chains and sides at each incline.
 
     Parameters
     ----------
     results
-        The last attempt at each run; blocks that lack a good one do not count.
+        The last attempt at each run; only blocks of four good runs count.
 
     Returns
     -------
     tuple of Effects
-        In order of incline; none where the plan is no ABBA or one chain does everything.
+        In order of incline; empty if the plan is not ABBA or there is a single chain.
     """
     if protocol.plan.order != "ABBA" or len(protocol.chains) < 2 or protocol.surface is None:
         return ()
@@ -79,24 +81,31 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
         planned.setdefault(run.incline_deg, []).append(run.number)
     every = []
     for incline, numbers in sorted(planned.items()):
-        blocks = _blocks([good.get(number) for number in numbers], first)
+        fours = [numbers[start : start + 4] for start in range(0, len(numbers), 4)]
+        full = [[good[number] for number in four] for four in fours if good.keys() >= {*four}]
+        # A shuffled plan has no ABBA blocks.
+        order = [first, second, second, first]
+        blocks = [block for block in full if [drop.run.impact for drop in block] == order]
         if blocks:
+            # First chain less second, for each run of a block.
+            signs = np.array([1.0 if name == first else -1.0 for name in order])
             rows = [row for row in MEASURANDS.values() if row.name in blocks[0][0].quantities]
-            evenly = np.ones(len(ABBA)) / len(ABBA)
-            signs = np.where(ABBA, evenly, -evenly) * 2.0
-            measured = {
-                row.name: [[run.quantities[row.name] for run in block] for block in blocks]
-                for row in rows
-            }
-            chain = {r.name: effect(measured[r.name], signs) for r in rows if r.by_chain}
-            side = {r.name: effect(measured[r.name], evenly) for r in rows if r.by_side}
+            chain = {r.name: _effect(blocks, r.name, signs / 2.0) for r in rows if r.by_chain}
+            side = {r.name: _effect(blocks, r.name, signs**2 / 4.0) for r in rows if r.by_side}
             every.append(Effects(incline, first, second, len(blocks), chain, side))
     return tuple(every)
 
 
-def _blocks(runs: Sequence[DropResult | None], first: str) -> list[Block]:
-    """Cut an incline's runs in fours, and keep those that are whole."""
-    fours = (runs[end - len(ABBA) : end] for end in range(len(ABBA), len(runs) + 1, len(ABBA)))
-    full = ([run for run in four if run is not None] for four in fours)
-    # All runs shuffled leave no blocks.
-    return [block for block in full if tuple(r.run.impact == first for r in block) == ABBA]
+def _effect(blocks: Sequence[Sequence[DropResult]], name: str, weights: Array) -> Measured:
+    """Return the mean over blocks of a weighted sum of runs; all but chains' own errors cancel."""
+    runs = [[drop.quantities[name] for drop in block] for block in blocks]
+    values = np.array([[run.value for run in block] for block in runs])
+    # Scatter of the sums between blocks, and another degree of freedom from each block.
+    squares = np.sum((values @ weights - np.mean(values @ weights)) ** 2)
+    # The contrast of a block that is free of its mean, its chains and linear drift.
+    rest = values @ [1.0, -3.0, 3.0, -1.0]
+    squares += weights @ weights * np.sum(rest**2) / 20.0
+    freedom = 2.0 * len(blocks) - 1.0
+    chains = [[block[n] for block in runs for n in pair] for pair in ((0, 3), (1, 2))]
+    scatter = math.sqrt(squares / freedom / len(blocks)), freedom
+    return combine(chains, 2.0 * weights[:2], scatter, _CHAINS_OWN)

@@ -1,4 +1,4 @@
-"""Results as plain data: what is printed of a result are attributes of it, by their names."""
+"""Conversion of results to JSON data: printed fields are attributes, under the same names."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON has it: results as they print themselves, no number that is none."""
+    """Return a value as JSON data; results by their `json`, non-finite numbers as `None`."""
     if hasattr(value, "json"):
         return value.json()
     if isinstance(value, Mapping):
         return {name: plain(member) for name, member in value.items()}
-    if hasattr(value, "tolist"):  # an array: who asks for none need not load what makes them
+    if hasattr(value, "tolist"):  # an array; avoids the import of numpy
         return value.tolist()
     if isinstance(value, Iterable) and not isinstance(value, str):
         return [plain(member) for member in value]
@@ -21,5 +21,5 @@ def plain(value: Any) -> Any:
 
 
 def attributes(result: object, *names: str) -> dict[str, Any]:
-    """Return attributes of a result as JSON has them."""
+    """Return attributes of a result as JSON data, by name."""
     return {name: plain(getattr(result, name)) for name in names}

@@ -1,4 +1,4 @@
-"""Work on many things: in this process or, where that takes long, on all processors."""
+"""Ordered execution of many tasks, in this process or, for long work, in several."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _WORTH_S = 4.0
-"""Work left to do from which other processes, each of which begins with 0.7 s of imports, help."""
-_LOOK = 4  # tasks after which is looked how long they take
+"""Least remaining work for which further processes save time; each starts with 0.7 s of imports."""
+_LOOK = 4  # tasks timed before further processes start
 _BATCH = 16  # tasks for each process that are read at once
 
 
@@ -32,18 +32,20 @@ def do_in_order(
     total: int,
     processes: int = 1,
 ) -> None:
-    """Call a function for each task, and take what it returns in the order of the tasks.
+    """Call `work` for each task, and `take` with each result in the order of the tasks.
 
     Parameters
     ----------
     work
-        Of a module, if other processes may help.
+        Function; of module level if other processes may be used.
     tasks
-        Read a batch at a time.
+        Tasks, read a batch at a time.
+    take
+        Called with each task and its result, in this process.
     total
         Number of tasks.
     processes
-        That may be used, where it is worth it.
+        Greatest number of processes.
     """
     remaining, began = iter(tasks), perf_counter()
     for number, task in enumerate(remaining, 1):
@@ -57,13 +59,13 @@ def do_in_order(
     executor = ProcessPoolExecutor(processes, context, _begin)
     try:
         while batch := list(islice(remaining, _BATCH * processes)):
-            with _ctrl_c_held():  # processes begin with the first tasks
-                # Not a map, which cancels what is left as it is closed, and a dead pool says so.
+            with _ctrl_c_held():  # processes start with the first tasks
+                # Not map: on close it cancels pending tasks, which fails in a broken pool.
                 results = [executor.submit(work, task) for task in batch]
             for task, result in zip(batch, results, strict=True):
                 take(task, result.result())
     except BaseException:
-        for process in multiprocessing.active_children():  # what they are at is not waited for
+        for process in multiprocessing.active_children():  # do not wait for running tasks
             process.kill()
         raise
     finally:
@@ -72,11 +74,11 @@ def do_in_order(
 
 @contextmanager
 def _ctrl_c_held() -> Iterator[None]:
-    """Keep Ctrl-C from processes that begin: it is this one that ends them, in a few words."""
+    """Block Ctrl-C in processes while they start: this process ends them, with a short message."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # which lets Ctrl-C through when it begins
+    resource_tracker.ensure_running()  # its start unblocks Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -85,7 +87,7 @@ def _ctrl_c_held() -> Iterator[None]:
 
 
 def _begin() -> None:
-    """Have a process end with the one that began it, however that ends."""
+    """Make a process end with its parent, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
 

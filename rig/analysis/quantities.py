@@ -1,4 +1,4 @@
-"""The measurands, as functions of the adjusted unknowns, and the lines of their budget."""
+"""The measurands as functions of the fitted unknowns, and the lines of their budget."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 
 
 class BudgetLine(NamedTuple):
-    """What is known of a line of the uncertainty budget.
+    """Properties of a line of the uncertainty budget.
 
     Attributes
     ----------
     common
-        Whether it is the same in every run, so that averaging does not reduce it.
+        Whether the error is the same in every run, so that averaging does not reduce it.
     guessed
-        Whether nobody has measured its size, unless a joint fit finds it.
+        Whether its size is an assumption, unless a joint fit estimates it.
     scale
-        The component that a joint fit finds, whose degrees of freedom the line has.
+        Variance component that a joint fit estimates, and whose degrees of freedom the line has.
     known
-        What could be measured better, with the protocol's key; empty where nothing can.
+        Input that could be measured better, with the protocol's key; empty if there is none.
     """
 
     common: bool = False
@@ -74,21 +74,21 @@ COMMON = tuple(name for name, line in BUDGET.items() if line.common)
 
 
 def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
-    """Return each measurand of the scene."""
-    drop = Adjusted(model, x)
+    """Return each measurand of the scene with its derivatives, by JSON name."""
+    drop = AdjustedDrop(model, x)
     values = ((name, compute(drop)) for name, compute in COMPUTED.items())
     return {name: value for name, value in values if value is not None}
 
 
 def effective_degrees(u: float, budget: Mapping[str, float], degrees: Mapping[str, float]) -> float:
-    """Effective degrees of freedom by Welch and Satterthwaite (GUM G.4); at least 1.
+    """Return the effective degrees of freedom by Welch–Satterthwaite (GUM G.4); at least 1.
 
     Parameters
     ----------
     budget
         Lines whose squares add up to that of `u`.
     degrees
-        Degrees of freedom of lines; those of guessed lines are `GUESSED`, others infinite.
+        Degrees of freedom of lines; `GUESSED` for other guessed lines, infinite for the rest.
     """
     share = sum(
         (line / u) ** 4 / degrees.get(name, GUESSED)
@@ -99,7 +99,7 @@ def effective_degrees(u: float, budget: Mapping[str, float], degrees: Mapping[st
 
 
 class _Strike(NamedTuple):
-    """How far above the contact level the top rod strikes, when, and how fast it is."""
+    """Strike of the top rod: height above the contact level, time and speed."""
 
     above: Dual
     when: Dual
@@ -107,8 +107,8 @@ class _Strike(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Adjusted:
-    """A drop with its unknowns, and what measurands and curves are made of.
+class AdjustedDrop:
+    """A drop at given unknowns: quantities from which measurands and curves are computed.
 
     Attributes
     ----------
@@ -126,16 +126,16 @@ class Adjusted:
 
     @property
     def both(self) -> bool:
-        """Whether a free chain falls beside it."""
+        """Whether a free chain falls beside the striking chain."""
         return self.strikes and "free" in self.model.records
 
     def linear(self, name: str, share: Array | float = 1.0) -> Dual:
-        """Return a sum of a block's members, nothing where the scene has none.
+        """Return a weighted sum of a block's members; zero if the scene has no such block.
 
         Parameters
         ----------
         share
-            Of each, shape ``(members,)`` or ``(n, members)``.
+            Weight of each member, shape ``(members,)`` or ``(n, members)``.
         """
         block, share = self.model.unknowns.blocks.get(name, slice(0)), np.atleast_1d(share)
         slopes = np.zeros((*share.shape[:-1], self.x.size))
@@ -150,40 +150,42 @@ class Adjusted:
 
     @cached_property
     def gravity(self) -> Dual:
-        """The acceleration of a fall, or down a track."""
+        """Acceleration of a free fall, or down a track, m/s²."""
         return self.model.protocol.gravity.value + self.linear("gravity")
 
     def release(self, role: str) -> Dual:
-        """When a chain was let go."""
+        """Return the release time of a chain, s."""
         return self.linear(f"{role} release") + self.model.guesses[role].release
 
     def levels(self, role: str, times: Dual) -> Dual:
-        """Where a chain's reference point is at some moments, shape ``(n,)``."""
+        """Return the height of a chain's reference point at `times`, m; shape ``(n,)``."""
         height, speed, slopes = self._path(role).sights(times.value)
         return self._by_path(role, height, slopes) - Dual(0.0 * speed, times.slopes) * speed
 
     def squares(self, role: str, levels: Dual) -> Dual:
-        """Square of a chain's speed by the equations at some levels, shape ``(n,)``."""
+        """Return the squared speed of a chain at some levels by its path; shape ``(n,)``."""
         squares, slopes, steeper = self._path(role).squares(levels.value)
         return self._by_path(role, squares, slopes) - Dual(0.0 * squares, levels.slopes) * steeper
 
     def top(self, role: str, levels: Dual) -> Dual:
-        """Where its top rod is, its reference point being at some levels, shape ``(n,)``."""
+        """Return the height of the top rod for levels of the reference point, m; shape ``(n,)``."""
         chain, protocol = self.model.records[role].chain.chain, self.model.protocol
         level = levels + chain.length + self.linear(f"{role} rods", np.eye(chain.rods)[-1])
-        # A chain that turned is lower at its top, the more the further it fell.
+        # A swinging chain turns as it falls, which lowers its top rod.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
         level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
         highest = np.full(levels.value.shape, chain.rods - 1)
         fall = self.model.records[role], protocol.drop.value, highest, levels.value
-        level += self.linear(f"{role} air lag", lags(*fall))
+        behind = slack(*fall)
+        level += self.linear(f"{role} air lag", lags(*fall)[:, None])
+        level += self.linear(f"{role} slack", behind) + self.linear(f"{role} usual slack", behind)
         if role == "free":
-            return level + self.linear("free slack", slack(*fall))
-        last: Array = levels.value < self._path(role).height[chain.rods - 1]  # of all that fall
-        return level + self.linear("top") * last - self.stretched(levels.value)[0]
+            return level
+        last: Array = levels.value < self._path(role).height[chain.rods - 1]  # falls alone
+        return level + self.linear("top") * last - self.stretch(levels.value)[0]
 
-    def stretched(self, levels: Array) -> tuple[Dual, Dual]:
-        """How far ahead strings have pulled the top rod, and how much faster it is for that."""
+    def stretch(self, levels: Array) -> tuple[Dual, Dual]:
+        """Return the stretch of the top rod, m, and its rate, m/s, at these levels."""
         modes = self.model.discrepancy.top(levels)
         ahead, faster = (
             self.linear(STRETCHES[0], part) + self.linear(STRETCHES[1], part) for part in modes
@@ -192,31 +194,31 @@ class Adjusted:
 
     @property
     def late(self) -> Dual:
-        """How much faster a late last pull makes the top rod by the contact level."""
+        """Gain of speed of the top rod by a late last pull, m/s."""
         return self.linear("late", self.model.discrepancy.late_pull)
 
     @property
     def speed(self) -> Dual:
-        """V as the top rod passes the contact level."""
+        """Speed V of the top rod at the contact level, m/s."""
         return self._arrival[0]
 
     @property
     def hit(self) -> Dual:
-        """When that is."""
+        """Time at which the top rod passes the contact level, s."""
         return self._arrival[1]
 
     @cached_property
     def _arrival(self) -> tuple[Dual, Dual]:
-        """V and its moment, by the equations' path, and by what strings did besides.
+        """V and its time, from the path and first-order corrections for the strings.
 
-        The stretch has brought the top rod w ahead, at its rate w′: it arrives e = w/(V + w′)
-        earlier, and slower by what it gains in that time. A late pull acts over the way below the
-        lowest beam. Both are small, and what is of second order in them is left out.
+        The stretch has brought the top rod ahead by w at the rate w′: it arrives e = w/(V + w′)
+        earlier, and slower by g·e. A late pull acts over the distance below the lowest beam. Both
+        are small, and second-order terms are left out.
         """
         path = self._path("impact")
         speed = self._by_path("impact", path.arrival, path.slopes.arrival)
         hit = self._by_path("impact", float(path.time[-1]), path.slopes.time[-1])
-        ahead, faster = self.stretched(-self.model.records["impact"].strikes[-1:])
+        ahead, faster = self.stretch(-self.model.records["impact"].strikes[-1:])
         fast = speed + faster[0]
         early = ahead[0] / fast
         speed = fast - self.gravity * early
@@ -225,15 +227,14 @@ class Adjusted:
 
     @cached_property
     def skew(self) -> Dual:
-        """The free chain's release less the impact chain's."""
+        """Release time of the free chain less that of the impact chain, s."""
         return self.release("free") - self.release("impact")
 
     @cached_property
     def strike(self) -> _Strike | None:
-        """Go back from the level to where the top rod strikes, in one ballistic leg.
+        """Strike of the top rod, a ballistic leg away from the contact level.
 
-        `None` where nothing is struck, or so high that the chain never falls from there to the
-        level.
+        `None` without impacts, or if the strike is higher than the speed at the level allows.
         """
         if not self.strikes:
             return None
@@ -247,20 +248,20 @@ class Adjusted:
         return _Strike(above, self.hit - 2.0 * above / (speed + end), end)
 
     def apart(self, when: Dual) -> Dual:
-        """Height of the free chain's top rod above the contact point at a moment."""
+        """Return the height of the free chain's top rod above the contact point at `when`, m."""
         moment = Dual(np.array([when.value]), when.slopes[None])
         return self.top("free", self.levels("free", moment))[0]
 
 
-def _acceleration(drop: Adjusted, *, track: bool) -> Dual | None:
-    """Return the acceleration of what strikes nothing, of a free fall or down a track."""
+def _acceleration(drop: AdjustedDrop, *, track: bool) -> Dual | None:
+    """Return the acceleration of a free fall or down a track; `None` for other scenes."""
     down = drop.model.protocol.track is not None
     return drop.gravity if down == track and not drop.strikes else None
 
 
-COMPUTED: dict[str, Callable[[Adjusted], Dual | None]] = {
-    # The free chain is read off as long after its own release as the other one takes to strike: no
-    # model of what it would have done comes in.
+COMPUTED: dict[str, Callable[[AdjustedDrop], Dual | None]] = {
+    # The free chain is read after the same time since its own release as the striking chain. No
+    # model of its later fall is needed.
     "separation_m": lambda drop: drop.apart(drop.hit + drop.skew) if drop.both else None,
     "separation_raw_m": lambda drop: drop.apart(drop.hit) if drop.both else None,
     "separation_strike_m": lambda drop: (
@@ -275,4 +276,4 @@ COMPUTED: dict[str, Callable[[Adjusted], Dual | None]] = {
     "gravity_m_s2": partial(_acceleration, track=False),
     "acceleration_m_s2": partial(_acceleration, track=True),
 }
-"""How each row of `rig.measurands` follows from the unknowns; `None` where the scene has none."""
+"""Function for each row of `rig.measurands`; it returns `None` if the scene lacks the measurand."""

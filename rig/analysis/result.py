@@ -1,4 +1,4 @@
-"""Results as plain data, and as the JSON that others rely on."""
+"""Results of drops: measured values, edge counts and verdicts, and their JSON."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
-"""Verdicts that take part in a summary."""
+"""Verdicts of drops that are included in a summary."""
 
 COUNTS = ("received", "matched", "missed", "spurious", "lost")
-"""Of edges, in the order in which tables have them."""
+"""Counts of edges in the order of tables."""
 
 
 def optional_package(name: str) -> Any:
@@ -46,20 +46,20 @@ def optional_package(name: str) -> Any:
 
 
 class Deviation(NamedTuple):
-    """Variance of a drop's result less its prediction if the model holds, coefficients aside.
+    """Variance of a drop's result less its prediction if the model holds.
 
-    A fall's own impulses, this rig's own rods and the errors of measuring are in it; what measuring
-    leaves to be as stated is in neither. Covariances of two drops of a session are products,
+    It includes single impulses, this rig's rods and measurement errors, but not the uncertainty of
+    the model's coefficients. The covariance of two drops of a session is
     `plus`·`plus` − `minus`·`minus`.
 
     Attributes
     ----------
     own
-        Variance that is this drop's own.
+        Variance that is independent of other drops.
     degrees
         Degrees of freedom of `own`.
     plus, minus
-        What it has in common with other drops.
+        Vectors whose products give the covariance with other drops.
     """
 
     own: float
@@ -79,12 +79,12 @@ class Measured:
     degrees
         Degrees of freedom of `u`.
     budget
-        What each source adds to `u`; the squares add up to its square.
+        Contribution of each source to `u`; the squares add up to u².
     shared
-        What of `u` is common to all drops of a session, as a vector: those of two drops multiplied
-        are their covariance. `None` for a drop by itself.
+        Part of `u` that is common to all drops of a session, as a vector: the product of two drops'
+        vectors is their covariance. `None` for a drop by itself.
     deviation
-        How far from the model's prediction it may be while the model holds.
+        Variance about the model's prediction if the model holds.
     """
 
     value: float
@@ -100,52 +100,52 @@ class Measured:
         return self.value / self.expanded if self.u > 0.0 else None
 
     def less(self, other: Measured) -> Measured:
-        """Return the difference from something measured or stated independently."""
+        """Return the difference from an independent value, with its uncertainty."""
         u = math.hypot(self.u, other.u)
         shares = self.u**4 / self.degrees + other.u**4 / other.degrees
         return Measured(self.value - other.value, u, u**4 / shares if shares else math.inf)
 
     @property
     def expanded(self) -> float:
-        """Expanded uncertainty for 95 %."""
-        # Effective degrees of freedom may come out below one, where t has no quantile of use.
+        """Expanded uncertainty for 95 % coverage."""
+        # Effective degrees of freedom may be below 1, where the quantile of t is useless.
         return coverage_factor(max(1.0, self.degrees)) * self.u
 
     def ufloat(self) -> Any:
-        """Return it for the package ``uncertainties``, as a number independent of all others.
+        """Return the value as an independent number of the package ``uncertainties``.
 
         Raises
         ------
         InputError
-            Where that package is not installed.
+            That package is not installed.
         """
         return optional_package("uncertainties").ufloat(self.value, self.u)
 
     def json(self) -> dict[str, float]:
-        """``{"value", "u", "U95"}``."""
+        """Return ``{"value", "u", "U95"}``."""
         return {"value": self.value, "u": self.u, "U95": self.expanded}
 
 
 @dataclass(frozen=True, slots=True)
 class Audit:
-    """What became of the edges of a drop.
+    """Edge counts of a drop.
 
     Attributes
     ----------
     received
         Edges in the record, of the gates in use.
     matched
-        Of these, belonging to a rod.
+        Received edges that belong to a rod.
     missed
-        Expected edges that nobody reported.
+        Expected edges that were not received.
     spurious
         Received edges that belong to no rod.
     lost
-        Edges the device saw and could not keep.
+        Edges that the device could not store.
     unexplained
-        Of the spurious ones, those that are not of a known kind either.
+        Spurious edges of no known kind.
     thinned
-        Of the spurious ones, those in the middle of long flickers, which nothing was fitted to.
+        Spurious edges in the middle of long flickers, which the fit did not use.
     """
 
     received: int = 0
@@ -157,49 +157,48 @@ class Audit:
     thinned: int = 0
 
     @property
-    def expected(self) -> int:
+    def edge_count(self) -> int:
         """Edges that a perfect rig would report."""
         return self.matched + self.missed
 
     def count(self, matched: int, unexplained: int) -> Audit:
-        """Count again, with other edges that belong to a rod."""
-        missed, spurious = self.expected - matched, self.received - matched
+        """Return the counts for other numbers of matched and unexplained edges."""
+        missed, spurious = self.edge_count - matched, self.received - matched
         changes = {"matched": matched, "missed": missed, "spurious": spurious}
         return replace(self, **changes, unexplained=unexplained)
 
     def json(self) -> dict[str, int]:
-        """``edges`` of a run as `rig analyze --json` prints it."""
+        """Return ``edges`` of a run as `rig analyze --json` prints it."""
         counts = attributes(self, *COUNTS)
         return counts | ({"thinned": self.thinned} if self.thinned else {})
 
 
 @dataclass(frozen=True, slots=True)
 class DropResult:
-    """Everything that a drop says.
+    """All results of a drop.
 
     Attributes
     ----------
     quantities
-        By JSON name (``separation_m`` …), only those the scene has.
+        Measurands by JSON name (``separation_m`` …), only those of the scene.
     matches
-        For each matched edge (by its number in the drop) its rod, bottom rod 0.
+        Rod of each matched edge, by the edge's number in the drop; the bottom rod is 0.
     scatter
-        How much more than assumed the edges scatter, at least 1; `None` when nothing was fitted.
+        Scatter of the edges relative to the assumed scatter, at least 1; `None` without a fit.
     alone
-        What the drop says by itself, where the quantities are in the light of the whole session.
+        Measurands of the drop by itself, if `quantities` come from the joint fit.
     unmatched
-        Every edge that is missing or belongs to no rod, and why.
+        Every edge that is missing or belongs to no rod, with its class.
     limits
-        The verdict that a rejected drop has by its limits.
+        The verdict of a rejected drop by its limits.
     damaged
-        Whether its stored record is damaged, which tells nothing of the rig.
+        Whether its stored record is damaged, which says nothing about the rig.
     gates
-        How one object passed each gate.
+        Passages of a single object through the gates.
     last_passages
-        Some of the quantities by themselves, see `rig.analysis.last_passages`.
+        Measurands from the last passages alone, see `rig.analysis.last_passages`.
     gravity
-        What the free chain says of gravity, m/s², see `rig.analysis.gravity`; `None` where nobody
-        asked it.
+        Gravity from the free chain, m/s², see `rig.analysis.gravity`; `None` if not computed.
     """
 
     run: Run
@@ -220,11 +219,11 @@ class DropResult:
 
     @property
     def learned(self) -> bool:
-        """Whether the quantities are in the light of the whole session."""
+        """Whether `quantities` come from the joint fit."""
         return bool(self.alone)
 
     def json(self) -> dict[str, Any]:
-        """One member of ``runs``."""
+        """Return a member of ``runs``."""
         fields: dict[str, Any] = {"run": self.run.number, "attempt": self.attempt}
         fields |= {"incline_deg": self.run.incline_deg, "impact_chain": self.run.impact}
         fields |= {"damaged": True} if self.damaged else {}

@@ -1,7 +1,7 @@
-"""How much better a drop would fit if something were off its place, without fitting it again.
+"""Rao's score test: gain of a drop's fit by a shift of the unknowns, without another fit.
 
-Rao's score test: at the best estimate, from the slope and the curvature of the likelihood along a
-direction of the unknowns in which nothing is known beforehand.
+It uses the slope and curvature of the log likelihood at the best estimate, along a direction of
+the unknowns without a prior.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ if TYPE_CHECKING:
     from rig.arrays import Array
 
 
-_UNTOLD = 1e-12  # of what the edges tell, below which the other unknowns do it as well
+_UNTOLD = 1e-12  # share of a direction's information below which other unknowns replace it
 
 
 class Score(NamedTuple):
-    """What a shift along one direction would do.
+    """Score test of a shift along a direction.
 
     Attributes
     ----------
     size
-        By how much to shift, in units of the direction.
+        Best shift, in units of the direction.
     u
-        Its standard uncertainty; infinite where the edges tell nothing of it.
+        Its standard uncertainty; infinite if the edges do not determine it.
     gain
-        By how much the logarithm of the likelihood would be more.
+        Gain of the log likelihood.
     follow
-        How much the unknowns would then move, for a shift of size 1; shape ``(unknowns,)``.
+        Change of the other unknowns for a shift of size 1; shape ``(unknowns,)``.
     """
 
     size: float
@@ -42,16 +42,16 @@ class Score(NamedTuple):
 
 
 def scores(fit: Fit, directions: Sequence[Array]) -> list[Score]:
-    """Try shifts of the unknowns that cost nothing beforehand.
+    """Return the score test of each direction, as a shift without a prior.
 
-    With J the observation equations at the estimate, r what they leave over, both in standard
+    With J the derivatives of the observations at the estimate, r the residuals, both in standard
     deviations, A = JᵀJ + 1 in units of the priors S, and c = Jd: θ = −cᵀr/h with h = cᵀc −
     cᵀJS A⁻¹ SJᵀc, and the gain is ½ (cᵀr)²/h.
 
     Parameters
     ----------
     directions
-        Shape ``(unknowns,)`` each.
+        Directions of the unknowns, shape ``(unknowns,)`` each.
     """
     if not directions:
         return []
@@ -65,7 +65,7 @@ def scores(fit: Fit, directions: Sequence[Array]) -> list[Score]:
         full += np.sum(moved**2, axis=0)
         shared[rows.columns] += estimate.sd[rows.columns, None] * (rows.slopes.T @ moved)
     follow = estimate.inverse @ (estimate.inverse.T @ shared)
-    # What other unknowns do not do as well, priors included: no difference of large numbers.
+    # Information left by the other unknowns and priors, without a difference of large numbers.
     own = np.sum(follow**2, axis=0)
     for rows, moved in seen:
         rest = moved - rows.slopes @ (estimate.sd[:, None] * follow)[rows.columns]

@@ -1,7 +1,7 @@
-"""How much results would move if a prior were three times wider, or narrower.
+"""Sensitivity of results to priors that are three times wider or narrower.
 
-Everything is adjusted again with each of them, from where it is: of a scatter that drops tell, what
-was stated is one member among many, and no linear formula knows how little that is.
+The session is fitted again with each change, from its present solution. A linear formula would not
+do: a stated scatter has little weight if the drops determine it.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ FACTOR = 3.0
 
 @one_thread
 def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
-    """Adjust a session again with each prior wider and narrower.
+    """Fit a session again with each prior wider and narrower.
 
     Returns
     -------
     list of dict
-        ``prior_sensitivity`` of ``rig analyze --priors --json``: one a prior, incline and
-        measurand, with what the mean moves by and what its U95 becomes times itself.
+        ``prior_sensitivity`` of ``rig analyze --priors --json``: a row for each prior, incline and
+        measurand, with the change of the mean and the ratio of its U95.
     """
     if not analysis.adjusted:
         return []
@@ -42,61 +42,51 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     unchanged = _again(protocol, analysis)
     rows = []
     for name, place in _priors(protocol).items():
-        changed = (_widened(protocol, place, by) for by in (FACTOR, 1.0 / FACTOR))
-        wider, narrower = (_again(changed_protocol, analysis) for changed_protocol in changed)
-        # Without one of these a prior's line is left out: its joint fit did not converge.
-        for line, wide, narrow in zip(unchanged or (), wider or (), narrower or (), strict=False):
+        wider, narrower = (
+            _again(_scale_at(protocol, place, by), analysis) for by in (FACTOR, 1.0 / FACTOR)
+        )
+        # A prior whose joint fit did not converge is left out.
+        for line, *changed in zip(unchanged, wider, narrower, strict=False):
             for quantity, mean in line.means.items():
                 row: dict[str, Any] = {"prior": name, **line.condition.json(), "quantity": quantity}
-                for word, changed_protocol in (("wider", wide.means), ("narrower", narrow.means)):
-                    row[word] = changed_protocol[quantity].value - mean.value
-                    row[f"U95_ratio_{word}"] = changed_protocol[quantity].expanded / mean.expanded
+                for word, other in zip(("wider", "narrower"), changed, strict=True):
+                    row[word] = other.means[quantity].value - mean.value
+                    row[f"U95_ratio_{word}"] = other.means[quantity].expanded / mean.expanded
                 rows.append(row)
     return rows
 
 
-def _again(protocol: Protocol, analysis: Analysis) -> list[Incline] | None:
-    """Means as they are with the priors of another protocol, if the joint fit converges."""
-    drops = {
-        key: replace(drop, model=drop.model.under(protocol))
-        for key, drop in analysis.adjusted.items()
-    }
-    if analysis.joint is None:
-        joints = [by_itself(alone(drop)) for drop in drops.values()]
-    else:
-        joints = [joint_fit(list(drops.values()))]
-        if not joints[0].settled:
-            return None
-    results = (fit.measured(drop) for fit in map(Budgets, joints) for drop in fit.joint.drops)
-    results_by_key = dict(zip(drops, results, strict=True))
-    return summarize(
-        protocol,
-        (
-            replace(
-                run, quantities=results_by_key.get((run.run.number, run.attempt), run.quantities)
-            )
-            for run in analysis.runs
-        ),
-    )
+def _again(protocol: Protocol, analysis: Analysis) -> list[Incline]:
+    """Return the summary with the priors of another protocol; empty if the fit diverges."""
+    fits = [replace(drop, model=drop.model.under(protocol)) for drop in analysis.adjusted.values()]
+    joints = [joint_fit(fits)] if analysis.joint else [by_itself(alone(fit)) for fit in fits]
+    if analysis.joint and not joints[0].settled:
+        return []
+    results = [fit.measure_all(drop) for fit in map(Budgets, joints) for drop in fit.joint.drops]
+    by_job = dict(zip(analysis.adjusted, results, strict=True))
+    runs = [
+        replace(run, quantities=by_job.get((run.run.number, run.attempt), run.quantities))
+        for run in analysis.runs
+    ]
+    return summarize(protocol, runs)
 
 
-def _priors(protocol: Protocol) -> dict[str, tuple[str, ...]]:
-    """Return where a protocol has each prior, by its key."""
-    places: dict[str, tuple[str, ...]] = {
-        prior.name: ("priors", prior.name) for prior in fields(Priors)
+def _priors(protocol: Protocol) -> dict[str, tuple[str, str]]:
+    """Return the attribute path of each prior in a protocol, by its key."""
+    places = {prior.name: ("priors", prior.name) for prior in fields(Priors)} | {
+        "height_uncertainty": ("gates", "height_u"),
+        "datum_uncertainty": ("gates", "datum_u"),
+        "position_uncertainty": ("chains", "position_u"),
+        "width_uncertainty": ("chains", "width_u"),
+        "drop": ("drop", "u"),
     }
-    places["height_uncertainty"] = ("gates", "height_u")
-    places["datum_uncertainty"] = ("gates", "datum_u")
-    places["position_uncertainty"] = ("chains", "position_u")
-    places["width_uncertainty"] = ("chains", "width_u")
-    places["drop"] = ("drop", "u")
     return places if protocol.surface is None else places | {"gravity": ("gravity", "u")}
 
 
-def _widened(value: Any, place: tuple[str, ...], by: float) -> Any:
-    """Return something with the number at a place multiplied; of several things that of each."""
+def _scale_at(value: Any, place: tuple[str, ...], by: float) -> Any:
+    """Return a copy with the number at an attribute path multiplied, also in mappings."""
     if isinstance(value, Mapping):
-        return {name: _widened(member, place, by) for name, member in value.items()}
+        return {name: _scale_at(member, place, by) for name, member in value.items()}
     if not place:
         return by * value
-    return replace(value, **{place[0]: _widened(getattr(value, place[0]), place[1:], by)})
+    return replace(value, **{place[0]: _scale_at(getattr(value, place[0]), place[1:], by)})

@@ -1,4 +1,4 @@
-"""All drops of a session."""
+"""Analysis of a session: each drop by itself, then the joint fit and the summary."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from rig.analysis.drop import DropSummary
-    from rig.analysis.fit import Fit, Matched
+    from rig.analysis.fit import DropFit, Fit
     from rig.analysis.joint_fit import JointFit, RigEstimate
     from rig.analysis.result import DropResult
     from rig.clock.calibration import TimeScale
@@ -41,13 +41,14 @@ if TYPE_CHECKING:
 
 K = TypeVar("K")
 
-_EXPLAINED = 6  # void drops of a session, after which it is not sought what else the next ones are
+_EXPLAINED = 6  # void drops of a session for which set-up faults are searched
 KEPT = 0.9
-"""Share of its edges that a drop must keep among others: without them priors are all it has."""
+"""Least share of its matched edges that a drop must keep in the joint fit: with fewer, its result
+rests on priors."""
 
 
 class SummaryByDrop(Interface):
-    """Where summaries of drops are kept, such as a dictionary."""
+    """Store of drop summaries, such as a dictionary."""
 
     def get(self, drop: Drop, /) -> DropSummary | None: ...  # noqa: D102
     def __setitem__(self, drop: Drop, summary: DropSummary, /) -> None: ...
@@ -55,7 +56,7 @@ class SummaryByDrop(Interface):
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """Everything that follows from the edges of a session.
+    """All results of a session.
 
     Attributes
     ----------
@@ -64,21 +65,20 @@ class Analysis:
     superseded
         Earlier attempts, by run and attempt.
     summary
-        One line an incline.
+        A line for each incline.
     rig
-        What the joint fit of all good drops says of the rig; `None` where there are too few.
+        Results of the joint fit about the rig; `None` if there are too few good drops.
     joint
-        The joint fit itself, and
+        The joint fit; not stored with an analysis.
     adjusted
-        good drops with their unknowns, in the light of all where there is a joint fit, by run and
-        attempt: both only of an analysis that was not kept.
+        Good drops with their fitted unknowns, by run and attempt, from the joint fit if there is
+        one; not stored with an analysis.
     effects
-        Of chains and sides, by incline; none where the plan has no blocks of A, B, B, A.
+        Effects of chains and sides, by incline; empty if the plan has no blocks of A, B, B, A.
     unsettled
-        Whether there are enough good drops, and their joint fit did not converge.
+        Whether there are enough good drops but their joint fit did not converge.
     with_rejected
-        The summary as it would be with the runs that were rejected and are good by their limits;
-        none where there are no such runs.
+        The summary including rejected runs that are good by their limits; empty if there are none.
     """
 
     runs: tuple[DropResult, ...]
@@ -104,14 +104,14 @@ class Analysis:
 
     @property
     def damage(self) -> list[str]:
-        """A line that counts and names the damaged drops; none where there are none."""
+        """A line that counts and names the damaged drops; empty if there are none."""
         names = "; ".join(f"run {drop.run.number}, attempt {drop.attempt}" for drop in self.damaged)
         count = f"{len(self.damaged)} of {len(self.drops)} drops"
         line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
         return [line] if names else []
 
     def json(self) -> dict[str, Any]:
-        """As `rig analyze --json` prints it."""
+        """Return the object that `rig analyze --json` prints."""
         where_there_are = {
             "superseded": self.superseded or None,
             "summary_with_rejected": self.with_rejected or None,
@@ -135,26 +135,26 @@ def analyze(
     total: int | None = None,
     processes: int = 1,
 ) -> Analysis:
-    """Analyse every drop and sum up.
+    """Analyse every drop, fit the good ones together, and summarize.
 
     Parameters
     ----------
     protocol
         The scene and its plan.
     drops
-        Raw records, several attempts at a run allowed; read as they are due.
+        Raw records, read lazily; a run may have several attempts.
     scale
-        Calibration of each drop's ticks.
+        Function that returns the calibration of a drop's ticks.
     rejected
         Causes by (run, attempt), for drops that the operator rejected.
     progress
-        Called with the number of drops done and the number of all.
+        Called with the number of drops done and the total.
     summaries
-        What is known of drops by themselves, and will be. Results are the same without.
+        Cache of the drops' own summaries, updated in place. Results are the same without it.
     total
-        Number of drops, where they have no length.
+        Number of drops, if `drops` has no length.
     processes
-        That may be used, where it is worth it. Results do not depend on it.
+        Greatest number of processes. Results do not depend on it.
 
     Raises
     ------
@@ -167,22 +167,22 @@ def analyze(
     summaries, rejected = {} if summaries is None else summaries, rejected or {}
     total = length_hint(drops) if total is None else total
     results: list[DropResult] = []
-    drops_adjusted: list[Matched | None] = []
+    drops_adjusted: list[DropFit | None] = []
     unexplained = 0
 
     def take(task: tuple[DropCase, DropSummary | None], summary: DropSummary) -> None:
         nonlocal unexplained
         case, before = task
-        # What is wrong with a rig is wrong in drop after drop: some of them tell it.
+        # A fault of the rig affects every drop: searching in a few drops suffices.
         explain = unexplained < _EXPLAINED
-        if summary.unexplained and summary.explained != explain:
+        if summary.needs_explanation and summary.explained != explain:
             summary = case.summary(summary, explain=explain)
-        unexplained += summary.unexplained
+        unexplained += summary.needs_explanation
         if summary is not before:
             summaries[case.drop] = summary
-        result = overruled(summary.result, rejected.get((case.run.number, case.drop.attempt)))
+        result = overrule(summary.result, rejected.get((case.run.number, case.drop.attempt)))
         results.append(result)
-        drops_adjusted.append(case.adjusted(summary) if joins(protocol, result) else None)
+        drops_adjusted.append(case.restore_drop(summary) if joins(protocol, result) else None)
         if progress is not None:
             progress(len(results), total)
 
@@ -201,15 +201,15 @@ def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
 
 
 def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
-    """Find the run of the plan that a drop was.
+    """Return the planned run of a drop.
 
     Raises
     ------
     InputError
-        There is none.
+        The plan has no run of this number.
     """
     if drop.run not in planned:
-        if drop.damage:  # its number is what was altered
+        if drop.damage:  # the damage may be in its number
             raise make_error(InputError, "record_damaged", text=f"run {drop.run}: {drop.damage}")
         raise InputError(
             f"run {drop.run} is not in the plan, which has {len(planned)} runs",
@@ -218,8 +218,8 @@ def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
     return planned[drop.run]
 
 
-def overruled(result: DropResult, causes: Sequence[Reason] | None) -> DropResult:
-    """Put the operator's causes to reject a drop, if there are any, above its limits."""
+def overrule(result: DropResult, causes: Sequence[Reason] | None) -> DropResult:
+    """Return a result rejected for the operator's causes; unchanged if there are none."""
     if causes is None:
         return result
     reasons = (*causes, *result.reasons)
@@ -227,22 +227,22 @@ def overruled(result: DropResult, causes: Sequence[Reason] | None) -> DropResult
 
 
 def joins(protocol: Protocol, result: DropResult) -> bool:
-    """Whether a drop that is so by itself may take part in a joint fit."""
+    """Whether a drop takes part in the joint fit, given its own result."""
     return result.verdict in GOOD or nearly_in_time(result, protocol.accept.release_skew)
 
 
 @one_thread
 def gather(
-    protocol: Protocol, results: Sequence[DropResult], drops: Sequence[Matched | None]
+    protocol: Protocol, results: Sequence[DropResult], drops: Sequence[DropFit | None]
 ) -> Analysis:
-    """Fit drops together that were analysed one by one, and sum up.
+    """Fit drops together that were analysed individually, and summarize.
 
     Parameters
     ----------
     protocol
         The scene and its plan.
     results, drops
-        Of each by itself; `None` for the unknowns of one that does not join.
+        Each drop's own result and fit; `None` for the fit of a drop that does not take part.
     """
     good = {n: drop for n, drop in enumerate(drops) if drop is not None}
     together = fit_together(dict(enumerate(results)), good)
@@ -261,14 +261,14 @@ def sum_up(
     joint: JointFit | None = None,
     adjusted: Mapping[tuple[int, int], Fit | JointDrop] | None = None,
 ) -> Analysis:
-    """Sum drops up as they are.
+    """Return the analysis of a session from the results of its drops.
 
     Parameters
     ----------
     protocol
         The scene and its plan.
     results
-        Of each drop.
+        Result of each drop.
     joint, adjusted
         As in `Analysis`.
     """
@@ -285,48 +285,47 @@ def sum_up(
 
 
 class FittedTogether(NamedTuple, Generic[K]):
-    """Drops in the light of all.
+    """Drops after a joint fit.
 
     Attributes
     ----------
     joint
-        `None` where there are too few drops, or their fit failed.
+        `None` if there are too few drops, or their fit did not converge.
     results
-        Of all that were given.
+        Results of all drops.
     drops
-        Those in the fit or, where there is none, as they would have gone into it.
+        Drops of the joint fit; without a joint fit, the input to it.
     settled
-        Whether nothing failed.
+        Whether no fit failed.
     """
 
     joint: JointFit | None
     results: dict[K, DropResult]
-    drops: Mapping[K, Matched]
+    drops: Mapping[K, DropFit]
     settled: bool = True
 
 
-def fit_together(results: Mapping[K, DropResult], drops: Mapping[K, Matched]) -> FittedTogether[K]:
-    """Give good drops the numbers that they have in the light of all of them.
+def fit_together(results: Mapping[K, DropResult], drops: Mapping[K, DropFit]) -> FittedTogether[K]:
+    """Fit good drops together and update their results.
 
-    A verdict is on a drop by itself, by limits fixed beforehand: what others say of the rig
-    changes its numbers and not whether they count, but for a release so near the limit that the
-    drop alone cannot tell. One that loses its edges among the others keeps the numbers that it has
-    by itself, and is left out.
+    A verdict depends on the drop alone, by limits fixed beforehand. The joint fit changes values,
+    and a verdict only where the drop alone cannot decide whether the release skew is within its
+    limit. A drop that loses matched edges in the joint fit is left out and keeps its own values.
 
     Parameters
     ----------
     results, drops
-        Of any drops, and of these the good ones with their unknowns.
+        Results of all drops, and the fits of the good ones.
     """
     outcome, good = dict(results), dict(drops)
     while len(good) >= FEWEST:
         joint = joint_fit(list(good.values()))
         fewer = {
-            key: drop.matched
+            key: drop.match_count
             for (key, fit), drop in zip(good.items(), joint.drops, strict=joint.settled)
-            if drop.matched < KEPT * fit.matched
+            if drop.match_count < KEPT * fit.match_count
         }
-        # Where most are left out it is the adjustment that fails, and no drop is to blame for that.
+        # If most drops are left out, the fit has failed, not the drops.
         if not joint.settled or 2 * (len(drops) - len(good) + len(fewer)) > len(drops):
             return FittedTogether(None, outcome, good, settled=False)
         if not fewer:
@@ -337,7 +336,7 @@ def fit_together(results: Mapping[K, DropResult], drops: Mapping[K, Matched]) ->
             return FittedTogether(joint, outcome | light, adjusted)
         for key, matched in fewer.items():
             result, fit = outcome[key], good.pop(key)
-            counts = {"matched": matched, "alone": fit.matched}
+            counts = {"matched": matched, "alone": fit.match_count}
             why = make_reason("differs_from_session", fit.model.protocol.vocabulary, **counts)
             own = result.alone or result.quantities
             outcome[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
@@ -345,15 +344,15 @@ def fit_together(results: Mapping[K, DropResult], drops: Mapping[K, Matched]) ->
 
 
 def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> DropResult:
-    """Give a drop the numbers that it has in the light of all."""
-    unmatched, measured = unmatched_edges(drop), budgets.measured(drop)
+    """Return a drop's result with the values of the joint fit."""
+    unmatched, measured = unmatched_edges(drop), budgets.measure_all(drop)
     reasons = [reason for reason in result.reasons if not reason.code.startswith("release_skew")]
     reasons += release_reasons(drop.model.protocol, measured)
     return replace(
         result,
         verdict=verdict_of(reasons),
         reasons=tuple(reasons),
-        audit=result.audit.count(drop.matched, count_unexplained(unmatched)),
+        audit=result.audit.count(drop.match_count, count_unexplained(unmatched)),
         quantities=measured,
         gates=budgets.gates(drop),
         matches=drop.rods,

@@ -1,7 +1,7 @@
-"""Several sessions fitted together: what is the same rig is one unknown, the rest is not.
+"""Joint fit of several sessions: unknowns of the same rig are shared, others are not.
 
-Each session's own joint fit is where the fit of all begins. A common unknown of two sessions is one
-if both have the same rig and state alike what the unknown is about: the posts, the beams, a chain.
+The fit starts from each session's own joint fit. Two sessions share an unknown if they have the
+same rig and their protocols agree about its owner: the posts, the beams, a chain.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from rig.analysis.components import stated
+from rig.analysis.components import priors
 from rig.analysis.session import fit_together, sum_up
 from rig.analysis.summary import summarize
 from rig.errors import InputError
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SessionPart:
-    """A session among others.
+    """A session of a joint fit.
 
     Attributes
     ----------
     name
-        Of the session, told from the others.
+        Unique name of the session.
     analysis
-        What the session says by itself.
+        Analysis of the session by itself.
     board
-        Unique id of its board; empty where none is known.
+        Unique id of its board; empty if unknown.
     """
 
     name: str
@@ -52,51 +52,43 @@ class SessionPart:
 
 
 @dataclass(frozen=True, slots=True)
-class PooledMeans:
-    """Means over all sessions of one scene, and the names of these."""
-
-    sessions: tuple[str, ...]
-    summary: tuple[Incline, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class SessionsFit:
-    """What several sessions say together.
+    """Result of a joint fit of several sessions.
 
     Attributes
     ----------
     parts
-        Each with its analysis in the light of all.
+        The sessions with their analysis from the joint fit.
     joint
-        `None` where there are too few good drops.
+        The joint fit; `None` if there are too few good drops.
     pooled
-        Means over sessions of like scenes.
+        Means over all sessions of a scene, by their names.
     shared
-        Names of the sessions that have in common what the key names, one list a rig.
+        Names of the sessions that share the owner of the key, a list for each rig.
     """
 
     parts: tuple[SessionPart, ...]
     joint: JointFit | None
-    pooled: tuple[PooledMeans, ...]
+    pooled: Mapping[tuple[str, ...], Sequence[Incline]]
     shared: Mapping[str, Sequence[Sequence[str]]]
 
 
 def same_owners(
     parts: Sequence[SessionPart], *, same_rig: bool | None
 ) -> dict[str, list[list[str]]]:
-    """Sort sessions by what they have in common.
+    """Group sessions by the owners of unknowns that they share.
 
     Parameters
     ----------
     same_rig
-        Whether all have the same rig; if `None`, those whose protocols have the same title, and
-        whose boards, where known, are the same.
+        Whether all sessions have the same rig; if `None`, those with the same protocol title and
+        the same board, if known.
 
     Returns
     -------
     dict
         For ``rig``, ``posts``, ``beams``, ``start``, ``condition`` and each ``chain NAME`` the
-        names of those sessions that have it in common, one list a rig.
+        names of the sessions that share this owner, a list for each group.
     """
     owners: dict[str, dict[tuple[object, str], list[str]]] = {}
     for place, part in enumerate(parts):
@@ -108,7 +100,7 @@ def same_owners(
 
 
 def _statements(protocol: Protocol) -> dict[str, object]:
-    """What a protocol states of the owner of each common unknown."""
+    """Return a protocol's statements about the owner of each shared unknown."""
     gates, chains = protocol.gates, protocol.chains
     assert gates is not None
     beams = [(gate.channel, gate.height, gate.side) for gate in gates.gates]
@@ -138,18 +130,16 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
         The sessions' scenes are of different kinds, or their drops fit no common rig.
     """
     first = parts[0]
-    for part in parts[1:]:
-        kinds = [
-            (member.protocol.vocabulary.scene, stated(member.protocol)) for member in (first, part)
-        ]
-        if kinds[0] != kinds[1]:
+    kinds = [(part.protocol.vocabulary.scene, priors(part.protocol)) for part in parts]
+    for part, kind in zip(parts, kinds, strict=True):
+        if kind != kinds[0]:
             raise make_error(InputError, "sessions_unlike", path=part.name, other=first.name)
     shared = same_owners(parts, same_rig=same_rig)
     drops = _own(parts, shared)
     together = fit_together(
         {
             (place, (member.run.number, member.attempt)): replace(
-                member, quantities=_unshared(member.quantities)
+                member, quantities=_strip_shared(member.quantities)
             )
             for place, part in enumerate(parts)
             for member in part.analysis.drops
@@ -166,41 +156,40 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
         replace(part, analysis=sum_up(part.protocol, members, part.analysis.joint))
         for part, members in zip(parts, results, strict=True)
     )
-    return SessionsFit(fitted, together.joint, _pooled(fitted), shared)
+    return SessionsFit(fitted, together.joint, _pool_sessions(fitted), shared)
 
 
-def _unshared(quantities: Mapping[str, Measured]) -> dict[str, Measured]:
-    """Leave out what a session's own fit says of covariances: their unknowns are others."""
+def _strip_shared(quantities: Mapping[str, Measured]) -> dict[str, Measured]:
+    """Return quantities without a session's own covariances, which refer to other unknowns."""
     return {name: replace(value, shared=None, deviation=None) for name, value in quantities.items()}
 
 
 def _own(parts: Sequence[SessionPart], shared: Mapping[str, Sequence[Sequence[str]]]) -> Drops:
-    """Return the good drops, each with the names of its session's common unknowns."""
+    """Return the good drops, each with the name suffixes of its session's shared unknowns."""
     suffixes: dict[str, dict[str, str]] = {part.name: {} for part in parts}
     for owner, groups in shared.items():
         for group in groups:
-            # What all have in common keeps the name that it has in one session.
+            # Unknowns that all sessions share keep their names.
             suffix = "" if len(group) == len(parts) else f" ({', '.join(group)})"
             for name in group:
                 suffixes[name][owner] = suffix
     return {
-        (place, job): replace(fit, model=fit.model.changed(owners=suffixes[part.name]))
+        (place, job): replace(fit, model=fit.model.copy_with(owners=suffixes[part.name]))
         for place, part in enumerate(parts)
         for job, fit in part.analysis.adjusted.items()
     }
 
 
-def _pooled(parts: Sequence[SessionPart]) -> tuple[PooledMeans, ...]:
-    """Average over all sessions of which the model says the same."""
+def _pool_sessions(parts: Sequence[SessionPart]) -> dict[tuple[str, ...], list[Incline]]:
+    """Return means over all sessions with the same predictions, by their names."""
     scenes: dict[str, list[SessionPart]] = {}
     for part in parts:
         own = part.protocol
         scene = (own.chains, own.surface, own.contact, own.drop, own.gravity, own.drag)
         scenes.setdefault(repr((*scene, own.track, own.initial_speed)), []).append(part)
-    return tuple(
-        PooledMeans(
-            tuple(part.name for part in alike),
-            tuple(summarize(alike[0].protocol, [r for part in alike for r in part.analysis.runs])),
+    return {
+        tuple(part.name for part in alike): summarize(
+            alike[0].protocol, [run for part in alike for run in part.analysis.runs]
         )
         for alike in scenes.values()
-    )
+    }

@@ -1,4 +1,4 @@
-"""Linear least squares on square roots: QR keeps the digits of which a normal matrix loses half."""
+"""Linear least squares by square roots: a normal matrix would lose half of the digits."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rig.arrays import Array, Index
+    from rig.arrays import Array, Flags, Index
 
 
 _MANY = 16
-"""Rows an unknown that are reduced at once: as quick as all of them, and a few MB."""
+"""Rows for each unknown that are reduced at once: as quick as all rows, and a few MB."""
 
 
 class EquationRows(NamedTuple):
-    """Observations in standard deviations: for a step d they leave ``left + slopes @ d[columns]``.
+    """Linearized residuals ``left + slopes @ d[columns]`` for a step d, in standard deviations.
 
     Attributes
     ----------
     slopes
-        Shape ``(rows, columns)``.
+        Derivatives, shape ``(rows, columns)``.
     left
-        Shape ``(rows,)``.
+        Residuals for d = 0, shape ``(rows,)``.
     columns
-        Which unknowns they depend on; shape ``(columns,)``.
+        Places of the unknowns that they depend on; shape ``(columns,)``.
     """
 
     slopes: Array
@@ -34,24 +34,24 @@ class EquationRows(NamedTuple):
     columns: Index
 
     def triangle(self) -> EquationRows:
-        """Return the same sum of squares of any step, in no more rows than columns and one."""
+        """Return equivalent rows, at most as many as columns plus one, by QR."""
         reduced = triangle(np.column_stack([self.slopes, self.left]))
         return self._replace(slopes=reduced[:, :-1], left=reduced[:, -1])
 
     def after(self, step: Array) -> EquationRows:
-        """Return the same about the point that a step leads to."""
+        """Return the rows linearized at the point after a step."""
         return self._replace(left=self.left + self.slopes @ step[self.columns])
 
 
 class Root(NamedTuple):
-    """A square root R of an information matrix RᵀR, and what R·d leaves: ``left + matrix @ d``.
+    """A square root R of an information matrix RᵀR, with residuals ``left + matrix @ d``.
 
     Attributes
     ----------
     matrix
-        Shape ``(unknowns, unknowns)``; a triangle but for the order of its columns.
+        R, shape ``(unknowns, unknowns)``; triangular up to the order of its columns.
     left
-        Shape ``(unknowns,)``.
+        Residuals for d = 0, shape ``(unknowns,)``.
     """
 
     matrix: Array
@@ -61,13 +61,13 @@ class Root(NamedTuple):
         """Return the step to the least sum of squares."""
         return np.asarray(np.linalg.solve(self.matrix, -self.left), dtype=np.float64)
 
-    def pulled(self, gradient: Array) -> Array:
-        """Return the step that balances a further gradient."""
+    def gradient_step(self, gradient: Array) -> Array:
+        """Return the step −(RᵀR)⁻¹·gradient."""
         step = np.linalg.solve(self.matrix, np.linalg.solve(self.matrix.T, -gradient))
         return np.asarray(step, dtype=np.float64)
 
-    def damped(self, damping: float, lengths: Array) -> Root:
-        """Return the root with λ times the squares of its columns' lengths (Marquardt 1963)."""
+    def damp(self, damping: float, lengths: Array) -> Root:
+        """Return the root of RᵀR + λ·diag(lengths²) (Marquardt 1963)."""
         size = self.left.size
         stack = np.zeros((2 * size, size + 1))
         stack[:size, :size], stack[:size, size] = self.matrix, self.left
@@ -76,17 +76,17 @@ class Root(NamedTuple):
         return Root(stack[:size, :size], stack[:size, size])
 
 
-class Eliminated(NamedTuple):
-    """Some unknowns o eliminated from observations of these and others c: o = own − gain·c.
+class Elimination(NamedTuple):
+    """Unknowns o eliminated from observations of o and c: best o = own − gain·c.
 
     Attributes
     ----------
     inverse
-        R⁻¹ of the eliminated ones, of which the covariance given the others is R⁻¹R⁻ᵀ.
+        R⁻¹ of the eliminated unknowns; their covariance given the others is R⁻¹R⁻ᵀ.
     gain, own
         As above.
     rest
-        What is left to say of the others.
+        Remaining observations of c.
     """
 
     inverse: Array
@@ -101,22 +101,22 @@ def square_root(blocks: Sequence[EquationRows], sd: Array, pull: Array) -> Root:
     Parameters
     ----------
     blocks
-        In the unknowns' own units. What only one of them knows of is eliminated from it first.
+        Observations in the unknowns' own units. Unknowns in a single block are eliminated first.
     sd
-        Prior standard uncertainties: the root's units; where 0 an unknown stays as it is.
+        Prior standard uncertainties, units of the root; 0 holds an unknown fixed.
     pull
-        How far the unknowns are above their prior means, in these units.
+        Deviations of the unknowns from their prior means, in these units.
     """
-    matrix, top, rest = _eliminate_private(blocks, sd, pull, np.arange(sd.size))
-    columns = np.setdiff1d(np.arange(sd.size), top, assume_unique=True)
-    last = _stacked(rest, columns, pull[columns])
-    matrix[top.size :, np.append(columns, sd.size)] = last[: columns.size]
+    matrix, private, rest = _eliminate_private(blocks, sd, pull, np.arange(sd.size))
+    columns = np.flatnonzero(~private)
+    last = _stack_blocks(rest, columns, pull[columns])
+    matrix[sd.size - columns.size :, np.append(columns, sd.size)] = last[: columns.size]
     return Root(matrix[:, :-1], matrix[:, -1])
 
 
 def eliminate(
     blocks: Sequence[EquationRows], sd: Array, pull: Array, own: Index, common: Index
-) -> Eliminated:
+) -> Elimination:
     """Eliminate some unknowns, priors of these included.
 
     Parameters
@@ -124,23 +124,23 @@ def eliminate(
     blocks, sd, pull
         As for `square_root`.
     own, common
-        Those that are eliminated, and all others.
+        Places of the unknowns to eliminate, and of all others.
     """
-    matrix, top, rest = _eliminate_private(blocks, sd, pull, own)
-    rest_of_own = np.setdiff1d(own, top, assume_unique=True)
+    matrix, private, rest = _eliminate_private(blocks, sd, pull, own)
+    rest_of_own = own[~private[own]]
     columns = np.concatenate([rest_of_own, common, [sd.size]])
-    last = _stacked(rest, columns[:-1], pull[rest_of_own])
-    matrix[top.size : own.size, columns] = last[: rest_of_own.size]
+    last = _stack_blocks(rest, columns[:-1], pull[rest_of_own])
+    matrix[own.size - rest_of_own.size : own.size, columns] = last[: rest_of_own.size]
     inverse = np.linalg.inv(matrix[: own.size, own]).astype(np.float64, copy=False)
     beside = inverse @ matrix[: own.size, columns[rest_of_own.size :]]
     last = last[rest_of_own.size :, rest_of_own.size :]
-    return Eliminated(
+    return Elimination(
         inverse, beside[:, :-1], -beside[:, -1], EquationRows(last[:, :-1], last[:, -1], common)
     )
 
 
-def condensed(blocks: list[EquationRows], size: int) -> list[EquationRows]:
-    """Return the same sum of squares in few rows: where there are many they become a triangle.
+def condense(blocks: list[EquationRows], size: int) -> list[EquationRows]:
+    """Return equivalent observations; many rows are reduced to a triangle.
 
     Parameters
     ----------
@@ -150,20 +150,20 @@ def condensed(blocks: list[EquationRows], size: int) -> list[EquationRows]:
     if sum(block.left.size for block in blocks) <= _MANY * size:
         return blocks
     columns = np.arange(size)
-    reduced = _stacked(blocks, columns, np.zeros(0))
+    reduced = _stack_blocks(blocks, columns, np.zeros(0))
     return [EquationRows(reduced[:, :-1], reduced[:, -1], columns)]
 
 
 def _eliminate_private(
     blocks: Sequence[EquationRows], sd: Array, pull: Array, among: Index
-) -> tuple[Array, Index, list[EquationRows]]:
-    """Eliminate from each block those of some unknowns that no other block knows of.
+) -> tuple[Array, Flags, list[EquationRows]]:
+    """Eliminate from each block those of the unknowns `among` that no other block has.
 
     Returns
     -------
-    whole, top, rest
-        Triangles of these, one below the other and the left sides behind, shape ``(unknowns,
-        unknowns + 1)``; their columns; and what each block says of other unknowns.
+    matrix, private, rest
+        Triangles of the eliminated unknowns, stacked, residuals in the last column, shape
+        ``(unknowns, unknowns + 1)``; their mask; and each block's rows of other unknowns.
     """
     size = sd.size
     block_count = np.zeros(size, dtype=np.intp)
@@ -172,7 +172,7 @@ def _eliminate_private(
     private = np.zeros(size, dtype=np.bool_)
     private[among] = block_count[among] == 1
     matrix, begin = np.zeros((size, size + 1)), 0
-    top, rest = [], []
+    rest = []
     for block in blocks:
         is_private = private[block.columns]
         order = np.concatenate([np.flatnonzero(is_private), np.flatnonzero(~is_private)])
@@ -185,13 +185,12 @@ def _eliminate_private(
         stack = triangle(stack)
         matrix[begin : begin + count, np.append(columns, size)] = stack[:count]
         begin += count
-        top.append(columns[:count])
         rest.append(EquationRows(stack[count:, count:-1], stack[count:, -1], columns[count:]))
-    return matrix, np.concatenate([np.zeros(0, dtype=np.intp), *top]), rest
+    return matrix, private, rest
 
 
-def _stacked(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Array:
-    """Stack blocks and the priors of the first columns to a triangle, the left side behind."""
+def _stack_blocks(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Array:
+    """Return the triangle of blocks and priors of the first columns, residuals in the last."""
     place = np.full(int(columns.max(initial=-1)) + 1, -1)
     place[columns] = np.arange(columns.size)
     stack = np.zeros((sum(block.left.size for block in blocks) + pull.size, columns.size + 1))
@@ -206,6 +205,6 @@ def _stacked(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Arr
 
 
 def triangle(rows: Array) -> Array:
-    """Return R of rows QR, with the same sum of squares of any step."""
+    """Return R of the QR decomposition of rows."""
     factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
     return factor

@@ -1,4 +1,4 @@
-"""All runs of one incline and striking chain together, beside the model."""
+"""Summary of a session: means for each incline and striking chain, with the model's values."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class GateMeans:
-    """One object at one gate, over all runs in which that gate saw it.
+    """Mean passage of an object through a gate, over all runs in which the gate saw it.
 
     Attributes
     ----------
     mean
-        Of each run's `GatePassage`.
+        Mean of the runs' `GatePassage`.
     n
         Number of runs.
     speed_sd, interval_sd
@@ -48,14 +48,14 @@ class GateMeans:
     interval_sd: float | None
 
     def json(self) -> dict[str, Any]:
-        """One member of ``gates`` of the summary."""
+        """Return a member of ``gates`` of the summary."""
         scatter = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd, "n": self.n}
         return self.mean.json() | {name: sd for name, sd in scatter.items() if sd is not None}
 
 
 @dataclass(frozen=True, slots=True)
 class Incline:
-    """One line of the summary.
+    """A line of the summary.
 
     Attributes
     ----------
@@ -64,13 +64,13 @@ class Incline:
     predicted
         The model's value of each measurand; missing outside its domain.
     impact_chain
-        Which chain struck, where chains are unlike.
+        Name of the striking chain, if chains differ.
     differences
         Each mean less the model's value.
     causes
-        What of each mean's uncertainty all runs share, by line of the budget.
+        Uncertainty of each mean that all runs share, by line of the budget.
     gates
-        How one object passed each gate, on average.
+        Mean passages of a single object through the gates.
     """
 
     incline_deg: float
@@ -85,15 +85,15 @@ class Incline:
 
     @property
     def condition(self) -> Condition:
-        """What its runs have in common."""
+        """Condition of its runs."""
         return Condition(self.incline_deg, self.impact_chain)
 
     def normalized_error(self, name: str) -> float | None:
-        """Of a measurand, see `Difference`; `None` where nothing can be compared."""
+        """Return E_n of a measurand, see `Difference`; `None` without a prediction."""
         return self.differences[name].normalized_error if name in self.differences else None
 
     def json(self) -> dict[str, Any]:
-        """One member of ``summary``."""
+        """Return a member of ``summary``."""
         fields: dict[str, Any] = {**self.condition.json(), "n": self.n}
         for name, value in self.means.items():
             fields[name] = value.json()
@@ -117,12 +117,12 @@ class Incline:
 def summarize(
     protocol: Protocol, results: Iterable[DropResult], *, rejected: bool = False
 ) -> list[Incline]:
-    """Average the good runs of each incline and, where chains are unlike, of each that strikes.
+    """Average the good runs of each incline and, if chains differ, of each striking chain.
 
     Parameters
     ----------
     rejected
-        Whether runs that are good by their limits count though the operator rejected them.
+        Whether to include runs that are good by their limits but were rejected by the operator.
     """
     cases = good_cases(protocol, results, rejected=rejected)
     compared = compare(protocol, cases)
@@ -132,7 +132,7 @@ def summarize(
 def good_cases(
     protocol: Protocol, results: Iterable[DropResult], *, rejected: bool = False
 ) -> list[list[DropResult]]:
-    """Sort good runs by condition; `rejected` as in `summarize`."""
+    """Return the good runs of each condition; `rejected` as in `summarize`."""
     good = [
         result
         for result in results
@@ -142,7 +142,7 @@ def good_cases(
 
 
 def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]) -> list[list[T]]:
-    """Sort by incline and, where chains are unlike, by the one that strikes."""
+    """Group members by incline and, if chains differ, by striking chain, in order."""
     groups: dict[Condition, list[T]] = {}
     for member in members:
         groups.setdefault(protocol.condition(run_of(member)), []).append(member)
@@ -156,6 +156,12 @@ def _incline(
     condition = protocol.condition(run)
     names = [row.name for row in averaged() if row.name in results[0].quantities]
     values = {name: [result.quantities[name] for result in results] for name in names}
+    differences = {
+        comparison.quantity: line
+        for comparison in compared
+        for line in comparison.differences
+        if line.condition == condition
+    }
     return Incline(
         run.incline_deg,
         len(results),
@@ -163,19 +169,14 @@ def _incline(
         {name: sd for name, runs in values.items() if (sd := _scatter(runs)) is not None},
         {name: model for name, model in predicted_run(protocol, run).items() if name in names},
         condition.impact_chain,
-        {
-            comparison.quantity: line
-            for comparison in compared
-            for line in comparison.differences
-            if line.condition == condition
-        },
+        differences,
         {name: _causes(runs) for name, runs in values.items()},
         tuple(_gate_means(results)),
     )
 
 
 def _gate_means(results: Sequence[DropResult]) -> Iterator[GateMeans]:
-    """Average what each gate saw, in the order of the object's way."""
+    """Yield the mean passage of each gate, from the top down."""
     by_channel: dict[int, list[GatePassage]] = {}
     for passage in (gate for result in results for gate in result.gates):
         by_channel.setdefault(passage.channel, []).append(passage)
@@ -191,7 +192,7 @@ def _scatter(values: Sequence[Measured]) -> float | None:
 
 
 def _causes(runs: Sequence[Measured]) -> dict[str, float]:
-    """Return what of a mean each common line of the budget makes, the largest first."""
+    """Return the contribution of each common budget line to a mean, the largest first."""
     parts = {
         name: math.sqrt(fmean(run.budget.get(name, 0.0) ** 2 for run in runs)) for name in COMMON
     }

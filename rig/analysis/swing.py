@@ -1,7 +1,8 @@
-"""How a chain that swings as it is let go falls: it turns, and its ends come nearer its middle.
+"""Fall of a chain that swings at the release: it turns, and its ends approach its middle.
 
-Nothing turns a chain that falls, so that it goes on at the rate ω that it was let go with: by ωt
-after a time t, and a rod at s above the centre of mass is lower than on a straight chain by ½sω²t².
+No torque acts on a falling chain, so it turns at the constant rate ω of the release. After a time t
+it has turned by ωt, and a rod at s above the centre of mass is lower than on a straight chain by
+½sω²t².
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 
-@lru_cache(maxsize=64)  # a session asks for the same two again and again
+@lru_cache(maxsize=64)  # a session needs the same two for every drop
 def lever(chain: Chain) -> Array:
-    """How far each rod is above the centre of mass, m; shape ``(rods,)``."""
+    """Return the height of each rod above the centre of mass, m; shape ``(rods,)``."""
     heights = np.array(chain.heights)
     levers: Array = heights - np.average(heights, weights=chain.masses)
     levers.flags.writeable = False
@@ -29,29 +30,29 @@ def lever(chain: Chain) -> Array:
 
 
 def drawn(lever: Array, protocol: Protocol, levels: Array) -> Array:
-    """How much lower rods are than on a straight chain, for a chain that turns at 1 rad/s.
+    """Return how much lower rods are than on a straight chain, for ω = 1 rad/s.
 
-    By ½t² = (start − level)/g; where the chain was struck before it takes a little less.
+    Uses ½t² = (start − level)/g; after impacts, t is slightly shorter.
 
     Parameters
     ----------
     lever
-        Of each rod, see `lever`, m.
+        Height of each rod above the centre of mass, m.
     levels
-        Of the reference point, m; likewise.
+        Levels of the reference point, m, of the same shape.
 
     Returns
     -------
     ndarray
-        m, of that shape.
+        m for ω² = 1/s², of the same shape.
     """
     return lever * np.maximum(protocol.drop.value - levels, 0.0) / protocol.gravity.value
 
 
 def strike_shifts(record: ChainRecord, protocol: Protocol) -> Array:
-    """How much lower on an inclined board each rod strikes for being carried along it, m.
+    """Return how much lower each rod strikes an inclined board because of its sideways motion, m.
 
-    For a bottom rod that is let go down the slope with 1 m/s, and a top rod that rests.
+    For a bottom rod released with 1 m/s down the slope, and a top rod at rest.
     """
     chain = record.chain.chain
     share = (chain.heights[-1] - np.array(chain.heights)) / chain.length
@@ -62,9 +63,8 @@ def strike_shifts(record: ChainRecord, protocol: Protocol) -> Array:
 
 
 def swing_sd(chain: Chain, protocol: Protocol) -> float:
-    """Standard deviation of ω² for what is known of the bottom rod's speed beforehand, 1/s².
+    """Return the prior standard deviation of ω², from that of the bottom rod's speed, 1/s².
 
-    Of a normally distributed speed the square has √3 times the square of its standard deviation,
-    about zero.
+    The square of a normal speed has the root mean square √3 σ².
     """
     return math.sqrt(3.0) * (protocol.priors.swing / chain.length) ** 2

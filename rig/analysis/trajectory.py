@@ -1,9 +1,9 @@
-"""Ways down of chains as functions of everything that is unknown about them, with derivatives.
+"""Trajectories of chains as functions of their parameters, with derivatives.
 
 Between impacts the path is ballistic (section III.D), or that of g − κv² in air: the same legs as
-in `rig.model.fall` and `rig.model.drag`, but with release time, start, gravity, κ, the relative
-gain at each impact and the place of each rod all free, and with the derivative by each of them on
-request. One routine serves one fall and many falls of one chain at once.
+in `rig.model.fall` and `rig.model.drag`. Parameters are release time, start height, gravity, κ,
+α at each impact and the place of each rod. The same functions take a single fall or an array of
+falls of the same chain.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ COMMON = 4
 RELEASE, START, GRAVITY, DRAG = range(COMMON)
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
 _NO_LESS = 1e-3
-"""Share of its speed that an impact leaves a chain: adjustments try to throw it back up."""
+"""Least share of its speed that a chain keeps at an impact: trial steps may give less than 0."""
 
 _NORMAL = math.sqrt(2.0 / math.pi)
-"""Slope of a normal distribution's error function, which a tanh follows to two in a hundred."""
+"""Slope at 0 of 2Φ(z) − 1, with Φ the normal distribution; tanh of it follows to 2 %."""
 _FAINT = 1e-3
-"""Probability of a leg below which it does not count."""
+"""Least probability of a leg that counts."""
 
 
 class Hits(NamedTuple):
@@ -48,11 +48,11 @@ class Hits(NamedTuple):
     Attributes
     ----------
     distance
-        How far the chain fell since the impact before, m.
+        Distance fallen since the previous impact, m.
     arrival
-        Speed just before, m/s.
+        Speed just before the impact, m/s.
     gain
-        ΔV/V.
+        Relative gain of speed ΔV/V.
     ratio
         ΔV/V for α = 1.
     """
@@ -64,7 +64,7 @@ class Hits(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Derivatives of a trajectory by its parameters, see `Trajectory`, or by anything else."""
+    """Derivatives of each leg's start and of the last arrival, by parameters or other unknowns."""
 
     time: Array
     height: Array
@@ -82,13 +82,13 @@ class Trajectory:
         At the beginning of each leg; speed after the impact, downward positive; shape ``(legs,)``,
         or ``(falls, legs)``.
     gravity
-        m/s²; of many falls shape ``(falls, 1)``.
+        m/s²; for many falls shape ``(falls, 1)``.
     hits
-        `None` where nothing is struck.
+        The impacts; `None` for a free fall.
     kappa
-        κ of the air, 1/m, likewise; what an adjustment tries may be negative.
+        κ of the air, 1/m, shaped like `gravity`; may be negative in a trial step of a fit.
     air
-        κ of each leg in units of `kappa`, shape ``(legs,)``; of one element where all are alike.
+        κ of each leg in units of `kappa`, shape ``(legs,)``; ``(1,)`` if all are equal.
     """
 
     time: Array
@@ -101,16 +101,16 @@ class Trajectory:
 
     @property
     def arrival(self) -> float:
-        """Speed just before the last impact, m/s; zero where nothing is struck."""
+        """Speed just before the last impact, m/s; zero for a free fall."""
         return 0.0 if self.hits is None else float(self.hits.arrival[-1])
 
     def heights(self, times: Array) -> tuple[Array, Array]:
-        """Height of the reference point and its speed (downward positive).
+        """Return the height of the reference point and its speed (downward positive), m and m/s.
 
         Parameters
         ----------
         times
-            Shape ``(times,)``; of many falls also ``(falls, times)``.
+            Shape ``(times,)``; for many falls also ``(falls, times)``.
         """
         leg, since = self._legs(times)
         fallen, speed, _ = fall_for(since, self.speed.take(leg), self.gravity, self.kappas(leg))
@@ -119,18 +119,18 @@ class Trajectory:
     def sights(
         self, times: Array, by: Array | None = None, strike_u: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """What `heights` says, and derivatives of the height, with every leg gone through once.
+        """Return heights and speeds as `heights` does, and derivatives of the height.
 
         Parameters
         ----------
         times
             As in `heights`.
         by
-            Derivatives of the parameters by anything else, shape ``(parameters, others)``.
+            Derivatives of the parameters by other unknowns, shape ``(parameters, others)``.
         strike_u
-            How well it is known at which height each rod strikes, m, shape ``(rods,)``. Derivatives
-            near a strike are then means of those of both legs, each as likely as it is: those of
-            one leg hold for no step across the strike.
+            Standard uncertainty of each rod's strike height, m, shape ``(rods,)``. Derivatives near
+            a strike are then averaged over both legs, weighted by their probabilities: those of a
+            single leg are wrong for a step across the strike.
 
         Returns
         -------
@@ -144,7 +144,7 @@ class Trajectory:
         fall = fallen, speed, by_speed = fall_for(since, begin, *flight)
         by_gravity, by_kappa = fall_slopes(since, begin, fall, *flight)
         time, height, faster = (part.reshape(-1, part.shape[-1]) for part in slopes[:3])
-        # In place: these are the largest arrays of an adjustment.
+        # In place: these are the largest arrays of a fit.
         moved = time.take(leg, axis=0)
         moved *= speed[..., None]
         part = height.take(leg, axis=0)
@@ -158,40 +158,40 @@ class Trajectory:
         moved[..., pulled] -= pull @ pulls[[GRAVITY, DRAG]][:, pulled]
         if strike_u is not None and self.hits is not None:
             strikes = self.time[1:]
-            rod = np.abs(times[:, None] - strikes).argmin(axis=1)  # whose strike is the nearest
+            rod = np.abs(times[:, None] - strikes).argmin(axis=1)  # with the nearest strike
             off = speed * (strikes[rod] - times) / strike_u[rod]
             other = 0.5 * (np.sign(off) - np.tanh(_NORMAL * off))
             near = np.flatnonzero(np.abs(other) > _FAINT)
-            # A strike lowers the chain by what it makes it faster, times how long ago it was.
+            # Moving a strike in time shifts the later path by its gain of speed.
             kicks = other * (self.speed[1:] - self.hits.arrival)[rod]
             moved[near] += kicks[near, None] * time[rod[near] + 1]
         return self.height.take(leg) - fallen, speed, moved
 
     def passages(self, heights: Array) -> tuple[Array, Array]:
-        """When the reference point comes down to each height, s, and how fast, m/s.
+        """Return when the reference point passes each height, s, and its speed, m/s.
 
-        It is at higher ones at the release.
+        For heights above the start, the time is that of the release.
         """
         leg = self._last_before(-self.height, -heights)
         kappa, speed = self.kappas(leg), self.speed.take(leg)
-        # An adjustment may try a rod that strikes above where the one before it did.
+        # A trial step may put a rod's strike above that of the rod before.
         reach = reach_of(np.maximum(self.height.take(leg) - heights, 0.0), kappa)
         arrival = np.sqrt(np.maximum((1.0 - kappa * reach) * speed**2 + self.gravity * reach, 0.0))
         lasted = lasting(reach, speed, arrival, self.gravity, kappa)
         return self.time.take(leg) + lasted, arrival
 
     def times(self, heights: Array) -> Array:
-        """When the reference point comes down to each height, s; the release for higher ones."""
+        """Return when the reference point passes each height, s; see `passages`."""
         return self.passages(heights)[0]
 
     def squares(self, levels: Array) -> tuple[Array, Array, Array]:
-        """Squares of the speeds with which the reference point comes down to some levels.
+        """Return the squared speeds of the reference point at some levels.
 
         Returns
         -------
         squares, slopes, steeper
-            m²/s²; derivatives by the parameters, shape ``(levels, parameters)``; and by the way,
-            m/s².
+            m²/s²; derivatives by the parameters, shape ``(levels, parameters)``; and derivatives
+            by the distance fallen, m/s².
         """
         begins = -self.height[: max(1, self.height.size - 1)]
         leg = np.maximum(np.searchsorted(begins, -levels, side="left") - 1, 0)
@@ -207,15 +207,15 @@ class Trajectory:
         return squares, slopes, steeper
 
     def kappas(self, leg: Index) -> float | Array:
-        """κ on each of some legs; one number where it is the same on all."""
+        """Return κ on each of these legs, 1/m; a single number if all legs have the same."""
         return some_air(self.kappa * self.shares(leg))
 
     def shares(self, leg: Index) -> float | Array:
-        """`air` of some legs, likewise."""
+        """Return `air` of each of these legs; a single number if all legs have the same."""
         return float(self.air[0]) if self.air.size == 1 else self.air.take(leg, mode="wrap")
 
     def loose(self, times: Array) -> Array:
-        """How loose the chain is at each time: 1/M for M rods that still fall, 0 if none struck."""
+        """Return 1/M at each time, with M rods still falling; 0 before the first strike."""
         if self.hits is None:
             return np.zeros(times.shape)
         struck = np.searchsorted(self.time[1:], times, side="left")
@@ -223,12 +223,12 @@ class Trajectory:
         return np.where(struck > 0, 1.0 / falling, 0.0)
 
     def _legs(self, times: Array) -> tuple[Index, Array]:
-        """On which leg each fall is at each time, in the line of all legs, and for how long."""
+        """Return each fall's leg at each time, as a flat index, and the time since it began, s."""
         leg = self._last_before(self.time, times)
         return leg, np.maximum(times - self.time.take(leg), 0.0)
 
     def _last_before(self, begins: Array, moments: Array) -> Index:
-        """Return the last leg that has begun, in the line of all falls' legs."""
+        """Return the last leg that has begun, as a flat index over all falls' legs."""
         if begins.ndim == 1:
             return np.maximum(np.searchsorted(begins, moments, side="right") - 1, 0)
         count, size = begins.shape
@@ -245,15 +245,15 @@ class Trajectory:
 
     @cached_property
     def slopes(self) -> Slopes:
-        """All derivatives; whoever only asks where the chain is does without them."""
+        """Derivatives by all parameters, computed on first use."""
         return self.slopes_by(self._every)
 
     def slopes_by(self, by: Array) -> Slopes:
-        """Derivatives by anything that parameters depend on, shape ``(parameters, others)``.
+        """Return derivatives by other unknowns, given `by` of shape ``(parameters, others)``.
 
         Squared speeds before and after each impact are E_k and f_k²·E_k; with q_k = e^(−2κd_k),
-        E_k = q_k·f²_{k−1}·E_{k−1} + g·(1 − q_k)/κ, and so are its derivatives but for what each leg
-        adds.
+        E_k = q_k·f²_{k−1}·E_{k−1} + g·(1 − q_k)/κ. Derivatives follow the same recursion with
+        another term for each leg.
         """
         common = by[:COMMON]
         if self.hits is None:
@@ -276,10 +276,10 @@ class Trajectory:
         added += reach[..., None] * common[GRAVITY] + by_kappa[..., None] * common[DRAG]
         kicked = 2.0 * remaining[..., 1:] * (factor * arrival**2)[..., :-1]
         added[..., 1:, :] += kicked[..., None] * d_factor[:-1]
-        d_arrival = _carried(remaining, factor, added) / (2.0 * arrival)[..., None]
+        d_arrival = _sum_legs(remaining, factor, added) / (2.0 * arrival)[..., None]
         d_speed = np.zeros((*self.time.shape, by.shape[1]))
         d_speed[..., 1:, :] = factor[..., None] * d_arrival + arrival[..., None] * d_factor
-        # A leg lasts until its way is done.
+        # The duration of a leg follows from its distance.
         lasted = np.diff(self.time)
         by_speed = speed_slope(lasted, distance, self.gravity, kappa)
         fall = distance, arrival, by_speed
@@ -299,27 +299,27 @@ class Trajectory:
 def _by_kappa(
     distance: Array, reach: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> Array:
-    """Derivative of the squared speed at the end of a leg by its κ."""
+    """Return the derivative of the squared speed at the end of a leg by its κ."""
     rest = 1.0 - kappa * reach
     slope: Array = gravity * reach_slopes(distance, reach, kappa) - 2.0 * distance * rest * speed**2
     return slope
 
 
 def _factors(gains: Array) -> Array:
-    """By what factor impacts make a chain faster."""
+    """Return the factor by which each impact changes the chain's speed."""
     return np.maximum(1.0 + gains, _NO_LESS)
 
 
-def _carried(remaining: Array, factor: Array, added: Array) -> Array:
-    """Sum up what each leg adds to a squared speed, and what is left of all legs before.
+def _sum_legs(remaining: Array, factor: Array, added: Array) -> Array:
+    """Solve the recursion E_k = remaining_k·factor²_{k−1}·E_{k−1} + added_k.
 
     Parameters
     ----------
     remaining, factor
-        What is left of it at the end of a leg, and by what factor an impact makes a chain faster;
-        shape ``(…, rods)``.
+        Share of a squared speed that drag leaves at the end of a leg, and the factor of speed at
+        its impact; shape ``(…, rods)``.
     added
-        Shape ``(…, rods)`` or ``(…, rods, others)``.
+        Term of each leg, shape ``(…, rods)`` or ``(…, rods, others)``.
     """
     product = np.ones_like(factor)
     np.cumprod(remaining[..., 1:] * factor[..., :-1] ** 2, axis=-1, out=product[..., 1:])
@@ -337,7 +337,7 @@ def free_trajectory(
     kappa: float | Array = 0.0,
     air: Array = ONE,
 ) -> Trajectory:
-    """Fall from rest of a chain that strikes nothing; arguments as in `struck_trajectory`."""
+    """Return the free fall of a chain from rest; arguments as in `struck_trajectory`."""
     height = start + np.zeros(1)
     zero = np.zeros_like(height)
     return Trajectory(release + zero, height, zero, gravity, kappa=kappa, air=air)
@@ -353,12 +353,12 @@ def struck_trajectory(
     kappa: float | Array = 0.0,
     air: Array = ONE,
 ) -> Trajectory:
-    """Fall of a chain whose rods strike the surface one after another, or many such falls.
+    """Return the fall of a chain whose rods strike the surface in turn, or many such falls.
 
     Parameters
     ----------
     start, gravity
-        m, m/s²; of many falls shape ``(falls, 1)``.
+        m, m/s²; for many falls shape ``(falls, 1)``.
     gains
         α of each impact, shape ``(rods,)`` or ``(falls, rods)``.
     ratios
@@ -371,7 +371,7 @@ def struck_trajectory(
     Returns
     -------
     Trajectory
-        Its parameters are the common ones, then α of each rod, then the place of each rod.
+        Its parameters are the `COMMON` first, then α of each rod, then the place of each rod.
     """
     gain = gains * ratios
     height = np.empty((*gain.shape[:-1], gain.shape[-1] + 1))
@@ -379,7 +379,7 @@ def struck_trajectory(
     distance = height[..., :-1] - height[..., 1:]
     kappas = some_air(kappa * (float(air[0]) if air.size == 1 else air[: len(places)]))
     reach, factor = reach_of(distance, kappas), _factors(gain)
-    squares = _carried(1.0 - kappas * reach, factor, gravity * reach)
+    squares = _sum_legs(1.0 - kappas * reach, factor, gravity * reach)
     arrival = np.sqrt(np.maximum(squares, 0.0))
     speed, time = np.zeros_like(height), np.zeros_like(height)
     speed[..., 1:] = factor * arrival

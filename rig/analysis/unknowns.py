@@ -1,9 +1,9 @@
-"""Everything that is not known about a drop: one table, from which all else follows.
+"""The table of nuisance parameters and measurands of a drop: names, priors and derivatives.
 
-A row of `TABLE` says what an unknown is called, its line of the uncertainty budget, what is known
-of it beforehand, who has it in common, and what it does to the path of a chain and to the levels at
-which edges are expected. Priors, observation equations, budget and joint fit are read from it; a
-scene that lacks something lacks its row.
+A row of `TABLE` gives an unknown's name, its line of the uncertainty budget, its prior, the drops
+that share it, and its derivatives of a chain's trajectory and of the levels at which edges are
+expected. Priors, observation equations, budget and joint fit all read this table. An unknown that
+a scene does not have has no prior and is left out.
 """
 
 from __future__ import annotations
@@ -28,58 +28,58 @@ if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.components import Components
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import Expected
+    from rig.analysis.equations import ExpectedEdges
     from rig.arrays import Array, Index
     from rig.protocol.protocol import Gates, Protocol
 
     Effect = Callable[["Side"], Array]
 
 ANYTHING = 1.0
-"""Prior of release times (s) and α: nothing is known."""
+"""Prior standard uncertainty of release times (s) and of α: uninformative."""
 ANY_GRAVITY = 5.0
-"""Prior of gravity where it is what a scene measures, m/s²."""
+"""Prior standard uncertainty of gravity where it is the measurand, m/s²."""
 
 
 class Side(NamedTuple):
-    """A chain of a drop, as the rows of the table look at it."""
+    """One chain of a drop: the argument of every prior and derivative in the table."""
 
     model: DropModel
     record: ChainRecord
 
     @property
     def protocol(self) -> Protocol:
-        """Of the scene."""
+        """Protocol of the scene."""
         return self.model.protocol
 
     @property
     def gates(self) -> Gates:
-        """Of the scene."""
+        """Photogates of the scene."""
         assert self.protocol.gates is not None
         return self.protocol.gates
 
     @property
-    def edges(self) -> Expected:
-        """Of its gates."""
+    def edges(self) -> ExpectedEdges:
+        """Expected edges of the chain at all its gates."""
         return self.model.expected[self.record.role]
 
     @property
     def rods(self) -> int:
-        """How many it has."""
+        """Number of rods of the chain."""
         return self.record.chain.chain.rods
 
     @property
     def alpha(self) -> float:
-        """Of its impacts, as it is guessed."""
+        """First guess of the impact coefficient α, absolute value."""
         return abs(self.model.guesses["impact"].alpha)
 
     @property
     def slope(self) -> float:
-        """Tangent of the tilt of its rods."""
+        """Tangent of the tilt angle of the rods."""
         return math.tan(math.radians(self.record.chain.tilt_deg))
 
     @property
     def steepest(self) -> float:
-        """That of the drop's more tilted chain."""
+        """Largest `slope` of all chains of the drop."""
         return max(Side(self.model, record).slope for record in self.model.records.values())
 
 
@@ -90,31 +90,31 @@ class Unknown:
     Attributes
     ----------
     name
-        To find it; after a role where each chain has its own.
+        Name of the block; the role of the chain comes before it if each chain has its own block.
     line
-        Of the uncertainty budget.
+        Line of the uncertainty budget.
     sd
-        Prior standard uncertainties of its members, but for `scale`; `None` where a scene has no
-        such unknown.
+        Prior standard uncertainties of the members, before `scale`; `None` if the scene does not
+        have this unknown.
     of
-        Whose it is: ``impact`` or ``free`` for what only that chain knows of, ``each`` where each
-        chain has its own, ``all`` for what both have in common.
+        Chains that the unknown acts on: ``impact`` or ``free`` for one of them, ``each`` if each
+        chain has its own value, ``all`` if both share a value.
     shared
-        In which drops it is the same: those of a rig, of its posts, beams, chain or starting
-        height, of a condition, or one drop alone. Of several sessions see `DropModel.owners`.
+        Drops that share the value: those with the same rig, posts, beams, chain, start height or
+        condition, or a single drop. For several sessions see `DropModel.owners`.
     moves
-        Which parameters of a side's trajectory it acts on, see `parameters`.
+        Parameters of the trajectory that the unknown changes, see `parameters`.
     path
-        Their derivatives, of any shape that fits ``(parameters, members)``.
+        Derivatives of these parameters, of any shape that broadcasts to ``(parameters, members)``.
     level
-        Derivatives of the levels of its expected edges, shape ``(edges, members)``.
+        Derivatives of the levels of the expected edges, shape ``(edges, members)``.
     rate
-        That of the time scale: how much later by it each moment is, relative.
+        Derivative of the time scale's relative rate; positive if true times are later.
     scale
-        Of `rig.analysis.components.Components`, which multiplies the prior and which its members
-        tell in turn.
+        Variance component (`rig.analysis.components.Components`) that multiplies the prior. The
+        members' estimates determine it in turn.
     absent
-        Share of its prior variance that is none where a prediction's equations hold.
+        Share of the prior variance that vanishes where a prediction's equations hold exactly.
     """
 
     name: str
@@ -130,7 +130,7 @@ class Unknown:
     absent: Callable[[Side], float | Array] = lambda _side: 0.0
 
     def prior(self, side: Side) -> Array | None:
-        """Prior standard uncertainties of its members where there are any, shape ``(members,)``."""
+        """Return the prior standard uncertainties, shape ``(members,)``; `None` without members."""
         sd = self.sd(side)
         if sd is None:
             return None
@@ -154,8 +154,8 @@ def _ripple_sd(side: Side) -> list[float] | None:
     return [side.steepest] * len(side.gates.gates) if side.steepest else None
 
 
-def _rippled(side: Side) -> Array:
-    """A beam is off by as much for a chain of less tilted rods, which shows less."""
+def _beam_ripple(side: Side) -> Array:
+    """Derivatives by a beam's sideways offset, in proportion to the tilt of the chain's rods."""
     return -side.slope / side.steepest * side.edges.turn[:, None] * _by_gate(side)
 
 
@@ -166,55 +166,55 @@ def _swing_sd(side: Side) -> float | None:
 
 
 def _swung(side: Side) -> Array:
-    """How much lower each rod is as it strikes."""
+    """Derivatives of the rods' places by swing, each at the moment when the rod strikes."""
     levers = lever(side.record.chain.chain)
     return -drawn(levers, side.protocol, -side.record.strikes)[:, None]
 
 
 def _impulse_sd(side: Side) -> Array:
     components: Components = side.model.components
-    return components.impulses(side.alpha, above(side.record.chain.chain))
+    return components.impulses(side.alpha, above(side.record.chain.chain), side.record.uneven)
 
 
 def _bounces(side: Side) -> Array:
-    """Share of the variance of impulses that strings make by bouncing."""
+    """Return the share of the impulses' variance that comes from bouncing strings."""
     sd = _impulse_sd(side)
     bounces = side.model.components.bounce * side.alpha / above(side.record.chain.chain)
-    # Zero where impulses are known exactly: then none bounce either.
+    # Zero where impulses are known exactly: strings then do not bounce either.
     share: Array = np.divide(bounces, sd, out=np.zeros_like(sd), where=sd > 0.0) ** 2
     return share
 
 
 def _top_sd(side: Side) -> float:
-    """It falls on as it was off its chain while two were left."""
+    """Prior of the top rod alone: it keeps the departure that it had while two rods fell."""
     components = side.model.components
     return math.sqrt(2.0) * math.hypot(components.departure, 0.5 * components.few)
 
 
 def _stretch_sd(side: Side) -> list[float]:
-    """A half of its variance is the same in all drops."""
+    """Prior of each stretch mode; the other half of the variance is common to all drops."""
     priors = side.protocol.priors
     size = priors.stretch * math.hypot(side.record.alpha, priors.impulse_floor)
     return [math.sqrt(0.5) * size * side.record.chain.chain.length] * MODES
 
 
 def _late_sd(side: Side) -> float:
-    """No edge tells it; where strings do not bounce, there is none."""
+    """Prior of the late pull, in proportion to bouncing: no edge measures this unknown."""
     priors = side.protocol.priors
     bounce = side.model.components.bounce / priors.last_impulse if priors.last_impulse else 1.0
     return bounce * priors.late_pull
 
 
 def _unlike_air_sd(side: Side) -> float | None:
-    """Of the κ of a chain unlike the first: widths alone do not tell of which wood each is."""
+    """Prior of the κ of a chain unlike the first: widths do not give its density."""
     more = abs(float(side.record.air[0]) - 1.0)
     stated = side.protocol.drag is not None or side.record.chain.weighed
     return None if stated or not more else more * side.model.kappa_u
 
 
-def _lag_sd(side: Side) -> list[float] | None:
+def _lag_sd(side: Side) -> float | None:
     unlike = any(record.unlike.any() for record in side.model.records.values())
-    return [math.hypot(*prior_air(side.protocol))] * 2 if unlike else None
+    return math.hypot(*prior_air(side.protocol)) if unlike else None
 
 
 def _lag(side: Side) -> Array:
@@ -222,7 +222,7 @@ def _lag(side: Side) -> Array:
 
 
 def _slack_sd(side: Side) -> list[float] | None:
-    """Of a rod that one other holds, as of the top rod while two are left."""
+    """Prior of each rod's slack: held by one other rod, like the top rod of the last two."""
     return [_top_sd(side)] * side.rods if side.record.unlike.any() else None
 
 
@@ -231,13 +231,13 @@ def _slack(side: Side) -> Array:
 
 
 def _strike_sd(side: Side) -> float:
-    """Where not all rods pass the lowest beams, the top rod may strike as high as these are."""
+    """Prior of the strike height; the top rod may strike as high as beams not all rods pass."""
     lying = [side.gates.gates[train.gate].height for train in side.record.aside]
     return max([side.protocol.contact.strike.u, *lying])
 
 
 def _contact(side: Side) -> Array:
-    """Results are at the stated level: where the top rod would be if others struck elsewhere."""
+    """Derivatives by the contact level; 0 for the top rod, as results refer to that level."""
     return np.append(-np.ones(side.rods - 1), 0.0)[:, None]
 
 
@@ -270,7 +270,7 @@ TABLE = (
         lambda side: None if side.protocol.surface is None else side.protocol.gravity.u,
         moves="gravity",
     ),
-    Unknown(  # Where gravity is the result, each drop measures it for itself.
+    Unknown(  # Where gravity is the measurand, each drop has its own value.
         "gravity",
         "gravity",
         lambda side: ANY_GRAVITY if side.protocol.surface is None else None,
@@ -303,7 +303,10 @@ TABLE = (
         absent=_all,
     ),
     _rig("air lag", "air", _lag_sd, of="each", level=_lag, absent=_all),
-    Unknown("free slack", "air", _slack_sd, of="free", shared="chain", level=_slack, absent=_all),
+    _chain("slack", "air", _slack_sd, level=_slack, absent=_all),
+    Unknown(
+        "free usual slack", "air", _slack_sd, of="free", shared="chain", level=_slack, absent=_all
+    ),
     Unknown(
         "datum",
         "datum",
@@ -318,8 +321,8 @@ TABLE = (
         level=_by_gate,
         scale="gates",
     ),
-    _beams("ripple", "beam offsets", _ripple_sd, level=_rippled, scale="beam"),
-    _chain(  # Told by the edges alone, so its uncertainty counts as theirs.
+    _beams("ripple", "beam offsets", _ripple_sd, level=_beam_ripple, scale="beam"),
+    _chain(  # Only edges determine the release, so its uncertainty belongs to their line.
         "release", "edges", lambda _: ANYTHING, moves="release"
     ),
     _chain("hang", "start height", _all, moves="start", scale="hang"),
@@ -407,27 +410,27 @@ TABLE = (
     _stretch("usual stretch", shared="condition"),
     _struck("late", "late pull", _late_sd, absent=_all),
 )
-"""In the order of a drop's vector. `strike` and `late` act on results alone."""
+"""Unknowns in the order of a drop's vector. `strike` and `late` act on results, not on edges."""
 
 
 class Unknowns:
-    """Named blocks of one long vector of a drop's unknowns, as the table has them.
+    """The vector of a drop's unknowns, divided into named blocks.
 
     All values are deviations from the nominal scene, so the prior mean is zero everywhere.
 
     Attributes
     ----------
     rows
-        Of the table, by the name of the block: that of the row, after the role of the chain where
-        each has its own.
+        Rows of the table by block name, which starts with the chain's role if each chain has its
+        own block.
     blocks
-        Place of each block in the vector, by name.
+        Slice of the vector for each block, by name.
     groups
         Blocks of each line of the uncertainty budget.
     sd
         Prior standard uncertainties, shape ``(unknowns,)``.
     rate
-        Derivatives of the time scale, see `Unknown.rate`; likewise.
+        Derivatives of the time scale, see `Unknown.rate`; shape ``(unknowns,)``.
     """
 
     def __init__(self, model: DropModel) -> None:
@@ -437,7 +440,7 @@ class Unknowns:
         priors: list[Array] = []
         rates: list[Array] = []
         size = 0
-        for name, row, side in _named(model):
+        for name, row, side in _named_rows(model):
             prior = row.prior(side)
             if prior is None:
                 continue
@@ -457,13 +460,13 @@ class Unknowns:
         return self.blocks[name]
 
     def __contains__(self, name: object) -> bool:
-        """Whether anything of a block is unknown: what is known exactly is as if it were not."""
+        """Whether a block exists and has a member with a prior uncertainty above zero."""
         block = self.blocks.get(str(name))
         return block is not None and bool(self.sd[block].any())
 
 
-def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
-    """Go through the rows for the chains that there are."""
+def _named_rows(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
+    """Yield the name, row and side of every block that the drop's chains may have."""
     sides = {role: Side(model, record) for role, record in model.records.items()}
     for own, rows in groupby((*TABLE, *model.suspects), lambda row: row.of == "each"):
         if own:
@@ -478,7 +481,7 @@ def _named(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
 
 
 def parameters(struck: int) -> dict[str, slice]:
-    """Return which parameters of a trajectory are what, for so many rods that strike."""
+    """Return the slices of a trajectory's parameters by name, for `struck` rods that strike."""
     places = {"release": RELEASE, "start": START, "gravity": GRAVITY, "drag": DRAG}
     spans = {name: slice(place, place + 1) for name, place in places.items()}
     ends = [COMMON, COMMON + struck, COMMON + 2 * struck]
@@ -486,7 +489,7 @@ def parameters(struck: int) -> dict[str, slice]:
 
 
 class SideSlopes(NamedTuple):
-    """What all unknowns of a drop do to one side, to which path and levels are linear in them.
+    """Derivatives of one side's path parameters and levels, which are linear in the unknowns.
 
     Attributes
     ----------
@@ -495,12 +498,12 @@ class SideSlopes(NamedTuple):
     levels
         Derivatives of the levels of expected edges, shape ``(edges, unknowns)``.
     columns
-        Unknowns that this side knows of, by their places in the drop's vector; first those that
-        move its trajectory. Shape ``(columns,)``.
+        Places in the drop's vector of the unknowns that act on this side; those that change the
+        trajectory come first. Shape ``(columns,)``.
     moving
-        How many do.
+        Number of columns that change the trajectory.
     clocks
-        Which of the columns change the time scale.
+        Columns that change the time scale.
     """
 
     path: Array
@@ -511,7 +514,7 @@ class SideSlopes(NamedTuple):
 
 
 def side_slopes(model: DropModel, role: str) -> SideSlopes:
-    """Put together what the rows of the table do to one side."""
+    """Collect the derivatives of one side's trajectory and levels by all unknowns."""
     at, side = model.unknowns, Side(model, model.records[role])
     moved = parameters(0 if side.record.ratios is None else side.rods)
     path = np.zeros((moved["all"].stop, len(at)))
@@ -530,17 +533,17 @@ def side_slopes(model: DropModel, role: str) -> SideSlopes:
 
 
 class SharedUnknowns:
-    """One vector of everything that the drops of a session have in common.
+    """The vector of unknowns that the drops of a session share.
 
-    A chain's rods are the same whether it strikes or falls freely, which is what tells them from
-    beam heights: chains change sides, beams do not.
+    A chain's rod spacings are the same whether the chain strikes or falls freely. That separates
+    them from beam heights: chains change sides, beams do not.
 
     Attributes
     ----------
     blocks
-        Place of each block in the vector, by name.
+        Slice of the vector for each block, by name.
     rows
-        Of the table, by the same names.
+        Rows of the table, by the same names.
     """
 
     def __init__(self, models: Iterable[DropModel]) -> None:
@@ -559,7 +562,7 @@ class SharedUnknowns:
         return self._size
 
     def places(self, model: DropModel) -> tuple[Index, Index]:
-        """Where a drop's unknowns that are here too are, in its own vector and in this one."""
+        """Return the places of a drop's shared unknowns in its own vector and in this one."""
         both = [
             (model.unknowns[own], self.blocks[name])
             for name, own in _common(model).items()
@@ -573,7 +576,7 @@ class SharedUnknowns:
 
 
 def _common(model: DropModel) -> dict[str, str]:
-    """Return the names of a drop's common blocks in its own vector, by those they have for all."""
+    """Return a drop's own names of its shared blocks, by their names in the session."""
     names: dict[str, str] = {}
     for own, row in model.unknowns.rows.items():
         if row.shared == "drop":

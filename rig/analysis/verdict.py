@@ -1,4 +1,4 @@
-"""Is a drop good? By limits that were fixed before any result was seen."""
+"""Verdict on a drop, by limits that are fixed before any result is seen."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rig.analysis.equations import STRAY
 from rig.analysis.identify import RESTLESS
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import APART, disagreements
+from rig.measurands import RELEASE_SKEW
 from rig.reasons import Reason, make_reason
 from rig.wordings import Severity
 
@@ -27,25 +28,22 @@ if TYPE_CHECKING:
     from rig.records import Drop
 
 LATE = 0.2
-"""Share of stamps so close behind another that they may be late which a drop may have without
-remark. Sixteen gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
+"""Share of possibly late stamps, close after another stamp, above which a remark is made. Sixteen
+gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
 
 _SURE = 4.0  # standard uncertainties
 
 
 def verdict_of(reasons: Iterable[Reason]) -> Verdict:
-    """Return the verdict that the gravest of some reasons makes of a drop."""
-    gravest = max((reason.severity for reason in reasons), default=Severity.REMARK)
-    verdicts: dict[Severity, Verdict] = {
-        Severity.VOID: "void",
-        Severity.DOUBT: "marginal",
-        Severity.REMARK: "accepted",
-    }
-    return verdicts[gravest]
+    """Return the verdict by the most severe reason."""
+    severities = {reason.severity for reason in reasons}
+    if Severity.VOID in severities:
+        return "void"
+    return "marginal" if Severity.DOUBT in severities else "accepted"
 
 
 def judge_record(drop: Drop, audit: Audit) -> tuple[Reason, ...]:
-    """Say why a drop cannot be analysed at all; nothing where it can."""
+    """Return reasons why a record cannot be analysed; empty if it can."""
     faults = {reason.code: reason for reason in drop.faults}
     if audit.lost:
         faults.setdefault("edges_lost", make_reason("edges_lost", lost=audit.lost))
@@ -62,39 +60,39 @@ def judge(
     by_passages: Mapping[str, Measured],
     unmatched: Collection[UnmatchedEdge],
 ) -> Diagnosis:
-    """Judge a drop by what was fitted.
+    """Return all reasons about a fitted drop, and the gates under suspicion.
 
     Parameters
     ----------
     by_passages
-        What its last passages say by themselves.
+        Measurands from the last passages alone.
     unmatched
         Edges that are missing or belong to no rod.
     """
     record, diagnosis = judge_record(drop, audit), diagnose(fit)
     void, doubts = _by_severity(diagnosis.reasons)
-    if diagnosis.known:  # all else that is odd follows from it
+    if diagnosis.known:  # the known fault causes all other oddities
         return Diagnosis((*record, *void), known=True)
     air, remarks, estimate = _air(fit), other_incline(fit, run), fit.estimate
-    # A motion in the wrong air tells nothing of the gates.
+    # With wrong drag, the fit says nothing about the gates.
     accused = air["air"] or tuple(void)
     beyond, near = _by_severity([*_counts(protocol, audit), *release_reasons(protocol, values)])
-    missed = any(reason.code == "edges_missed" for reason in beyond)
-    restless = estimate.scatter > RESTLESS or not estimate.settled
     pushed = air["air_accelerates"]
-    odd = diagnosis.odd or bool(pushed) or missed or restless
+    odd = diagnosis.odd or bool(pushed) or any(why.code == "edges_missed" for why in beyond)
+    odd |= estimate.scatter > RESTLESS or not estimate.settled
     void = [*record, *beyond, *accused, *air["air_implausible"]]
-    reasons = [*void, *doubts]  # what is doubtful about gates may be why
+    reasons = [*void, *doubts]  # doubts about gates may be the cause
     if not void:
         reasons += [*near, *_doubts(protocol, drop, estimate), *pushed]
-        reasons += disagreements(values, by_passages)
-        # A drop is as good where the model's α is not its own: that is what is measured.
-        reasons += [*remarks, *_later_passages(protocol, unmatched)]
+        # A drop whose α differs from the model's is still good: that is a result.
+        reasons += [*disagreements(values, by_passages), *remarks]
+        later = sum(edge.kind == "later passage" for edge in unmatched)
+        reasons += [make_reason("later_passages", protocol.vocabulary, edges=later)] * (later > 0)
     return Diagnosis(tuple(reasons), diagnosis.suspects, odd, accused=(*accused, *pushed, *remarks))
 
 
 def _by_severity(reasons: Iterable[Reason]) -> tuple[list[Reason], list[Reason]]:
-    """Part reasons for which a drop is void from all others."""
+    """Split reasons into those that make a drop void and all others."""
     parts: tuple[list[Reason], list[Reason]] = [], []
     for reason in reasons:
         parts[reason.severity is not Severity.VOID].append(reason)
@@ -102,61 +100,51 @@ def _by_severity(reasons: Iterable[Reason]) -> tuple[list[Reason], list[Reason]]
 
 
 def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:
-    """Yield which edges are more than the protocol accepts, or more but for so few of them.
+    """Yield reasons for missed or unexplained edges above the protocol's limits.
 
-    Of few edges one is a large share: a rig that misses as many as usual must not lose more than a
-    drop in a thousand by chance; and one stray pulse may always come.
+    With few edges, a single edge is a large share. So a rig with the usual rate of misses must not
+    lose more than 1 drop in 1000 by chance, and a single stray pulse is tolerated.
     """
     accept = protocol.accept
-    chance = most_by_chance(audit.expected, min(MISSED, accept.missed_edges / 2.0))
-    missed = {"missed": audit.missed, "expected": audit.expected}
-    stray = {"unexplained": audit.unexplained, "received": audit.received}
-    for code, few, limit, tolerable, counts in (
-        ("edges_missed", "edges_missed_few", accept.missed_edges, chance, missed),
-        ("edges_unexplained", "edges_unexplained_few", accept.unexplained_edges, SIDES, stray),
-    ):
-        count, total = counts.values()
-        if count > limit * total:
-            why = code if count > tolerable else few
-            yield make_reason(why, protocol.vocabulary, **counts, limit=limit)
+    chance = most_by_chance(audit.edge_count, min(MISSED, accept.missed_edges / 2.0))
+    if audit.missed > accept.missed_edges * audit.edge_count:
+        why = "edges_missed" if audit.missed > chance else "edges_missed_few"
+        counts = {"missed": audit.missed, "expected": audit.edge_count}
+        yield make_reason(why, protocol.vocabulary, **counts, limit=accept.missed_edges)
+    if audit.unexplained > accept.unexplained_edges * audit.received:
+        why = "edges_unexplained" if audit.unexplained > SIDES else "edges_unexplained_few"
+        counts = {"unexplained": audit.unexplained, "received": audit.received}
+        yield make_reason(why, protocol.vocabulary, **counts, limit=accept.unexplained_edges)
 
 
 def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple[Reason, ...]:
-    """Say that releases were too far apart, or that nobody can tell; nothing where all is well."""
-    skew, limit = values.get("release_skew_s"), protocol.accept.release_skew
+    """Return the reason for a release skew above its limit, or too uncertain; empty if neither.
+
+    If its expanded uncertainty exceeds the limit, the skew must exceed both together.
+    """
+    skew, limit = values.get(RELEASE_SKEW.name), protocol.accept.release_skew
     if skew is None:
         return ()
-    near = abs(abs(skew.value) - limit) < skew.expanded
-    code = "release_skew" if _too_late(skew, limit) else "release_skew_near" if near else ""
-    return (make_reason(code, skew_s=skew.value, limit_s=limit),) if code else ()
+    size, u95 = abs(skew.value), skew.expanded
+    beyond = size - (u95 if u95 > limit else 0.0) > limit
+    if not beyond and abs(size - limit) >= u95:
+        return ()
+    code = "release_skew" if beyond else "release_skew_near"
+    return (make_reason(code, skew_s=skew.value, limit_s=limit),)
 
 
 def nearly_in_time(result: DropResult, limit: float) -> bool:
-    """Whether a drop is void for its release alone, and by no more than that is uncertain."""
+    """Whether a drop is void only for its release skew, by less than its uncertainty."""
     if result.verdict != "void":
         return False
-    if {why.code for why in result.reasons if why.severity is Severity.VOID} != {"release_skew"}:
+    if {why.code for why in _by_severity(result.reasons)[0]} != {"release_skew"}:
         return False
-    skew = result.quantities["release_skew_s"]
+    skew = result.quantities[RELEASE_SKEW.name]
     return abs(skew.value) - skew.expanded < limit
 
 
-def _too_late(skew: Measured, limit: float) -> bool:
-    """Whether releases were further apart than is accepted.
-
-    What is less sure than the limit is large must be beyond it with its uncertainty.
-    """
-    return abs(skew.value) - (skew.expanded if skew.expanded > limit else 0.0) > limit
-
-
-def _later_passages(protocol: Protocol, unmatched: Collection[UnmatchedEdge]) -> tuple[Reason, ...]:
-    """Say how many edges of later passages a result is without."""
-    edges = sum(edge.kind == "later passage" for edge in unmatched)
-    return (make_reason("later_passages", protocol.vocabulary, edges=edges),) if edges else ()
-
-
 def _doubts(protocol: Protocol, drop: Drop, estimate: Estimate) -> Iterator[Reason]:
-    """Yield what is remarkable about a fit and a device."""
+    """Yield remarks about a fit and the device's certificate."""
     if estimate.scatter > RESTLESS:
         yield make_reason("scatter", factor=estimate.scatter)
     if not estimate.settled:
@@ -164,17 +152,17 @@ def _doubts(protocol: Protocol, drop: Drop, estimate: Estimate) -> Iterator[Reas
     device, edges = drop.certificate, max(1, len(drop.edges))
     if device is not None and device.late > LATE * edges:
         yield make_reason("late_stamps", edges=device.late)
-    # A pulse too short to be timed may be an edge that left no trace.
+    # A pulse too short to be timed may be a missed edge.
     if device is not None and device.glitches > MISSED * edges:
         yield make_reason("short_pulses", pulses=device.glitches)
 
 
 def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
-    """Say what an adjusted motion tells of the air, by code; nothing where all is well.
+    """Return reasons about the fitted drag, by code; each is empty if drag is plausible.
 
-    Edges tell the air better than a protocol does: where it is not as stated, that is said. Where
-    air that nobody would expect explains much and edges do not fit even so, it is no fall. And air
-    only holds back: where it seems to push, something is not as it is said to be.
+    ``air``: κ differs from the stated value. ``air_implausible``: κ is far from its prior and the
+    edges still do not fit, so that this is no fall. ``air_accelerates``: κ is negative, which is
+    not physical, so that some input is wrong.
     """
     model, estimate = fit.model, fit.estimate
     at = model.unknowns["drag"].start
@@ -182,7 +170,7 @@ def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
     kappa = float(model.kappa(estimate.x))
     variance = float(estimate.inverse[at] @ estimate.inverse[at])
     u = math.sqrt(variance) * sd
-    # By the edges alone, without what the protocol makes of them.
+    # Estimate by the edges alone, without the prior.
     share = 1.0 / (1.0 - min(variance, 0.9))
     alone = {"kappa": kappa + (share - 1.0) * off, "U95": 2.0 * math.sqrt(share) * u}
     blown = estimate.scatter > RESTLESS and abs(off) > APART * sd

@@ -1,4 +1,4 @@
-"""What a video of the same fall says of its acceleration, beside what the gates say."""
+"""Acceleration from a video of the same fall, for comparison with the gates."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 _BENT = 0.5
-"""Correlation of neighbours' residuals above which frames follow another curve."""
-_ENOUGH = 8  # frames that tell such a correlation
+"""Correlation of neighbouring residuals above which frames do not follow a parabola."""
+_ENOUGH = 8  # least number of frames for that correlation
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +25,11 @@ class VideoFall:
     Attributes
     ----------
     acceleration
-        m/s², with what the frames' scatter allows; the video's scale of lengths is not in it.
+        m/s²; its uncertainty is from the frames' scatter, without that of the video's length scale.
     frames
-        How many.
+        Number of frames.
     bent
-        Whether they follow another curve than a parabola, by more than chance.
+        Whether the frames depart from a parabola by more than chance.
     """
 
     acceleration: Measured
@@ -37,25 +37,25 @@ class VideoFall:
     bent: bool
 
     def beside(self, gates: Measured) -> float:
-        """E_n of the video's acceleration less that of the gates; within ±1 they agree."""
+        """Return E_n of the video's acceleration less that of the gates; within ±1 both agree."""
         return self.acceleration.less(gates).normalized_error or 0.0
 
     def json(self, gates: Measured | None) -> dict[str, Any]:
-        """As ``video`` in the results."""
+        """Return ``video`` of the results."""
         fields: dict[str, Any] = {"acceleration_m_s2": self.acceleration.json()}
         fields |= {"frames": self.frames, "bent": self.bent}
         return fields if gates is None else fields | {"normalized_error": self.beside(gates)}
 
 
 def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
-    """Fit parabolas to both coordinates; which way is down, and where it began, do not matter.
+    """Fit parabolas to both coordinates; direction and origin do not matter.
 
     Parameters
     ----------
     times, x, y
         s and m, shape ``(frames,)``, at least 4 frames.
     """
-    design = np.vander(times - times.mean(), 3)  # centred, so that squares do not drown
+    design = np.vander(times - times.mean(), 3)  # centred, for numerical accuracy
     basis, triangle = np.linalg.qr(design)
     inverse = np.linalg.inv(triangle)
     places = np.column_stack([x, y])
@@ -65,7 +65,7 @@ def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
     size = float(np.hypot(*rates))
     along = rates / size if size else np.array([0.0, 1.0])
     degrees = times.size - 3
-    off = residuals @ along  # only what scatters the same way moves the size
+    off = residuals @ along  # only scatter along the acceleration affects its size
     u = 2.0 * float(np.sqrt(off @ off / degrees) * np.linalg.norm(inverse[0]))
     total = float(off @ off)
     neighbours = float(off[1:] @ off[:-1]) / total if total else 0.0

@@ -79,7 +79,7 @@ class Extreme(NamedTuple):
         values = {"alpha": impact.alpha, "gamma": impact.gamma, **end_values(end)}
         return Answer(values, chain.rods, "; ".join(impact.notes))
 
-    def printed(self) -> Answer:
+    def as_printed(self) -> Answer:
         """Return what the equations as printed give with the digits and the range of a float."""
         values = self.exact(self.inputs, as_float=True)
         return Answer({name: float(value) for name, value in values.items()}, len(self.masses))

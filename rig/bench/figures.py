@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     from rig.bench.stability import StabilityRow
     from rig.bench.work import Point
 
-INK, MODEL, SECOND, MUTED, PAPER = (
-    looks.COLORS[number][0]
-    for number in (looks.INK, looks.MODEL, looks.SECOND, looks.MUTED, looks.PAPER)
+INK, MODEL, SECOND, MUTED = (
+    looks.COLORS[number][0] for number in (looks.INK, looks.MODEL, looks.SECOND, looks.MUTED)
 )
 FLOOR = 3e-17
 """Where an error of 0 is drawn: no float is nearer."""
@@ -32,29 +31,14 @@ _LOOKS = [
 
 
 @contextmanager
-def canvas(
-    *heights: float, width_in: float = 7.0, columns: int = 1, sharex: bool = True
-) -> Iterator[Figure]:
-    """Set the style up, and hand out empty panels; for what `rig.report.figure` cannot describe.
-
-    Parameters
-    ----------
-    heights
-        Of the panels, inches.
-    width_in
-        Of the figure, inches.
-    columns
-        Panels side by side in each row.
-    sharex
-        Whether all panels have one horizontal axis.
-    """
+def canvas(*heights: float) -> Iterator[Figure]:
+    """Set the style up, and hand out empty panels of so many inches above each other."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - half a second, only for figures
 
     with style():
-        drawing = Figure(figsize=(width_in, sum(heights)), layout="constrained")
-        drawing.subplots(len(heights), columns, sharex=sharex, height_ratios=heights)
+        drawing = Figure(figsize=(7.0, sum(heights)), layout="constrained")
+        drawing.subplots(len(heights), sharex=True, height_ratios=heights)
         yield drawing
-        drawing.align_ylabels()
 
 
 def work_figure(title: str, points: Sequence[Point]) -> str:

@@ -1,8 +1,8 @@
 """What a scene costs, counted by a Python process that has done nothing else.
 
-``python -c "from rig.bench.scene_probe import main; main()" time FILE`` predicts the scene as the
-command does and prints the processor time so far; with ``count`` it prints what that has loaded and
-allocated, and only then loads what counting needs.
+``python -c "from rig.bench.scene_probe import main; main()" FILE`` predicts the scene as the
+command does, notes what that has loaded and taken, and only then loads what counting needs. Bytes
+are counted where Python is started with ``-X tracemalloc``, which makes it slower.
 """
 
 from __future__ import annotations
@@ -25,15 +25,11 @@ COUNTED = {
 
 
 def main() -> None:
-    """Print what is asked for on the command line, as JSON."""
+    """Print what the scene of the command line costs, as JSON."""
     import io  # noqa: PLC0415 - loaded by Python itself
     import runpy  # noqa: PLC0415 - as by python -m
 
-    task, path = sys.argv[1:]
-    if task == "count":
-        import tracemalloc  # noqa: PLC0415 - only to count
-
-        tracemalloc.start()
+    path = sys.argv[1]
     stdout, sys.stdout = sys.stdout, io.StringIO()
     sys.argv = ["rig", "predict", path]
     try:
@@ -43,24 +39,21 @@ def main() -> None:
             raise
     finally:
         sys.stdout = stdout
-    if task == "time":
-        print(time.process_time())
-        return
-    import gc  # noqa: PLC0415 - only to count
+    seconds, modules = time.process_time(), sorted({*sys.modules} - {"rig.bench", __name__})
+
+    import gc  # noqa: PLC0415 - from here on nothing is counted as the scene's
+    import json  # noqa: PLC0415
+    import tracemalloc  # noqa: PLC0415
 
     gc.collect()
     held = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    modules = sorted({*sys.modules} - {"rig.bench", __name__, "tracemalloc", "gc"})
-
-    import json  # noqa: PLC0415 - from here on nothing is counted as the scene's
-
     from rig.predictions import predictions  # noqa: PLC0415
     from rig.protocol.reader import read  # noqa: PLC0415
 
     protocol = read(path)
     calls = count(lambda: predictions(protocol))
-    print(json.dumps({"modules": modules, "bytes": held, "calls": calls}))
+    print(json.dumps({"modules": modules, "bytes": held, "seconds": seconds, "calls": calls}))
 
 
 def count(work: Callable[[], object]) -> dict[str, int]:

@@ -17,9 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.bench.figures import scenes_figure
 from rig.bench.findings import Findings
-from rig.bench.work import processor_time
 from rig.errors import RigError
-from rig.predictions import predictions
 from rig.protocol.reader import parse
 from rig.streams import say
 from rig.text_table import text_table
@@ -41,7 +39,6 @@ PARTS = {
 """Modules and calls that only a scene with this part may need; no prediction has figures."""
 _PROBE = "from rig.bench.scene_probe import main; main()"
 _PROBES = 3
-_CALLS = 20
 
 _LEVEL = "surface: {restitution: 0.50}\ndrop: 180 mm\n"
 _INCLINED = "surface: {restitution: 0.50, friction: 0.20}\ndrop: 180 mm\n"
@@ -72,27 +69,28 @@ class Cost(NamedTuple):
     ----------
     modules
         Names of all modules that ``rig predict`` has loaded, Python's own included.
-    least_bytes, most_bytes
-        What Python holds when the command is done; from process to process.
+    bytes
+        What Python holds when the command is done, the least and the most of some processes.
     calls
         Of the prediction alone: of all functions, and of `rig.bench.scene_probe.COUNTED`.
-    command_s, compute_s
-        Processor time of ``rig predict``, Python's start included, and of the prediction alone.
-    shares
-        Each cost over that of the whole.
+    command_s, command_share
+        Processor time of ``rig predict``, Python's start included, and that over the whole's.
     gained
         What belongs to a part that this scene does not have; nothing, or the study fails.
     """
 
     scene: str
     modules: list[str]
-    least_bytes: int
-    most_bytes: int
+    bytes: tuple[int, int]
     calls: dict[str, int]
     command_s: float
-    compute_s: float
-    shares: dict[str, float]
+    command_share: float
     gained: tuple[str, ...]
+
+    @property
+    def rooms(self) -> list[str]:
+        """Modules of this program."""
+        return [name for name in self.modules if name.partition(".")[0] == "rig"]
 
 
 def ladder() -> dict[str, str]:
@@ -122,16 +120,17 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     texts |= {path.stem: path.read_text("utf-8") for path in paths}
     costs = measure(texts, arguments.rounds)
     names = [cost.scene for cost in costs]
+    whole = next(cost for cost in costs if cost.scene == "whole")
     panels = {
-        "modules\nof rig": [float(len(_rooms(cost))) for cost in costs],
-        "rig predict,\nof the whole": [cost.shares["command"] for cost in costs],
-        "calls,\nof the whole": [cost.shares["calls"] for cost in costs],
+        "modules\nof rig": [float(len(cost.rooms)) for cost in costs],
+        "rig predict,\nof the whole": [cost.command_share for cost in costs],
+        "calls,\nof the whole": [cost.calls["calls"] / whole.calls["calls"] for cost in costs],
     }
     rows = [_row(cost) for cost in costs]
     table = text_table([[*rows[0]], *([*row.values()] for row in rows)], left={0}, rule=True)
     yield Findings(
         {"python": sys.version.split()[0], "scenes": [cost._asdict() for cost in costs]},
-        [*table, *_remarks(costs)], _HEAD, rows, scenes_figure(names, panels),
+        [*table, *_remarks(costs, whole)], _HEAD, rows, scenes_figure(names, panels),
         failed=any(cost.gained for cost in costs),
     )  # fmt: skip
 
@@ -158,53 +157,42 @@ def measure(texts: Mapping[str, str], rounds: int) -> list[Cost]:
         files = {name: Path(folder) / f"{n}.yaml" for n, name in enumerate(texts)}
         for name, file in files.items():
             file.write_text(texts[name], "utf-8")
-        say("counting …")
+        say("counting and timing …")
         counts = {name: _count(file) for name, file in files.items()}
-        say("timing …")
         times = [
-            {name: _times(file, protocols[name]) for name, file in files.items()}
-            for _ in range(rounds)
+            {name: _probe(file)["seconds"] for name, file in files.items()} for _ in range(rounds)
         ]
-    for name, counted in counts.items():
-        shares: dict[str, float] = {}
-        for n, kind in enumerate(("command", "compute")):
-            counted[f"{kind}_s"] = median(turn[name][n] for turn in times)
-            shares[kind] = median(turn[name][n] / turn["whole"][n] for turn in times)
-        shares["calls"] = counted["calls"]["calls"] / counts["whole"]["calls"]["calls"]
-        counted["shares"] = shares
-        counted["gained"] = _gained(protocols[name], counted)
-    return [Cost(name, **counted) for name, counted in counts.items()]
+    return [
+        Cost(
+            name, **counted, command_s=median(turn[name] for turn in times),
+            command_share=median(turn[name] / turn["whole"] for turn in times),
+            gained=_unneeded_parts(protocols[name], counted),
+        )
+        for name, counted in counts.items()
+    ]  # fmt: skip
 
 
 def _count(file: Path) -> dict[str, Any]:
-    reports = [json.loads(_probe("count", file)) for _ in range(_PROBES)]
-    sizes = [report.pop("bytes") for report in reports]
-    report = reports[0]
-    if reports.count(report) < _PROBES:
+    reports = [_probe(file, "-X", "tracemalloc") for _ in range(_PROBES)]
+    sizes, _ = zip(*((each.pop("bytes"), each.pop("seconds")) for each in reports), strict=True)
+    if reports.count(reports[0]) < _PROBES:
         raise RigError(f"{file.name}: two equal runs do not count the same")
-    return {**report, "least_bytes": min(sizes), "most_bytes": max(sizes)}
+    return {**reports[0], "bytes": (min(sizes), max(sizes))}
 
 
-def _probe(task: str, file: Path) -> str:
-    """Have a fresh Python process look at a scene, and return what it prints."""
+def _probe(file: Path, *options: str) -> Any:
+    """Have a fresh Python process look at a scene, and return what it says."""
     process = subprocess.run(
-        [sys.executable, "-c", _PROBE, task, str(file)],
+        [sys.executable, *options, "-c", _PROBE, str(file)],
         capture_output=True, encoding="utf-8", check=False,
         env={**os.environ, "PYTHONHASHSEED": "0", "PYTHONUTF8": "1"},
     )  # fmt: skip
     if process.returncode:
         raise RigError("a scene could not be measured", process.stderr.strip())
-    return process.stdout
+    return json.loads(process.stdout)
 
 
-def _times(file: Path, protocol: Protocol) -> tuple[float, float]:
-    """Return the processor time of ``rig predict`` and of the prediction alone, s."""
-    command_s = float(_probe("time", file))
-    predictions(protocol)  # a first call is slow
-    return command_s, processor_time(lambda: predictions(protocol), _CALLS)[1]
-
-
-def _gained(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str, ...]:
+def _unneeded_parts(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str, ...]:
     """List what was loaded or called for parts that the scene does not have."""
     from_surface = any(rods.chain.alpha is None for rods in protocol.chains.values())
     present: dict[str, object] = {
@@ -216,27 +204,22 @@ def _gained(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(f"{name} ({part})" for part in absent for name in sorted(PARTS[part] & used))
 
 
-def _rooms(cost: Cost) -> list[str]:
-    return [name for name in cost.modules if name.partition(".")[0] == "rig"]
-
-
 def _row(cost: Cost) -> dict[str, str]:
     """Return a line of the table, which is also that of the CSV file."""
-    shares = {f"{name} ×": f"{share:.2g}" for name, share in cost.shares.items()}
+    least, most = cost.bytes
     return {
-        "scene": cost.scene, "modules": f"{len(cost.modules)}", "of rig": f"{len(_rooms(cost))}",
-        "MB held": f"{cost.least_bytes / 1e6:.2f}–{cost.most_bytes / 1e6:.2f}",
-        "command ms": f"{1e3 * cost.command_s:.1f}", "compute µs": f"{1e6 * cost.compute_s:.3g}",
-        **shares, **{name: f"{calls}" for name, calls in cost.calls.items()},
+        "scene": cost.scene, "modules": f"{len(cost.modules)}", "of rig": f"{len(cost.rooms)}",
+        "MB held": f"{least / 1e6:.2f}–{most / 1e6:.2f}",
+        "command ms": f"{1e3 * cost.command_s:.1f}", "command ×": f"{cost.command_share:.2g}",
+        **{name: f"{calls}" for name, calls in cost.calls.items()},
     }  # fmt: skip
 
 
-def _remarks(costs: Sequence[Cost]) -> Iterator[str]:
+def _remarks(costs: Sequence[Cost], whole: Cost) -> Iterator[str]:
     """Say what each scene leaves out that the whole has, and what one gained."""
-    whole = next(cost for cost in costs if cost.scene == "whole")
     yield from ("", "× is over the whole; left out of the whole:")
     for cost in costs:
-        without = sorted(set(_rooms(whole)) - set(_rooms(cost)))
+        without = sorted(set(whole.rooms) - set(cost.rooms))
         without += [name for name, calls in whole.calls.items() if calls and not cost.calls[name]]
         yield f"  {cost.scene}: {', '.join(without) or 'nothing'}"
     faults = [f"{cost.scene} gained {name}" for cost in costs for name in cost.gained]

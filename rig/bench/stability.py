@@ -10,16 +10,15 @@ from __future__ import annotations
 import math
 import warnings
 from decimal import Decimal
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.bench import references
 from rig.bench.extremes import Extreme, alone, pairs
 from rig.bench.problems import beam_fit, contact, fall_time
 from rig.bench.work import SLACK, WorkProblem, direct, relative_error
 from rig.errors import DomainError, RigError
+from rig.streams import say
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
 CONTACTS_S = tuple(10.0**-n for n in range(1, 13))
 BANDS_M = tuple(10.0**-n for n in range(6))
 KAPPAS = tuple(10.0**n for n in range(-15, 4, 2))
@@ -62,17 +61,13 @@ class StabilityRow(NamedTuple):
     note: str
 
 
-def stability(
-    *, quick: bool = False, say: Callable[[str], None] = lambda _: None
-) -> list[StabilityRow]:
+def stability(*, quick: bool = False) -> list[StabilityRow]:
     """Examine each quantity by itself, the problems of `rig.bench.problems`, and pairs.
 
     Parameters
     ----------
     quick
         Without chains of more than a thousand rods, and with few problems.
-    say
-        Told what goes on.
     """
     say("each quantity by itself …")
     cases = [of_fall(scene) for scene in alone() if not quick or len(scene.masses) <= _MANY]
@@ -133,6 +128,6 @@ def of_fall(scene: Extreme) -> WorkProblem:
     return WorkProblem(
         scene.name, scene.name, scene.inputs if rods <= _MANY else {},
         lambda **inputs: scene.exact({**scene.inputs, **inputs}), "legs in closed form",
-        [direct("rig", scene.predict), direct("as printed", scene.printed)],
+        [direct("rig", scene.predict), direct("as printed", scene.as_printed)],
         "rig", "as printed", slack=SLACK * math.sqrt(rods),
     )  # fmt: skip

@@ -152,36 +152,19 @@ class Point(NamedTuple):
         return row | {f"{quantity}_error": error for quantity, error in errors.items()}
 
 
-class LeftOut(NamedTuple):
-    """The first setting of a method that gave no answer, and why; dearer ones were not tried."""
-
-    problem: str
-    method: str
-    setting: str
-    reason: str
-
-
-class _Trial(NamedTuple):
-    """A setting that works, with its times so far."""
-
-    solve: Callable[[], Answer]
-    turns: int
-    calls: int
-    times: list[float]
-    point: Callable[..., Point]
-    """From what its times come to."""
-
-
-def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], list[LeftOut]]:
+def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], list[str]]:
     """Solve a problem by every method with every setting, and time them in turns.
+
+    Of a method that gives no answer at a setting dearer ones are not tried: it is left out from
+    there on, and why is the second value.
 
     Parameters
     ----------
     quick
         Two settings of each method, two turns.
     """
-    trials: list[_Trial] = []
-    left_out: list[LeftOut] = []
+    trials: list[tuple[partial[Answer], int, int, list[float], partial[Point]]] = []
+    left_out: list[str] = []
     exact = problem.exact(**problem.inputs)
     for method in problem.methods:
         for value in method.values[:6:3] if quick else method.values:
@@ -192,21 +175,21 @@ def measure(problem: WorkProblem, *, quick: bool = False) -> tuple[list[Point], 
                 if seconds < _SHARE_S:  # a first call also loads and compiles
                     answer, seconds = processor_time(solve)
             except RigError as error:
-                left_out.append(LeftOut(*names, error.message))
+                left_out.append(f"{names[0]}, {names[1]}, from {names[2]} on: {error.message}")
                 break  # what follows is dearer still
             errors = {name: relative_error(x, exact[name]) for name, x in answer.values.items()}
             worst = max(errors.values())
             point = partial(Point, *names, value, worst, errors, answer.evaluations)
             turns = 2 if quick else min(_TURNS, max(_FEWEST, round(_SHARE_S / seconds)))
-            trials.append(_Trial(solve, turns, max(1, round(_CALLS_S / seconds)), [], point))
+            trials.append((solve, turns, max(1, round(_CALLS_S / seconds)), [], point))
     for turn in range(_TURNS):
-        for trial in trials:
-            if turn < trial.turns:
-                trial.times.append(processor_time(trial.solve, trial.calls)[1])
+        for solve, turns, calls, times, _ in trials:
+            if turn < turns:
+                times.append(processor_time(solve, calls)[1])
     points = []
-    for trial in trials:
-        lower, middle, upper = statistics.quantiles(trial.times, n=4, method="inclusive")
-        points.append(trial.point(middle, lower, upper, trial.turns))
+    for _, turns, _, times, point in trials:
+        lower, middle, upper = statistics.quantiles(times, n=4, method="inclusive")
+        points.append(point(middle, lower, upper, turns))
     return points, left_out
 
 

@@ -84,10 +84,10 @@ def list_hashes(files: Mapping[str, bytes]) -> dict[str, bytes]:
 
 def pack(files: Mapping[str, bytes]) -> bytes:
     """Return the archive of some files."""
-    return zipped({ROOT + name: files[name] for name in sorted(files)}, zipfile.ZIP_STORED)
+    return zip_files({ROOT + name: files[name] for name in sorted(files)}, zipfile.ZIP_STORED)
 
 
-def zipped(files: Mapping[str, bytes], compression: int = zipfile.ZIP_DEFLATED) -> bytes:
+def zip_files(files: Mapping[str, bytes], compression: int = zipfile.ZIP_DEFLATED) -> bytes:
     """Put files into an archive in their order; the same files give the same bytes."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", compression, compresslevel=9) as archive:

@@ -270,8 +270,8 @@ class Flow:
         What went wrong last; empty when it is over.
     home
         Where a stage leads that ends without a drop.
-    not_armed, not_fired
-        Refusals in a row.
+    refusals
+        How often the device has refused to arm or to fire, since it fired last.
     row
         Voids in a row.
     attended
@@ -291,8 +291,7 @@ class Flow:
     judged: tuple[str, tuple[Reason, ...]] = ("", ())
     trouble: str = ""
     home: Stage = Stage.PREPARE
-    not_armed: int = 0
-    not_fired: int = 0
+    refusals: int = 0
     attended: bool = True
     row: VoidRow = ()
 
@@ -383,44 +382,37 @@ def _take_answer(flow: Flow, token: int | None) -> Outcome:
     if flow.stage is Stage.SETTLING:
         return flow.to(Stage.ARMING), (ArmRelease(job),)
     if flow.stage is Stage.ARMING:
-        armed = replace(flow.to(Stage.COUNTDOWN), not_armed=0)
-        return replace(armed, token=token or 0, left_s=flow.countdown_s), ()
+        return replace(flow.to(Stage.COUNTDOWN), token=token or 0, left_s=flow.countdown_s), ()
     if flow.stage is Stage.FIRING:
-        return replace(flow.to(Stage.LIVE), not_fired=0), (Collect(job),)
+        return replace(flow.to(Stage.LIVE), refusals=0), (Collect(job),)
     if flow.stage is Stage.LIVE:
         return flow.to(Stage.JUDGING), (Judge(job),)
     return replace(flow, logged=True), ()
 
 
 def _effect_failed(flow: Flow, event: EffectFailure) -> Outcome:
-    if flow.stage is Stage.ARMING:
-        return _not_armed(flow, event)
-    if flow.stage is Stage.FIRING:
-        return _not_fired(flow, event)
+    if flow.stage in {Stage.ARMING, Stage.FIRING}:
+        return _take_refusal(flow, event)
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
         return flow.to(flow.home, event.trouble), (GiveUp(),)
     unlogged = () if flow.logged else (GiveUp(),)
     return replace(flow, trouble=event.trouble, logged=True), unlogged
 
 
-def _not_armed(flow: Flow, event: EffectFailure) -> Outcome:
-    refusals, passes = flow.not_armed + 1, event.reason in _PASSING
-    if not passes or flow.attended or refusals >= LOOKS:
-        # Who attends has been asked, and arms again when all is well.
-        give_up = () if passes and flow.attended else (GiveUp(),)
+def _take_refusal(flow: Flow, event: EffectFailure) -> Outcome:
+    refusals, is_firing = flow.refusals + 1, flow.stage is Stage.FIRING
+    passes = event.reason in (_DISTURBED if is_firing else _PASSING)
+    # Who attends has been asked, and arms again when all is well.
+    give_up = () if passes and (flow.attended or refusals < LOOKS) else (GiveUp(),)
+    if is_firing:
+        # Whether it was let go is not known for sure when the answer is an error.
+        stop = Stop(event.trouble.partition("\n")[0])
+        flow = replace(flow.to(Stage.PREPARE, event.trouble), refusals=refusals)
+        return flow, (stop, *give_up)
+    if flow.attended or give_up:
         return flow.to(flow.home, event.trouble), give_up
     pause = event.detail / 1000 if event.reason is RefusalReason.COOLING else LOOK_S
-    return replace(flow.to(Stage.SETTLING), not_armed=refusals), (Wait(pause),)
-
-
-def _not_fired(flow: Flow, event: EffectFailure) -> Outcome:
-    refusals = flow.not_fired + 1
-    flow = replace(flow.to(Stage.PREPARE, event.trouble), not_fired=refusals)
-    # Whether it was let go is not known for sure when the answer is an error.
-    stop = Stop(event.trouble.partition("\n")[0])
-    if event.reason not in _DISTURBED or (not flow.attended and refusals >= LOOKS):
-        return flow, (stop, GiveUp())
-    return flow, (stop,)
+    return replace(flow.to(Stage.SETTLING), refusals=refusals), (Wait(pause),)
 
 
 def _tick(flow: Flow, seconds: float) -> Outcome:
@@ -432,7 +424,7 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
-        return replace(flow, job=job, not_armed=0).to(Stage.SETTLING), (Wait(settle_s),)
+        return replace(flow, job=job).to(Stage.SETTLING), (Wait(settle_s),)
     if flow.stage is Stage.RESULT and not flow.logged:
         return flow, ()  # what comes next depends on it
     if flow.stage is Stage.HALTED and flow.job is not None:

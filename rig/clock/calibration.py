@@ -25,6 +25,10 @@ HOST_U = 50e-6 / sqrt(3)
 _UNKNOWN = RESONATOR_TOLERANCE / sqrt(3)
 _ROUGH = 1e-4
 """Of a time scale, relative: 0.1 mm in a metre, far less than from rod to rod."""
+_WORDS = {
+    "pings": "device against host clock, {} samples",
+    "reference": "device against 1 Hz reference, {} pulses",
+}
 _FIRED_S = 1.0  # FIRED is logged before the request leaves; the device waits 0.25 s at most
 
 
@@ -207,84 +211,51 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
     identities = session.identities()
     nominal = next((board["tick_hz"] for _, board in identities if "tick_hz" in board), None)
     u = next((board["clock_u"] for _, board in identities if "clock_u" in board), _UNKNOWN)
+    said: dict[str, Any] = {"source": "stated", "rate_ppm": 0.0, "u_ppm": u * 1e6}
     if nominal is None:
         details = {"source": "times as the file gives them", "relative_u": u}
-        stated: dict[str, Any] = {
-            "source": "stated",
-            "rate_ppm": 0.0,
-            "u_ppm": u * 1e6,
-            "notes": [],
-        }
-        return Calibration(None, details, stated, u)
+        return Calibration(None, details, said | {"notes": []}, u)
     breaks = session.host_breaks()
     axis = one_axis(pings, [ns for ns, _ in identities], breaks)
     split = epochs(axis.pings, nominal, axis.cuts_ns)
     by_host = Source("pings", ping_rate(split), 0.0 if session.simulated else HOST_U)
-    sources = [by_host] if by_host.rate.n else []
-    if pulses := session.pulses():
-        shifted = [
-            pulse._replace(
-                host_send_ns=pulse.host_send_ns + shift, host_recv_ns=pulse.host_recv_ns + shift
-            )
-            for pulse in pulses
-            for shift in axis.shifts(pulse.host_send_ns)
-        ]
-        rate = pulse_rate(split, shifted, by_host.rate)
-        if rate.n:
-            sources.append(Source("reference", rate, reference_u))
+    shifted = [
+        pulse._replace(
+            host_send_ns=pulse.host_send_ns + shift, host_recv_ns=pulse.host_recv_ns + shift
+        )
+        for pulse in session.pulses()
+        for shift in axis.shifts(pulse.host_send_ns)
+    ]
+    reference = Source("reference", pulse_rate(split, shifted, by_host.rate), reference_u)
+    sources = [source for source in (by_host, reference) if source.rate.n]
     sources.sort(key=lambda source: source.mean().u)
     scale = sources[0].mean() if sources else TimeScale(nominal, _UNKNOWN)
-    said: dict[str, Any] = _record(sources, scale, nominal) | {
-        "epochs": len(split.pings),
-        "host_breaks": len(breaks),
-        "notes": _notes(sources, len(breaks)),
-    }
-    best = sources[0].rate if sources else by_host.rate
-    return Calibration(
-        scale,
-        {
-            "source": _words(sources),
-            "tick_hz": scale.hz,
-            "nominal_tick_hz": nominal,
-            "error_ppm": said["rate_ppm"],
-            "u_ppm": said["u_ppm"],
-            "samples": best.n,
-            "span_s": best.span_s,
-        },
-        said,
-        u,
-        tuple(sources),
-        FireTimes(split, scale.hz, axis, session.fired_ns()),
-    )
-
-
-def _record(sources: list[Source], scale: TimeScale, nominal: int) -> dict[str, Any]:
-    record: dict[str, Any] = {
-        "source": sources[0].name if sources else "stated",
-        "rate_ppm": (scale.hz / nominal - 1.0) * 1e6,
-        "u_ppm": scale.u * 1e6,
-        "nominal_tick_hz": nominal,
-    }
+    said |= {"rate_ppm": (scale.hz / nominal - 1.0) * 1e6, "u_ppm": scale.u * 1e6}
+    said["nominal_tick_hz"] = nominal
+    words, best = "nominal tick rate: too few clock samples", by_host
     if sources:
         best = sources[0]
-        record |= {"clock_u_ppm": best.u * 1e6, "span_s": best.rate.span_s}
+        words = _WORDS[best.name].format(best.rate.n)
+        said |= {"source": best.name, "clock_u_ppm": best.u * 1e6, "span_s": best.rate.span_s}
         if best.rate.track is not None:
-            record["wander_ppm_sqrt_h"] = best.rate.track.wander * 60.0 * 1e6
-    rates = {source.name: source.rate for source in sources}
-    if "pings" in rates:
-        record |= {"pings": rates["pings"].n, "outliers": rates["pings"].outliers}
-    if "reference" in rates:
-        record["pulses"] = rates["reference"].n
-    return record
-
-
-def _words(sources: list[Source]) -> str:
-    if not sources:
-        return "nominal tick rate: too few clock samples"
-    n = sources[0].rate.n
-    if sources[0].name == "reference":
-        return f"device against 1 Hz reference, {n} pulses"
-    return f"device against host clock, {n} samples"
+            said["wander_ppm_sqrt_h"] = best.rate.track.wander * 60.0 * 1e6
+    if by_host in sources:
+        said |= {"pings": by_host.rate.n, "outliers": by_host.rate.outliers}
+    if reference in sources:
+        said["pulses"] = reference.rate.n
+    said |= {"epochs": len(split.pings), "host_breaks": len(breaks)}
+    said["notes"] = _notes(sources, len(breaks))
+    details = {
+        "source": words,
+        "tick_hz": scale.hz,
+        "nominal_tick_hz": nominal,
+        "error_ppm": said["rate_ppm"],
+        "u_ppm": said["u_ppm"],
+        "samples": best.rate.n,
+        "span_s": best.rate.span_s,
+    }
+    fired = FireTimes(split, scale.hz, axis, session.fired_ns())
+    return Calibration(scale, details, said, u, tuple(sources), fired)
 
 
 def _notes(sources: list[Source], breaks: int) -> list[str]:

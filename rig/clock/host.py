@@ -28,13 +28,8 @@ class Clock(Protocol):
 class SystemClock:
     """The computer's monotonic clock."""
 
-    def now_ns(self) -> int:
-        """Monotonic host time."""
-        return time.monotonic_ns()
-
-    def sleep(self, seconds: float) -> None:
-        """Let time pass."""
-        time.sleep(seconds)
+    now_ns = staticmethod(time.monotonic_ns)
+    sleep = staticmethod(time.sleep)
 
 
 class HostClocks(NamedTuple):
@@ -93,13 +88,9 @@ class HostWatch:
         awake_ns = passed_ns = clocks.monotonic - last.monotonic
         if clocks.boottime is not None and last.boottime is not None:
             passed_ns = clocks.boottime - last.boottime
-        slept_ns = _large(passed_ns - awake_ns)
-        stepped_ns = _large(clocks.wall - last.wall - passed_ns)
+        moved = passed_ns - awake_ns, clocks.wall - last.wall - passed_ns
+        slept_ns, stepped_ns = (ns if abs(ns) >= TOLERANCE_NS else 0 for ns in moved)
         if not slept_ns and not stepped_ns:
             return None  # what is too small to tell stays in the comparison, and may add up
         self._last = clocks
         return HostBreak(clocks.monotonic, slept_ns, stepped_ns)
-
-
-def _large(difference_ns: int) -> int:
-    return difference_ns if abs(difference_ns) >= TOLERANCE_NS else 0

@@ -9,7 +9,7 @@ from rig.bench.figures import choice_figure, work_figure
 from rig.bench.findings import Findings
 from rig.bench.problems import problems
 from rig.bench.references import own_error
-from rig.bench.work import TARGETS, LeftOut, Point, WorkProblem, cheapest, measure
+from rig.bench.work import TARGETS, Point, WorkProblem, cheapest, measure
 from rig.commands.output import say
 from rig.commands.study import carry_out
 from rig.text_table import text_table
@@ -52,18 +52,16 @@ class Study:
         self._name, self._head = name, head
         self.problems: list[WorkProblem] = []
         self.points: list[Point] = []
-        self.left_out: list[LeftOut] = []
+        self.left_out: list[str] = []
 
-    def add(
-        self, problem: WorkProblem, points: Sequence[Point], left_out: Sequence[LeftOut]
-    ) -> None:
+    def add(self, problem: WorkProblem, points: Sequence[Point], left_out: Sequence[str]) -> None:
         """Take in what was measured of one more problem."""
         self.problems.append(problem)
         self.points += points
         self.left_out += left_out
 
-    def findings(self) -> Findings:
-        """Return the page, its pictures and its tables."""
+    def findings(self, table: Sequence[str] = ()) -> Findings:
+        """Return page, pictures and table; by default what to choose, with a picture of it."""
         pictures = {
             f"{self._name}-{problem.name}": work_figure(problem.title, self._of(problem))
             for problem in self.problems
@@ -73,10 +71,14 @@ class Study:
         record = {
             "problems": [{"name": one.name, "title": one.title} for one in self.problems],
             "points": [point._asdict() for point in self.points],
-            "left_out": [setting._asdict() for setting in self.left_out],
+            "left_out": self.left_out,
         }
-        lines, rows = [*self.table(), "", *self.remarks()], [point.row() for point in self.points]
-        return Findings(record, lines, head, rows, choice_figure(choices), pictures)
+        lines, rows = (
+            [*(table or self.table()), "", *self.remarks()],
+            [point.row() for point in self.points],
+        )
+        picture = "" if table else choice_figure(choices)
+        return Findings(record, lines, head, rows, picture, pictures)
 
     def _of(self, problem: WorkProblem) -> list[Point]:
         return [point for point in self.points if point.problem == problem.name]
@@ -96,13 +98,21 @@ class Study:
             rows.append([problem.title, best[0], *again])
         return text_table(rows, left=range(5), rule=True)
 
+    def points_table(self) -> list[str]:
+        """Return every point, for problems whose errors are far from `TARGETS`."""
+        rows = [["method", "setting", "error", "ms"]]
+        rows += [
+            [point.method, point.setting, f"{point.error:.1e}", f"{1e3 * point.cpu_s:.4g}"]
+            for point in self.points
+        ]
+        return text_table(rows, left={0, 1}, rule=True)
+
     def remarks(self) -> Iterator[str]:
         """Say how well references are known, and what was left out."""
         known = max(own_error(one.exact, one.inputs) for one in self.problems)
         routes = dict.fromkeys(one.route for one in self.problems)
         yield f"references, known to {max(1e-50, known):.0e}: {'; '.join(routes)}"
-        for one in self.left_out:
-            yield f"left out: {one.problem}, {one.method}, from {one.setting} on: {one.reason}"
+        yield from (f"left out: {setting}" for setting in self.left_out)
 
 
 def _words(point: Point | None) -> str:

@@ -11,7 +11,6 @@ from rig.bench.figures import conditioning_figure
 from rig.bench.findings import Findings
 from rig.bench.stability import VERDICTS, stability
 from rig.bench.work import EPSILON
-from rig.commands.output import say
 from rig.commands.study import carry_out
 from rig.text_table import text_table
 
@@ -30,7 +29,7 @@ def main(arguments: Namespace) -> int:
 
 
 def _examine(arguments: Namespace) -> Iterator[Findings]:
-    rows = stability(quick=arguments.quick, say=say)
+    rows = stability(quick=arguments.quick)
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in VERDICTS}
     records = plain([row._asdict() for row in rows])
     lines = [

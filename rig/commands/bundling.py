@@ -10,7 +10,7 @@ from rig.bundle.archive import pack
 from rig.bundle.contents import SESSION, bundle_files, copy_session
 from rig.commands.output import progress, say, tell_damage
 from rig.commands.report import make_report
-from rig.files import check_place, replacing
+from rig.files import write_atomic
 from rig.recover.examine import ExaminedFile, examine
 from rig.report.canvas import figure_file
 from rig.report.finding import deviations
@@ -38,7 +38,6 @@ class DerivedBundle(NamedTuple):
 
 def write_bundle(arguments: Namespace) -> int:
     """Write a session as a bundle; the same session gives the same bytes."""
-    check_place(arguments.bundle)
     secret = None
     if arguments.sign is not None:
         from rig.bundle import signing  # noqa: PLC0415 - an extra that few need
@@ -48,8 +47,7 @@ def write_bundle(arguments: Namespace) -> int:
         data = copy_session(session)
     derived = derive_bundle(data)
     files = signing.sign(derived.files, secret) if secret else derived.files
-    with replacing(arguments.bundle) as stream:
-        stream.write(pack(files))
+    write_atomic(arguments.bundle, pack(files))
     say(f"bundle: {arguments.bundle}; rig verify {arguments.bundle} checks it")
     return tell_damage(derived.analysis)
 
@@ -68,7 +66,7 @@ def derive_bundle(data: bytes) -> DerivedBundle:
         examined = examine(copy)
         with Session.open(copy, readonly=True) as session:
             # Every number from the raw edges: what is kept of earlier results proves nothing.
-            outcome = results(session, progress, fresh=True, with_joint_fit=True)
+            outcome = results(session, progress, fresh=True)
             report = make_report(session, outcome, "U95", estimate=False, fresh=True)
             drawn = {"report.html": report.html.encode()} | {
                 f"figures/figure-{number}.svg": figure_file(figure, "svg")

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
-from rig.commands.output import print_json
-from rig.errors import InputError
+from rig.commands.output import print_data
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
@@ -21,33 +20,21 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> int:
     """Describe a protocol, or what any protocol may say."""
-    if arguments.keys or arguments.schema:
+    if arguments.protocol is None:
         from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol
 
-        if arguments.schema:
-            print_json(schema())
-        else:
-            print(page().rstrip())
+        print_data(schema(), [page().rstrip()], as_json=arguments.schema)
         return 0
-    if arguments.protocol is None:
-        hint = "rig check PROTOCOL; rig check --keys lists all keys"
-        raise InputError("PROTOCOL is missing", hint)
     protocol = reader.read(arguments.protocol)
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
     if arguments.output:
-        _draw(protocol, Path(arguments.output))
+        from rig.report.canvas import write_figure  # noqa: PLC0415 - matplotlib, only here
+        from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
+
+        write_figure(Path(arguments.output), mounting_figure(protocol, check_gates(protocol)))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
     return 0
-
-
-def _draw(protocol: Protocol, path: Path) -> None:
-    gates = check_gates(protocol)
-    from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - matplotlib, only here
-    from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
-
-    kind_of(path)
-    write_figure(path, mounting_figure(protocol, gates))
 
 
 def _trials(protocol: Protocol) -> list[str]:

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rig.commands.output import VOID, print_data, progress, say
-from rig.files import check_place, write_atomic
+from rig.files import write_atomic
 from rig.report.canvas import write_figure
 from rig.report.comparison import (
     comparison_page,
@@ -21,8 +21,6 @@ from rig.session.store import Session
 
 def main(arguments: Namespace) -> int:
     """Compare sessions with the first of them."""
-    if arguments.output is not None:
-        check_place(arguments.output)
     together = read_together(arguments)
     lines = difference_lines(together)
     print_data(together.comparison_json(), lines, as_json=arguments.json)

@@ -13,8 +13,7 @@ from pathlib import Path
 
 from rig.board.process import BoardProcess
 from rig.commands.output import say
-from rig.daemon.listener import notify_systemd
-from rig.daemon.server import Server, logging_to
+from rig.daemon.server import Server
 from rig.daemon.socket_path import default_socket, require_sockets
 from rig.link.port import check_url
 from rig.printable import printable
@@ -63,18 +62,20 @@ def main(arguments: Namespace) -> int:
         say(f"rig daemon: {arguments.port} at {path}")
         for board in boards:
             say(f"rig daemon: page to look on, {board.words}")
-        notify_systemd()
 
-    with logging_to(StderrHandler()), ExitStack() as stack:
-        places = [] if arguments.board is None else [arguments.board]
-        boards = [stack.enter_context(closing(BoardProcess(*place))) for place in places]
+    logging.basicConfig(handlers=[StderrHandler()], level="INFO", format="%(message)s")
+    with ExitStack() as stack:
+        boards = [
+            stack.enter_context(closing(BoardProcess(*place)))
+            for place in filter(None, [arguments.board])
+        ]
         server = Server(
             arguments.port,
             path,
-            tcp=arguments.tcp,
             idle_s=arguments.idle_timeout,
             onlookers=[board.follow for board in boards],
         )
         asyncio.run(server.run(ready))
+    logging.shutdown()  # the last lines go out
     say("rig daemon: ended")
     return 0

@@ -12,27 +12,21 @@ from typing import TYPE_CHECKING
 
 from rig.analysis.result import GOOD
 from rig.commands import report
-from rig.commands.narration import narrator
-from rig.commands.output import exit_code, goes_on, say, show
-from rig.errors import InputError
+from rig.commands.output import exit_code, goes_on, say
 from rig.files import make_folder, write_atomic
 from rig.measurands import averaged
 from rig.ports import truth_file
+from rig.protocol.plan import runs
 from rig.protocol.reader import parse
 from rig.ready import ready_protocol
-from rig.recorder.interrupts import Interrupts
-from rig.report.estimate import symbol
 from rig.report.numbers import fixed, plus_minus
-from rig.results.estimated import session_estimate
-from rig.runner import run_protocol
-from rig.session.store import Session
+from rig.runner import Operator, run_protocol
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rig.analysis.session import Analysis
-    from rig.results import SessionResults
 
 _PROTOCOL = "inclined-uniform"
 _REPEATS = "repeats: 12 "
@@ -45,41 +39,25 @@ def main(arguments: Namespace) -> int:
     text = ready_protocol(_PROTOCOL).read_text("utf-8")
     assert _REPEATS in text
     text = text.replace(_REPEATS, f"repeats: {arguments.repeats} ")
-    inclines = len(parse(text).plan.inclines)
     write_atomic(protocol, text)
-    say(f"{inclines * arguments.repeats} drops of two chains, {arguments.repeats} at each incline")
-    again = (
-        f"rig demo -o {quote(str(folder))} --repeats {arguments.repeats} --seed {arguments.seed}"
-    )
-    with goes_on(f"{again} continues it"):
-        return _run_demo(protocol, session, arguments)
-
-
-def _run_demo(protocol: Path, session: Path, arguments: Namespace) -> int:
-    """Let chains fall, or those that have not fallen yet, and show what was found."""
-    interrupts = Interrupts()
-    with interrupts.caught():
-        operator = narrator(str(protocol), None)
-        outcome = run_protocol(
-            str(protocol), "sim://", str(session), operator, arguments.seed, interrupts
-        )
-    print("SIMULATED DATA")
-    print("\n".join(beside_truth(outcome.analysis, session)))
-    with Session.open(session, readonly=True) as recorded:
-        show([impacts(recorded, outcome)])
-    page = session.with_name("report.html")
-    places = {"session": str(session), "output": str(page), "figures": str(page.parent)}
-    usual = {"bars": "U95", "fresh": False, "estimate": False, "pdf": None}
-    code = report.main(Namespace(**places, **usual))
+    drops = len(runs(parse(text)))
+    say(f"{drops} drops of two chains, {arguments.repeats} at each incline")
+    options = f"--repeats {arguments.repeats} --seed {arguments.seed}"
+    with goes_on(f"rig demo -o {quote(str(folder))} {options} continues it"):
+        places = str(protocol), "sim://", str(session)
+        analysis = run_protocol(*places, Operator(say), arguments.seed).analysis
+        print("\n".join(["SIMULATED DATA", *beside_truth(analysis, session)]))
+        page = folder / "report.html"
+        usual = {"bars": "U95", "fresh": False, "estimate": False, "pdf": None}
+        code = report.main(Namespace(session=session, output=page, figures=folder, **usual))
     # A browser in a terminal would be in the way.
-    screens = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))
-    has_screen = sys.stdout.isatty() and (sys.platform == "darwin" or any(screens))
-    if arguments.open or has_screen:
+    has_screen = sys.platform == "darwin" or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()
+    if arguments.open or (has_screen and sys.stdout.isatty()):
         import webbrowser  # noqa: PLC0415 - only where somebody looks
 
         webbrowser.open(page.absolute().as_uri())
     say(f"show it: rig tui --session {session}\nyour own set-up: rig new my.yaml")
-    return code or exit_code(outcome.analysis)
+    return code or exit_code(analysis)
 
 
 def beside_truth(analysis: Analysis, session: Path) -> list[str]:
@@ -99,20 +77,18 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
     truths = {(truth["run"], truth["attempt"]): truth for truth in lines}
     rows: list[dict[str, str]] = []
     agreements: list[bool] = []
-    for result in analysis.runs:
+    for result in sorted(analysis.runs, key=lambda result: result.run.incline_deg):
         true = truths.get((result.run.number, result.attempt))
         if true is None or result.verdict not in GOOD:
             continue
         cells = {"incline (°)": f"{result.run.incline_deg:g}"}
         for row in averaged():
             value, hidden = result.quantities.get(row.name), true.get(row.name)
-            if value is None or hidden is None:
-                continue
-            cells[f"{row.symbol} ± U ({row.unit})"] = plus_minus(value, row.scale, row.decimals)
-            cells[f"true {row.symbol}"] = fixed(hidden * row.scale, row.decimals)
-            agreements.append(abs(value.value - hidden) <= value.expanded)
+            if value is not None and hidden is not None:
+                cells[f"{row.symbol} ± U ({row.unit})"] = plus_minus(value, row.scale, row.decimals)
+                cells[f"true {row.symbol}"] = fixed(hidden * row.scale, row.decimals)
+                agreements.append(abs(value.value - hidden) <= value.expanded)
         rows.append(cells)
-    rows.sort(key=lambda cells: float(cells["incline (°)"]))
     if not rows:
         return ["no good drop to compare with the truth"]
     headings = max(rows, key=len)
@@ -122,17 +98,3 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
         f"{sum(agreements)} of {len(agreements)} results agree with the hidden truth "
         "within ± U (95 % expected)",
     ]
-
-
-def impacts(session: Session, results: SessionResults) -> str:
-    """Say which β and μ the drops tell, beside those that the simulated board has."""
-    try:
-        coefficients = session_estimate(session, results).coefficients
-    except InputError as error:
-        return error.message
-    parts = [
-        f"{symbol(value.name)} {plus_minus(value.least_squares)} (hidden: {value.stated.value:g})"
-        for value in (coefficients.parameters if coefficients else ())
-        if value.identified
-    ]
-    return f"from all impacts: {', '.join(parts).replace('-', '−') or 'too few drops'}"

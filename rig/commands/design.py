@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.components import Components, stated
+from rig.analysis.components import Components, priors
 from rig.commands.output import print_data, say
 from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
@@ -13,7 +13,7 @@ from rig.design.rewriting import rewrite_heights
 from rig.design.search import better, room
 from rig.design.trials import readable, trials, trials_text
 from rig.errors import InputError
-from rig.files import check_place, write_atomic
+from rig.files import write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable
@@ -33,22 +33,19 @@ SPACING_M = 0.01
 
 def main(arguments: Namespace) -> int:
     """Predict the uncertainties of a layout, and search for a better layout."""
-    if arguments.output and arguments.no_search:
-        raise make_error(InputError, "proposal_unwanted")
-    if arguments.output:
-        check_place(arguments.output)
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
     check_gates(protocol)
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
-    components = stated(protocol) if arguments.learned is None else _read_scatter(arguments.learned)
+    learned = arguments.learned
+    components = _read_scatter(learned, protocol) if learned else priors(protocol)
     limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing or SPACING_M)
     if limits.lowest > limits.highest:
         raise make_error(InputError, "beams_reversed")
     layouts: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
-        "scatter": "stated" if arguments.learned is None else "learned",
+        "scatter": "learned" if learned else "stated",
         "current": _forecast(protocol, components),
     }
     if not arguments.no_search:
@@ -61,13 +58,15 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def _read_scatter(path: str) -> Components:
+def _read_scatter(path: str, protocol: Protocol) -> Components:
     """Return the scatter of an earlier session of the same rig."""
-    from rig.results import detailed  # noqa: PLC0415 - only with --learned
+    from rig.results import complete_analysis, protocol_of  # noqa: PLC0415 - only with --learned
     from rig.session.store import Session  # noqa: PLC0415
 
     with Session.open(path, readonly=True) as session:
-        joint = detailed(session)[0].joint
+        if (protocol_of(session).surface is None) != (protocol.surface is None):
+            raise make_error(InputError, "scatter_unlike", path=path, protocol=protocol.title)
+        joint = complete_analysis(session).joint
     if joint is None:
         raise make_error(InputError, "scatter_unknown", path=path)
     return joint.components
@@ -118,13 +117,12 @@ def design_lines(design: Mapping[str, Any]) -> list[str]:
         *text_table([["quantity", *layouts], *rows], left={0}, rule=True),
     ]
     for name, layout in layouts.items():
-        heights: dict[str, list[str]] = {}
-        for gate in layout["gates"]:
-            heights.setdefault(gate["side"], []).append(f"{gate['height_m'] * 1e3:g}")
         lines.append("")
-        for side, millimetres in heights.items():
-            where = f", {side} side" if len(heights) > 1 else ""
-            lines.append(f"{name}{where} (mm): {', '.join(millimetres)}")
+        sides = dict.fromkeys(gate["side"] for gate in layout["gates"])
+        for side in sides:
+            where = f", {side} side" if len(sides) > 1 else ""
+            heights = (gate["height_m"] for gate in layout["gates"] if gate["side"] == side)
+            lines.append(f"{name}{where} (mm): {', '.join(f'{1e3 * z:g}' for z in heights)}")
         lines.append(f"{name}: {layout['trials']['text']}")
         if not layout["readable"]:
             lines.append(
@@ -136,16 +134,13 @@ def design_lines(design: Mapping[str, Any]) -> list[str]:
 
 def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:
     """Write the standard uncertainty of each quantity of one run, and of each coefficient."""
-    cells = {}
-    for line in layout["measurands"]:
-        row = MEASURANDS[line["name"]]
-        if row.told:
-            name = f"{row.symbol} of one run ({row.fine})"
-            cells[name] = _plain(line["u_run"] * row.fine_scale)
-    for line in layout["coefficients"]:
-        cells[symbol(line["name"])] = _plain(line["u"]) if line["identified"] else "not identified"
-    return cells
-
-
-def _plain(uncertainty: float) -> str:
-    return fixed(uncertainty, decimals_for(uncertainty))
+    runs = [(MEASURANDS[line["name"]], line["u_run"]) for line in layout["measurands"]]
+    u = {f"{row.symbol} of one run ({row.fine})": u * row.fine_scale for row, u in runs if row.told}
+    u |= {
+        symbol(line["name"]): line["u"] if line["identified"] else None
+        for line in layout["coefficients"]
+    }
+    return {
+        name: "not identified" if value is None else fixed(value, decimals_for(value))
+        for name, value in u.items()
+    }

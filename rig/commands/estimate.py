@@ -6,7 +6,6 @@ from argparse import Namespace
 from dataclasses import replace
 from typing import Any
 
-from rig.cache.entry import CacheEntry
 from rig.commands.output import print_json, progress, say, tell_damage
 from rig.files import make_folder
 from rig.report.estimate import estimate_text
@@ -23,7 +22,7 @@ def main(arguments: Namespace) -> int:
         folder = None if arguments.output is None else make_folder(arguments.output)
         check_open(session, protocol_of(session))
         fresh = arguments.fresh
-        outcome = results(session, progress, fresh=fresh, with_joint_fit=True)
+        outcome = results(session, progress, fresh=fresh)
         estimate = session_estimate(session, outcome, progress, fresh=fresh)
     analysis, simulated = outcome.analysis, outcome.simulated
     likeness = None if analysis.rig is None else analysis.rig.likeness
@@ -38,12 +37,7 @@ def main(arguments: Namespace) -> int:
     if folder is not None:
         from rig.report.canvas import write_figure  # noqa: PLC0415 - likewise
 
-        entry = CacheEntry(dict, "estimate pictures", outcome.digest, fresh=fresh)
-        drawn = entry.find()
-        if drawn is None:
-            drawn = estimate_pictures(estimate, sections)
-            drawn = drawn if sections.failed or estimate.failed else entry.keep(drawn)
-        for name, figure in drawn.items():
+        for name, figure in estimate_pictures(estimate, sections).items():
             write_figure(folder / f"{name}.svg", replace(figure, simulated=simulated))
             say(f"{folder / name}.svg")
     for sentence in sections.failed.values():

@@ -6,17 +6,13 @@ from argparse import Namespace
 
 from rig.bundle.tables import csv_files
 from rig.commands.output import progress, say, tell_damage
-from rig.errors import InputError
 from rig.files import make_folder, write_atomic
-from rig.reasons import make_error
 from rig.results import results
 from rig.session.store import Session
 
 
 def main(arguments: Namespace) -> int:
     """Write a session as CSV files, or as one file that another person can check."""
-    if arguments.sign is not None and arguments.bundle is None:
-        raise make_error(InputError, "sign_without_bundle")
     if arguments.bundle is not None:
         from rig.commands.bundling import write_bundle  # noqa: PLC0415 - it draws a report
 

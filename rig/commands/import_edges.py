@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.analysis.chain_records import chain_records
-from rig.analysis.components import stated
+from rig.analysis.components import priors
 from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity
 from rig.analysis.identify import log_evidence, most_votes
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 _COMPARED = 3
 """Drops that are compared with falls: as many as tell a way of reading from another."""
+_MOST = 120
+"""Drops that are compared at most, evenly over a long session."""
 
 
 def main(arguments: Namespace) -> int:
@@ -90,11 +92,12 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     evidence, gravity = 0.0, list[float]()
     results: list[DropResult] = []
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
-    for drop in [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]:
+    compared = [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]
+    for drop in compared[:: 1 + len(compared) // _MOST]:
         run = planned[drop.run]
         records = chain_records(protocol, run, drop, TICK_HZ)
-        votes = sum(most_votes(protocol, record, rate.u, stated(protocol)) for record in records)
-        due = sum(record.expected for record in records)
+        votes = sum(most_votes(protocol, record, rate.u, priors(protocol)) for record in records)
+        due = sum(record.edge_count for record in records)
         shares.append(votes / max(1, len(drop.edges), due))
         near, expected = near + votes, expected + due
         if exact and len(results) < _COMPARED:
@@ -102,7 +105,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
             evidence += log_evidence(fit) if fit else 0.0
             gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
             results.append(result)
-    text = make_reason("falls_fit", runs=len(drops), near=near, due=expected).text
+    text = make_reason("falls_fit", runs=len(shares) - 1, near=near, due=expected).text
     if gravity:
         text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)

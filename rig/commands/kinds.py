@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from rig.boards import GATES
+from rig.files import check_new, check_place
 from rig.ready import find_protocol
 
 
@@ -20,7 +21,7 @@ class _ListFormats(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         rows = import_module("rig.timers.vocabulary").read_rows("formats.txt", "|")
-        print("\n".join(f"{name}: {how}; {example}" for name, _, how, example in rows))
+        print("\n".join(f"{name}: {how}; {example}" for name, how, example in rows))
         parser.exit()
 
 
@@ -39,12 +40,33 @@ def _accept(
     return {"type": convert}
 
 
-def _place(name: str, text: str) -> str:
-    """Read a file's place: in a folder it has this name, else at least its ending."""
-    if text.endswith("/") or os.path.isdir(text):  # noqa: PTH112 - pathlib takes 5 ms
-        return os.path.join(text, name)  # noqa: PTH118
-    named = os.path.splitext(text)[1] or os.path.exists(text)  # noqa: PTH110, PTH122
-    return text if named else text + os.path.splitext(name)[1]  # noqa: PTH122
+def _place(names: str, text: str) -> str:
+    """Read a file's place: in a folder it has the first name, else its ending or another one.
+
+    What ends otherwise is of another kind, such as a protocol that a page would replace.
+
+    Raises
+    ------
+    InputError
+        A file could not be written there.
+    """
+    name, *others = names.split(",")
+    endings = os.path.splitext(name)[1], *others  # noqa: PTH122 - pathlib takes 5 ms
+    if text.endswith("/") or os.path.isdir(text):  # noqa: PTH112
+        text = os.path.join(text, name)  # noqa: PTH118
+    elif not os.path.splitext(text)[1]:  # noqa: PTH122
+        text = text if os.path.exists(text) else text + endings[0]  # noqa: PTH110
+    elif not text.endswith(endings):
+        raise argparse.ArgumentTypeError(f"found '{text}'; accepted endings: {', '.join(endings)}")
+    check_place(text)
+    return text
+
+
+def _new_place(names: str, text: str) -> str:
+    """Read a place as `_place` does where no file is yet: people wrote what it would replace."""
+    place = _place(names, text)
+    check_new(place)
+    return place
 
 
 def _quantity(text: str, dimension: str) -> float:
@@ -61,7 +83,7 @@ def _socket(name: str) -> str:
 _NAME = _accept("letters, digits, - and _", str, re.compile(r"(?a:[\w-]{1,40})").fullmatch)
 """A rig's name, which becomes a part of a file's."""
 KINDS: dict[str, dict[str, Any]] = {
-    "int": {"type": int},
+    "int": _accept("a whole number", int, lambda _: True),
     "count": _accept("a whole number, 1 or more", int, lambda n: n >= 1),
     "gates": _accept(
         f"numbers from 0 to {GATES - 1}, with commas between",
@@ -94,11 +116,8 @@ KINDS: dict[str, dict[str, Any]] = {
         lambda text: _quantity(text, "NUMBER"),
         lambda share: 0.0 <= share < 0.1,
     ),
-    "trials": _accept(
-        "a whole number or adaptive",
-        lambda text: text if text == "adaptive" else int(text),
-        lambda trials: trials == "adaptive" or trials >= 1,
-    ),
+    "trials": _accept("a whole number from 2", int, lambda trials: trials >= 2),
     "file": {"type": _place},
+    "new": {"type": _new_place},
     "formats": {"action": _ListFormats, "nargs": 0},
 }

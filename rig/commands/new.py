@@ -6,21 +6,21 @@ import sys
 import tempfile
 from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from rig.boards import BOARDS, GATES
 from rig.commands.output import print_results
 from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import check_new, write_atomic
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.draft import SCENES, Draft, Scene, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.ready import WIRED
-from rig.recorder.interrupts import Interrupts
-from rig.report.canvas import write_figure
+from rig.report.canvas import figure_file
 from rig.report.mounting import mounting_figure
 from rig.report.wiring import wiring_drawing
 from rig.runner import Operator, run_protocol
@@ -38,26 +38,24 @@ _CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
 def main(arguments: Namespace) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
     path = Path(arguments.output)
-    mounting, wiring = (
-        path.with_name(f"{path.stem}-{drawing}.svg") for drawing in ("mounting", "wiring")
-    )
-    for file in (path, mounting, wiring):
-        if file.exists():
-            raise InputError(f"{file} already exists", "name a new file, or move this file away")
-    if path.suffix not in {".yaml", ".yml"}:
-        raise InputError(f"{path}: the name of a protocol ends in .yaml")
+    places = {word: path.with_name(f"{path.stem}-{word}.svg") for word in ("mounting", "wiring")}
+    for place in places.values():
+        check_new(place)
     board, draft = _read_answers(arguments, path)
     text = draft_text(draft)
     protocol = reader.parse(text, str(path))
     check_recordable(protocol, BOARDS.get(board))
-    write_atomic(path, text)
-    say(f"protocol: {path}")
     assert protocol.gates is not None
-    write_figure(mounting, mounting_figure(protocol, protocol.gates))
-    say(f"mounting: {mounting}")
+    texts: dict[str, str | bytes] = {"protocol": text}
+    texts["mounting"] = figure_file(mounting_figure(protocol, protocol.gates), "svg")
     if board in WIRED:
-        write_atomic(wiring, wiring_drawing(protocol, board))
-        say(f"wiring: {wiring}")
+        texts["wiring"] = wiring_drawing(protocol, board)
+    with ExitStack() as undo:  # a disk that is full half-way is left as it was
+        for word, content in texts.items():
+            write_atomic(places.get(word, path), content)
+            undo.callback(places.get(word, path).unlink)
+        undo.pop_all()
+    say("\n".join(f"{word}: {places.get(word, path)}" for word in texts))
     print(describe(protocol, notes(protocol)))
     print("\nFour simulated drops")
     return _simulate(draft)
@@ -71,10 +69,12 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     scene: Scene = next(name for name in SCENES if name == word)
     answers: dict[str, Any] = {"rods": "1", "length": "", "incline": ""}
     lines = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-    rows = (map(str.strip, line.split("|")) for line in lines if not line.startswith("#"))
-    for scenes, option, question, usual in rows:
-        if scenes and scene not in scenes.split():
-            continue
+    rows = [[*map(str.strip, line.split("|"))] for line in lines if not line.startswith("#")]
+    fitting = [row for row in rows if not row[0] or scene in row[0].split()]
+    for option in {row[1] for row in rows} - {row[1] for row in fitting}:
+        if getattr(arguments, option) is not None:
+            raise InputError(f"--{option}: not in the scene {scene}", "leave it out")
+    for _, option, question, usual in fitting:
         many = option == "incline" and answers.get("aim") == _COEFFICIENTS
         default = _MANY_INCLINES if many else usual
         words = {"board": (*BOARDS, "other"), "aim": (usual, _COEFFICIENTS)}.get(option, ())
@@ -117,9 +117,8 @@ def _count(name: str, text: str, limit: int) -> int:
 
 def _simulate(draft: Draft) -> int:
     """Simulate four drops of the drafted scene, and print the results."""
-    interrupts = Interrupts()
-    with tempfile.TemporaryDirectory() as folder, interrupts.caught():
+    with tempfile.TemporaryDirectory() as folder:
         protocol, session = (Path(folder) / f"trial.{end}" for end in ("yaml", "session"))
         write_atomic(protocol, draft_text(draft.trial()))
-        results = run_protocol(str(protocol), "sim://", str(session), Operator(say), 1, interrupts)
+        results = run_protocol(str(protocol), "sim://", str(session), Operator(say), 1)
         return print_results(results, as_json=False)

@@ -6,6 +6,7 @@ from argparse import Namespace
 
 from rig.errors import InputError
 from rig.reasons import make_error, plain_reason
+from rig.report.numbers import ranges
 from rig.session.store import Session
 from rig.wordings import NOTE
 
@@ -15,7 +16,8 @@ def main(arguments: Namespace) -> int:
     with Session.open(arguments.session) as session:
         last = session.latest_state(arguments.run)
         if last is None or session.drop(last.run, last.attempt) is None:
-            values = {"path": arguments.session, "run": arguments.run}
+            runs = ranges("run", [drop.run for drop in session.latest_drops()])
+            values = {"path": arguments.session, "run": arguments.run, "runs": runs}
             raise make_error(InputError, "run_unrecorded", **values)
         reasons = (*last.reasons, plain_reason(arguments.text, NOTE))
         # The host's clock may have begun anew since the drop: the entry keeps the drop's time.

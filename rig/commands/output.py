@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import re
 import sys
 from contextlib import contextmanager
 from shutil import get_terminal_size
@@ -13,17 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from rig.command_help import runnable
 from rig.streams import say as narrate
-from rig.streams import tolerated
+from rig.streams import tolerate_broken
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from rig.analysis.session import Analysis
     from rig.results import SessionResults
     from rig.selftest.findings import Finding
 
 VOID = 3
-GO_ON = "  then press Enter (Ctrl-C stops; the same command continues) "
 
 
 def say(line: str) -> None:
@@ -40,30 +37,14 @@ def goes_on(hint: str) -> Iterator[None]:
         raise KeyboardInterrupt(hint) from None
 
 
-_ODD = re.compile(r"\b(void|rejected|marginal|disagrees)\b")
-"""Words that have a colour on a terminal, and say the same without."""
 _GAP = "   "  # as between cells of a table, whose lines are not broken
 
 
 def show(lines: Iterable[str]) -> None:
-    """Print results; on a terminal with colours, and sentences broken at its width."""
-    if not sys.stdout.isatty():
-        print("\n".join(lines))
-        return
-    width = get_terminal_size().columns
+    """Print results; on a terminal with sentences broken at its width."""
+    width = get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
     for line in lines:
-        for part in _break_sentence(line, width):
-            print(tint(part))
-
-
-def tint(text: str) -> str:
-    """Colour what is not as it should be, unless the reader wants none (no-color.org)."""
-    return _ODD.sub("\x1b[33m\\1\x1b[0m", text) if has_colours() else text
-
-
-def has_colours() -> bool:
-    """Whether a terminal may be given colours."""
-    return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+        print("\n".join(_break_sentence(line, width)))
 
 
 def _break_sentence(line: str, width: int) -> list[str]:
@@ -89,7 +70,7 @@ def stage(label: str) -> None:
         Empty to clear the line.
     """
     if sys.stderr.isatty():
-        with tolerated(sys.stderr):
+        with tolerate_broken(sys.stderr):
             print(f"\r\x1b[K{label}", end="", file=sys.stderr, flush=True)
 
 
@@ -101,18 +82,16 @@ def print_data(data: Mapping[str, Any], lines: Iterable[str], *, as_json: bool) 
         show(lines)
 
 
-def print_findings(
-    key: str, findings: Iterable[Finding], write: Callable[[Finding], str], *, as_json: bool
-) -> list[Finding]:
-    """Print each finding as soon as it is made, or all of them as JSON; return them."""
+def print_findings(key: str, findings: Iterable[Finding], *, as_json: bool) -> int:
+    """Print each finding as soon as it is made, or all of them as JSON; count those that failed."""
     checks = []
     for finding in findings:
         checks.append(finding)
         if not as_json:
-            print(write(finding), flush=True)
+            print(runnable(str(finding)), flush=True)
     if as_json:
         print_json({key: [finding.json() for finding in checks]})
-    return checks
+    return sum(finding.failed for finding in checks)
 
 
 def print_json(data: Mapping[str, Any]) -> None:

@@ -6,10 +6,9 @@ from argparse import Namespace
 from collections import Counter
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import asdict
 from typing import Any
 
-from rig.commands.output import print_json, say
+from rig.commands.output import print_data, say
 from rig.errors import DeviceError
 from rig.flash.drive import sees_boot_pico, waiting_drives
 from rig.link.client import Device
@@ -21,20 +20,16 @@ from rig.usb.listing import SerialPort, serial_ports
 def main(arguments: Namespace) -> int:
     """List the ports, and ask who is there where that is wanted."""
     ports = serial_ports()
-    listed = {port.path for port in ports}
-    asked: dict[str, dict[str, Any]] = {}
-    if arguments.identify is not None:
-        chosen = arguments.identify or [port.path for port in ports if port.candidate]
-        asked = {path: _identify(path) for path in chosen}
-    why = "not a serial port of this computer"
-    ports += [SerialPort(path, skipped=why) for path in asked if path not in listed]
+    chosen = arguments.identify
+    if chosen == []:
+        chosen = [port.path for port in ports if port.candidate]
+    why, listed = "not a serial port of this computer", {port.path for port in ports}
+    ports += [SerialPort(path, skipped=why) for path in chosen or () if path not in listed]
+    records = [_describe(port, ask=port.path in (chosen or ())) for port in ports]
+    print_data({"ports": records}, map(_line, records), as_json=arguments.json)
     if arguments.json:
-        print_json({"ports": [_fields(port, asked) for port in ports]})
         return 0
-    for port in ports:
-        print(_line(port, asked.get(port.path)))
-    identities = (answer["identity"] for answer in asked.values() if answer["identity"])
-    ids = Counter(identity["unique_id"] for identity in identities)
+    ids = Counter(record["identity"]["unique_id"] for record in records if record["identity"])
     for shared in (number for number, count in ids.items() if count > 1):
         say(f"several boards have the id {shared}: erase the EEPROM of all but one board")
     for drive in waiting_drives():
@@ -46,33 +41,30 @@ def main(arguments: Namespace) -> int:
     return 0
 
 
-def _identify(path: str) -> dict[str, Any]:
-    """Ask who is at a port; what is wrong there is an answer too."""
-    try:
-        with closing(open_port(path)) as port:
-            identity = Device(port, port_clock(port), tries=3).connect()
-    except DeviceError as error:
-        return {"identity": None, "trouble": str(error)}
-    return {"identity": identity.json(), "trouble": None}
+def _describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
+    """Say what a port is and, where asked, who is there; what is wrong there is an answer too."""
+    record = port._asdict() | {"kind": port.kind, "candidate": port.candidate}
+    identity, trouble = None, None
+    if ask:
+        try:
+            with closing(open_port(port.path)) as opened:
+                identity = Device(opened, port_clock(opened), tries=3).connect().json()
+        except DeviceError as error:
+            trouble = str(error)
+    return record | {"identity": identity, "trouble": trouble}
 
 
-def _fields(port: SerialPort, asked: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
-    fields = {"kind": port.kind, "candidate": port.candidate, "identity": None, "trouble": None}
-    return asdict(port) | fields | asked.get(port.path, {})
-
-
-def _line(port: SerialPort, answer: Mapping[str, Any] | None) -> str:
-    parts = [port.path]
-    if port.vid is not None and port.pid is not None:
-        parts.append(f"USB {port.vid:04x}:{port.pid:04x}")
-    if port.serial_number:
-        parts.append(f"serial number {port.serial_number}")
-    parts += filter(None, dict.fromkeys([port.product, port.kind]))
-    if answer is None:
-        parts.append(f"skipped: {port.skipped}" if port.skipped else "a candidate")
-    elif answer["identity"] is None:
-        parts.append(answer["trouble"].replace("\n", ";"))
-    else:
-        identity = answer["identity"]
+def _line(port: Mapping[str, Any]) -> str:
+    parts = [port["path"]]
+    if None not in {port["vid"], port["pid"]}:
+        parts.append(f"USB {port['vid']:04x}:{port['pid']:04x}")
+    if port["serial_number"]:
+        parts.append(f"serial number {port['serial_number']}")
+    parts += filter(None, dict.fromkeys([port["product"], port["kind"]]))
+    if identity := port["identity"]:
         parts.append(f"{identity['board']}, {identity['firmware']}, id {identity['unique_id']}")
+    elif port["trouble"]:
+        parts.append(port["trouble"].replace("\n", ";"))
+    else:
+        parts.append(f"skipped: {port['skipped']}" if port["skipped"] else "a candidate")
     return "  ".join(parts)

@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING
 
 from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import print_data, say
-from rig.errors import InputError
-from rig.files import check_place, write_atomic
+from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED, Measurand
 from rig.predictions import group_notes, predictions
 from rig.protocol import reader
-from rig.reasons import make_error
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import csv_text, text_table
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from rig.model.prediction import PredictedIncline
     from rig.protocol.protocol import Protocol
@@ -28,13 +26,8 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> int:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
-        if arguments.protocol is not None:
-            values = {"figure": arguments.figure, "path": arguments.protocol}
-            raise make_error(InputError, "figure_of_paper", **values)
-        _write_figure(arguments.figure, arguments.output, resolved=arguments.resolved)
+        _write_figure(arguments.figure, arguments.output)
         return 0
-    if arguments.protocol is None:
-        raise make_error(InputError, "predict_nothing")
     protocol = reader.read(arguments.protocol)
     lines = predictions(protocol)
     data = {"predictions": [line.json() for line in lines]}
@@ -79,40 +72,15 @@ def _number(value: float | None, u: float | None, row: Measurand) -> str:
     return plus_minus(SimpleNamespace(value=value, expanded=COVERAGE_95 * u), row.scale)
 
 
-def _write_figure(number: int, output: str | None, *, resolved: bool) -> None:
+def _write_figure(number: int, output: str) -> None:
     """Write a figure of the paper, and its numbers as CSV beside it."""
-    from rig.report.canvas import kind_of, write_figure  # noqa: PLC0415 - it needs matplotlib
+    from rig.report.canvas import write_figure  # noqa: PLC0415 - it needs matplotlib
     from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
 
-    if output is None:
-        raise make_error(InputError, "figure_nowhere", figure=number)
     path = Path(output)
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
-    kind_of(picture)
-    check_place(picture)
-    falls = _resolve(number) if resolved else None
-    drawing, columns = paper_figure(number, falls)
-    write_figure(picture, drawing)
-    written = {path.with_suffix(".csv"): _table(columns)}
-    if falls is not None:
-        written[path.with_name(f"{path.stem}-resolved.csv")] = _table(falls)
-    for file, text in written.items():
-        write_atomic(file, text)
-    say(" and ".join(map(str, [picture, *written])))
-
-
-def _table(columns: Mapping[str, list[float]]) -> str:
+    drawing, columns = paper_figure(number)
     rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-    return csv_text(columns, rows)
-
-
-def _resolve(number: int) -> dict[str, list[float]]:
-    """Let the figure's chains fall in the resolved world."""
-    from rig.bench import resolved_paper  # noqa: PLC0415 - only where chains really fall
-
-    if number not in {3, 4}:
-        raise make_error(InputError, "figure_unresolved", figure=number)
-    say("simulating drops rod by rod; this takes some minutes")
-    if number == 3:
-        return resolved_paper.figure_3(resolved_paper.uniform())
-    return resolved_paper.figure_4(resolved_paper.graded())
+    write_figure(picture, drawing)
+    write_atomic(path.with_suffix(".csv"), csv_text(columns, rows))
+    say(f"{picture} and {path.with_suffix('.csv')}")

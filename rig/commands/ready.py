@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from pathlib import Path
 
 from rig.commands.output import say
-from rig.errors import InputError
-from rig.files import write_atomic
+from rig.files import check_new, write_atomic
 from rig.protocol import reader
 from rig.ready import ready_protocol, ready_protocols
 from rig.text_table import text_table
@@ -20,10 +18,9 @@ def main(arguments: Namespace) -> int:
         print("\n".join(text_table(rows, left={0, 1})))
         say("try one: rig run NAME --port sim:// --session my.session; copy one: rig ready NAME")
         return 0
-    copy = Path(f"{arguments.name}.yaml")
+    copy = f"{arguments.name}.yaml"
     text = ready_protocol(arguments.name).read_text("utf-8")
-    if copy.exists():
-        raise InputError(f"{copy} already exists", "move this file away")
+    check_new(copy)
     write_atomic(copy, text)
     say(f"protocol: {copy}")
     return 0

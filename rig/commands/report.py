@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cache.entry import recall
 from rig.commands.output import progress, say, stage, tell_damage
-from rig.errors import InputError
-from rig.files import check_place, write_atomic
-from rig.films import film_digest
+from rig.files import write_atomic
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
 from rig.results import SessionResults, protocol_of, results
@@ -36,23 +34,20 @@ class Report(NamedTuple):
 
 def main(arguments: Namespace) -> int:
     """Write a session's report."""
-    check_place(arguments.output)
     if arguments.pdf is not None:
         from rig.report.pdf import write_pdf  # noqa: PLC0415 - an extra that few need
 
-        check_place(arguments.pdf)
-        if os.path.realpath(arguments.pdf) == os.path.realpath(arguments.output):
-            raise InputError(f"--pdf {arguments.pdf} is the page's own file", "name another one")
     with Session.open(arguments.session, readonly=True) as session:
         fresh, estimate = arguments.fresh, arguments.estimate
-        outcome = results(session, progress, fresh=fresh, with_joint_fit=estimate)
-        # The page has the file's name; how simulated chains moved lies beside the file.
-        content = session.path.name, arguments.bars, estimate, film_digest(session.path)
+        outcome = results(session, progress, fresh=fresh)
+        make = partial(
+            make_report, session, outcome, arguments.bars, estimate=estimate, fresh=fresh
+        )
         report = recall(
             Report,
-            lambda: make_report(session, outcome, arguments.bars, estimate=estimate, fresh=fresh),
-            outcome.digest,
-            content,
+            make,
+            # The page has the file's name.
+            *(outcome.digest, session.path.name, arguments.bars, estimate),
             fresh=fresh,
         )
     write_atomic(arguments.output, report.html)

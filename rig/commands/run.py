@@ -6,29 +6,27 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from rig.commands.narration import narrator
-from rig.commands.output import GO_ON, goes_on, print_results
-from rig.recorder.interrupts import Interrupts
+from rig.commands.output import goes_on, print_results
 from rig.report.finding import finding
 from rig.report.templates import sentence
-from rig.runner import run_protocol
+from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
+
+_GO_ON = "  then press Enter (Ctrl-C stops; the same command continues) "
 
 
 def main(arguments: Namespace) -> int:
     """Carry out a protocol."""
     attended = not arguments.yes and sys.stdin.isatty()
-    operator = narrator(arguments.protocol, _ask if attended else None)
-    interrupts = Interrupts()
-    with goes_on("the same command continues the session"), interrupts.caught():
+    operator = Operator(say, _ask if attended else None)
+    with goes_on("the same command continues the session"):
         outcome = run_protocol(
             arguments.protocol,
             arguments.port,
             arguments.session,
             operator,
             arguments.seed,
-            interrupts,
-            None if arguments.socket is None else Path(arguments.socket),
+            arguments.socket and Path(arguments.socket),
         )
         code = print_results(outcome, as_json=arguments.json)
     say(f"session: {arguments.session}")
@@ -37,4 +35,4 @@ def main(arguments: Namespace) -> int:
 
 
 def _ask(request: str) -> None:
-    ask(f"{request}\n{GO_ON}")
+    ask(f"{request}\n{_GO_ON}")

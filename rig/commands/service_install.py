@@ -10,7 +10,7 @@ import platformdirs
 
 from rig.commands.output import say
 from rig.files import make_folder, write_atomic
-from rig.ready import shipped
+from rig.ready import find_resource
 from rig.usb.listing import sole_port
 
 
@@ -18,7 +18,7 @@ def main(arguments: Namespace) -> int:
     """Write the user's systemd unit that keeps a daemon running at the board's port."""
     rig, port = arguments.name, _lasting_name(arguments.port or sole_port())
     template = "chainrig@.service" if rig else "chainrig.service"
-    text = shipped(f"packaging/{template}").read_text("utf-8")
+    text = find_resource(f"packaging/{template}").read_text("utf-8")
     values = {
         "%h/.local/bin": str(Path(sys.executable).parent).replace("%", "%%"),
         "${RIG_PORT}": port.replace("%", "%%"),

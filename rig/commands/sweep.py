@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from rig.commands.output import goes_on, say, stage
 from rig.errors import InputError
-from rig.files import check_place, replacing
+from rig.files import replacing
 from rig.protocol import reader
 from rig.reasons import make_error
-from rig.report.canvas import KINDS, write_figure
+from rig.report.canvas import ENDINGS, write_figure
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
@@ -24,16 +24,15 @@ if TYPE_CHECKING:
 
     from rig.protocol.protocol import Protocol
 
-_KINDS = (".csv", ".npz", *(f".{kind}" for kind in KINDS))
-
 
 def main(arguments: Namespace) -> int:
     """Compute a sweep and write it to a file."""
     output = Path(arguments.output)
-    _check_output(output)
+    if output.suffix in ENDINGS:  # found out now, not after a long computation
+        import_module("matplotlib")
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
-    if _is_picture(output):
+    if output.suffix in ENDINGS:
         _check_drawable(layout)
     with goes_on("nothing was written"):
         swept = _compute(layout, arguments.jobs, arguments.cluster)
@@ -43,7 +42,7 @@ def main(arguments: Namespace) -> int:
 
 
 def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
-    size, start = layout.grid.size, time.monotonic()
+    size, start = layout.size, time.monotonic()
     due = 1  # quarter of the points
 
     def show(done: int) -> None:
@@ -68,7 +67,7 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
     facts = provenance(protocol, layout)
-    if _is_picture(output):
+    if output.suffix in ENDINGS:
         from rig.report.sweep import sweep_figure  # noqa: PLC0415 - it needs matplotlib
 
         write_figure(output, sweep_figure(facts, layout, swept))
@@ -80,29 +79,13 @@ def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> No
             write_csv(stream, facts, layout, swept)
 
 
-def _is_picture(output: Path) -> bool:
-    return output.suffix.removeprefix(".") in KINDS
-
-
-def _check_output(output: Path) -> None:
-    """Find out before a long computation what would go wrong after it."""
-    if output.suffix not in _KINDS:
-        ending = output.suffix or "is missing and"
-        kinds = ", ".join(_KINDS)
-        raise make_error(InputError, "no_kind_of_sweep", path=output, ending=ending, kinds=kinds)
-    check_place(output)
-    if _is_picture(output):
-        import_module("matplotlib")
-
-
 def _check_drawable(layout: Layout) -> None:
-    axes = layout.grid.axes
     if layout.layered:
-        inclines = ", ".join(f"{value:g}" for value in axes[0].values)
-        last = f"{axes[0].values[-1]:g}"
+        *first, last = (f"{value:g}" for value in layout.values["incline"])
+        inclines = ", ".join([*first, last])
         raise make_error(InputError, "sweep_of_inclines", inclines=inclines, last=last)
-    if len(axes) > 2:
-        raise make_error(InputError, "sweep_of_axes", axes=len(axes))
+    if len(layout.axes) > 2:
+        raise make_error(InputError, "sweep_of_axes", axes=len(layout.axes))
 
 
 def _summary(swept: Swept) -> str:

@@ -1,29 +1,33 @@
-"""Clients of the daemon: the line that each has, and a blocking one for the runner and for scripts.
+"""Clients of the daemon: the line that each has, and on it a blocking client and one for asyncio.
 
-`rig.daemon.aclient` has one for asyncio. Nothing here loads asyncio.
+Scripts and the runner wait; faces, which show what is going on, have a loop of their own.
 """
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import json
 import socket
+import struct
 import threading
 from concurrent.futures import Future, wait
-from contextlib import suppress
+from contextlib import ExitStack, nullcontext, suppress
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from rig.daemon import rpc
 from rig.daemon.lease import LEASE_S, ControlError
-from rig.daemon.socket_path import reach
+from rig.daemon.replica import Replica
+from rig.daemon.socket_path import check_folder
 from rig.errors import DeviceError, DeviceTimeoutError, RigError
 from rig.reasons import Reason, make_error
 from rig.recorder.interrupts import Interrupts
 from rig.session.store import Session
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from rig.records import Drop
     from rig.session.reading import Reader
@@ -31,39 +35,9 @@ if TYPE_CHECKING:
 
 HELLO_S = 10.0
 """How long a client waits for the answer to `hello`."""
+_REACH_S = 5.0  # until the daemon takes a new client
 _ANSWER_S = 100.0  # everything but waiting is over by then, a recording too, or the daemon hangs
 _BEAT_S = LEASE_S / 4
-
-
-class MessageReader:
-    """Finds messages in the bytes that come from a daemon, however they were cut."""
-
-    def __init__(self) -> None:
-        self._rest = bytearray()  # of a line that has not ended yet
-
-    def feed(self, data: bytes) -> Iterator[dict[str, Any]]:
-        """Take the next bytes, none for the end, and give the messages that are whole.
-
-        Raises
-        ------
-        DeviceError
-            It hung up, or is no daemon of this rig.
-        """
-        if not data:
-            raise _gone("it hung up")
-        self._rest += data
-        if b"\n" in data:
-            *lines, self._rest = self._rest.split(b"\n")
-            for line in lines:
-                try:
-                    message = json.loads(line)
-                except ValueError:
-                    message = None
-                if not isinstance(message, dict):
-                    raise make_error(DeviceError, "not_a_daemon")
-                yield message
-        if len(self._rest) > rpc.MESSAGE_LIMIT:
-            raise make_error(DeviceError, "not_a_daemon")
 
 
 class Line:
@@ -72,7 +46,7 @@ class Line:
     Parameters
     ----------
     path
-        The daemon's Unix socket; beside it the file that stands for TCP.
+        The daemon's Unix socket.
     name
         What others are told of this client.
     notify
@@ -80,8 +54,6 @@ class Line:
         answer to ``subscribe`` comes as a ``snapshot`` before what changed since.
     end
         Called there when the connection has ended.
-    beat
-        Called there whenever nothing has come for a while.
 
     Attributes
     ----------
@@ -102,21 +74,19 @@ class Line:
         name: str,
         notify: Callable[[str, dict[str, Any]], None] = lambda _method, _params: None,
         end: Callable[[], None] = lambda: None,
-        beat: Callable[[], None] = lambda: None,
     ) -> None:
-        self._notify, self._end, self._beat = notify, end, beat
+        self._notify, self._end = notify, end
         self._guard = threading.Lock()  # one line after the other, and none after the end
         self._numbers = itertools.count(1)
         self._open: dict[int, Future[Any]] = {}
         self._over: RigError | None = None
-        self._socket, token = reach(path)
-        self._socket.settimeout(_BEAT_S)
+        self._socket = _reach(path)
         self._thread = threading.Thread(target=self._read, name="rig client", daemon=True)
         self._thread.start()
         try:
-            hello = {"api": rpc.API, "client": name} | ({"token": token} if token else {})
+            hello = self.ask("hello", api=rpc.API, client=name)
             silent = make_error(DeviceTimeoutError, "daemon_silent", path=path, patience_s=HELLO_S)
-            self.daemon: dict[str, Any] = _result(self.ask("hello", **hello), HELLO_S, silent)
+            self.daemon: dict[str, Any] = _result(hello, HELLO_S, silent)
         except BaseException:
             self.close()
             raise
@@ -147,16 +117,11 @@ class Line:
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def _read(self) -> None:
-        reader, over = MessageReader(), _gone("it failed")
+        over = _gone("it hung up")
         try:
-            while True:
-                try:
-                    data = self._socket.recv(1 << 16)
-                except TimeoutError:
-                    self._beat()
-                else:
-                    for message in reader.feed(data):
-                        self._take(message)
+            with self._socket.makefile("rb") as stream:
+                while (line := stream.readline(rpc.MESSAGE_LIMIT)).endswith(b"\n"):
+                    self._take(_message_of(line))
         except RigError as error:
             over = error
         except OSError as error:
@@ -194,18 +159,18 @@ class Client:
 
     Parameters
     ----------
-    path, name
-        As for `Line`, which says what is raised.
+    line
+        To the daemon, or to a worker of this process.
     interrupts
-        Let through while the daemon works, and kept waiting inside a message.
+        Let through while it works, unless something falls.
     """
 
-    def __init__(self, path: Path, name: str, interrupts: Interrupts | None = None) -> None:
+    def __init__(self, line: Line, interrupts: Interrupts | None = None) -> None:
         self._interrupts = Interrupts() if interrupts is None else interrupts
         self._session: Session | None = None
-        self._in_control = self._armed = False
-        self.line = Line(path, name, beat=self._renew)
-        self.daemon = self.line.daemon
+        self._armed = False
+        self._closed = threading.Event()
+        self.line = line
 
     def call(self, method: str, *, patience: float = _ANSWER_S, **params: Any) -> Any:
         """Ask for anything in the interface, see API.md.
@@ -222,10 +187,11 @@ class Client:
         RigError
             As the daemon raised it, or it is gone.
         """
-        with self._interrupts.held():
-            answer = self.line.ask(method, **params)
+        answer = self.line.ask(method, **params)
         silent = make_error(DeviceTimeoutError, "daemon_no_answer", method=method)
-        return _result(answer, patience, silent)
+        # What has fallen is recorded whole.
+        with nullcontext() if method == "collect" else self._interrupts.let_through():
+            return _result(answer, patience, silent)
 
     def take_control(self) -> None:
         """Take control and keep it until `close`.
@@ -236,12 +202,13 @@ class Client:
             Another client has it.
         """
         self.call("take_control")
-        self._in_control = True
+        threading.Thread(target=self._renew, name="rig control", daemon=True).start()
 
     def _renew(self) -> None:
-        # Armed, the thread's sign of life is not enough: this client must be at it.
-        if self._in_control and not self._armed:
-            self.line.ask("renew")
+        while not self._closed.wait(_BEAT_S):
+            # Armed, this thread's sign of life is not enough: the client must be at it.
+            if not self._armed:
+                self.line.ask("renew")
 
     # ------------------------------------------------------------------ what a rig does
 
@@ -304,12 +271,91 @@ class Client:
     def close(self) -> None:
         """Hang up; a drop that fell is recorded all the same."""
         self._let_go()
+        self._closed.set()
         self.line.close()
 
     def _let_go(self) -> None:
         if self._session is not None:
             self._session.close()
             self._session = None
+
+
+class AsyncClient:
+    """One connection to a daemon; `replica` follows its state once it is subscribed.
+
+    Attributes
+    ----------
+    replica
+        The state.
+    changed
+        Called whenever it has changed. It should only take a note: it is called often.
+    lost
+        Set when the connection has ended.
+    """
+
+    _line: Line
+
+    def __init__(self) -> None:
+        self.replica = Replica()
+        self.changed: Callable[[], None] = lambda: None
+        self.lost = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+
+    @classmethod
+    async def connect(cls, path: Path, name: str) -> Self:
+        """Connect and shake hands.
+
+        Parameters
+        ----------
+        path, name
+            As for `Line`, which says what is raised.
+        """
+        client = cls()
+        notify, end = partial(client._soon, client._follow), partial(client._soon, client._end)
+        client._line = await client._loop.run_in_executor(None, Line, path, name, notify, end)
+        return client
+
+    async def call(self, method: str, **params: Any) -> Any:
+        """Ask for anything in the interface, see API.md.
+
+        Raises
+        ------
+        RigError
+            As the daemon raised it, or it is gone.
+        """
+        return await asyncio.wrap_future(self._line.ask(method, **params))
+
+    async def subscribe(self) -> None:
+        """Follow the state."""
+        await self.call("subscribe")
+
+    async def close(self) -> None:
+        """Hang up."""
+        self._line.close()
+        self._end()
+
+    def _soon(self, do: Callable[..., None], *values: object) -> None:
+        """Have something done in the loop, in the order in which it came."""
+        with suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(do, *values)
+
+    def _follow(self, method: str, params: dict[str, Any]) -> None:
+        self.replica.follow(method, params)
+        self.changed()
+
+    def _end(self) -> None:
+        self.lost.set()
+        self.changed()
+
+
+def _message_of(line: bytes) -> dict[str, Any]:
+    try:
+        message = json.loads(line)
+    except ValueError:
+        message = None
+    if not isinstance(message, dict):
+        raise make_error(DeviceError, "not_a_daemon")
+    return message
 
 
 def _result(answer: Future[Any], patience_s: float, silent: DeviceError) -> Any:
@@ -320,3 +366,32 @@ def _result(answer: Future[Any], patience_s: float, silent: DeviceError) -> Any:
 
 def _gone(why: object) -> RigError:
     return make_error(DeviceError, "daemon_gone", text=why)
+
+
+def _reach(path: Path) -> socket.socket:
+    """Connect to a daemon of this user, in a folder where nobody else can have one.
+
+    Raises
+    ------
+    DeviceError
+        Nobody answers there.
+    InputError
+        The folder belongs to, or is open to, somebody else.
+    BusyError
+        Too many want to be let in.
+    """
+    with ExitStack() as stack:
+        try:
+            check_folder(path.parent)
+            line = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+            # More may want to be let in than the kernel keeps waiting.
+            patience = struct.pack("@2l", round(_REACH_S), 0)
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
+            line.connect(str(path))
+        except BlockingIOError as error:
+            busy = make_error(rpc.BusyError, "daemon_busy", path=path, patience_s=_REACH_S)
+            raise busy from error
+        except OSError as error:
+            raise make_error(DeviceError, "no_daemon", path=path, text=error) from error
+        stack.pop_all()
+    return line

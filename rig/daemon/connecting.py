@@ -2,29 +2,62 @@
 
 from __future__ import annotations
 
+import logging
 import os
-from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-from rig.daemon.socket_path import default_socket, token_file
+from rig.daemon.client import Client, Line
+from rig.daemon.lease import Lease
+from rig.daemon.service import METHODS
+from rig.daemon.socket_path import default_socket
+from rig.daemon.worker import Worker
 from rig.errors import DeviceError, RigError
 from rig.reasons import make_error
-from rig.recorder.controller import Controller
+from rig.recorder.published import PublishedState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import Future
 
-    from rig.daemon.client import Client
     from rig.recorder.interrupts import Interrupts
 
-    Rig: TypeAlias = Controller | Client
-    """What can be asked of a rig; `Controller` says what each method does and raises."""
+
+class OwnLine(Line):
+    """The line to a worker of this process, which owns the port until the line is closed.
+
+    Parameters
+    ----------
+    url
+        The port.
+    """
+
+    def __init__(self, url: str) -> None:
+        # What the worker would tell onlookers, whoever asked is told as an error.
+        logging.getLogger("rig.daemon.worker").addHandler(logging.NullHandler())
+        lease = Lease(lambda: 0.0)  # never lapses
+        lease.take(self, "rig run")
+        self._worker = Worker(url, PublishedState(), lease)
+
+    def ask(self, method: str, **params: Any) -> Future[Any]:
+        """Have something done, see API.md."""
+        if method == "stop":
+            return self._worker.stop(**params)
+        row = METHODS[method]
+        answer = self._worker.submit(row.bind(params), self, writes=row.writes)
+        self._worker.start()
+        return answer
+
+    def close(self) -> None:
+        """Make safe and close session and port; a drop that fell is recorded to its end."""
+        self._worker.end()
+        self._worker.start()
+        self._worker.join()
 
 
 def connect(
     url: str, say: Callable[[str], None], interrupts: Interrupts, socket: Path | None = None
-) -> Rig:
+) -> Client:
     """Find the owner of a port, or become it.
 
     Parameters
@@ -34,13 +67,13 @@ def connect(
     say
         Is told when a daemon does the work.
     interrupts
-        As for `rig.recorder.recorder.Recorder`.
+        As for `Client`.
     socket
         Of the daemon to ask, which must then be there; else the usual one, if there is one.
 
     Returns
     -------
-    Rig
+    Client
         To be closed.
 
     Raises
@@ -49,26 +82,26 @@ def connect(
         The daemon that was named is not there or has another port; another client is in control.
     """
     path = default_socket() if socket is None else socket
-    if socket is None and not path.exists() and not token_file(path).exists():
-        return Controller(url, interrupts)
-    from rig.daemon.client import Client  # noqa: PLC0415 - most runs have no daemon
-
+    if socket is None and not path.exists():
+        return Client(OwnLine(url), interrupts)
     try:
-        client = Client(path, f"rig run {os.getpid()}", interrupts)
+        line = Line(path, f"rig run {os.getpid()}")
+        # A board that was plugged in again may have another path than the daemon was told.
+        if not any(_is_same(line.daemon.get(name, ""), url) for name in ("port", "path")):
+            line.close()
+            raise make_error(DeviceError, "daemon_port", port=line.daemon["port"], wanted=url)
     except RigError:
         if socket is not None:
             raise
-        return Controller(url, interrupts)  # what a killed daemon left, or one of another version
-    with ExitStack() as unless_in_control:
-        unless_in_control.callback(client.close)
-        # A board that was plugged in again may have another path than the daemon was told.
-        if not any(_is_same(client.daemon.get(name, ""), url) for name in ("port", "path")):
-            if socket is None:
-                return Controller(url, interrupts)
-            raise make_error(DeviceError, "daemon_port", port=client.daemon["port"], wanted=url)
+        # Another port's daemon, what a killed one left, or one of another version.
+        return Client(OwnLine(url), interrupts)
+    client = Client(line, interrupts)
+    try:
         client.take_control()
-        unless_in_control.pop_all()
-    say(f"through the daemon, process {client.daemon['pid']}, which owns {url}")
+    except RigError:
+        client.close()
+        raise
+    say(f"through the daemon, process {line.daemon['pid']}, which owns {url}")
     return client
 
 

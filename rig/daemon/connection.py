@@ -13,7 +13,13 @@ if TYPE_CHECKING:
 
     from rig.errors import RigError
 
-    _Message: TypeAlias = rpc.Request | rpc.RpcError
+    Message: TypeAlias = rpc.Request | rpc.RpcError
+
+
+HELLO_S = 2.0
+"""A connection on which nobody says hello for so long is ended."""
+CLIENTS = 128
+"""Connections beyond those may only `stop`, and no longer than `HELLO_S`."""
 
 
 class Connection:
@@ -36,31 +42,31 @@ class Connection:
     ----------
     name
         What it calls itself.
+    is_client
+        Whether it was let in: it has said hello, and there was room.
     subscribed
         Whether it wants changes.
     behind
         Whether it was too slow for them.
-    spoke
-        Whether a line has come from it.
     """
 
     def __init__(
         self,
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
-        do: Callable[[Connection, rpc.Request], Awaitable[Any]],
+        do: Callable[[Connection, Message], Awaitable[Any]],
         heard: Callable[[Connection], None],
         turns: asyncio.Lock,
     ) -> None:
         self.name = ""
-        self.subscribed = self.behind = self.spoke = False
+        self.is_client = self.subscribed = self.behind = False
         self._reader = reader
         self._writer = writer
         self._do = do
         self._heard = heard
         self._turns = turns
         self._urgent: set[asyncio.Task[None]] = set()
-        self._waiting: asyncio.Queue[tuple[_Message, _Replies]] = asyncio.Queue(rpc.BATCH_LIMIT)
+        self._waiting: asyncio.Queue[Message] = asyncio.Queue(rpc.WAITING_LIMIT)
 
     def send(self, line: bytes) -> None:
         """Send one message, some time."""
@@ -98,75 +104,40 @@ class Connection:
 
     async def _read(self) -> None:
         while line := await self._reader.readline():
-            self.spoke = True
             self._heard(self)
             if self.waiting() > rpc.UNREAD_LIMIT:
                 await self._writer.drain()
-            messages = rpc.read_line(line)
-            replies = _Replies(self.send, messages)
-            for message in messages if isinstance(messages, list) else [messages]:
-                self._take(message, replies)
+            self._take(rpc.read_line(line))
             await asyncio.sleep(0)  # many lines are there already: others' are read between them
 
-    def _take(self, message: _Message, replies: _Replies) -> None:
+    def _take(self, message: Message) -> None:
         """Have one message answered in its turn, or at once where it overtakes."""
         method = message.method if isinstance(message, rpc.Request) else ""
         if method in {"stop", "renew"} and self.name and len(self._urgent) < 8:
-            task = asyncio.get_running_loop().create_task(self._answer(message, replies))
+            task = asyncio.get_running_loop().create_task(self._answer(message))
             self._urgent.add(task)
             task.add_done_callback(self._urgent.discard)
         elif self._waiting.full():
             # Refused, not kept back: a stop behind it must be read.
-            busy = make_error(rpc.BusyError, "requests_full", requests=rpc.BATCH_LIMIT)
-            silent = isinstance(message, rpc.RpcError) or message.silent
-            replies.add(None if silent else rpc.failure(message.id, busy))
+            busy = make_error(rpc.BusyError, "requests_full", requests=rpc.WAITING_LIMIT)
+            self.send(rpc.failure(message.id, busy))
         else:
-            self._waiting.put_nowait((message, replies))
+            self._waiting.put_nowait(message)
 
     async def _answer_all(self) -> None:
         while True:
-            message, replies = await self._waiting.get()
+            message = await self._waiting.get()
             async with self._turns:
                 await asyncio.sleep(0)
-            await self._answer(message, replies)
+            await self._answer(message)
             await self._writer.drain()
             if not self.name:
                 self.close()
                 return
 
-    async def _answer(self, message: _Message, replies: _Replies) -> None:
-        if isinstance(message, rpc.RpcError):
-            line = rpc.failure(message.id, message)
-        else:
-            try:
-                line = rpc.answer(message.id, await self._do(self, message))
-            except Exception as error:
-                line = rpc.failure(message.id, error)
-        replies.add(None if message.silent else line)
-
-
-class _Replies:
-    """The answers to one line: one message's at once, a batch's when all are there.
-
-    Parameters
-    ----------
-    send
-        Takes the line.
-    messages
-        What a client sent.
-    """
-
-    def __init__(self, send: Callable[[bytes], None], messages: _Message | list[_Message]) -> None:
-        self._send = send
-        self._batch = isinstance(messages, list)
-        self._open = len(messages) if isinstance(messages, list) else 1
-        self._answers: list[bytes] = []
-
-    def add(self, line: bytes | None) -> None:
-        """Take the answer to one message, `None` for a notification."""
-        self._open -= 1
-        if line is not None:
-            self._answers.append(line.rstrip(b"\n"))
-        if not self._open and self._answers:
-            answers = b",".join(self._answers)
-            self._send((b"[%b]\n" if self._batch else b"%b\n") % answers)
+    async def _answer(self, message: Message) -> None:
+        try:
+            line = rpc.answer(message.id, await self._do(self, message))
+        except Exception as error:
+            line = rpc.failure(message.id, error)
+        self.send(line)

@@ -24,27 +24,25 @@ class Lease:
     ----------
     now
         Seconds, monotonic.
+
+    Attributes
+    ----------
+    name
+        What the holder calls itself.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now = now
         self._guard = threading.Lock()
         self._holder: object = None
-        self._name = ""
+        self.name = ""
         self._until = 0.0
-        self._overtaken: dict[object, float] = {}  # when those were heard who lost control
-        self._silences: dict[object, float] = {}  # and for how long they were not, s
 
     @property
     def holder(self) -> object:
         """The client in control; `None` for nobody, also when its lease has lapsed."""
         with self._guard:
             return self._holder if self._now() < self._until else None
-
-    @property
-    def name(self) -> str:
-        """What the holder calls itself."""
-        return self._name
 
     def take(self, client: object, name: str) -> None:
         """Give control to a client that may already have it.
@@ -55,20 +53,15 @@ class Lease:
             Another client has it.
         """
         with self._guard:
-            if self._holder not in {None, client}:
-                if self._now() < self._until:
-                    raise make_error(ControlError, "control_held", holder=self._name)
-                self._overtaken[self._holder] = self._until - LEASE_S
-            self._silences.pop(client, None)
-            self._holder, self._name, self._until = client, name, self._now() + LEASE_S
+            if self._holder not in {None, client} and self._now() < self._until:
+                raise make_error(ControlError, "control_held", holder=self.name)
+            self._holder, self.name, self._until = client, name, self._now() + LEASE_S
 
     def heard(self, client: object) -> None:
         """Note a sign of life; control that lapsed and that nobody took comes back with it."""
         with self._guard:
             if self._holder is client:
                 self._until = self._now() + LEASE_S
-            elif client in self._overtaken:
-                self._silences[client] = self._now() - self._overtaken.pop(client)
 
     def silence(self, client: object) -> float:
         """How long nothing has been heard from the client in control, s; 0 for any other."""
@@ -78,11 +71,9 @@ class Lease:
     def release(self, client: object) -> bool:
         """Take control away from a client; `False` when it did not have it."""
         with self._guard:
-            self._overtaken.pop(client, None)
-            self._silences.pop(client, None)
             if self._holder is not client:
                 return False
-            self._holder, self._name, self._until = None, "", 0.0
+            self._holder, self.name, self._until = None, "", 0.0
             return True
 
     def require(self, client: object) -> None:
@@ -93,12 +84,7 @@ class Lease:
         ControlError
             Another client has control, or this one gave it up.
         """
-        with self._guard:
-            holder, name = self._holder, self._name or "nobody"
-            silence = self._silences.get(client)
         # A request may wait behind a busy disk for longer than a lease: that takes nothing away.
-        if holder is client:
-            return
-        if silence is not None:
-            raise make_error(ControlError, "control_lost", silence_s=silence, holder=name)
-        raise make_error(ControlError, "control_needed", holder=name)
+        with self._guard:
+            if self._holder is not client:
+                raise make_error(ControlError, "control_needed", holder=self.name or "nobody")

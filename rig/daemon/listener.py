@@ -1,70 +1,60 @@
-"""Where clients come in: a socket, or a port and a token, and nobody else's in its place."""
+"""Where clients come in: a socket, and nobody else's in its place."""
 
 from __future__ import annotations
 
-import json
-import os
 import socket
 from contextlib import suppress
 from pathlib import Path
 
-from rig.daemon import rpc
-from rig.daemon.rpc import BusyError
-from rig.daemon.socket_path import prepare_folder, reach, token_file
-from rig.errors import DeviceError, InputError
-from rig.files import identity_of, write_atomic
+from filelock import FileLock, Timeout
+
+from rig.daemon.socket_path import prepare_folder
+from rig.errors import InputError
 from rig.reasons import make_error
 
-_PROBE_S = 1.0
+_LOCK_S = 0.1  # one that ends takes its lock's file away, and the next tries again
 _BACKLOG = 1024  # that many may come at once; the kernel has a limit of its own besides
 
 
-def listen(path: Path, token: str) -> socket.socket:
-    """Let clients come.
+class Door:
+    """The socket by which clients find a daemon.
+
+    A lock beside it, which the kernel takes away with the process, says whose it is.
 
     Parameters
     ----------
     path
-        The Unix socket; the file that stands for TCP is beside it.
-    token
-        What a client over TCP must know; empty for the socket.
+        The Unix socket.
 
-    Returns
-    -------
-    socket
-        Which listens, and does not block.
+    Attributes
+    ----------
+    listener
+        A socket that listens, and does not block.
 
     Raises
     ------
     InputError
         Another daemon is there, or the folder cannot be trusted.
     """
-    prepare_folder(path.parent)
-    if _answers(path):
-        raise make_error(InputError, "daemon_there", path=path)
-    for left_by_a_killed_one in (path, token_file(path)):
-        left_by_a_killed_one.unlink(missing_ok=True)
-    if token:
-        listener = socket.create_server(("127.0.0.1", 0), backlog=_BACKLOG)
-        file, port = token_file(path), listener.getsockname()[1]
-        file.touch(mode=0o600)
-        write_atomic(file, json.dumps({"port": port, "token": token}))
-        file.chmod(0o600)
-    else:
-        listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        listener.bind(str(path))
-        path.chmod(0o600)
-        listener.listen(_BACKLOG)
-    listener.setblocking(False)
-    return listener
-
-
-class Door:
-    """The file by which clients find a daemon: its socket, or what stands for its TCP port."""
 
     def __init__(self, path: Path) -> None:
+        prepare_folder(path.parent)
+        self._lock = FileLock(path.with_suffix(".lock"), _LOCK_S, thread_local=False)
         self.path = path
-        self._ours = identity_of(path)
+        self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._lock.acquire()
+            if path.is_socket():  # left by a killed one; any other file is the user's
+                path.unlink()
+            self.listener.bind(str(path))
+        except OSError as error:
+            self.listener.close()
+            code = "daemon_there" if isinstance(error, Timeout) else "place_unusable"
+            raise make_error(InputError, code, path=path, text=error) from error
+        path.chmod(0o600)
+        self.listener.listen(_BACKLOG)
+        self.listener.setblocking(False)
+        self._ours = _identity(self.path)
         self._lost = False
 
     def there(self) -> bool:
@@ -73,44 +63,22 @@ class Door:
         What stands there later is another daemon's, though the file system may give it the number
         that this one's had.
         """
-        self._lost = self._lost or identity_of(self.path) != self._ours
+        self._lost = self._lost or _identity(self.path) != self._ours
         return not self._lost
 
-    def remove(self) -> None:
-        """Take it away, unless another daemon's is in its place."""
+    def close(self) -> None:
+        """Let nobody in any more; take the file away unless another daemon's is in its place."""
+        self.listener.close()
         with suppress(OSError):
             if self.there():
                 self.path.unlink()
+                Path(self._lock.lock_file).unlink()  # locked: nobody locks a name that is gone
+        self._lock.release()
 
 
-def _answers(path: Path) -> bool:
-    """Whether a daemon answers: any program may have the port of one that was killed."""
-    try:
-        line, token = reach(path)
-    except BusyError:
-        return True  # so many wait that it does not come to us
-    except DeviceError as error:
-        if isinstance(error.__cause__, FileNotFoundError | ConnectionRefusedError | ValueError):
-            return False
-        raise make_error(InputError, "place_unusable", path=path, text=error.__cause__) from error
-    with line:
-        line.settimeout(_PROBE_S)
-        hello = {"api": rpc.API, "client": "a daemon that starts", "token": token}
-        try:
-            line.sendall(rpc.request("hello", hello, 1))
-            return not token or b'"jsonrpc"' in line.recv(1 << 12)
-        except OSError:
-            return not token
-
-
-def notify_systemd() -> None:
-    """Tell systemd that clients can come, where it asked to be told (sd_notify(3))."""
-    address = os.environ.get("NOTIFY_SOCKET", "")
-    if not address:
-        return
-    with (
-        suppress(OSError),
-        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as out,
-    ):
-        out.connect("\0" + address[1:] if address.startswith("@") else address)
-        out.send(b"READY=1")
+def _identity(path: Path) -> tuple[int, int, int] | None:
+    """Return what another file at a path has otherwise; its number alone may be the same."""
+    with suppress(OSError):
+        about = path.stat()
+        return about.st_dev, about.st_ino, about.st_mode
+    return None

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from rig.daemon import rpc
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rig.daemon.connection import Connection
     from rig.recorder.published import PublishedState
 
@@ -26,47 +28,39 @@ class Publisher:
     ----------
     published
         The state.
-
-    Attributes
-    ----------
     connections
-        All clients that have said hello.
+        All that there are, at any time.
     """
 
-    def __init__(self, published: PublishedState) -> None:
+    def __init__(self, published: PublishedState, connections: Iterable[Connection]) -> None:
         self.published = published
-        self.connections: set[Connection] = set()
+        self._connections = connections
         self._dirty = asyncio.Event()
 
-    def add(self, connection: Connection) -> None:
-        """Count a client, which may subscribe."""
-        self.connections.add(connection)
-        self.published.set(clients=len(self.connections))
-
-    def discard(self, connection: Connection) -> None:
-        """Forget a client."""
-        self.connections.discard(connection)
-        self.published.set(clients=len(self.connections))
-        self._watch()
+    def count(self) -> None:
+        """Show how many clients there are, and note whether anybody looks."""
+        clients = [connection for connection in self._connections if connection.is_client]
+        self.published.watched = any(client.subscribed for client in clients)
+        self.published.set(clients=len(clients))
 
     def subscribe(self, connection: Connection) -> dict[str, Any]:
         """Give a client the snapshot upon which its changes will follow."""
         self.spread()  # what the others are told first is in the snapshot
         connection.subscribed = True
-        self._watch()
+        self.count()
         return self.published.snapshot()
 
     def unsubscribe(self, connection: Connection) -> None:
         """Send a client no more changes."""
         connection.subscribed = connection.behind = False
-        self._watch()
+        self.count()
 
     def spread(self) -> None:
         """Send what changed."""
         change = self.published.take()
         line = None if change is None else rpc.request("change", change, None)
         snapshot = None
-        for connection in self.connections:
+        for connection in self._connections:
             if not connection.subscribed:
                 continue
             if connection.waiting() > _FULL:
@@ -84,11 +78,8 @@ class Publisher:
         self.published.changed = partial(loop.call_soon_threadsafe, self._dirty.set)
         self._dirty.set()
         while True:
-            if not any(connection.behind for connection in self.connections):
+            if not any(connection.behind for connection in self._connections):
                 await self._dirty.wait()
             self._dirty.clear()
             self.spread()
             await asyncio.sleep(_CHANGES_S)
-
-    def _watch(self) -> None:
-        self.published.watched = any(client.subscribed for client in self.connections)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import logging
-from dataclasses import dataclass
-from typing import Any, NoReturn, TypeAlias
+from typing import Any, Literal, NoReturn
+
+import msgspec
 
 from rig.daemon.lease import ControlError
 from rig.errors import DeviceError, DeviceTimeoutError, InputError, RigError, SessionError
 from rig.link.messages import DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
+from rig.printable import one_line
 from rig.reasons import make_error, read_record
 from rig.recorder.interrupts import StoppedError
 
@@ -25,8 +27,8 @@ UNREAD_LIMIT = 1 << 22
 """Bytes of answers that a client leaves unread before the daemon reads no more of its requests."""
 PARSE, INVALID, NO_METHOD, BAD_PARAMS = -32700, -32600, -32601, -32602
 FAILURE = -32000
-BATCH_LIMIT = 64
-"""Requests of one connection that may wait for their answers, in a batch or one by one."""
+WAITING_LIMIT = 64
+"""Requests of one connection that may wait for their answers."""
 
 
 class BusyError(DeviceError):
@@ -42,13 +44,10 @@ class VersionError(RigError):
 class RpcError(Exception):
     """A line that is no proper request, with JSON-RPC's own code."""
 
-    def __init__(
-        self, code: int, message: str, request_id: RequestId = None, *, silent: bool = False
-    ) -> None:
+    def __init__(self, code: int, message: str, number: int | float | str | None = None) -> None:
         super().__init__(message)
         self.code = code
-        self.id = request_id
-        self.silent = silent  # of a notification, which is never answered
+        self.id = number
 
 
 _KINDS: dict[str, type[RigError]] = {
@@ -60,44 +59,28 @@ _KINDS: dict[str, type[RigError]] = {
 }  # fmt: skip
 
 
-RequestId: TypeAlias = "int | float | str | None"
+class Request(msgspec.Struct, frozen=True, kw_only=True):
+    """A request."""
 
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """A request; a notification is `silent`: it gets no answer."""
-
+    jsonrpc: Literal["2.0"]
     method: str
-    params: dict[str, Any]
-    id: RequestId
-    silent: bool = False
+    id: int | float | str | None
+    params: Any = msgspec.field(default_factory=dict)
 
 
-def read_line(line: bytes) -> Request | RpcError | list[Request | RpcError]:
-    """Read one line from a client: a message, or a batch of them."""
+def read_line(line: bytes) -> Request | RpcError:
+    """Read one line from a client."""
     try:
         message = json.loads(line, parse_constant=_no_number)
     except (ValueError, RecursionError):
         return RpcError(PARSE, "not JSON")
-    if not isinstance(message, list):
-        return _read_message(message)
-    if not 0 < len(message) <= BATCH_LIMIT:
-        return RpcError(INVALID, f"a batch has 1 to {BATCH_LIMIT} requests")
-    return [*map(_read_message, message)]
-
-
-def _read_message(message: Any) -> Request | RpcError:
-    if not isinstance(message, dict):
-        return RpcError(INVALID, "not a request")
-    number, method, params = message.get("id"), message.get("method"), message.get("params", {})
-    if isinstance(number, bool) or not isinstance(number, int | float | str | None):
-        return RpcError(INVALID, "an id is a number or a text")
-    if message.get("jsonrpc") != "2.0" or not isinstance(method, str):
-        return RpcError(INVALID, "not a request of JSON-RPC 2.0", number)
-    silent = "id" not in message
-    if not isinstance(params, dict):
-        return RpcError(BAD_PARAMS, "parameters have names here", number, silent=silent)
-    return Request(method, params, number, silent)
+    try:
+        return msgspec.convert(message, Request)
+    except msgspec.ValidationError as error:
+        number = message.get("id") if isinstance(message, dict) else None
+        known = isinstance(number, int | float | str) and not isinstance(number, bool)
+        text = one_line(f"not a request of JSON-RPC 2.0: {error}", 200)
+        return RpcError(INVALID, text, number if known else None)
 
 
 def _no_number(text: str) -> NoReturn:
@@ -145,28 +128,21 @@ def in_words(error: Exception) -> RigError:
 
 def error_to_data(error: RigError) -> dict[str, Any]:
     """Write an error as API.md says; an unknown kind becomes the nearest listed one above it."""
-    refused = error if isinstance(error, DeviceRefusedError) else None
+    refusal = {name: getattr(error, name, None) for name in ("reason", "detail", "disarmed")}
     return {
         "kind": next(kind.__name__ for kind in type(error).__mro__ if kind in _KINDS.values()),
         "message": error.message,
         "hint": error.hint,
         "exit_code": error.exit_code,
-        "reason": refused.reason.name if refused else None,
-        "detail": refused.detail if refused else None,
-        "disarmed": refused.disarmed.name if refused and refused.disarmed else None,
         "reason_codes": [reason.record() for reason in error.reasons],
-    }
+    } | {name: getattr(value, "name", value) for name, value in refusal.items()}
 
 
 def error_from_data(data: dict[str, Any]) -> RigError:
     """Make the error again; one of a kind this program does not know is a `RigError`."""
     if data.get("kind") == "DeviceRefusedError":
-        disarmed = data.get("disarmed")
-        return DeviceRefusedError(
-            RefusalReason[data["reason"]],
-            data["detail"],
-            DisarmReason[disarmed] if disarmed else None,
-        )
+        disarmed = DisarmReason[data["disarmed"]] if data.get("disarmed") else None
+        return DeviceRefusedError(RefusalReason[data["reason"]], data["detail"], disarmed)
     kind = _KINDS.get(str(data.get("kind")), RigError)
     error = kind(str(data.get("message", "")), str(data.get("hint", "")))
     error.exit_code = int(data.get("exit_code", kind.exit_code))

@@ -7,27 +7,25 @@ import logging
 import os
 from functools import partial
 from inspect import isawaitable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import msgspec
 
 from rig import __version__
 from rig.daemon import rpc
-from rig.daemon.admission import Admission
+from rig.daemon.connection import CLIENTS, Connection
+from rig.daemon.lease import Lease
+from rig.daemon.publisher import Publisher
+from rig.daemon.worker import Worker
 from rig.errors import DeviceTimeoutError
 from rig.printable import encodable, one_line
-from rig.reasons import Reason, make_error, plain_reason, read_record
+from rig.reasons import make_error, plain_reason, read_record
 from rig.recorder.controller import Controller
+from rig.recorder.published import PublishedState
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from rig.daemon.connection import Connection
-    from rig.daemon.lease import Lease
-    from rig.daemon.publisher import Publisher
-    from rig.daemon.worker import Worker
 
 log = logging.getLogger(__name__)
 _STOP_S = 1.0  # for the board's answer; what is not known by then is said so
@@ -38,29 +36,29 @@ class Service:
 
     Parameters
     ----------
-    token
-        What a client must know; empty for nothing.
-    worker
-        Does what needs the port or the session.
-    lease
-        Who is in control.
-    publisher
-        Shows everything.
+    url
+        The port.
 
     Attributes
     ----------
-    admission
-        Who is let in.
+    published, publisher
+        The state, on its way to the clients.
+    lease
+        Who is in control.
+    worker
+        Does what needs the port or the session.
+    connections
+        All that there are.
     """
 
-    def __init__(self, token: str, worker: Worker, lease: Lease, publisher: Publisher) -> None:
-        self.token = token
-        self.worker = worker
-        self.lease = lease
-        self.publisher = publisher
-        self.admission = Admission()
+    def __init__(self, url: str) -> None:
+        self.published = PublishedState()
+        self.lease = Lease()
+        self.worker = Worker(url, self.published, self.lease)
+        self.connections: set[Connection] = set()
+        self.publisher = Publisher(self.published, self.connections)
 
-    async def do(self, client: Connection, request: rpc.Request) -> Any:
+    async def do(self, client: Connection, request: rpc.Request | rpc.RpcError) -> Any:
         """Carry out one request of a client.
 
         Raises
@@ -70,32 +68,33 @@ class Service:
         RigError
             It failed.
         """
+        if isinstance(request, rpc.RpcError):
+            raise request
         method = METHODS.get(request.method)
         if method is None:
             raise rpc.RpcError(rpc.NO_METHOD, f"no method {one_line(request.method, 80)}")
         if not client.name and request.method != "hello":
             raise rpc.RpcError(rpc.INVALID, "hello comes first")
-        self.admission.check(client, request.method)
+        if not client.is_client and request.method not in {"hello", "stop"}:
+            raise make_error(rpc.BusyError, "clients_only_stop", clients=CLIENTS)
         try:
-            parsed = msgspec.convert(request.params, method.parameters, dec_hook=_read_value)
+            work = method.bind(request.params)
         except msgspec.ValidationError as error:
             text = one_line(f"{request.method}: {error}", 200)
             raise rpc.RpcError(rpc.BAD_PARAMS, text) from None
-        values = {name: getattr(parsed, name) for name in parsed.__struct_fields__}
         if method.of_rig:
             self.lease.require(client)
-            work = partial(method.do, **values)
             result = asyncio.wrap_future(self.worker.submit(work, client, writes=method.writes))
         else:
-            result = method.do(self, client, **values)
+            result = work(self, client)
         if isawaitable(result):
             result = await result
         return result if isinstance(result, dict) else {}
 
     def forget(self, client: Connection) -> None:
         """Note that a client is gone: what it had armed is disarmed."""
-        self.admission.forget(client)
-        self.publisher.discard(client)
+        self.connections.discard(client)
+        self.publisher.count()
         self.release(client)
 
     def release(self, client: Connection) -> None:
@@ -106,11 +105,10 @@ class Service:
 
     def show_control(self) -> None:
         """Show who is in control now."""
-        published = self.publisher.published
         control = None if self.lease.holder is None else {"client": self.lease.name}
-        if control != published.get("control"):
+        if control != self.published.get("control"):
             log.info("in control: %s", control["client"] if control else "nobody")
-        published.set(control=control)
+        self.published.set(control=control)
 
 
 class ApiMethod(NamedTuple):
@@ -134,43 +132,27 @@ class ApiMethod(NamedTuple):
     of_rig: bool = False
     writes: bool = False
 
+    def bind(self, params: Any) -> Callable[..., Any]:
+        """Return what is to be done, with the parameters that a client sent.
 
-class Reasons(tuple[Reason, ...]):
-    """A list in which clients write reasons as texts or as records."""
-
-    __slots__ = ()
-
-
-def _read_value(kind: type, value: Any) -> Any:
-    """Read a parameter of a kind of our own."""
-    if kind is Reasons:
-        if not isinstance(value, list):
-            raise TypeError("reasons: a list")
-        return Reasons(
-            plain_reason(encodable(reason)) if isinstance(reason, str) else read_record(reason)
-            for reason in value
-        )
-    try:
-        if isinstance(value, str) and b"\0" not in os.fsencode(value) and value.startswith("/"):
-            return Path(value)
-    except UnicodeEncodeError:
-        pass
-    raise ValueError("a path from the root is needed, as in /home/ada/drops")
+        Raises
+        ------
+        msgspec.ValidationError
+            They are not what the method takes.
+        """
+        return partial(self.do, **msgspec.structs.asdict(msgspec.convert(params, self.parameters)))
 
 
-def _hello(
-    service: Service, caller: Connection, api: object, client: str, token: str
-) -> dict[str, Any]:
+def _hello(service: Service, caller: Connection, api: object, client: str) -> dict[str, Any]:
     if isinstance(api, bool) or api != rpc.API:
         versions = {"client": one_line(str(api), 40), "rig": __version__, "daemon": rpc.API}
         raise make_error(rpc.VersionError, "daemon_version", **versions)
-    if service.token and token != service.token:
-        raise rpc.RpcError(rpc.INVALID, "wrong token")
     if not caller.name:
-        service.admission.welcome(caller)
-        service.publisher.add(caller)
+        others = sum(connection.is_client for connection in service.connections)
+        caller.is_client = others < CLIENTS
+        service.publisher.count()
     caller.name = one_line(client, 80) or "a client"
-    port = service.publisher.published.get("port")
+    port = service.published.get("port")
     return {
         "api": rpc.API,
         "version": __version__,
@@ -196,49 +178,48 @@ async def _stop(service: Service, client: Connection, reason: str) -> None:
     done.result()
 
 
-def _open_session(
-    rig: Controller, protocol: Path, session: Path, seed: int | None
-) -> dict[str, Any]:
-    fetched = rig.open_session(str(protocol), str(session), seed)
+def _open_session(rig: Controller, **names: Any) -> dict[str, Any]:
+    fetched = rig.open_session(**names)
     return {"session": rig.published.get("session"), "fetched": fetched}
 
 
-def _log_state(rig: Controller, reasons: Reasons, **values: Any) -> None:
-    rig.log_state(reasons=tuple(reasons), **values)
+def _log_state(rig: Controller, reasons: list[str | dict[str, Any]], **values: Any) -> None:
+    records = (
+        plain_reason(encodable(reason)) if isinstance(reason, str) else read_record(reason)
+        for reason in reasons
+    )
+    rig.log_state(reasons=tuple(records), **values)
 
 
-def _at_once(do: Callable[..., Any], **parameters: Any) -> ApiMethod:
-    return ApiMethod(do, _declare(parameters))
-
-
-def _of_rig(do: Callable[..., Any], *, writes: bool = True, **parameters: Any) -> ApiMethod:
-    return ApiMethod(do, _declare(parameters), of_rig=True, writes=writes)
-
-
-def _declare(parameters: dict[str, Any]) -> type[msgspec.Struct]:
-    """Make what reads parameters: of each its type, and its default where it may be missing."""
+def _method(
+    do: Callable[..., Any], *, of_rig: bool = False, writes: bool = False, **parameters: Any
+) -> ApiMethod:
+    """Make a row: of each parameter its type, and its default where it may be missing."""
     fields = [(name, *(of if isinstance(of, tuple) else (of,))) for name, of in parameters.items()]
-    return msgspec.defstruct("Parameters", fields, kw_only=True, forbid_unknown_fields=True)
+    reader = msgspec.defstruct("Parameters", fields, kw_only=True, forbid_unknown_fields=True)
+    return ApiMethod(do, reader, of_rig, writes)
 
 
+_of_rig, _writing = partial(_method, of_rig=True), partial(_method, of_rig=True, writes=True)
+_PATH = Annotated[str, msgspec.Meta(pattern="^/[^\0\ud800-\udc7f\udd00-\udfff]*$")]
 _SECONDS = Annotated[float, msgspec.Meta(ge=0.0, le=3600.0)]
 METHODS = {
-    "hello": _at_once(_hello, api=Any, client=str, token=(str, "")),
-    "subscribe": _at_once(lambda service, client: service.publisher.subscribe(client)),
-    "unsubscribe": _at_once(lambda service, client: service.publisher.unsubscribe(client)),
-    "take_control": _at_once(_take_control),
-    "release_control": _at_once(Service.release),
-    "renew": _at_once(lambda service, _: {"disk_s": service.worker.disk_s()}),
-    "stop": _at_once(_stop, reason=(str, "")),
-    "open_session": _of_rig(
-        _open_session, protocol=Path, session=Path, seed=(int | None, None), writes=False
+    "hello": _method(_hello, api=Any, client=str),
+    "subscribe": _method(lambda service, client: service.publisher.subscribe(client)),
+    "unsubscribe": _method(lambda service, client: service.publisher.unsubscribe(client)),
+    "take_control": _method(_take_control),
+    "release_control": _method(Service.release),
+    "renew": _method(lambda service, _: {"disk_s": service.worker.disk_s()}),
+    "stop": _method(_stop, reason=(str, "")),
+    "open_session": _of_rig(_open_session, protocol=_PATH, session=_PATH, seed=(int | None, None)),
+    "close_session": _of_rig(Controller.close_session),
+    "wait": _writing(Controller.wait, seconds=_SECONDS),
+    "arm": _writing(lambda rig, **job: {"token": rig.arm(**job)}, run=int, attempt=int),
+    "fire": _writing(Controller.fire, token=int),
+    "collect": _of_rig(Controller.collect, run=int, attempt=int),
+    "test_release": _writing(Controller.test_release),
+    "log_state": _writing(
+        _log_state, run=int, attempt=int, state=RunState, reasons=list[str | dict[str, Any]]
     ),
-    "close_session": _of_rig(Controller.close_session, writes=False),
-    "wait": _of_rig(Controller.wait, seconds=_SECONDS),
-    "arm": _of_rig(lambda rig, **job: {"token": rig.arm(**job)}, run=int, attempt=int),
-    "fire": _of_rig(Controller.fire, token=int),
-    "collect": _of_rig(Controller.collect, run=int, attempt=int, writes=False),
-    "test_release": _of_rig(Controller.test_release),
-    "log_state": _of_rig(_log_state, run=int, attempt=int, state=RunState, reasons=Reasons),
-    "unblind": _of_rig(Controller.unblind),
+    "unblind": _writing(Controller.unblind),
 }

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import os
 import socket
 import struct
 from pathlib import Path
 
-from rig.daemon.rpc import BusyError
-from rig.errors import DeviceError, InputError
+from rig.errors import InputError
 from rig.reasons import make_error
 
 _SECRET = 0o077  # what the group and others may not have
-_REACH_S = 5.0
-_PATIENCE = struct.pack("@2l", round(_REACH_S), 0)
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
 
 
@@ -23,11 +19,6 @@ def default_socket(name: str = "") -> Path:
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     folder = Path(runtime) if runtime else Path.home() / ".cache"
     return folder / "chainrig" / (f"rig-{name}.sock" if name else "rig.sock")
-
-
-def token_file(path: Path) -> Path:
-    """Name the file that stands for a socket where TCP is spoken."""
-    return path.with_suffix(".tcp")
 
 
 def prepare_folder(folder: Path) -> None:
@@ -81,48 +72,3 @@ def peer_uid(connection: socket.socket) -> int | None:
     data = connection.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size)
     uid: int = _CREDENTIALS.unpack(data)[1]
     return uid
-
-
-def reach(path: Path) -> tuple[socket.socket, str]:
-    """Connect to a daemon of this user.
-
-    Parameters
-    ----------
-    path
-        Its Unix socket; beside it the file that stands for TCP.
-
-    Returns
-    -------
-    socket, str
-        The connection, and the token that the daemon wants to hear; empty for none.
-
-    Raises
-    ------
-    DeviceError
-        Nobody answers there, or somebody else.
-    BusyError
-        Too many want to be let in.
-    """
-    tcp, token = token_file(path), ""
-    line: socket.socket | None = None
-    try:
-        check_folder(path.parent)
-        if not path.exists() and tcp.exists():
-            place = json.loads(tcp.read_text("ascii"))
-            address = "127.0.0.1", place["port"]
-            line, token = socket.create_connection(address, _REACH_S), place["token"]
-        else:
-            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            # More may want to be let in than the kernel keeps waiting.
-            line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _PATIENCE)
-            line.connect(str(path))
-    except (OSError, ValueError) as error:
-        if line is not None:
-            line.close()
-        if isinstance(error, BlockingIOError | TimeoutError):
-            raise make_error(BusyError, "daemon_busy", path=path, patience_s=_REACH_S) from error
-        raise make_error(DeviceError, "no_daemon", path=path, text=error) from error
-    if peer_uid(line) not in {None, os.getuid()}:
-        line.close()
-        raise make_error(DeviceError, "daemon_foreign", path=path)
-    return line, token

@@ -20,7 +20,6 @@ from typing import Any, NamedTuple
 
 from rig.daemon.lease import ControlError, Lease
 from rig.daemon.rpc import error_to_data, in_words
-from rig.daemon.stopper import Stopper
 from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
@@ -38,17 +37,14 @@ _STATISTICS_S = 1.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S, _GROWTH = 0.25, 5.0, 1.6
 STALL_S = 1.0
 """Held up for longer, the worker is said to be: nothing is known of the board meanwhile."""
+_ABORTS, _ABORT_S = 5, 0.03
+"""As an ABORT of the worker is repeated: all within the 250 ms after which everything is off."""
 _WAITING = make_reason("records_waiting")
 
 
 class _Job(NamedTuple):
     work: Callable[[], Any]
     outcome: Future[Any]
-
-
-class _Stop(NamedTuple):
-    reason: str
-    outcome: Future[None]
 
 
 class Worker:
@@ -67,8 +63,8 @@ class Worker:
     ----------
     controller
         Used by the worker's own thread only.
-    died
-        Called, in that thread, with what it did not survive.
+    over
+        Done when that thread has ended; what it did not survive is its exception.
     """
 
     def __init__(self, url: str, published: PublishedState, lease: Lease) -> None:
@@ -76,7 +72,7 @@ class Worker:
         self._url = url
         self._lease = lease
         self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
-        self._stops: list[_Stop] = []  # why everything shall be off
+        self._stops: list[tuple[str, Future[None]]] = []  # why everything shall be off
         self._holder: object = None  # who armed
         self._at_work = False  # for a client
         self._ending = False
@@ -84,21 +80,18 @@ class Worker:
         self._ping_s = 0.0  # until the next clock sample
         self._pause_s = _FIRST_PAUSE_S
         self._trouble: RigError | None = None
-        self._trouble_session: object = None  # that was open then
         self._begun: dict[str, float] = {}  # when each duty was done last
-        self.died: Callable[[BaseException], object] = lambda _: None
-        self.controller = Controller(
-            url, published=published, halted=self._is_halted, keep_port=True
-        )
-        self._stopper = Stopper(self._abort_past)
-        self._thread = threading.Thread(target=self._run, name="rig worker")
+        self.over: Future[None] = Future()
+        self.controller = Controller(url, published, self._is_halted)
+        self._attended = threading.Event()  # to STOP, by the worker's own thread
+        self._thread = threading.Thread(target=self._run, name="rig worker", daemon=True)
 
     # ------------------------------------------------------------------ from other threads
 
     def start(self) -> None:
-        """Begin to work."""
-        self._stopper.start()
-        self._thread.start()
+        """Begin to work, unless it has begun."""
+        if self._thread.ident is None:
+            self._thread.start()
 
     def submit(
         self, work: Callable[[Controller], Any], holder: object, *, writes: bool = True
@@ -122,18 +115,17 @@ class Worker:
                 raise self._trouble
             return work(self.controller)
 
-        return self._put(in_control)
-
-    def _put(self, work: Callable[[], Any]) -> Future[Any]:
         outcome: Future[Any] = Future()
-        self._jobs.put(_Job(work, outcome))
+        self._jobs.put(_Job(in_control, outcome))
         return outcome
 
     def stop(self, reason: str) -> Future[None]:
         """Have everything switched off, before anything else is done."""
         outcome: Future[None] = Future()
-        self._stops.append(_Stop(reason, outcome))
-        self._stopper.ask()
+        self._stops.append((reason, outcome))
+        self._attended.clear()
+        # A port that takes no bytes may hold this thread until the process ends.
+        threading.Thread(target=self._send_aborts, name="rig stop", daemon=True).start()
         self.wake()
         return outcome
 
@@ -143,9 +135,8 @@ class Worker:
 
     def disk_s(self) -> float:
         """How long the disk has been at the write under way, s; 0 for none."""
-        with suppress(SessionError):
-            return self.controller.session.write_s
-        return 0.0
+        session = self.controller.opened
+        return 0.0 if session is None else session.write_s
 
     def stall(self) -> RigError | None:
         """Say that nothing is known of the board, when the worker has been held up for long."""
@@ -158,10 +149,6 @@ class Worker:
         codes = ("disk_slow", "disk_slow_armed") if disk else ("held_up", "held_up_armed")
         return make_error(SessionError, codes[bool(self.controller.armed)], late_s=late_s)
 
-    def at_rest(self) -> Future[bool]:
-        """Find out whether nothing is lost when this ends now: nothing armed, falling, unsaved."""
-        return self._put(lambda: not self.controller.has_unsaved())
-
     def end(self) -> None:
         """Finish: what is armed is disarmed, what is being recorded is recorded to its end."""
         self._ending = True
@@ -170,7 +157,15 @@ class Worker:
     def join(self) -> None:
         """Wait for the end."""
         self._thread.join()
-        self._stopper.end()
+
+    def _send_aborts(self) -> None:
+        """Send ABORT at once, and again until the worker's own thread is at it.
+
+        A thread of its own waits for no disk and for nothing that is under way.
+        """
+        for _ in range(_ABORTS):
+            if not self._abort_past() or self._attended.wait(_ABORT_S):
+                return
 
     def _abort_past(self) -> bool:
         """Send ABORT past the worker's own thread; `False` when nobody can hear it."""
@@ -204,13 +199,12 @@ class Worker:
     def _run(self) -> None:
         try:
             self._work()
+            self.over.set_result(None)
         except BaseException as error:
             self._drain(in_words(RuntimeError("the worker died")))
-            self.died(error)
+            self.over.set_exception(error)
 
     def _work(self) -> None:
-        if not is_simulated(self._url):
-            self._trying(self.controller.connect)
         while not self._ending:
             patience_s = self._patience()
             self._beat(patience_s)
@@ -219,7 +213,7 @@ class Worker:
                 job = self._jobs.get(timeout=patience_s)
             self._beat()
             self._turn(job)
-        self._stops.append(_Stop("the daemon ended", Future()))
+        self._stops.append(("the daemon ended", Future()))
         self._attend()
         self._drain(make_error(StoppedError, "daemon_ends"))
         self._trying(self.controller.close)
@@ -250,24 +244,20 @@ class Worker:
             is_stopped = isinstance(error, StoppedError | DeviceRefusedError) and self._stops
             job.outcome.set_exception(self._stop_error() if is_stopped else failure)
         else:
-            if self._trouble is not None and self._over():
-                self._well()
+            if self._trouble is not None and self._is_settled():
+                self._trying(self._recover)  # what was asked for has ended it, by the way
             job.outcome.set_result(result)
         finally:
             self._at_work = False
 
-    def _over(self) -> bool:
-        """Whether what was asked for has ended the trouble, by the way."""
-        if isinstance(self._trouble, SessionError):
-            return self._trouble_session is not self._open_session
-        return self.controller.recorder is not None
-
-    @property
-    def _open_session(self) -> object:
-        return self.controller.session if self.controller.recording else None
+    def _is_settled(self) -> bool:
+        """Whether nothing is to be connected: there is a connection, or nothing that needs one."""
+        controller = self.controller
+        is_idle = controller.opened is None and is_simulated(self._url)
+        return is_idle or controller.recorder is not None
 
     def _stop_error(self) -> StoppedError:
-        return make_error(StoppedError, "stopped", text=self._stops[0].reason)
+        return make_error(StoppedError, "stopped", text=self._stops[0][0])
 
     def _drain(self, error: RigError) -> None:
         with suppress(queue.Empty):
@@ -282,18 +272,18 @@ class Worker:
         stops = [*self._stops]  # one that comes from here on is not lost
         why: Reason | str = ""
         if stops:
-            why = stops[0].reason
+            why = stops[0][0]
             self._drain(self._stop_error())
         elif self.controller.armed is not None and not self._held:
             silence = self._lease.silence(self._holder)
             client = {"client": self._lease.name, "silence_s": silence} if silence else {}
             why = make_reason("client_silent" if silence else "client_lost", **client)
         if why:
-            self._stopper.taken_over()
+            self._attended.set()
             self._trying(partial(self.controller.stop, why))
         del self._stops[: len(stops)]
-        for stop in stops:
-            stop.outcome.set_result(None)
+        for _, outcome in stops:
+            outcome.set_result(None)
 
     # ------------------------------------------------------------------ between requests
 
@@ -303,15 +293,15 @@ class Worker:
         watched = self.published.watched
         if self._trouble is not None:
             yield self._recover, self._pause_s
-        elif recorder is not None:
+        elif recorder is not None and (watched or not is_simulated(self._url)):
             is_armed = recorder.armed is not None
             yield recorder.look, _ARMED_S if is_armed else _WATCHED_S if watched else _ALONE_S
-            if controller.recording and not is_armed:
+            if controller.opened is not None and not is_armed:
                 yield self._ping, self._ping_s
-                yield controller.session.commit, _COMMIT_S
+                yield controller.opened.commit, _COMMIT_S
             if watched:
                 yield self._statistics, _STATISTICS_S
-        elif not is_simulated(self._url):
+        elif recorder is None and not is_simulated(self._url):
             yield controller.connect, _ALONE_S
 
     def _due_at(self, duty: Callable[[], object], period_s: float) -> float:
@@ -319,11 +309,9 @@ class Worker:
 
     def _patience(self) -> float:
         """How long nothing needs to be done, s."""
-        if self._stops:
-            return 0.0
         now = time.monotonic()
         moments = [self._due_at(*duty) for duty in self._duties()]
-        return max(0.0, min([now + _ALONE_S, *moments]) - now)
+        return 0.0 if self._stops else max(0.0, min([now + _ALONE_S, *moments]) - now)
 
     def _idle(self) -> None:
         now = time.monotonic()
@@ -338,13 +326,10 @@ class Worker:
             recorder.ping()
 
     def _statistics(self) -> None:
-        if (recorder := self.controller.recorder) is None:
-            return
-        pending = self.controller.session.pending if self.controller.recording else 0
-        self.published.set(
-            statistics=recorder.statistics()
-            | {"uncommitted": pending, "commands_waiting": self._jobs.qsize()}
-        )
+        if (recorder := self.controller.recorder) is not None:
+            pending = self.controller.opened.pending if self.controller.opened else 0
+            more = {"uncommitted": pending, "commands_waiting": self._jobs.qsize()}
+            self.published.set(statistics=recorder.statistics() | more)
 
     # ------------------------------------------------------------------ trouble
 
@@ -361,9 +346,9 @@ class Worker:
         if isinstance(error, DeviceRefusedError | StoppedError | ControlError | InputError):
             return
         if isinstance(error, SessionError):
-            if not controller.recording:
+            if controller.opened is None:
                 return  # of a file that is not, or no longer, open
-            if controller.session.pending and _WAITING not in error.reasons:
+            if controller.opened.pending and _WAITING not in error.reasons:
                 error.reasons += (_WAITING,)
                 error.hint = "; ".join(remedies(error.reasons))
             if controller.recorder is not None and controller.armed is not None:
@@ -372,7 +357,7 @@ class Worker:
         else:
             with suppress(RigError):
                 controller.disconnect()
-            if is_simulated(self._url) and not controller.recording:
+            if is_simulated(self._url) and controller.opened is None:
                 return  # there is no scene, so there is no port to come back to
         longer_s = min(self._pause_s * _GROWTH, _LONGEST_PAUSE_S)
         self._pause_s = _FIRST_PAUSE_S if self._trouble is None else longer_s
@@ -380,19 +365,17 @@ class Worker:
         if str(self._trouble) != str(error):  # said once, however often it is tried again
             what = "trouble" if isinstance(error, SessionError) else "down"
             log.warning("%s: %s%s", what, error.message, f" ({error.hint})" if error.hint else "")
-        self._trouble, self._trouble_session = error, self._open_session
+        self._trouble = error
         is_up, data = controller.recorder is not None, error_to_data(error)
         link = link_state("up" if is_up else "down", None if is_up else data, self._pause_s)
-        self.published.set(link=link, phase="trouble", error=data, statistics=None)
+        self.published.set(link=link, error=data, statistics=None)
 
     def _recover(self) -> None:
-        if self.controller.recording:
-            self.controller.session.commit()  # what waits in memory since the disk was full
-        self.controller.connect()
-        if self.controller.recording:
+        if self.controller.opened is not None:
+            self.controller.opened.commit()  # what waits in memory since the disk was full
+        if not self._is_settled():
+            self.controller.connect()
+        if self.controller.opened is not None:
             self.controller.settle()
-        self._well()
-
-    def _well(self) -> None:
-        self._trouble = self._trouble_session = None
-        self.published.set(error=None, phase="idle")
+        self._trouble = None
+        self.published.set(error=None)

@@ -97,7 +97,11 @@ def cases(protocol: Protocol, components: Components) -> tuple[Case, ...]:
     """
     counts = Counter(replace(run, number=0) for run in runs(protocol))
     kinds = sorted(counts, key=lambda run: (run.incline_deg, str(run.impact)))
-    models = [_model(protocol, run, components) for run in kinds]
+    models = []
+    for run in kinds:
+        model, x = predict_drop(at_contact(protocol, run.incline_deg, run.impact), run, components)
+        seen = perfect(model, x)
+        models.append((DropModel(model.protocol, seen, model.guesses, CLOCK_U, components), x))
     shared = SharedUnknowns(model for model, _ in models)
     # Beams are left out here and added by each layout: the rest is worked out once for all.
     places = np.full(len(shared), -1)
@@ -115,7 +119,7 @@ def _places(blocks: Mapping[str, slice], *names: str) -> Index:
     return np.concatenate([np.zeros(0, dtype=np.intp), *every])
 
 
-def predicted(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
+def predict_drop(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
     """Return a drop that no beam has seen yet, and its unknowns as the model predicts them.
 
     Parameters
@@ -145,13 +149,6 @@ def perfect(model: DropModel, x: Array) -> list[ChainRecord]:
         )
         collected.append(replace(record, trains=tuple(trains)))
     return collected
-
-
-def _model(protocol: Protocol, run: Run, components: Components) -> tuple[DropModel, Array]:
-    """The equations of the drop as the model predicts it."""
-    model, x = predicted(at_contact(protocol, run.incline_deg, run.impact), run, components)
-    records = perfect(model, x)
-    return DropModel(model.protocol, records, model.guesses, CLOCK_U, components), x
 
 
 def with_edges(train: EdgeTrain, edges: Index, times: Array) -> EdgeTrain:

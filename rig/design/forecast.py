@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,17 +15,16 @@ from rig.estimate.hypotheses import model_alpha
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence, Set
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 
-    from rig.analysis.square_root import Eliminated
+    from rig.analysis.square_root import Elimination
     from rig.arrays import Array, Index
     from rig.design.cases import Case
     from rig.protocol.protocol import Condition, Protocol
     from rig.units import Quantity
 
 
-@dataclass(frozen=True, slots=True)
-class GateLayout:
+class GateLayout(NamedTuple):
     """Some beams, and what they say of every kind of drop.
 
     Attributes
@@ -66,23 +64,18 @@ class GateLayout:
         )
         return GateLayout(self.cases, self.beams + len(beams), blocks)
 
-    def without(self, counts: Iterable[int]) -> list[Eliminated]:
+    def without(self, count_of: Callable[[Case], int]) -> Iterator[tuple[Case, Elimination]]:
         """Eliminate so many of the first unknowns of each kind of drop, priors included."""
-        reduced = []
-        for case, blocks, count in zip(self.cases, self.blocks, counts, strict=True):
-            size = case.core + BEAM * self.beams
-            own, others = np.split(np.arange(size), [count])
-            reduced.append(eliminate(blocks, np.ones(size), np.zeros(size), own, others))
-        return reduced
+        for case, blocks in zip(self.cases, self.blocks, strict=True):
+            yield case, _eliminate_first(count_of(case), blocks, case.core + BEAM * self.beams)
 
     def triangles(self) -> GateLayout:
         """Return the same in no more rows than columns: for beams to be added again and again."""
-        reduced = self.without([0] * len(self.cases))
-        return replace(self, blocks=tuple((drop.rest,) for drop in reduced))
+        reduced = self.without(lambda _: 0)
+        return self._replace(blocks=tuple((drop.rest,) for _, drop in reduced))
 
 
-@dataclass(frozen=True, slots=True)
-class Forecast:
+class Forecast(NamedTuple):
     """Standard uncertainties to be expected.
 
     Attributes
@@ -107,10 +100,6 @@ class Forecast:
         values = self.single[name].values()
         return math.sqrt(sum(u * u for u in values) / len(values))
 
-    def goals(self) -> dict[str, float]:
-        """All that a layout is judged by."""
-        return {name: self.typical(name) for name in self.single} | dict(self.coefficients)
-
 
 @one_thread
 def forecast(
@@ -126,32 +115,45 @@ def forecast(
         Only these measurands, if given.
     """
     size = layout.size
-    reduced = layout.without(case.own + case.struck for case in layout.cases)
-    drops = list(zip(layout.cases, reduced, strict=True))
-    rows = [_of_all_runs(case, drop.rest.slopes, layout.places(case)) for case, drop in drops]
+    # First without α, which coefficients may take the place of; then α goes too.
+    with_alpha = list(layout.without(lambda case: case.own))
+    drops = []
+    for case, drop in with_alpha:
+        left = np.arange(drop.rest.slopes.shape[1])
+        alpha = _eliminate_first(case.struck, [drop.rest._replace(columns=left)], left.size)
+        drops.append((case, drop, alpha))
+    rows = [_of_all_runs(case, last.rest.slopes, layout.places(case)) for case, _, last in drops]
     # Once a layout, then asked by every measurand and incline.
     inverse = np.linalg.inv(square_root(rows, np.ones(size), np.zeros(size)).matrix)
     single: dict[str, dict[Condition, float]] = {}
     mean: dict[str, dict[Condition, float]] = {}
     for group in by_case(protocol, drops, lambda drop: drop[0].run):
         at = protocol.condition(group[0][0].run)
-        n = sum(case.count for case, _ in group)
+        n = sum(case.count for case, _, _ in group)
         gradients = group[0][0].gradients
         for name in (name for name in gradients if name in (names or gradients)):
             by_one, by_mean, common = 0.0, 0.0, np.zeros(size)
-            for case, drop in group:
+            for case, *stages in group:
                 share, gradient = case.count / n, case.gradients[name]
-                by_own, by_others = np.split(gradient, [case.own + case.struck])
-                slopes = -by_own @ drop.gain
-                slopes[: by_others.size] += by_others
-                own, shared = by_own @ drop.inverse, slopes @ inverse[layout.places(case)]
-                chance = gradient[case.by_chance]
-                by_one += share * float(own @ own + shared @ shared)
-                by_mean += share * float(own @ own + chance @ chance) / n
+                chance, own, slopes = gradient[case.by_chance], 0.0, gradient
+                for stage in stages:
+                    by_own, by_others = np.split(slopes, [len(stage.inverse)])
+                    scatter, slopes = by_own @ stage.inverse, -by_own @ stage.gain
+                    slopes[: by_others.size] += by_others
+                    own += float(scatter @ scatter)
+                shared = slopes @ inverse[layout.places(case)]
+                by_one += share * (own + float(shared @ shared))
+                by_mean += share * (own + float(chance @ chance)) / n
                 common += share * shared
             single.setdefault(name, {})[at] = math.sqrt(by_one)
             mean.setdefault(name, {})[at] = math.sqrt(by_mean + float(common @ common))
-    return Forecast(single, mean, *_coefficients(protocol, layout))
+    return Forecast(single, mean, *_coefficients(protocol, layout, with_alpha))
+
+
+def _eliminate_first(count: int, blocks: Sequence[EquationRows], size: int) -> Elimination:
+    """Eliminate the first of so many unknowns, priors included, in units of these."""
+    own, others = np.split(np.arange(size), [count])
+    return eliminate(blocks, np.ones(size), np.zeros(size), own, others)
 
 
 def _of_all_runs(case: Case, slopes: Array, columns: Index) -> EquationRows:
@@ -159,12 +161,19 @@ def _of_all_runs(case: Case, slopes: Array, columns: Index) -> EquationRows:
     return EquationRows(math.sqrt(case.count) * slopes, np.zeros(len(slopes)), columns)
 
 
-def _coefficients(protocol: Protocol, layout: GateLayout) -> tuple[dict[str, float], set[str]]:
-    """Standard uncertainties of β, μ and a pile's β, and those that edges do not tell."""
+def _coefficients(
+    protocol: Protocol, layout: GateLayout, with_alpha: Sequence[tuple[Case, Elimination]]
+) -> tuple[dict[str, float], set[str]]:
+    """Standard uncertainties of β, μ and a pile's β, and those that edges do not tell.
+
+    Parameters
+    ----------
+    with_alpha
+        What each kind of drop leaves of α and of the session's unknowns.
+    """
     stated: dict[str, Quantity] = {}
     tied = []
-    reduced = layout.without(case.own for case in layout.cases)
-    for case, drop in zip(layout.cases, reduced, strict=True):
+    for case, drop in with_alpha:
         if case.struck:
             struck = protocol.chains[case.run.impact or ""].chain, case.run.incline_deg
             depends_on, _ = coefficients_of(protocol, *struck)

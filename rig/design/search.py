@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from operator import attrgetter
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from rig.protocol.protocol import Gate
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from rig.analysis.components import Components
     from rig.protocol.protocol import Gates, Protocol
@@ -39,8 +40,7 @@ _BEFORE = 2  # beams of a side above the chain's lower end that stay there
 _WORTH = 1e-3  # a gain in the mean logarithm that is worth moving a beam for
 
 
-@dataclass(frozen=True, slots=True)
-class Room:
+class Room(NamedTuple):
     """Where beams may be, m.
 
     Attributes
@@ -60,18 +60,15 @@ def room(protocol: Protocol, lowest: float | None, highest: float | None, spacin
     """Take limits as they are given, else from the gates that are there and the chains."""
     heights = [gate.height for gate in check_gates(protocol).gates]
     top = min(protocol.drop.value + rods.chain.length for rods in protocol.chains.values())
-    return Room(
-        min(heights) if lowest is None else lowest,
-        min(top, max(heights)) if highest is None else min(top, highest),
-        spacing,
-    )
+    lowest = min(heights) if lowest is None else lowest
+    highest = max(heights) if highest is None else highest
+    return Room(lowest, min(top, highest), spacing)
 
 
 def candidates(protocol: Protocol, limits: Room) -> list[float]:
     """Heights on a grid at which no hanging rod blocks a beam."""
     rods = hanging_rods(protocol.chains.values(), protocol.drop)
-    n = math.floor((limits.highest - limits.lowest) / _GRID_M + 1e-9)
-    grid = (limits.lowest + _GRID_M * np.arange(n + 1)).tolist()
+    grid = np.arange(limits.lowest, limits.highest + 1e-9, _GRID_M).tolist()
     return [round(height, 4) for height in grid if blocking_rod(rods, height) is None]
 
 
@@ -106,7 +103,7 @@ def better(
     layout = list(range(len(present.gates)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
     floor = min(MARGIN, margin(protocol))
-    best = score(protocol, GateLayout.of(all_cases, layout))
+    best = present_score = score(protocol, GateLayout.of(all_cases, layout))
     for sweep in range(1, _SWEEPS + 1):
         before = best
         for slot, gate in enumerate(present.gates):
@@ -132,7 +129,8 @@ def better(
                     proposed = with_gates(protocol, (gates[number] for number in numbers))
                     if _see_before(protocol, proposed) and margin(proposed) >= floor:
                         best, layout[slot] = trial, n
-        say(f"sweep {sweep}: uncertainties × {math.exp(best):.3g} in the geometric mean")
+        ratio = math.exp(best - present_score)
+        say(f"sweep {sweep}: uncertainties × {ratio:.3g} in the geometric mean")
         if before - best < _WORTH:
             break
     return with_gates(protocol, _in_order(present, [gates[n] for n in layout]))
@@ -154,17 +152,16 @@ def _see_before(protocol: Protocol, proposed: Protocol) -> bool:
 def score(protocol: Protocol, layout: GateLayout) -> float:
     """Mean of the logarithms of all uncertainties that count; less is better."""
     goals = (*(row.name for row in averaged()), *COEFFICIENTS)
-    uncertainties = forecast(protocol, layout, goals).goals()
+    expected = forecast(protocol, layout, goals)
+    uncertainties = {name: expected.typical(name) for name in expected.single}
+    uncertainties |= expected.coefficients
     values = [math.log(uncertainties[name]) for name in goals if name in uncertainties]
     return sum(values) / len(values)
 
 
 def _in_order(present: Gates, moved: Sequence[Gate]) -> list[Gate]:
     """Give the lowest gate of each side its lowest new height, and so on upwards."""
-
-    def upwards(gates: Iterable[Gate]) -> list[Gate]:
-        return sorted(gates, key=lambda gate: (gate.side, gate.height))
-
-    pairs = zip(upwards(present.gates), upwards(moved), strict=True)
+    upwards = attrgetter("side", "height")
+    pairs = zip(sorted(present.gates, key=upwards), sorted(moved, key=upwards), strict=True)
     heights = {gate.channel: place.height for gate, place in pairs}
     return [replace(gate, height=heights[gate.channel]) for gate in present.gates]

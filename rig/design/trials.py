@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import cycle, islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rig.analysis.annealing import MISSED
-from rig.analysis.components import stated
+from rig.analysis.components import priors
 from rig.analysis.identify import (
     LEAD,
     Identification,
@@ -24,7 +24,7 @@ from rig.analysis.identify import (
     identify,
     pattern_faults,
 )
-from rig.design.cases import CLOCK_U, perfect, predicted, with_edges
+from rig.design.cases import CLOCK_U, perfect, predict_drop, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
 from rig.threads import one_thread
@@ -45,8 +45,7 @@ _OFF = 2.0  # standard uncertainties that the drop may be off
 _SEED = 1  # the same drops for every layout, and on every machine
 
 
-@dataclass(frozen=True, slots=True)
-class Trials:
+class Trials(NamedTuple):
     """What became of a layout's trial drops.
 
     Attributes
@@ -92,7 +91,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
 def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainRecord]:
     """Let chains fall that hang and are let go a little off, with impulses that scatter."""
     assert protocol.gates is not None
-    model, x = predicted(protocol, run, stated(protocol))
+    model, x = predict_drop(protocol, run, priors(protocol))
     at, sd, fallen = model.unknowns, model.unknowns.sd, []
 
     def shake(name: str, members: int | slice = slice(None)) -> None:
@@ -135,7 +134,7 @@ def read_drop(
     earliest
         When chains were let go at the earliest, s.
     """
-    identification = identify(protocol, records, CLOCK_U, stated(protocol), earliest)
+    identification = identify(protocol, records, CLOCK_U, priors(protocol), earliest)
     unlike = list(pattern_faults(identification))
     if unlike or identification.fit is None:
         return identification, unlike or [record.role for record in records]
@@ -160,7 +159,7 @@ def margin(protocol: Protocol) -> float:
     least = MARGIN
     for incline in {min(ends), max(ends)}:
         here = at_contact(protocol, incline, ends[incline].impact)
-        model, x = predicted(here, ends[incline], stated(here))
+        model, x = predict_drop(here, ends[incline], priors(here))
         for off in (-_OFF, _OFF):
             x[model.unknowns["drop"]] = off * protocol.drop.u
             identification, unclear = read_drop(here, perfect(model, x))

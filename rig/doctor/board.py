@@ -1,179 +1,90 @@
-"""Checks of a board: what it says of itself, its clock, its stop and its gates.
+"""Checks of a board before a session: what the self-test has for that, and its light.
 
-No release is driven, and no drop of anybody is touched. A check returns what is well, in words, or
-raises why it is not.
+No release is driven, and no drop of anybody is touched.
 """
 
 from __future__ import annotations
 
 import cmath
-from contextlib import suppress
-from dataclasses import dataclass
 from math import tau
 from typing import TYPE_CHECKING
 
+from rig.errors import DeviceError
 from rig.flash.boards import UNSEEN
 from rig.flash.image import shipped_firmware
-from rig.link.client import Device
-from rig.link.gatewatch import GateStates, name_gates, watch_gates
-from rig.link.messages import HOST_SILENCE_MS, Arm, Identity, Phase, RefusalReason, unpack_label
+from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.reasons import Reason, make_reason
-from rig.selftest.board import LABEL
-from rig.selftest.findings import CheckFailedError, fail_if
-from rig.selftest.line_checks import judge_clock
+from rig.reasons import make_error
+from rig.selftest import checks, line_checks
+from rig.selftest.findings import fail_if, need
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
-    from rig.clock.host import Clock
-    from rig.link.port import Port
-    from rig.records import ClockSample, Edge
+    from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
 
-_GLANCE_S = 0.3
 _WATCH_S = 1.0
-_PINGS = 40
 _TRIES = 40
-_AGAIN = (RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY)
+_AGAIN = {RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY}
 """Refusals that a flickering gate gives now and then."""
 _MAINS_HZ = (50, 60, 100, 120)  # lamps flicker at twice the mains' frequency
 _IN_STEP = 0.8
 _ENOUGH = 10  # edges to tell a rhythm from chance
 
 
-@dataclass(frozen=True, slots=True)
-class BoardFacts:
-    """What a board says and does.
-
-    Attributes
-    ----------
-    shipped
-        The firmware that comes with this program for such a board; empty when none does.
-    states
-        Its gates as STATUS had them for a moment.
-    edges
-        Of all gates that were not blocked, for a second, from a recording without a release; or
-        the reason for which none could be made.
-    """
-
-    identity: Identity
-    shipped: str
-    pings: tuple[ClockSample, ...]
-    states: GateStates
-    edges: tuple[Edge, ...] | Reason
+def check_firmware(board: BoardUnderTest) -> str:
+    """See that the board has the firmware that comes with this program."""
+    name, firmware = board.identity.board, board.identity.firmware
+    shipped = shipped_firmware(name)
+    if not shipped:
+        return f"{firmware}; none for a {name} comes with rig"
+    fail_if(firmware != shipped, "firmware_differs", firmware=firmware, shipped=shipped)
+    return f"{firmware}, as it comes with rig; {UNSEEN}"
 
 
-def look_at_board(port: Port, clock: Clock) -> BoardFacts:
-    """Ask a board about everything that can be asked in a few seconds.
-
-    Raises
-    ------
-    DeviceError
-        It does not answer, or speaks another version.
-    """
-    device = Device(port, clock)
-    identity = device.connect()
-    pings: list[ClockSample] = []
-    for n in range(_PINGS):
-        pings += filter(None, [device.ping()])
-        clock.sleep(0.023 + 0.0071 * (n % 5))
-    state = device.status()
-    states = watch_gates(lambda: device.status().gates, clock, _GLANCE_S)
-    edges: tuple[Edge, ...] | Reason
-    if state.phase is not Phase.IDLE:
-        run, attempt = unpack_label(state.label)
-        edges = make_reason("drop_held", run=run, attempt=attempt)
-    elif clear := ((1 << identity.gates) - 1) & ~states.stuck:
-        edges = _record_gates(device, clear)
-    else:
-        edges = make_reason("gates_blocked", gates_listed=name_gates(states.stuck))
-    return BoardFacts(identity, shipped_firmware(identity.board), tuple(pings), states, edges)
+def check_held_drop(board: BoardUnderTest) -> str:
+    """See that the board holds no drop that somebody waits for."""
+    drop = board.foreign_drop()
+    fail_if(drop, "drop_held", **drop)
+    return "none"
 
 
-def _record_gates(device: Device, gates: int) -> tuple[Edge, ...] | Reason:
-    """Record the gates with all releases off; else say why that cannot be.
+def record_gates(board: BoardUnderTest) -> str:
+    """See that no gate changes while nothing moves, and whether the mains do it if one does."""
+    hz, times = board.identity.tick_hz, dict[int, list[float]]()
+    for edge in _record(board).edges:
+        if edge.blocked:
+            times.setdefault(edge.channel, []).append(edge.tick / hz)
+    ripples = {gate: mains_ripple(times[gate]) for gate in sorted(times)}
+    gates = "; ".join(
+        f"gate {gate} {len(times[gate])} times" + (f", in step with {hz} Hz" if hz else "")
+        for gate, hz in ripples.items()
+    )
+    code = "gates_flicker_mains" if any(ripples.values()) else "gates_flicker"
+    fail_if(gates, code, gates_listed=f"{gates} within {_WATCH_S:g} s")
+    return f"none within {_WATCH_S:g} s"
+
+
+def _record(board: BoardUnderTest) -> RecordedDrop:
+    """Record all gates that are not blocked, with all releases off.
 
     A board fires only when all its gates are clear and keep still. One that flickers with the
     mains does so for some milliseconds between two pulses, so a few tries in a row get there.
     """
-    order = Arm(LABEL, gates, 0, 0, timeout_ms=1000, record_ms=round(_WATCH_S * 1000))
+    clear = ((1 << board.identity.gates) - 1) & ~board.gates.stuck
+    need(clear, "a gate that is clear")
+    board.settle()
+    order = board.order(gates=clear, record_ms=round(_WATCH_S * 1000))
     for _ in range(_TRIES):
         try:
-            device.fire(device.arm(order))
-        except DeviceRefusedError as refusal:
-            reason: Reason = refusal.reasons[0]
-            if refusal.reason not in _AGAIN:
-                break
+            board.fire(board.arm(order))
+        except DeviceRefusedError as refused:
+            if refused.reason not in _AGAIN:
+                raise
         else:
-            drop = device.collect(LABEL)
-            if drop.certificate is not None:
-                device.acknowledge(LABEL, drop.certificate.crc32)
-            return drop.edges
-    with suppress(DeviceRefusedError):
-        device.abort()
-    return reason
-
-
-def _firmware(board: BoardFacts) -> str:
-    """See that the board has the firmware that comes with this program."""
-    firmware = board.identity.firmware
-    if not board.shipped:
-        return f"{firmware}; none for a {board.identity.board} comes with rig"
-    differs = firmware != board.shipped
-    fail_if(differs, "firmware_differs", firmware=firmware, shipped=board.shipped)
-    return f"{firmware}, as it comes with rig; {UNSEEN}"
-
-
-def _held_drop(board: BoardFacts) -> str:
-    """See that the board holds no drop that somebody waits for."""
-    if isinstance(board.edges, Reason) and board.edges.code == "drop_held":
-        raise CheckFailedError("drop_held", **board.edges.values)
-    return "none"
-
-
-def _round_trip(board: BoardFacts) -> str:
-    """See that answers come fast enough to keep an armed board armed."""
-    fail_if(not board.pings, "no_ping")
-    slowest = max(ping.host_recv_ns - ping.host_send_ns for ping in board.pings) * 1e-9
-    fail_if(slowest > HOST_SILENCE_MS / 2000, "slow_answers", slowest_s=slowest)
-    return f"{slowest * 1e3:.1f} ms at most"
-
-
-def _emergency_stop(board: BoardFacts) -> str:
-    """See that the emergency stop lets the board arm."""
-    if not isinstance(board.edges, Reason):
-        return "closed"
-    fail_if(board.edges.code == "refused_stopped", "stop_open")
-    return "not tried"
-
-
-def _stuck_gates(board: BoardFacts) -> str:
-    """See that no gate is blocked all the time."""
-    stuck = board.states.stuck
-    fail_if(stuck, "gates_blocked", gates_listed=name_gates(stuck))
-    return "none"
-
-
-def _flickering_gates(board: BoardFacts) -> str:
-    """See that no gate changes while nothing moves, and whether the mains do it if one does."""
-    edges = board.edges
-    if isinstance(edges, Reason) or not edges:
-        flickering = board.states.flickering
-        fail_if(flickering, "gates_flicker", gates_listed=name_gates(flickering))
-        if isinstance(edges, Reason):
-            return f"none seen at a glance; not recorded: {edges}"
-        return f"none within {_WATCH_S:g} s"
-    rises: dict[int, list[float]] = {}
-    for edge in edges:
-        if edge.blocked:
-            rises.setdefault(edge.channel, []).append(edge.tick / board.identity.tick_hz)
-    ripples = {channel: mains_ripple(times) for channel, times in sorted(rises.items())}
-    gates = "; ".join(
-        f"gate {channel} {len(rises[channel])} times" + (f", in step with {hz} Hz" if hz else "")
-        for channel, hz in ripples.items()
-    )
-    code = "gates_flicker_mains" if any(ripples.values()) else "gates_flicker"
-    raise CheckFailedError(code, gates_listed=f"{gates} within {_WATCH_S:g} s")
+            return board.collect_drop()
+    listed = "too often to begin a recording"
+    raise make_error(DeviceError, "gates_flicker", gates_listed=listed)
 
 
 def mains_ripple(times_s: Sequence[float]) -> int | None:
@@ -196,12 +107,11 @@ def mains_ripple(times_s: Sequence[float]) -> int | None:
     return next(in_step, None) if count >= _ENOUGH else None
 
 
-BOARD_CHECKS: Mapping[str, Callable[[BoardFacts], str]] = {
-    "firmware": _firmware,
-    "held drop": _held_drop,
-    "clock": lambda board: judge_clock(board.pings, board.identity.tick_hz),
-    "round trip": _round_trip,
-    "emergency stop": _emergency_stop,
-    "blocked gates": _stuck_gates,
-    "flickering gates": _flickering_gates,
+BOARD_CHECKS: Mapping[str, Check] = {
+    "board": checks.identify,
+    "firmware": check_firmware,
+    "held drop": check_held_drop,
+    "round trips": line_checks.measure_round_trips,
+    "gates": checks.look_at_gates,
+    "stop and flickering gates": record_gates,
 }

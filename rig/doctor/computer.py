@@ -6,13 +6,14 @@ A check returns what is well, in words, or raises why it is not. No port is open
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from contextlib import suppress
-from importlib.metadata import packages_distributions
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires, version
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from rig.selftest.findings import CheckFailedError, fail_if
+from rig.selftest.findings import fail_if
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,54 +22,56 @@ if TYPE_CHECKING:
 
 ROOM = 200 * 10**6
 """Bytes that should be free: a day of drops takes a few tens of MB, and its log as much again."""
-_IGNORED = ("E:ID_MM_DEVICE_IGNORE=1", "E:ID_MM_PORT_IGNORE=1")
+_IGNORED = {"E:ID_MM_DEVICE_IGNORE=1", "E:ID_MM_PORT_IGNORE=1"}
+_PROC = Path("/proc")
+_UDEV = Path("/run/udev/data")
+"""Where the kernel and udev keep their accounts."""
 
 
-class PortPlace(NamedTuple):
-    """A port's path, and where the kernel and udev keep their accounts."""
-
-    path: str
-    proc: Path = Path("/proc")
-    udev: Path = Path("/run/udev/data")
-
-    @property
-    def device(self) -> Path:
-        """What the path leads to."""
-        return Path(os.path.realpath(self.path))
-
-
-def check_permission(port: PortPlace) -> str:
+def check_permission(port: Path) -> str:
     """See that this user may read and write the port."""
-    fail_if(not port.device.exists(), "port_missing")
-    if os.access(port.device, os.R_OK | os.W_OK):
-        return "given"
-    group = ""
+    fail_if(not port.exists(), "port_missing")
+    group, given = "", os.access(port, os.R_OK | os.W_OK)
     with suppress(OSError, KeyError):  # gone, or a group without a name
-        group = port.device.group()
+        group = port.group()
     # Who joins the group root to reach a board can do far more than that.
-    fail_if(group == "root", "port_of_root")
-    raise CheckFailedError("port_forbidden", group=group or "its group", join=group or "dialout")
+    fail_if(not given and group == "root", "port_of_root")
+    fail_if(not given, "port_forbidden", group=group or "its group", join=group or "dialout")
+    return "given"
 
 
-def check_owners(port: PortPlace) -> str:
+def check_owners(port: Path) -> str:
     """See that no other process has the port open; other users' processes do not say."""
-    owners = list(_owners(port))
-    if not owners:
-        return "none seen"
+    owners = []
+    for folder, command in _processes():
+        with suppress(OSError):
+            handles = map(os.path.realpath, (folder / "fd").iterdir())
+            if folder.name != str(os.getpid()) and os.path.realpath(port) in handles:
+                owners.append(f"{command} (process {folder.name})")
     code = "port_of_daemon" if any("daemon" in owner for owner in owners) else "port_in_use"
-    raise CheckFailedError(code, owners=", ".join(owners))
+    fail_if(owners, code, owners=", ".join(owners))
+    return "none seen"
 
 
-def check_modem_manager(port: PortPlace) -> str:
+def check_modem_manager(port: Path) -> str:
     """See that ModemManager does not take the board for a modem."""
-    if all(name != "ModemManager" for _, name in _processes(port.proc)):
-        return "it does not run"
+    lines: list[str] = []
     with suppress(OSError):
-        number = port.device.stat().st_rdev
-        account = port.udev / f"c{os.major(number)}:{os.minor(number)}"
-        if any(line in _IGNORED for line in account.read_text("utf-8", "replace").splitlines()):
-            return "it is told to leave this port alone"
-    raise CheckFailedError("modem_manager")
+        number = port.stat().st_rdev
+        account = _UDEV / f"c{os.major(number)}:{os.minor(number)}"
+        lines = account.read_text("utf-8", "replace").splitlines()
+    programs = {Path(command.split(" ")[0]).name for _, command in _processes()}
+    is_running = "ModemManager" in programs
+    fail_if(is_running and _IGNORED.isdisjoint(lines), "modem_manager")
+    return "it is told to leave this port alone" if is_running else "it does not run"
+
+
+def _processes() -> Iterator[tuple[Path, str]]:
+    """Give each process's folder and its command."""
+    for folder in _PROC.glob("[0-9]*"):
+        with suppress(OSError):  # it has ended meanwhile
+            words = (folder / "cmdline").read_bytes().split(b"\0")
+            yield folder, b" ".join(words).decode("utf-8", "replace").strip()
 
 
 PORT_CHECKS = {
@@ -79,10 +82,18 @@ PORT_CHECKS = {
 
 
 def check_packages(owner: str) -> str:
-    """See that no package but the owner has modules of the name `rig`, and mixes them with ours."""
+    """See that all that a package needs is there, and that no other one mixes its files with it."""
     names = sorted(set(packages_distributions().get("rig", ())) - {owner})
     fail_if(names, "packages_mixed", packages=", ".join(names), names=" ".join(names))
-    return "only this one"
+    present, lacking = [], []
+    for needed in (row for row in requires(owner) or () if "extra ==" not in row):
+        name = re.split(r"[^\w.-]", needed)[0]
+        try:
+            present.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            lacking.append(name)
+    fail_if(lacking, "packages_lacking", packages=" ".join(lacking))
+    return ", ".join(present)
 
 
 def describe_cache(cache: CacheFile) -> str:
@@ -103,21 +114,3 @@ def check_room(folder: Path) -> str:
     values = {"free_mb": free / 1e6, "needed_mb": ROOM / 1e6}
     fail_if(free < ROOM, "disk_full", folder=str(place), **values)
     return f"{free / 1e6:.0f} MB free in {place}"
-
-
-def _processes(proc: Path) -> Iterator[tuple[Path, str]]:
-    for folder in proc.glob("[0-9]*"):
-        with suppress(OSError):  # it has ended meanwhile
-            yield folder, (folder / "comm").read_text("utf-8", "replace").strip()
-
-
-def _owners(port: PortPlace) -> Iterator[str]:
-    for folder, name in _processes(port.proc):
-        if folder.name == str(os.getpid()):
-            continue
-        with suppress(OSError):
-            handles = (folder / "fd").iterdir()
-            if str(port.device) in map(os.path.realpath, handles):
-                words = (folder / "cmdline").read_bytes().split(b"\0")
-                command = b" ".join(words).decode("utf-8", "replace").strip()
-                yield f"{command or name} (process {folder.name})"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 from rig.link.messages import unpack_label
 from rig.link.transcript import Restart, causes
 from rig.records import Drop, Job
-from rig.recover.examine import ExaminedFile, examine
-from rig.selftest.findings import CheckFailedError, Finding, fail_if, make_check
+from rig.recover.examine import examine
+from rig.selftest.findings import Finding, fail_if, make_check
 from rig.session.drop_check import ByteReplay
 from rig.session.store import Session
 
@@ -20,11 +21,11 @@ def check_session(path: str) -> Iterator[Finding]:
     Raises
     ------
     SessionError
-        It cannot be read at all.
+        It became unreadable meanwhile.
     """
-    examined = examine(path)
-    yield make_check(f"session {path}", check_whole, examined, path)
-    if examined.whole:
+    whole = make_check(f"session {path}", check_whole, path)
+    yield whole
+    if not whole.failed:
         with Session.open(path, readonly=True) as session:
             replay = ByteReplay()
             drops = [*session.drops(replay)]
@@ -33,11 +34,13 @@ def check_session(path: str) -> Iterator[Finding]:
         yield make_check("supply", describe_supply, drops)
 
 
-def check_whole(examined: ExaminedFile, path: str) -> str:
-    """See that a session file is whole."""
+def check_whole(path: str) -> str:
+    """See that a session file is there, and whole."""
+    fail_if(not Path(path).exists(), "session_missing")
+    examined = examine(path)
     fail_if(examined.foreign, "no_session", text=examined.foreign)
     for trouble in examined.troubles:
-        raise CheckFailedError("session_damaged", text=trouble, path=path)
+        fail_if(trouble, "session_damaged", text=trouble, path=path)
     writer = examined.snapshot.writer
     return f"whole, being written by {writer}" if writer else "whole"
 
@@ -52,19 +55,21 @@ def check_restarts(restarts: Iterable[Restart], drops: Iterable[Drop]) -> str:
     drops
         Their certificates tell of the others.
     """
-    counts: Counter[str] = Counter()
+    times: Counter[str] = Counter()
     for restart in restarts:
-        when = restart.when + _because(restart.cause)
-        if restart.label is not None:
-            when = f"{Job(*unpack_label(restart.label))}: {when}"
-        counts[when] += 1
+        job = "" if restart.label is None else f"{Job(*unpack_label(restart.label))}: "
+        times[job + restart.when + _because(restart.cause)] += 1
     for drop in drops:
         if drop.certificate and drop.certificate.restarts:
-            counts[f"{drop.job}: before it, unseen{_because(drop.certificate.restarts)}"] = 1
-    if not counts:
-        return "none"
-    text = "; ".join(when + (f", {n} times" if n > 1 else "") for when, n in counts.items())
-    raise CheckFailedError("board_restarts", text=text)
+            times[f"{drop.job}: before it, unseen{_because(drop.certificate.restarts)}"] += 1
+    text = "; ".join(f"{when}, {n} times" if n > 1 else when for when, n in times.items())
+    fail_if(text, "board_restarts", text=text)
+    return "none"
+
+
+def _because(mask: int) -> str:
+    words = causes(mask)
+    return f" ({words})" if words else ""
 
 
 def describe_supply(drops: Iterable[Drop]) -> str:
@@ -78,8 +83,3 @@ def describe_supply(drops: Iterable[Drop]) -> str:
         return "not measured"
     _, name, at_fire, lowest = min(dips)
     return f"at most from {at_fire:.2f} V to {lowest:.2f} V, in {name}"
-
-
-def _because(mask: int) -> str:
-    words = causes(mask)
-    return f" ({words})" if words else ""

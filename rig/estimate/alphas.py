@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rig.analysis.air import prior_air
 from rig.analysis.plain_data import attributes, plain
-from rig.analysis.result import Measured
 from rig.estimate.hypotheses import by_model, one_alpha, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, LikelihoodRatio, fit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from rig.analysis.result import Measured
     from rig.estimate.coefficients import CoefficientProblem
     from rig.estimate.hypothesis_fit import Hypothesis
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.protocol.protocol import Condition, Protocol, Run
 
 
-@dataclass(frozen=True, slots=True)
-class ConditionAlpha:
+class ConditionAlpha(NamedTuple):
     """The best single α under a condition.
 
     Attributes
@@ -44,8 +41,7 @@ class ConditionAlpha:
         return record if self.model is None else record | {"model": self.model}
 
 
-@dataclass(frozen=True, slots=True)
-class RunAlpha:
+class RunAlpha(NamedTuple):
     """The best single α of one run; `model` as in `ConditionAlpha`."""
 
     run: Run
@@ -64,8 +60,7 @@ class RunAlpha:
         return record if self.residual is None else record | {"residual": self.residual}
 
 
-@dataclass(frozen=True, slots=True)
-class SingleAlphas:
+class SingleAlphas(NamedTuple):
     """The best single α's.
 
     Attributes
@@ -108,7 +103,7 @@ def single_alphas(
         return protocol.condition(form.run)
 
     def in_air(supposed: Hypothesis) -> Hypothesis:
-        return with_nuisances(supposed, (), prior_air(protocol))
+        return with_nuisances(supposed, (), protocol)
 
     by_run = fit(forms, in_air(one_alpha(forms, lambda form: form.run.number)))
     by_case = fit(groups, in_air(one_alpha(groups, case)))
@@ -127,11 +122,11 @@ def single_alphas(
             tests["model"] = fit(problem.forms, in_air(supposed)).against(open_)
     return SingleAlphas(
         tuple(
-            ConditionAlpha(key, counts[key], Measured(*by_case[f"α {key}"]), model.get(key))
+            ConditionAlpha(key, counts[key], by_case[f"α {key}"], model.get(key))
             for key in sorted(counts)
         ),
         tuple(
-            RunAlpha(form.run, Measured(*by_run[f"α {form.run.number}"]), model.get(case(form)))
+            RunAlpha(form.run, by_run[f"α {form.run.number}"], model.get(case(form)))
             for form in forms
         ),
         tests,

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from rig.analysis.air import prior_air
 from rig.estimate.hypotheses import by_model, given_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
 from rig.model.impact import ALPHA, BETA, MU, PILE, impact_on, stated_coefficients
+from rig.reasons import make_reason
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -24,8 +23,7 @@ FOUND = 0.5
 """Share of its prior uncertainty that a nuisance must lose to the edges to count as found."""
 
 
-@dataclass(frozen=True, slots=True)
-class CoefficientProblem:
+class CoefficientProblem(NamedTuple):
     """What there is to be estimated.
 
     What the edges tell is fitted, whatever the protocol says of it. What they do not tell is held
@@ -64,7 +62,7 @@ class CoefficientProblem:
     def hold(self, held: Mapping[str, float]) -> CoefficientProblem:
         """Hold coefficients within these uncertainties; one that is exact leaves the fit."""
         stated = {name: q for name, q in self.stated.items() if held.get(name) != 0.0}
-        return replace(self, stated=stated, held=tuple(name for name in held if name in stated))
+        return self._replace(stated=stated, held=tuple(name for name in held if name in stated))
 
 
 def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> CoefficientProblem:
@@ -83,23 +81,22 @@ def coefficient_problem(protocol: Protocol, forms: Sequence[QuadraticForm]) -> C
         if depends_on:
             in_model.append(form)
         else:
-            left_out.append(f"{form.run.incline_deg:g}° tells no coefficient: {'; '.join(notes)}")
+            at = {"incline_deg": form.run.incline_deg, "notes": "; ".join(notes)}
+            left_out.append(make_reason("incline_without_coefficient", **at).text)
     problem = CoefficientProblem(tuple(in_model), stated)
 
     def uncertainties(held: Mapping[str, float]) -> dict[str, float]:
         candidate = problem.hold(held)
         outcome = best(protocol, candidate)
-        return {name: outcome[name][1] for name in candidate.stated}
+        return {name: outcome[name].u for name in candidate.stated}
 
     held = held_back(stated, uncertainties)
     inclines = ", ".join(f"{incline:g}°" for incline in problem.inclines)
-    left_out += [
-        f"{words(name)} is not identified by drops at {inclines}: held at the protocol's "
-        f"{stated[name].value:g}"
-        + (f" ± {u:g}, which the other coefficients allow for" if u else "")
-        for name, u in held.items()
-    ]
-    return replace(problem.hold(held), left_out=tuple(dict.fromkeys(left_out)))
+    for name, u in held.items():
+        values = {"coefficient": words(name), "value": stated[name].value, "u": u}
+        code = "coefficient_held" if u else "coefficient_exact"
+        left_out.append(make_reason(code, inclines=inclines, **values).text)
+    return problem.hold(held)._replace(left_out=tuple(dict.fromkeys(left_out)))
 
 
 def coefficients_of(
@@ -157,4 +154,4 @@ def best(
 ) -> HypothesisFit:
     """Fit the coefficients, or these parameters instead of theirs, with all nuisances."""
     supposed = by_model(protocol, parameters or problem.parameters)
-    return fit(problem.forms, with_nuisances(supposed, problem.inclines, prior_air(protocol)))
+    return fit(problem.forms, with_nuisances(supposed, problem.inclines, protocol))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from rig.analysis.dual import Dual
 from rig.analysis.fit import Fit
 from rig.analysis.joint_fit import JointFit, by_itself
 from rig.analysis.plain_data import attributes
-from rig.analysis.quantities import Adjusted
+from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.trajectory import free_trajectory, struck_trajectory
 from rig.measurands import SEPARATION
 from rig.model.fall import kicks
@@ -30,8 +29,7 @@ if TYPE_CHECKING:
 POINTS = 120
 
 
-@dataclass(frozen=True, slots=True)
-class Curve:
+class Curve(NamedTuple):
     """A quantity along a fall, each array of shape ``(POINTS,)``.
 
     Attributes
@@ -48,12 +46,11 @@ class Curve:
 
     def json(self, name: str) -> dict[str, list[float]]:
         """``{name, name_U95, name_model}``."""
-        ends = {name: self.measured, f"{name}_U95": self.u95, f"{name}_model": self.model}
-        return {key: values.tolist() for key, values in ends.items()}
+        ends = {"": self.measured, "_U95": self.u95, "_model": self.model}
+        return {name + end: values.tolist() for end, values in ends.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class DropCurves:
+class DropCurves(NamedTuple):
     """One drop from release to the top rod's hit.
 
     Attributes
@@ -92,7 +89,7 @@ def drop_curves(
         joint = by_itself(drop)
         (drop,) = joint.drops
     assert joint is not None
-    adjusted, budgets = Adjusted(drop.model, drop.x), Budgets(joint)
+    adjusted, budgets = AdjustedDrop(drop.model, drop.x), Budgets(joint)
 
     def with_band(measured: Dual, model: Array) -> Curve:
         _, own, shared = budgets.roots(drop, measured.slopes)
@@ -113,19 +110,19 @@ def drop_curves(
     return DropCurves(run, heights, squares, times, separation)
 
 
-def _squares(drop: Adjusted, heights: Array) -> Dual:
+def _squares(drop: AdjustedDrop, heights: Array) -> Dual:
     """V² of the impact chain when its top rod is at some heights."""
     levels = Dual(heights, np.zeros((heights.size, drop.x.size)))
     levels -= drop.model.records["impact"].chain.chain.length
     for _ in range(2):  # what the top rod is off its chain hardly depends on the level
         levels = levels + heights - drop.top("impact", levels)
-    speed = drop.squares("impact", levels).root() + drop.stretched(levels.value)[1]
+    speed = drop.squares("impact", levels).root() + drop.stretch(levels.value)[1]
     if (catching_up := drop.model.discrepancy.late_way) > 0.0:  # below the lowest beam
         speed += drop.late * np.clip(1.0 - heights / catching_up, 0.0, 1.0)
     return speed * speed
 
 
-def _separations(drop: Adjusted, times: Array) -> Dual:
+def _separations(drop: AdjustedDrop, times: Array) -> Dual:
     """How far the free chain's top rod is above the other's, each so long after its release."""
     free, struck = (
         drop.top(role, drop.levels(role, drop.release(role) + times)) for role in ("free", "impact")
@@ -156,6 +153,6 @@ def model_fall(protocol: Protocol, run: Run, role: Side) -> Trajectory:
     gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
     # Of the top rod, as each touches: one that touches higher does so earlier.
     touching = chain.length - np.array(chain.heights)
-    touching += higher_contacts(protocol, run.incline_deg, rods)
+    touching += higher_contacts(run.incline_deg, rods)
     path = np.array(gains), np.ones(chain.rods), -touching
     return struck_trajectory(0.0, start, gravity, *path, 1.0, np.array([*kappas, kappas[-1]]))

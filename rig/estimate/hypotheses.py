@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.air import prior_air
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
 from rig.model.impact import ALPHA, impact_on, with_coefficients
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from rig.estimate.quadratic_forms import QuadraticForm
     from rig.model.chain import Chain
     from rig.protocol.protocol import Protocol
-
-    AlphaAndSlopes = tuple[float, Array]
 
 END, AIR = "end_correction", "drag"
 CONTACT_U = 1e-3
@@ -36,19 +34,16 @@ def by_model(protocol: Protocol, parameters: Sequence[Parameter]) -> Hypothesis:
     """Suppose Eqs. 8 to 13 with these coefficients unknown, the others as stated."""
     names = [parameter.name for parameter in parameters]
 
-    @cache
-    def alpha_at(chain: Chain, incline_deg: float, values: tuple[float, ...]) -> AlphaAndSlopes:
-        return model_alpha(protocol, chain, incline_deg, dict(zip(names, values, strict=True)))
+    def alpha(form: QuadraticForm, values: Array) -> tuple[float, Array]:
+        by_name = dict(zip(names, values.tolist(), strict=True))
+        return model_alpha(protocol, form.chain, form.run.incline_deg, by_name)
 
-    return Hypothesis(
-        tuple(parameters),
-        lambda form, values: alpha_at(form.chain, form.run.incline_deg, tuple(values.tolist())),
-    )
+    return Hypothesis(tuple(parameters), alpha)
 
 
 def model_alpha(
     protocol: Protocol, chain: Chain, incline_deg: float, values: Mapping[str, float]
-) -> AlphaAndSlopes:
+) -> tuple[float, Array]:
     """α of all rods by Eqs. 8 to 13, and its derivatives by coefficients, shape ``(values,)``.
 
     Parameters
@@ -114,17 +109,9 @@ def with_end_correction(
     return Hypothesis((*inner.parameters, added), alphas)
 
 
-def with_nuisances(
-    inner: Hypothesis, inclines: Sequence[float], air: tuple[float, float]
-) -> Hypothesis:
-    """Suppose air, and the contact point to be at another height at each of some inclines.
-
-    Parameters
-    ----------
-    air
-        Mean and standard uncertainty of κ beforehand, see `rig.analysis.air.prior_air`.
-    """
-    prior = 0.0, CONTACT_U
+def with_nuisances(inner: Hypothesis, inclines: Sequence[float], protocol: Protocol) -> Hypothesis:
+    """Suppose air, and the contact point to be at another height at each of some inclines."""
+    air, prior = prior_air(protocol), (0.0, CONTACT_U)
     added = [Parameter(f"contact {at:g}", 0.0, prior, "contact", at) for at in inclines]
     added.append(Parameter(AIR, air[0], air, "drag"))
     return inner._replace(parameters=(*inner.parameters, *added))

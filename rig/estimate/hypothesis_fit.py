@@ -9,8 +9,9 @@ import numpy as np
 
 from rig.analysis.adjust import least_squares
 from rig.analysis.distributions import chi2_tail
-from rig.analysis.equations import Linearization, scaled
+from rig.analysis.equations import Linearization, standardise
 from rig.analysis.plain_data import attributes
+from rig.analysis.result import Measured
 from rig.analysis.square_root import EquationRows
 from rig.errors import RigError
 from rig.estimate.quadratic_forms import EXTRA
@@ -104,10 +105,10 @@ class HypothesisFit:
     chi2: float
     log_volume: float
 
-    def __getitem__(self, name: str) -> tuple[float, float]:
+    def __getitem__(self, name: str) -> Measured:
         """Value and standard uncertainty of a parameter."""
         n = self.names.index(name)
-        return float(self.values[n]), float(np.sqrt(self.covariance[n, n]))
+        return Measured(float(self.values[n]), float(np.sqrt(self.covariance[n, n])))
 
     def against(self, wider: HypothesisFit) -> LikelihoodRatio:
         """Test it against a hypothesis in which it is contained; rounding makes no χ² negative."""
@@ -178,7 +179,7 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
     if not solution.settled:
         raise RigError("the fit does not settle", "rig analyze shows whether the drops are sound")
     chi2 = sum(float(rows.left @ rows.left) for rows in solution.rows.values())
-    chi2 += float(np.sum(scaled(solution.x, sd) ** 2))
+    chi2 += float(np.sum(standardise(solution.x, sd) ** 2))
     by_root = solution.inverse[shared:] * sd[shared:, None]
     volume = float(np.sum(np.log(sd[sd > 0.0])) - np.linalg.slogdet(solution.root)[1])
     names = tuple(parameter.name for parameter in parameters)

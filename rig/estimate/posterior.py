@@ -8,17 +8,16 @@ any power of their number. Nothing is drawn at random.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.plain_data import attributes
 from rig.estimate.coefficients import CoefficientProblem, best
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter
 from rig.model.impact import MU
 
 if TYPE_CHECKING:
+    from rig.analysis.result import Measured
     from rig.arrays import Array
     from rig.protocol.protocol import Protocol
 
@@ -26,8 +25,7 @@ NODES = 41
 _REACH = 6.0  # standard uncertainties on either side
 
 
-@dataclass(frozen=True, slots=True)
-class Posterior:
+class Posterior(NamedTuple):
     """A sum of normal distributions.
 
     Attributes
@@ -46,32 +44,22 @@ class Posterior:
     means: Array
     sds: Array
 
-    def json(self) -> dict[str, Any]:
-        """``posterior``."""
-        record = attributes(self, "names", "weights", "means", "sds")
-        return record | {"nodes": self.weights.size}
+    def summary(self, name: str) -> dict[str, float]:
+        """Moments, and the ends of the probabilistically symmetric interval of 95 %."""
+        from scipy.special import ndtr  # noqa: PLC0415 - only a summary needs it
 
-    def moments(self, name: str) -> tuple[float, float]:
-        """Mean and standard deviation."""
         n = self.names.index(name)
-        mean = float(self.weights @ self.means[:, n])
-        variance = self.weights @ (self.sds[:, n] ** 2 + (self.means[:, n] - mean) ** 2)
-        return mean, math.sqrt(float(variance))
-
-    def interval(self, name: str) -> tuple[float, float]:
-        """Ends of the probabilistically symmetric interval of 95 %."""
-        return self.quantile(name, 0.025), self.quantile(name, 0.975)
-
-    def quantile(self, name: str, probability: float) -> float:
-        """Value that the coefficient stays below with a probability; by bisection."""
-        n = self.names.index(name)
-        mean, sd = self.moments(name)
-        low, high = mean - 20.0 * sd, mean + 20.0 * sd
-        while high - low > 1e-9 * sd and low < (middle := 0.5 * (low + high)) < high:
-            z = (middle - self.means[:, n]) / (self.sds[:, n] * math.sqrt(2.0))
-            below = float(self.weights @ [0.5 * math.erfc(-scaled) for scaled in z.tolist()])
-            low, high = (middle, high) if below < probability else (low, middle)
-        return 0.5 * (low + high)
+        means, sds = self.means[:, n], self.sds[:, n]
+        mean = float(self.weights @ means)
+        sd = math.sqrt(float(self.weights @ (sds**2 + (means - mean) ** 2)))
+        record = {"value": mean, "u": sd}
+        for end, probability in (("low", 0.025), ("high", 0.975)):
+            low, high = mean - 20.0 * sd, mean + 20.0 * sd
+            while high - low > 1e-9 * sd and low < (middle := 0.5 * (low + high)) < high:
+                below = float(self.weights @ ndtr((middle - means) / sds))
+                low, high = (middle, high) if below < probability else (low, middle)
+            record[end] = 0.5 * (low + high)
+        return record
 
 
 def posterior(protocol: Protocol, problem: CoefficientProblem, centre: HypothesisFit) -> Posterior:
@@ -83,7 +71,7 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
         The least-squares fit of the same scene, around which the nodes lie.
     """
     priors = {
-        name: Parameter(name, centre[name][0], (stated.value, stated.u) if stated.u else None)
+        name: Parameter(name, centre[name].value, (stated.value, stated.u) if stated.u else None)
         for name, stated in problem.stated.items()
     }
     names, prior = tuple(priors), priors[MU].prior if MU in priors else None
@@ -95,7 +83,7 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
         at = best(protocol, problem, [*(priors | node).values()])
         off = (node[MU].start - prior[0]) / prior[1] if prior else 0.0
         logs.append(at.log_volume - 0.5 * (at.chi2 + off**2))
-        estimates.append([at[name] for name in names])
+        estimates.append([(at[name].value, at[name].u) for name in names])
     weights = np.exp(np.array(logs) - max(logs))  # of the largest: no exponent overflows
     means, widths = np.moveaxis(np.reshape(estimates, (len(nodes), len(names), 2)), 2, 0)
     if MU in priors:
@@ -103,9 +91,10 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
     return Posterior(names, weights / weights.sum(), means, widths)
 
 
-def _nodes(measured: tuple[float, float], prior: tuple[float, float] | None) -> Array:
+def _nodes(measured: Measured, prior: tuple[float, float] | None) -> Array:
     """Return even nodes around what edges and prior say together; friction has no negative side."""
-    values, us = np.transpose([measured, prior] if prior else [measured])
+    known = [(measured.value, measured.u), *([prior] if prior else ())]
+    values, us = np.transpose(known)
     mean, sd = float(us**-2 @ values / (us**-2).sum()), float((us**-2).sum()) ** -0.5
     low = max(0.0, mean - _REACH * sd)
     return np.linspace(low, max(mean, low) + _REACH * sd, NODES)

@@ -10,8 +10,7 @@ say is lost.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,8 +33,7 @@ EXTRA = ("contact", "drag")
 """Columns behind those of the rods: height of the contact point, m, and κ of the air, 1/m."""
 
 
-@dataclass(frozen=True, slots=True)
-class QuadraticForm:
+class QuadraticForm(NamedTuple):
     """|R·z + r|², z being the shared unknowns of the drop, then its impacts.
 
     Attributes
@@ -120,7 +118,7 @@ def _blocks(drop: Fit | JointDrop, alphas: Array) -> tuple[list[EquationRows], i
     for role, matches in drop.matches.items():
         rows = model.equations(role, x, matches)
         pairing = model.pairings[role]
-        times = pairing.times[pairing.observed(matches)[1]] * (1.0 + x[at["clock"]])
+        times = pairing.times[pairing.indices(matches)[1]] * (1.0 + x[at["clock"]])
         path = model.trajectory(role, x).sights(times)[2]
         # A contact point higher up is met as if every rod that strikes hung that much lower.
         lower = -path[:, COMMON + alphas.size :].sum(axis=1)
@@ -148,8 +146,7 @@ def merge_like(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
     for form in forms:
         groups.setdefault((form.run.incline_deg, form.run.impact, form.run.free), []).append(form)
     return [
-        replace(
-            group[0],
+        group[0]._replace(
             rows=EquationRows(
                 np.concatenate([form.rows.slopes for form in group]),
                 np.concatenate([form.rows.left for form in group]),

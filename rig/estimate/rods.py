@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import prior_air
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
 from rig.estimate.hypotheses import one_alpha, open_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import LikelihoodRatio, fit
+from rig.reasons import make_reason
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,14 +22,9 @@ if TYPE_CHECKING:
 
 RESOLVED = 0.5
 """U95 over the predicted impulse: rods known less well are taken together with the next ones."""
-_TOGETHER = (
-    "The gates do not resolve every rod by itself; neighbours are taken together until their sum "
-    f"is known to {100 * RESOLVED:.0f} % (95 %)."
-)
 
 
-@dataclass(frozen=True, slots=True)
-class Gain:
+class Gain(NamedTuple):
     """Speed that the chain gains from neighbours which the gates tell apart from all others.
 
     Attributes
@@ -64,8 +58,7 @@ class Gain:
         return record | attributes(self, "eq9_m_s", "normalized_error")
 
 
-@dataclass(frozen=True, slots=True)
-class Impulses:
+class Impulses(NamedTuple):
     """What each rod gave, under one condition.
 
     Attributes
@@ -120,24 +113,17 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
 
 def resolution(impulses_by_case: Sequence[Impulses]) -> str:
     """Say whether each rod was resolved."""
-    if all(case.resolved == case.rods for case in impulses_by_case):
-        return "The gates resolve the impulse of every rod at every incline."
-    counts = {(case.resolved, case.rods) for case in impulses_by_case}
-    if len(counts) == 1:
-        ((resolved, rods),) = counts
-        return f"{_TOGETHER} Resolved alone at every incline: {resolved} of {rods}."
-    short = "; ".join(
-        f"{case.condition.incline_deg:g}°: {case.resolved} of {case.rods}"
-        for case in impulses_by_case
-        if case.resolved < case.rods
-    )
-    return f"{_TOGETHER} Resolved alone at {short}."
+    short = [case for case in impulses_by_case if case.resolved < case.rods]
+    if not short:
+        return f"{make_reason('rods_resolved')}."
+    inclines = (f"{at.condition.incline_deg:g}°: {at.resolved} of {at.rods}" for at in short)
+    return f"{make_reason('rods_together', limit=100 * RESOLVED, inclines='; '.join(inclines))}."
 
 
 def _impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> Impulses:
-    condition, air = protocol.condition(forms[0].run), prior_air(protocol)
+    condition = protocol.condition(forms[0].run)
     single, open_fit = (
-        fit(forms, with_nuisances(alphas, [condition.incline_deg], air))
+        fit(forms, with_nuisances(alphas, [condition.incline_deg], protocol))
         for alphas in (one_alpha(forms, lambda _: "one"), open_alphas(forms))
     )
     rods = forms[0].alphas.size - 1
@@ -145,13 +131,8 @@ def _impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> Impulses:
     gains = weight * open_fit.values[:rods]
     covariance = open_fit.covariance[:rods, :rods] * np.outer(weight, weight)
     model = weight * single.values[0]
-    return Impulses(
-        condition,
-        rods,
-        Measured(*single["α one"]),
-        single.against(open_fit),
-        _gains(gains, covariance, model),
-    )
+    groups = _gains(gains, covariance, model)
+    return Impulses(condition, rods, single["α one"], single.against(open_fit), groups)
 
 
 def _gains(gains: Array, covariance: Array, model: Array) -> tuple[Gain, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,10 +22,13 @@ from rig.estimate.hypotheses import AIR, CONTACT_U
 from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merge_like, quadratic_form
 from rig.estimate.rods import Impulses, impulses, resolution
+from rig.reasons import make_error, make_reason
 from rig.sections import Sections
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rig.analysis.session import Analysis
     from rig.arrays import Array
     from rig.estimate.coefficients import CoefficientProblem
@@ -34,8 +37,7 @@ if TYPE_CHECKING:
     from rig.units import Quantity
 
 
-@dataclass(frozen=True, slots=True)
-class Coefficient:
+class Coefficient(NamedTuple):
     """One coefficient of the impacts.
 
     Attributes
@@ -46,46 +48,26 @@ class Coefficient:
         Whether the edges tell it; else it is held by what the protocol states.
     least_squares
         From the edges, and from nothing else where it is identified.
-    mean, sd, low, high
-        Of the posterior: moments, and its interval of 95 %.
     stated
         In the protocol.
+    posterior
+        As `Posterior.summary` has it.
     """
 
     name: str
     identified: bool
     least_squares: Measured
-    mean: float
-    sd: float
-    low: float
-    high: float
     stated: Quantity
+    posterior: Mapping[str, float]
 
     def json(self) -> dict[str, Any]:
         """One of ``parameters``."""
+        stated = {"stated": attributes(self.stated, "value", "u")}
         record = attributes(self, "name", "identified", "least_squares")
-        posterior = {"value": self.mean, "u": self.sd, "low": self.low, "high": self.high}
-        return record | {"stated": attributes(self.stated, "value", "u"), "posterior": posterior}
+        return record | stated | attributes(self, "posterior")
 
 
-@dataclass(frozen=True, slots=True)
-class ContactPoint:
-    """Where the rods touch at an incline, m above the contact level.
-
-    `identified`: whether the edges tell it better than is supposed beforehand.
-    """
-
-    incline_deg: float
-    height: Measured
-    identified: bool
-
-    def json(self) -> dict[str, Any]:
-        """One of ``contact``."""
-        return attributes(self, "incline_deg", "identified") | {"height_m": self.height.json()}
-
-
-@dataclass(frozen=True, slots=True)
-class Coefficients:
+class Coefficients(NamedTuple):
     """The coefficients of the impacts, fitted to all drops.
 
     Attributes
@@ -95,9 +77,9 @@ class Coefficients:
     correlation
         Of the parameters by least squares, shape ``(parameters, parameters)``.
     posterior
-        Of all parameters; `None` without any.
+        Of all parameters.
     contact
-        One an incline.
+        Where the rods touch at each incline, m above the contact level, see `is_identified`.
     drag
         κ in g − κv², 1/m; `None` where the edges tell it no better than the protocol.
     chi2
@@ -106,19 +88,27 @@ class Coefficients:
 
     parameters: tuple[Coefficient, ...]
     correlation: Array
-    posterior: Posterior | None
-    contact: tuple[ContactPoint, ...]
+    posterior: Posterior
+    contact: Mapping[float, Measured]
     drag: Measured | None
     chi2: float
 
     def json(self) -> dict[str, Any]:
         """``parameters`` to ``edges_chi2``."""
-        record = attributes(self, "parameters", "contact")
-        if self.posterior is not None:
-            names = [parameter.name for parameter in self.parameters]
-            record["correlation"] = {"names": names, "matrix": self.correlation.tolist()}
-            record["posterior"] = self.posterior.json()
+        record = attributes(self, "parameters")
+        record["contact"] = [
+            {"incline_deg": at, "identified": is_identified(height), "height_m": height.json()}
+            for at, height in self.contact.items()
+        ]
+        if self.parameters:
+            matrix = {"names": self.posterior.names, "matrix": self.correlation}
+            record["correlation"] = plain(matrix)
         return record | {"drag_per_m": plain(self.drag), "edges_chi2": self.chi2}
+
+
+def is_identified(contact: Measured) -> bool:
+    """Whether the edges tell a contact point better than is supposed beforehand."""
+    return contact.u < of.FOUND * CONTACT_U
 
 
 @dataclass(slots=True)
@@ -181,10 +171,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
         Where no chain strikes anything, or no drop is good and fits a motion.
     """
     if protocol.surface is None:
-        raise InputError(
-            "this scene has no coefficients to estimate",
-            "rig analyze SESSION gives the acceleration of free fall",
-        )
+        raise make_error(InputError, "impacts_absent")
     good = {
         (result.run.number, result.attempt): result.run
         for result in analysis.runs
@@ -192,8 +179,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     }
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:
-        none = "no motion fits the edges of any good drop" if good else "no good drop"
-        raise InputError(f"{none} in this session", "rig analyze SESSION says why")
+        raise make_error(InputError, "drops_unfitted" if good else "drops_unusable")
     shared = (
         analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
     )
@@ -204,12 +190,9 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     problem, outcome = None, None
     with sections.alone("The coefficients"):
         problem = of.coefficient_problem(protocol, groups)
-        sentence = (
-            "run {} is left out: no motion fits its edges, or not together with the other runs; "
-            "rig analyze SESSION says which"
-        )
         lost = sorted(run for run, _ in good.keys() - drops.keys())
-        results.left_out = (*map(sentence.format, lost), *problem.left_out)
+        sentences = (make_reason("run_unfitted", run=run).text for run in lost)
+        results.left_out = (*sentences, *problem.left_out)
         if problem.forms:
             outcome = of.best(protocol, problem)
             results.coefficients = _coefficients(protocol, problem, outcome)
@@ -235,28 +218,17 @@ def _coefficients(
     protocol: Protocol, problem: CoefficientProblem, outcome: HypothesisFit
 ) -> Coefficients:
     """Least squares and posterior, with correlations and nuisances."""
-    names, spread = list(problem.stated), posterior(protocol, problem, outcome)
-    covariance = outcome.covariance[: len(names), : len(names)]  # behind them are nuisances
-    sd, drag = np.sqrt(covariance.diagonal()), Measured(*outcome[AIR])
-    heights = {at: Measured(*outcome[f"contact {at:g}"]) for at in problem.inclines}
+    spread, count = posterior(protocol, problem, outcome), len(problem.stated)
+    covariance = outcome.covariance[:count, :count]  # behind them are nuisances
+    sd, drag = np.sqrt(covariance.diagonal()), outcome[AIR]
     return Coefficients(
         tuple(
-            Coefficient(
-                name,
-                name not in problem.held,
-                Measured(*outcome[name]),
-                *spread.moments(name),
-                *spread.interval(name),
-                problem.stated[name],
-            )
-            for name in names
+            Coefficient(name, name not in problem.held, outcome[name], stated, spread.summary(name))
+            for name, stated in problem.stated.items()
         ),
         covariance / np.outer(sd, sd),
-        spread if names else None,
-        tuple(
-            ContactPoint(incline, height, height.u < of.FOUND * CONTACT_U)
-            for incline, height in heights.items()
-        ),
+        spread,
+        {at: outcome[f"contact {at:g}"] for at in problem.inclines},
         drag if drag.u < of.FOUND * prior_air(protocol)[1] else None,
         outcome.chi2,
     )

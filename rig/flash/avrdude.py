@@ -3,110 +3,81 @@
 from __future__ import annotations
 
 import os
-import select
-import shutil
-import subprocess
-import sys
 from contextlib import suppress
+from subprocess import DEVNULL, PIPE, STDOUT, Popen, TimeoutExpired
 from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, InputError
+from rig.link.port import open_port
 from rig.reasons import make_error
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
     from rig.flash.boards import Target
+    from rig.flash.image import Image
 
 _LOOK_S = 0.2
 _CAUSES = {
     # What it says, in lower case, over the versions 6 and 7; the first that fits counts.
     "expected signature for": "flash_other_chip",
     "mismatch": "flash_mismatch",
-    "permission denied": "flash_denied",
-    "busy": "flash_busy",
-    "no such file": "flash_port_gone",
     "programmer is not responding": "flash_no_loader",
     "timeout": "flash_no_loader",
     "not in sync": "flash_no_loader",
+    "": "flash_failed",
 }
 
 
-def find_avrdude(path: str | None) -> str:
-    """Find the program.
-
-    Parameters
-    ----------
-    path
-        Where the user says it is; `None`: wherever programs are.
-
-    Raises
-    ------
-    InputError
-        It is not there.
-    """
-    program = shutil.which(path or "avrdude")
-    if program:
-        return program
-    if path:
-        raise make_error(InputError, "no_program", path=path)
-    raise make_error(InputError, "no_avrdude")
-
-
-def write_flash(avrdude: str, target: Target, port: str, image: Path) -> None:
+def write_flash(
+    target: Target, port: str, path: str | None, image: Image, say: Callable[[str], None]
+) -> None:
     """Write an image into a board's flash; avrdude reads it back and compares.
 
     Parameters
     ----------
-    avrdude
-        The program.
     target
         The kind of board.
     port
         Device path.
+    path
+        Of avrdude; `None`: wherever programs are.
     image
         Intel HEX file.
+    say
+        Told what happens.
 
     Raises
     ------
+    InputError
+        No real port, or no such program.
     DeviceError
-        Avrdude failed.
+        The port cannot be used, or avrdude failed.
     """
+    if "://" in port:
+        raise make_error(InputError, "not_flashable", port=port)
+    # Avrdude tries for ever to open a port that is not there, and does not ask who uses it.
+    open_port(port).close()
+    avrdude = path or "avrdude"
+    say(f"writing {image.firmware} ({image.size} bytes) to the {target.board.name} at {port}")
     # -D: a boot loader erases each page as it comes, and knows no erasing of the whole chip.
-    writing = ["-D", "-P", port, "-U", f"flash:w:{image}:i"]
+    writing = ["-D", "-P", port, "-U", f"flash:w:{image.path}:i"]
+    command = [avrdude, *target.avrdude.split(), *writing]
     try:
-        child = subprocess.Popen(
-            [avrdude, *target.avrdude.split(), *writing],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            bufsize=0,
+        child = Popen(
+            command, text=True, errors="replace", stdin=DEVNULL, stdout=PIPE, stderr=STDOUT
         )
     except OSError as error:
         raise make_error(InputError, "program_failed", path=avrdude, text=error) from error
-    with child:
-        output = _relay_output(child, port)
+    output = None
+    while output is None:
+        with suppress(TimeoutExpired):
+            output, _ = child.communicate(timeout=_LOOK_S)
+        if not os.path.lexists(port):
+            child.kill()  # avrdude would try for ever to reach a board that is gone
+    say(output.strip())
     if not os.path.lexists(port):
         raise make_error(DeviceError, "flash_broke_off", port=port)
     if child.returncode:
-        codes = (code for clue, code in _CAUSES.items() if clue in output.lower())
-        code = next(codes, "flash_failed")
+        code = next(code for clue, code in _CAUSES.items() if clue in output.lower())
         raise make_error(DeviceError, code, port=port, exit_code=child.returncode)
-
-
-def _relay_output(child: subprocess.Popen[bytes], port: str) -> str:
-    """Pass on what a program says as it says it: its progress is a line that grows."""
-    output = bytearray()
-    assert child.stdout is not None
-    while True:
-        readable, _, _ = select.select([child.stdout], [], [], _LOOK_S)
-        if not os.path.lexists(port):
-            child.kill()  # avrdude would try for ever to reach a board that is gone
-        if readable:
-            chunk = child.stdout.read(4096)
-            if not chunk:
-                return output.decode(errors="replace")
-            output += chunk
-            with suppress(OSError):
-                sys.stderr.write(chunk.decode(errors="replace"))
-                sys.stderr.flush()

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from rig.boards import MEGA, PICO, UNO, Capabilities
 
 UNSEEN = "never seen on hardware: please tell us how it goes (docs/first-board.md)"
 """Said of every board until somebody has: then it becomes an attribute of `Target`."""
-FIRMWARE = "chainrig"
-"""What a firmware of this project begins its name with; its version follows."""
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """A kind of board.
 
     Attributes
@@ -36,7 +33,7 @@ class Target:
     avrdude: str = ""
 
     @property
-    def shipped(self) -> Path:
+    def image_path(self) -> Path:
         """The firmware that comes with this program."""
         return Path(__file__).with_name(self.image)
 

@@ -5,113 +5,49 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, DeviceTimeoutError, InputError
 from rig.flash.boards import DRIVE
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.port import open_port, port_clock
 from rig.reasons import make_error
 from rig.usb.listing import serial_ports
 
-_MOUNTS = Path("/proc/mounts")
+if TYPE_CHECKING:
+    from rig.flash.image import Image
+
 _ABOUT = "INFO_UF2.TXT"  # the boot program's file about the board
 _BOARD = "RPI-RP2"
-_USB = Path("/sys/bus/usb/devices")
-_BOOT = ["2e8a", "0003"]  # USB vendor and product of the RP2040's boot program
+_LABEL = Path("/dev/disk/by-label") / _BOARD
+_MOUNTS = Path("/proc/mounts")
+_FAT = {"vfat", "msdos", "fuseblk"}
 _OCTAL = re.compile(r"\\([0-7]{3})")
+_BY_BUTTON = {"device_silent", "refused_unknown_message", "refused_version"}
+"""Why a board has to be told by its button: it has another or an older firmware."""
 _LOOK_S = 0.2
-MOUNT_S = 5.0
+_MOUNT_S = 5.0
 """In which a desktop mounts the drive of a Pico that goes over to wait."""
 _RESTART_S = 10.0
+"""In which its port appears, and udev permits it, which it does some time after."""
 
 
 def waiting_drives() -> list[Path]:
     """Find the drives of Picos that wait for firmware, where they are mounted."""
-    return [folder for folder in _fat_mounts() if _is_drive(folder)]
+    text = _MOUNTS.read_text("utf-8", "surrogateescape") if _MOUNTS.exists() else ""
+    mounts = [line.split(" ")[1:3] for line in text.splitlines()]
+    names = [name for name, kind in mounts if kind in _FAT]
+    folders = [Path(_OCTAL.sub(lambda code: chr(int(code[1], 8)), name)) for name in names]
+    return [folder for folder in folders if _is_drive(folder)]
 
 
 def sees_boot_pico() -> bool:
-    """Whether a Pico in boot mode is plugged in, by the kernel's account of USB devices."""
-    names = ("idVendor", "idProduct")
-    for device in _USB.glob("*"):
-        with suppress(OSError):
-            if [(device / name).read_text("ascii").strip() for name in names] == _BOOT:
-                return True
-    return False
-
-
-def looks(seconds: float) -> Iterator[None]:
-    """Come back now and then until the time is over, and once at least."""
-    end = time.monotonic() + seconds
-    yield
-    while time.monotonic() < end:
-        time.sleep(_LOOK_S)
-        yield
-
-
-def choose_drive(folder: str | None) -> Path:
-    """Find the one drive to copy to.
-
-    Raises
-    ------
-    InputError
-        The folder that was given is no such drive.
-    DeviceError
-        There is none, or several.
-    """
-    if folder is not None:
-        if not _is_drive(Path(folder)):
-            raise make_error(InputError, "not_a_pico", path=folder, file=_ABOUT)
-        return Path(folder)
-    drives = waiting_drives()
-    if len(drives) == 1:
-        return drives[0]
-    if drives:
-        names = ", ".join(map(str, drives))
-        raise make_error(DeviceError, "many_picos", count=len(drives), names=names)
-    raise make_error(DeviceError, "pico_unmounted" if sees_boot_pico() else "no_pico")
-
-
-def copy_to(drive: Path, image: Path) -> None:
-    """Copy a file. The board takes it block by block and restarts at the last: the drive is gone.
-
-    Raises
-    ------
-    DeviceError
-        The drive could not be written.
-    """
-    code = "drive_unwritable"
-    try:
-        with (drive / "chainrig.uf2").open("wb") as stream:
-            code = "drive_failed"
-            stream.write(image.read_bytes())
-            stream.flush()
-            os.fsync(stream.fileno())
-    except OSError as error:
-        # The board may be gone before the computer has noticed that everything was written: who it
-        # is afterwards decides.
-        if code == "drive_unwritable" or _is_drive(drive):
-            raise make_error(DeviceError, code, path=drive, text=error) from None
-
-
-def new_port(before: set[str]) -> str:
-    """Wait for the port of the board that restarts.
-
-    Parameters
-    ----------
-    before
-        Ports that were there already.
-
-    Raises
-    ------
-    DeviceTimeoutError
-        None appears.
-    """
-    for _ in looks(_RESTART_S):
-        for path in pico_ports() - before:
-            return path
-    raise make_error(DeviceTimeoutError, "no_pico_port")
+    """Whether a Pico in boot mode is plugged in, by the name that udev gives its drive."""
+    return _LABEL.exists()
 
 
 def pico_ports() -> set[str]:
@@ -119,15 +55,94 @@ def pico_ports() -> set[str]:
     return {p.path for p in serial_ports() if p.candidate and DRIVE.board.name in p.kinds}
 
 
-def _fat_mounts() -> Iterator[Path]:
+def copy_firmware(
+    port: str | None, folder: str | None, image: Image, say: Callable[[str], None]
+) -> str:
+    """Copy firmware to a Pico's drive. It takes it block by block and restarts at the last.
+
+    Parameters
+    ----------
+    port
+        Device path that it will have; `None`: whichever appears.
+    folder
+        At which its drive is mounted; `None`: wherever it is, and a Pico that runs is asked first.
+    image
+        UF2 file.
+    say
+        Told what happens.
+
+    Returns
+    -------
+    str
+        The port of the board that has restarted.
+
+    Raises
+    ------
+    InputError
+        The folder that was given is no such drive.
+    DeviceError
+        No Pico waits, or several; it could not be written, or does not come back.
+    """
+    if folder is None and not waiting_drives() and not sees_boot_pico():
+        _ask_to_wait(port, say)
+    drive = _choose_drive(folder)
+    before = pico_ports()
+    say(f"copying {image.firmware} ({image.size} bytes) to the {DRIVE.board.name} at {drive}")
     try:
-        lines = _MOUNTS.read_text("utf-8", "surrogateescape").splitlines()
-    except OSError:  # another kernel
+        with (drive / "chainrig.uf2").open("wb") as stream:
+            stream.write(image.path.read_bytes())
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        # The board may be gone before the computer has noticed that everything was written: who it
+        # is afterwards decides.
+        if _is_drive(drive):
+            raise make_error(DeviceError, "drive_failed", path=drive, text=error) from None
+
+    def restarted() -> list[str]:
+        return [port] if port else [*pico_ports() - before]
+
+    _wait(_RESTART_S, lambda: any(os.access(path, os.R_OK | os.W_OK) for path in restarted()))
+    for path in restarted():
+        return path
+    raise make_error(DeviceTimeoutError, "no_pico_port")
+
+
+def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
+    """Ask the one Pico that runs to take firmware, which it does when it has nothing else to do."""
+    paths = [port] if port else [*pico_ports()]
+    if len(paths) != 1:
         return
-    for line in lines:
-        _, folder, kind, *_ = line.split(" ")
-        if kind in {"vfat", "msdos", "fuseblk"}:
-            yield Path(_OCTAL.sub(lambda code: chr(int(code[1], 8)), folder))
+    with closing(open_port(paths[0])) as opened:
+        device = Device(opened, port_clock(opened))
+        try:
+            device.connect()
+            device.request(wire.Flash(), wire.Done)
+        except DeviceError as error:
+            if not {reason.code for reason in error.reasons} <= _BY_BUTTON:
+                raise
+            return
+    say(f"the {DRIVE.board.name} at {paths[0]} waits for firmware")
+    _wait(_MOUNT_S, waiting_drives)
+
+
+def _choose_drive(folder: str | None) -> Path:
+    if folder is not None and not _is_drive(Path(folder)):
+        raise make_error(InputError, "not_a_pico", path=folder, file=_ABOUT)
+    drives = waiting_drives() if folder is None else [Path(folder)]
+    if not drives:
+        raise make_error(DeviceError, "pico_unmounted" if sees_boot_pico() else "no_pico")
+    if len(drives) > 1:
+        names = ", ".join(map(str, drives))
+        raise make_error(DeviceError, "many_picos", count=len(drives), names=names)
+    return drives[0]
+
+
+def _wait(seconds: float, look: Callable[[], object]) -> None:
+    """Look now and then, once at least, until there is something or the time is over."""
+    end = time.monotonic() + seconds
+    while not look() and time.monotonic() < end:
+        time.sleep(_LOOK_S)
 
 
 def _is_drive(folder: Path) -> bool:

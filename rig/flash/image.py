@@ -7,22 +7,27 @@ board must answer after flashing is written down nowhere a second time.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+import struct
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from rig.errors import InputError, Problem
 from rig.files import read_input
-from rig.flash.boards import FIRMWARE, TARGETS, Target
-from rig.flash.uf2 import read_blocks
+from rig.flash.boards import TARGETS, Target
 from rig.reasons import make_error
 
-_DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START = range(6)
-_ERASED = b"\xff"
-_VERSION = re.compile(rb"(%s [0-9][\w.+-]*)\0" % FIRMWARE.encode())
+_DATA, _END = 0, 1
+_BASES = {2: 4, 4: 16}
+"""Kinds of record that say where the next ones are, and how far their number is shifted."""
+_KINDS = {_DATA, _END, *_BASES, 3, 5}  # the last two name a program's start, which boards know
+_RECORD = re.compile(":(?:[0-9A-Fa-f]{2}){5,}")
+_BLOCK = struct.Struct("<8I476sI")
+_PAYLOAD = 256
+_VERSION = re.compile(rb"(chainrig [0-9][\w.+-]*)\0")
 
 
-@dataclass(frozen=True, slots=True)
-class Image:
+class Image(NamedTuple):
     """A firmware image.
 
     Attributes
@@ -55,20 +60,23 @@ def read_image(file: str | Path | None, target: Target) -> Image:
     InputError
         The file is damaged, is no firmware of this project, or is for another board.
     """
-    path = target.shipped if file is None else Path(file)
+    path = target.image_path if file is None else Path(file)
     try:
         data = read_input(path)
     except OSError as error:
         raise make_error(InputError, "image_unreadable", path=path, text=error) from None
-    flash = (_flash if target.avrdude else read_blocks)(data, path)
+    flash = bytearray()
+    for at, content in (_read_records if target.avrdude else _read_blocks)(data, path):
+        if at + len(content) > target.flash_limit:
+            raise InputError(f"{path} would overwrite the boot loader of {target.board.one}")
+        flash.extend(b"\xff" * (at + len(content) - len(flash)))
+        flash[at : at + len(content)] = content
     versions = set(_VERSION.findall(flash))
     boards = {each.board for each in TARGETS.values() if each.board.name.encode() + b"\0" in flash}
     if len(versions) != 1 or len(boards) != 1:
         raise make_error(InputError, "image_foreign", path=path)
     if boards != {target.board}:
         raise InputError(f"{path} is for {boards.pop().one}, not for {target.board.one}")
-    if len(flash) > target.flash_limit:
-        raise InputError(f"{path} would overwrite the boot loader of {target.board.one}")
     return Image(path, versions.pop().decode(), len(flash))
 
 
@@ -78,34 +86,37 @@ def shipped_firmware(board: str) -> str:
     return next((read_image(None, target).firmware for target in targets), "")
 
 
-def _flash(data: bytes, path: Path) -> bytes:
-    """Lay the records out from address 0; what no record fills stays erased."""
-    flash = bytearray()
-    base = number = 0
-
-    def fault(line: int, text: str) -> InputError:
-        return InputError(problems=[Problem(str(path), line, 1, "", text)])
-
-    for number, line in enumerate(data.decode("ascii", "replace").splitlines(), 1):
-        try:
-            record = bytes.fromhex(line.removeprefix(":"))
-        except ValueError:
-            record = b""
-        if not line.startswith(":") or len(record) < 5 or len(record) != record[0] + 5:
-            raise fault(number, "no record of an Intel HEX file")
-        if sum(record) & 0xFF:
-            raise fault(number, "the checksum is wrong: the file is damaged")
+def _read_records(data: bytes, path: Path) -> Iterator[tuple[int, bytes]]:
+    """Give address and content of each record of an Intel HEX file that has any."""
+    base = 0
+    lines = data.decode("ascii", "replace").splitlines()
+    for number, line in enumerate([*lines, ""], 1):
+        record = bytes.fromhex(line[1:]) if _RECORD.fullmatch(line) else b"\0"
+        if len(record) != record[0] + 5 or sum(record) & 0xFF or record[3] not in _KINDS:
+            text = "no whole record of an Intel HEX file, whose last is :00000001FF"
+            raise InputError(problems=[Problem(str(path), number, 1, "", text)])
         kind, content = record[3], record[4:-1]
         if kind == _DATA:
-            at = base + int.from_bytes(record[1:3], "big")
-            if at + len(content) > 1 << 20:
-                raise fault(number, "an address beyond any board's flash")
-            flash.extend(_ERASED * (at + len(content) - len(flash)))
-            flash[at : at + len(content)] = content
-        elif kind in {_SEGMENT, _LINEAR}:
-            base = int.from_bytes(content, "big") << (4 if kind == _SEGMENT else 16)
+            yield base + int.from_bytes(record[1:3], "big"), content
+        elif kind in _BASES:
+            base = int.from_bytes(content, "big") << _BASES[kind]
         elif kind == _END:
-            return bytes(flash)
-        elif kind not in {_START_SEGMENT, _START}:
-            raise fault(number, f"an unknown kind of record: {kind}")
-    raise fault(number, "the end of the file is missing")
+            return
+
+
+def _read_blocks(data: bytes, path: Path) -> Iterator[tuple[int, bytes]]:
+    """Give place in the flash and content of each block of a UF2 file, which a Pico's drive takes.
+
+    A block has 512 bytes, among them its address.
+    """
+    count, rest = divmod(len(data), _BLOCK.size)
+    if rest or not count:
+        raise InputError(f"{path} is no whole UF2 file")
+    for n, (*head, content, end) in enumerate(_BLOCK.iter_unpack(data)):
+        at = n * _PAYLOAD
+        # Two magic numbers and the flag that a family of chips is named; then the address, in the
+        # flash that begins at 0x10000000, and the sizes; then the family (RP2040) and the end.
+        magic, family = (0x0A324655, 0x9E5D5157, 0x2000), (0xE48BFF56, 0x0AB16F30)
+        if (*head, end) != (*magic, 0x10000000 + at, _PAYLOAD, n, count, *family):
+            raise InputError(f"{path} is damaged, or not for an RP2040: block {n}")
+        yield at, content[:_PAYLOAD]

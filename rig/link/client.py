@@ -273,10 +273,10 @@ class Device(Exchange):
         if drop.certificate is None:
             self.request(wire.Read(label, 0, 0), wire.DropCertificate)
         self._read_missing(drop)
-        if not drop.missing() and not drop.sound():
+        certificate, identity = drop.certificate, self.transcript.identity
+        if certificate and not drop.missing() and not drop.sound():
             # Two CRC-16 collisions in one drop are all but impossible: once more is enough.
-            identity = self.transcript.identity
-            drop.forget_events(identity.capacity if identity else None)
+            drop.forget_events(identity.capacity if identity else certificate.events)
             self._read_missing(drop)
         return self.transcript.pending(label)
 
@@ -284,8 +284,9 @@ class Device(Exchange):
         """Ask for missing events in ever smaller pieces: on a bad line short frames get through."""
         size = wire.EVENTS_PER_FRAME
         failures = 0
-        while missing := drop.missing(at_most=size, readable=True):
-            first, count = missing[0]
+        while missing := drop.missing(drop.first_kept):
+            first = missing[0]
+            count = sum(number == first + n for n, number in enumerate(missing[:size]))
             try:
                 self.request(wire.Read(drop.label, first, count), wire.EventsFrame, tries=2)
             except DeviceRefusedError as refused:
@@ -298,6 +299,6 @@ class Device(Exchange):
                     raise
                 size = max(_SMALLEST_READ, size // 2)
             else:
-                if drop.missing(at_most=size, readable=True)[:1] == missing[:1]:
+                if first in drop.missing():
                     raise make_error(DeviceError, "events_not_sent")
                 failures = 0

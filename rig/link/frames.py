@@ -125,15 +125,12 @@ def encode(frame: Frame) -> bytes:
 
     Raises
     ------
-    FrameError
+    ValueError
         When the payload is too long or a header field is not a byte.
     """
     if len(frame.payload) > PAYLOAD_LIMIT:
         raise FrameError(f"payload of {len(frame.payload)} bytes, at most {PAYLOAD_LIMIT} fit")
-    try:
-        body = bytes((frame.type, frame.seq, frame.ack)) + frame.payload
-    except ValueError as error:
-        raise FrameError("type, seq and ack are single bytes") from error
+    body = bytes(frame[:3]) + frame.payload
     return cobs_encode(body + crc16(body).to_bytes(2, "little")) + DELIMITER
 
 

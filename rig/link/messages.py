@@ -22,10 +22,9 @@ from __future__ import annotations
 
 import struct
 import typing
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
-from itertools import takewhile
 from typing import Annotated, Any, NamedTuple, TypeAlias, dataclass_transform
 
 from rig.boards import Capabilities
@@ -83,19 +82,20 @@ class UnsignedInt:
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """Exactly `size` bytes."""
+    """Exactly `size` bytes; as a tail, any number of them up to the end of the payload."""
 
     size: int
+    tail: bool = False
 
     def pack(self, value: bytes) -> bytes:
-        """Write a value."""
-        if len(value) != self.size:
-            raise ValueError(f"{len(value)} bytes, not {self.size}")
+        """Write whole records."""
+        if len(value) % self.size if self.tail else len(value) != self.size:
+            raise ValueError(f"{len(value)} bytes of records of {self.size}")
         return bytes(value)
 
     def unpack(self, payload: bytes, at: int) -> tuple[bytes, int]:
-        """Read a value."""
-        end = at + self.size
+        """Read a value, or all that is left; give where the next one starts, too."""
+        end = len(payload) if self.tail else at + self.size
         return self.pack(payload[at:end]), end
 
 
@@ -117,23 +117,6 @@ class Chars:
         return text.decode(), end
 
 
-@dataclass(frozen=True, slots=True)
-class Tail:
-    """Records of `size` bytes up to the end of the payload; only ever the last field."""
-
-    size: int
-
-    def pack(self, value: bytes) -> bytes:
-        """Write whole records."""
-        if len(value) % self.size:
-            raise ValueError(f"the last of the {self.size}-byte records is cut short")
-        return bytes(value)
-
-    def unpack(self, payload: bytes, at: int) -> tuple[bytes, int]:
-        """Read all that is left."""
-        return self.pack(payload[at:]), len(payload)
-
-
 _BYTE = UnsignedInt("B")
 
 U8: TypeAlias = Annotated[int, _BYTE]
@@ -142,7 +125,7 @@ U32: TypeAlias = Annotated[int, UnsignedInt("I")]
 UniqueId: TypeAlias = Annotated[bytes, Raw(8)]
 Name: TypeAlias = Annotated[str, Chars(24)]
 Line: TypeAlias = Annotated[str, Chars(96)]
-EventRecords: TypeAlias = Annotated[bytes, Tail(EVENT.size)]
+EventRecords: TypeAlias = Annotated[bytes, Raw(EVENT.size, tail=True)]
 
 
 class Field(NamedTuple):
@@ -150,7 +133,7 @@ class Field(NamedTuple):
 
     name: str
     python: type
-    wire: UnsignedInt | Chars | Raw | Tail
+    wire: UnsignedInt | Chars | Raw
 
 
 class Phase(IntEnum):
@@ -474,31 +457,8 @@ def _wire_fields(message: type[Any]) -> tuple[Field, ...]:
     )
 
 
-def _payload_reader(message: Sequence[Field]) -> Callable[[bytes], list[Any]]:
-    """Make what reads a whole payload: numbers at its beginning at once, the rest one by one."""
-    numbers = [*takewhile(lambda field: isinstance(field.wire, UnsignedInt), message)]
-    head = struct.Struct("<" + "".join(getattr(field.wire, "code", "") for field in numbers))
-    enums = [(n, field.python) for n, field in enumerate(numbers) if field.python is not int]
-    rest = [field.wire for field in message[len(numbers) :]]
-
-    def read(payload: bytes) -> list[Any]:
-        values: list[Any] = [*head.unpack_from(payload)]
-        for number, enum in enums:
-            values[number] = enum(values[number])
-        at = head.size
-        for wire in rest:
-            value, at = wire.unpack(payload, at)
-            values.append(value)
-        if at != len(payload):
-            raise ValueError(f"{len(payload) - at} bytes too many")
-        return values
-
-    return read
-
-
 CODES = {message: code for code, message in TABLE.items()}
 FIELDS = {message: _wire_fields(message) for message in CODES}
-_READERS = {message: _payload_reader(fields) for message, fields in FIELDS.items()}
 
 
 def pack(message: Message) -> tuple[int, bytes]:
@@ -550,10 +510,16 @@ def unpack(code: int, payload: bytes) -> Message:
     kind = TABLE.get(code)
     if kind is None:
         raise MessageError(f"unknown message code 0x{code:02X}")
+    at, values = 0, []
     try:
-        return kind(*_READERS[kind](payload))
+        for _, python, wire in FIELDS[kind]:
+            value, at = wire.unpack(payload, at)
+            values.append(python(value))
     except (struct.error, IndexError, ValueError) as error:
         raise MessageError(f"bad {kind.__name__}: {error}") from error
+    if at != len(payload):
+        raise MessageError(f"bad {kind.__name__}: {len(payload) - at} bytes too many")
+    return kind(*values)
 
 
 def pack_label(run: int, attempt: int) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import socket
 import warnings
 from typing import Any, Protocol
@@ -83,15 +82,13 @@ def open_port(url: str) -> Port:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
         if _scheme(url) in _NETWORK:
-            text = _why_unreachable(error)
-            raise make_error(DeviceError, "port_unreachable", port=url, text=text) from error
-        # Of what it cannot set up, pyserial keeps the cause only behind its own words.
+            # Pyserial keeps the cause only behind its own words.
+            cause = error.__context__ if isinstance(error.__context__, OSError) else error
+            raise make_error(DeviceError, "port_unreachable", port=url, text=cause) from error
         below = error.__context__.args[:1] if error.__context__ else ()
         number = error.errno or next((code for code in below if isinstance(code, int)), 0)
-        text = _PLAIN.get(number, str(error))
-        raise make_error(
-            DeviceError, _CODES.get(number, "port_failed"), port=url, text=text
-        ) from error
+        code, text = _CODES.get(number, "port_failed"), _PLAIN.get(number, str(error))
+        raise make_error(DeviceError, code, port=url, text=text) from error
     except ValueError as error:
         if _scheme(url) == "emu":  # pyserial says no more of a handler it cannot import
             raise make_error(DeviceError, "emulator_missing") from error
@@ -172,23 +169,3 @@ class NetworkPort:
         if not self._port.in_waiting:  # also says when the port is closed
             return 0
         return len(self._socket.recv(_PEEK, socket.MSG_PEEK))
-
-
-def _why_unreachable(error: OSError) -> str:
-    """Say in words why a connection could not be made.
-
-    Parameters
-    ----------
-    error
-        Pyserial's, which has the cause in its text and its context only.
-    """
-    match error.__context__:
-        case socket.gaierror():
-            return "there is no computer of that name"
-        case TimeoutError():
-            return "nobody answers"
-        case OSError(errno=errno.ECONNREFUSED):
-            return "nothing listens there"
-        case OSError(errno=int(number)) if number:
-            return os.strerror(number)
-    return str(error)

@@ -1,10 +1,10 @@
-"""Many falls of one chain at once: arrays in, arrays out, the same numbers as one fall at a time.
+"""Vectorized falls of a chain, with the same results as `rig.model.fall.fall` for each.
 
 Every step is that of `rig.model.fall.fall`, in its order, so that with the same α and γ not a bit
-differs as long as squares of its sizes are floats. α itself rests on numpy's sine and cosine, which
-may differ from the C library's in the last digit; near a singular Eq. 13 that digit weighs more.
+differs as long as squares of its sizes are floats. α itself uses numpy's sine and cosine, which may
+differ from the C library's in the last digit; near a singular Eq. 13 that digit has more effect.
 
-Nothing is raised and no warning given: where a single fall has no answer the results are `NaN`.
+There are no errors or warnings: falls without a solution give `NaN`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rig.model.chain import UNIFORM_ROD_INERTIA
+from rig.model.impact import alpha_level, contact_share, gamma_finite
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 
-# Falls that pass all rods together. A dozen arrays of so many stay in the second-level cache, and
-# one is long enough that numpy's time for a call does not count.
+# Falls computed together. A dozen arrays of this size fit into the second-level cache, and each is
+# long enough to make numpy's overhead for a call negligible.
 _BLOCK = 8192
 
 
@@ -37,7 +38,7 @@ class Impacts(NamedTuple):
     alpha, gamma
         `NaN` where Eq. 13 is singular.
     sliding
-        False where f = μN does not hold, the incline being below arctan μ.
+        False where f = μN does not hold because the incline is below arctan μ.
     """
 
     alpha: Floats
@@ -45,22 +46,8 @@ class Impacts(NamedTuple):
     sliding: Flags
 
 
-class FallBatch(NamedTuple):
-    """The ends of falls; every array has the shape to which the inputs broadcast.
-
-    Attributes
-    ----------
-    separation_m, speed_m_s, time_s
-        Δz, V and t as in `rig.model.fall.Fall`; `NaN` where there is no α.
-    """
-
-    separation_m: Floats
-    speed_m_s: Floats
-    time_s: Floats
-
-
 def given_impacts(alpha: ArrayLike, gamma: ArrayLike = 0.0) -> Impacts:
-    """Coefficients that are simply given, as for a bead chain."""
+    """Return coefficients with stated values, as for a bead chain."""
     return Impacts(_floats(alpha), _floats(gamma), np.ones(np.shape(alpha), np.bool_))
 
 
@@ -74,7 +61,7 @@ def surface_impacts(
     gamma: ArrayLike | None = None,
     pile: Pile | None = None,
 ) -> Impacts:
-    """Coefficients that follow from the surface, Eqs. 8, 10, 12 and 13; all arguments broadcast.
+    """Return coefficients for a surface, Eqs. 8, 10, 12 and 13; all arguments broadcast.
 
     Parameters
     ----------
@@ -93,21 +80,18 @@ def surface_impacts(
         piled = theta_deg < pile.below_deg
         beta = np.where(piled, pile.restitution.value, beta)
         level = level | piled
-    eq_10 = _gamma(xi, xi)
-    free_rod = eq_10 if inertia_z is None else _gamma(xi, _floats(inertia_z))
+    free_rod = gamma_finite(xi, None if inertia_z is None else _floats(inertia_z))
     with np.errstate(all="ignore"):
-        # As in rig.model.impact.alpha_inclined: Eq. 13 × (cos θ + μ sin θ), and cos θ that
-        # keeps its digits near 90°, where there is no pull.
+        # As in rig.model.impact.alpha_inclined: cos θ with full precision near 90°, where α is 0.
         sin = np.sin(np.radians(theta_deg))
         cos = np.sin(np.radians(90.0 - theta_deg))
-        g = cos + free_rod * sin * (sin - mu * cos) / (cos + mu * sin)
+        g = contact_share(sin, cos, mu, free_rod)
         g = np.where((g > 0.0) & np.isfinite(g), g, np.nan)
-        eq_8 = (1.0 + beta) / 4.0 * (1.0 - xi)
+        eq_8 = alpha_level(beta, xi)
         inclined = np.where(cos == 0.0, 0.0, eq_8 * cos / g)
     sliding = level | (theta_deg >= np.degrees(np.arctan(mu)))
-    return Impacts(
-        np.where(level, eq_8, inclined), eq_10 if gamma is None else _floats(gamma), sliding
-    )
+    eq_10 = gamma_finite(xi) if gamma is None else _floats(gamma)
+    return Impacts(np.where(level, eq_8, inclined), eq_10, sliding)
 
 
 def falls(
@@ -117,8 +101,8 @@ def falls(
     drop: ArrayLike,
     gravity: ArrayLike,
     initial_speed: ArrayLike = 0.0,
-) -> FallBatch:
-    """Δz, V and t of many falls (Eq. 9 and section III.D).
+) -> Floats:
+    """Return Δz, V and t of many falls (Eq. 9 and section III.D).
 
     Parameters
     ----------
@@ -128,6 +112,12 @@ def falls(
         From `surface_impacts` or `given_impacts`.
     drop, gravity, initial_speed
         As in `rig.model.fall.hits`: m, m/s² and m/s; these and the impacts broadcast.
+
+    Returns
+    -------
+    ndarray
+        Δz, V and t as in `rig.model.fall.Fall`, each of the shape to which the inputs broadcast;
+        `NaN` without a finite α.
     """
     mass = _floats(masses)
     above = np.cumsum(mass[:0:-1])[::-1]  # from the top, as in rig.model.chain.Chain.legs
@@ -140,15 +130,15 @@ def falls(
         for start in range(0, flat[0].size, _BLOCK):
             block = slice(start, start + _BLOCK)
             ends[:, block] = _block_ends(legs, *(array[block] for array in flat))
-    return FallBatch(*(row.reshape(shape) for row in ends))
+    return ends.reshape(3, *shape)
 
 
 def _block_ends(legs: Sequence[tuple[float, float]], *inputs: Floats) -> tuple[Floats, ...]:
-    """Δz, V and t of falls rod by rod; the inputs of `falls`, each of shape ``(falls,)``."""
+    """Return Δz, V and t of falls, rod by rod; inputs as in `falls`, of shape ``(falls,)``."""
     alpha, gamma, drop, gravity, initial_speed = inputs
     twice_g = gravity * 2.0
     arrival = np.sqrt(initial_speed * initial_speed + twice_g * drop)
-    # A rod released on the contact point strikes at once, though its leg's time was 0/0.
+    # A rod released on the contact point strikes at once; its leg's time was 0/0.
     arrival = np.where(drop == 0.0, initial_speed, arrival)
     time = np.where(drop == 0.0, 0.0, 2.0 * drop / (initial_speed + arrival))
     gained, separation, speed, step = np.zeros((4, drop.size))
@@ -169,11 +159,6 @@ def _block_ends(legs: Sequence[tuple[float, float]], *inputs: Floats) -> tuple[F
         duration *= gained
         separation += duration
     return separation, arrival, time
-
-
-def _gamma(inertia: Floats, inertia_above: Floats) -> Floats:
-    """γ, Eq. 10, as `rig.model.impact.gamma_finite`."""
-    return 0.25 * (1.0 + inertia) * (1.0 + 1.0 / inertia_above)
 
 
 def _floats(values: ArrayLike) -> Floats:

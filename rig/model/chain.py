@@ -1,4 +1,4 @@
-"""A chain of rods: what the mechanics needs and nothing else."""
+"""A chain of rods: masses, heights and inertia for the mechanics."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ if TYPE_CHECKING:
     from rig.units import Quantity
 
 XI = 4.0
-"""ξ over the moment of inertia in units of m L²."""
+"""Factor from a moment of inertia in units of m L² to ξ."""
 UNIFORM_ROD_INERTIA = 1.0 / 3.0
 """ξ = 4I/(mL²) of a uniform rod about its middle (below Eq. 8)."""
 
 
-@dataclass(frozen=True)  # without slots, so that `legs` is worked out once
+@dataclass(frozen=True)  # without slots, so that `legs` can be cached
 class Chain:
     """Masses and places of the rods, bottom up.
 
     Attributes
     ----------
     masses
-        Mass of each rod; only ratios matter, so any one unit will do.
+        Mass of each rod in any common unit, as only ratios matter.
     heights
         Height of each rod's middle above the middle of the bottom rod, m; strictly rising from 0.
     inertia
         ξ = 4I/(mL²), the dimensionless rotational inertia of every rod (Eqs. 8 and 10).
     inertia_z
-        ξ about the vertical axis where it is not the same as about the horizontal one (Eq. 13).
+        ξ about the vertical axis if it differs from that about the horizontal axis (Eq. 13).
     alpha, gamma
-        Impact coefficients where they are simply given (a bead chain); `None` means that they
-        follow from the surface by Eqs. 8 to 13.
+        Stated impact coefficients (a bead chain); `None` to compute them from the surface by
+        Eqs. 8 to 13.
     """
 
     masses: tuple[float, ...]
@@ -49,7 +49,7 @@ class Chain:
 
     @property
     def length(self) -> float:
-        """Middle of the bottom rod to the middle of the top rod, m."""
+        """Distance of the top rod's middle from that of the bottom rod, m."""
         return self.heights[-1]
 
     @cached_property

@@ -31,19 +31,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, never_falls
+from rig.model.fall import Fall, free_leg, never_falls
 from rig.model.quadrature import gauss
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 _FARTHEST = 45.0
-"""x beyond which nothing is left to add: e^−45 of the chain, 1e-18 of Δz and of t."""
+"""Largest x of the integrals: beyond are e^−45 of the chain, and 1e-18 of Δz and of t."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +64,7 @@ class UniformChain:
     Raises
     ------
     DomainError
-        Where a number is negative or not finite, the length is 0, or nothing would ever move.
+        A number is negative or not finite, the length is 0, or the chain would never move.
     """
 
     length_m: float
@@ -107,14 +103,7 @@ class UniformChain:
     @property
     def strike_speed(self) -> float:
         """V_h, speed as the chain first strikes, m/s."""
-        return math.sqrt(self.initial_speed**2 + 2.0 * self.gravity * self.drop_m)
-
-    @property
-    def drop_time_s(self) -> float:
-        """Time from release to the first strike."""
-        if self.drop_m == 0.0:
-            return 0.0
-        return 2.0 * self.drop_m / (self.initial_speed + self.strike_speed)
+        return free_leg(self.drop_m, self.initial_speed, self.gravity)[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +117,7 @@ class ContinuumEnd(Fall):
     lay_down_s
         Time since the first strike, t of S15.
     evaluations
-        How often the speed was evaluated.
+        Number of evaluations of the speed.
     """
 
     lay_down_s: float
@@ -136,7 +125,7 @@ class ContinuumEnd(Fall):
 
 
 def speed(chain: UniformChain, height_m: float) -> float:
-    """Speed with the chain's top end at a height, Eq. 14 with any initial speed, m/s.
+    """Return the speed with the chain's top end at a height, Eq. 14 with any initial speed, m/s.
 
     ``V² = V_h² (A/B)^2α + 2gB ((A/B)^(1+2α) − 1)/(1+2α)`` with B = z + γs, written as a sum of
     positive terms. Above z₀ the chain still falls freely.
@@ -149,26 +138,23 @@ def speed(chain: UniformChain, height_m: float) -> float:
     fallen = chain.length_m - height_m
     if not -chain.drop_m <= fallen <= chain.length_m:
         raise ValueError(f"height {height_m:g} m is outside the fall")
-    squared = chain.strike_speed**2
-    if fallen <= 0.0:
-        return math.sqrt(chain.initial_speed**2 + 2.0 * chain.gravity * (chain.drop_m + fallen))
     below = height_m + chain.reach_m
+    if fallen <= 0.0 or below == chain.alpha == 0.0:  # nothing pulls
+        return free_leg(chain.drop_m + fallen, chain.initial_speed, chain.gravity)[0]
     if below == 0.0:
-        if chain.alpha > 0.0:
-            return math.inf
-        return math.sqrt(squared + 2.0 * chain.gravity * chain.length_m)
+        return math.inf
     ratio, power = fallen / below, chain.power
-    bracket = squared - chain.pull * math.expm1(-power * math.log1p(ratio)) / power
+    pulled = chain.pull * math.expm1(-power * math.log1p(ratio)) / power
     try:
         # A power of the ratio itself: its logarithm would be rounded before it is multiplied up.
         grown = math.pow(1.0 + ratio, chain.alpha)
     except OverflowError:
         return math.inf
-    return grown * math.sqrt(bracket)
+    return grown * math.sqrt(chain.strike_speed**2 - pulled)
 
 
 def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> ContinuumEnd:
-    """Δz, V and t of a fall by composite Gauss–Legendre quadrature of S15 and S16.
+    """Return Δz, V and t of a fall by composite Gauss–Legendre quadrature of S15 and S16.
 
     The substitution x = X p (p + q)/(1 + q) makes x + x₀ the square of p + q/2, x₀ being how far
     before the first strike V² has its zero. V is then smooth in p however small the drop is: it
@@ -179,7 +165,7 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     nodes
         Nodes in each panel.
     panels
-        Panels of equal width in p; `None` takes what full precision needs at 16 nodes.
+        Panels of equal width in p; `None` for full precision with 16 nodes.
     """
     span = _FARTHEST  # X, as far as it matters for Δz and t
     if chain.reach_m > 0.0:
@@ -191,7 +177,8 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     p = half * (2.0 * np.arange(panels)[:, None] + 1.0 + rule.nodes)
     x = span * p * (square * p + line)
     stretch = half * span * (2.0 * square * p + line)  # dx per unit of the rule
-    v = _speeds(chain, x)
+    pulled = chain.pull * np.expm1(-chain.power * x) / chain.power
+    v = np.exp(chain.alpha * x) * np.sqrt(chain.strike_speed**2 - pulled)  # Eq. 14
     passing = (chain.length_m + chain.reach_m) * np.exp(-x) / v * stretch
     gaining = v * stretch
     panel_gains = gaining @ rule.weights
@@ -201,14 +188,14 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     return ContinuumEnd(
         separation_m=chain.alpha * float(np.sum((gained * passing) @ rule.weights)),
         speed_m_s=speed(chain, 0.0),
-        time_s=chain.drop_time_s + lay_down,
+        time_s=free_leg(chain.drop_m, chain.initial_speed, chain.gravity)[1] + lay_down,
         lay_down_s=lay_down,
         evaluations=v.size,
     )
 
 
 def _substitution(chain: UniformChain, span: float) -> tuple[float, float]:
-    """Coefficients a and b of x = X p (a p + b), that is 1/(1 + q) and q/(1 + q).
+    """Return a and b of x = X p (a p + b), that is 1/(1 + q) and q/(1 + q).
 
     V² is zero at x = −x₀ (x₀ ≈ V_h²/2gA for a small drop), and x + x₀ is to be the square of
     p + q/2 but for a factor: q²/(4(1 + q)) = x₀/X.
@@ -223,7 +210,7 @@ def _substitution(chain: UniformChain, span: float) -> tuple[float, float]:
 
 
 def separation_leading_order(alpha: float, length_m: float, reach_m: float) -> float:
-    """Δz from rest on the surface (h = 0) to first order in α, Eq. 15, m.
+    """Return Δz from rest on the surface (h = 0) to first order in α, Eq. 15, m.
 
     With y = 1/√(1 + γs/z₀) the braces of Eq. 15 are ``2 artanh(y)/y + ln(1 − y²)/y² − 1``, which
     cancel as y → 0 and equal ``Σ y^2k/((k + 1)(2k + 1))``, k = 1, 2, …
@@ -246,10 +233,3 @@ def separation_leading_order(alpha: float, length_m: float, reach_m: float) -> f
     if ratio > 0.0:
         braces += c * ratio / (c + 1.0) * math.log(ratio / (c * (c + 1.0)))
     return 2.0 * alpha * length_m * braces
-
-
-def _speeds(chain: UniformChain, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Eq. 14 as a function of x = ln(A/(z + γs))."""
-    bracket = chain.strike_speed**2 - chain.pull * np.expm1(-chain.power * x) / chain.power
-    grown: NDArray[np.float64] = np.exp(chain.alpha * x) * np.sqrt(bracket)
-    return grown

@@ -1,6 +1,6 @@
-"""The discrete fall in air that resists as the square of the speed.
+"""The discrete fall with drag proportional to the square of the speed.
 
-A rod is held back by c v²; what still falls then has the acceleration g − κ v², where
+The drag on a rod is c v²; the falling part of the chain then has the acceleration g − κ v², where
 κ = Σc/Σm over the rods still falling. The free chain keeps all its rods and the first κ.
 
 A leg of length d from speed v₀ to v₁, with q = e^(−2κd) and φ = (1 − q)/(2κd):
@@ -24,16 +24,17 @@ from operator import mul
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, Hit, checked_fall, hits
+from rig.model.fall import Fall, checked_fall, free_leg
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rig.model.chain import Chain
+    from rig.model.fall import Leg
 
 
 def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
-    """κ on the leg before each rod's impact, 1/m: Σc/Σm of that rod and all above it.
+    """Return κ on the leg before each rod's impact, 1/m: Σc/Σm of that rod and all above it.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
     return [*_per_mass(tuple(drags), chain.masses)]
 
 
-@lru_cache(maxsize=64)  # fractions take their time, and there are few chains
+@lru_cache(maxsize=64)  # fractions are slow, and there are few chains
 def _per_mass(drags: tuple[float, ...], masses: tuple[float, ...]) -> tuple[float, ...]:
     falling = [
         list(accumulate(map(Fraction, reversed(values))))[::-1] for values in (drags, masses)
@@ -60,11 +61,11 @@ def _per_mass(drags: tuple[float, ...], masses: tuple[float, ...]) -> tuple[floa
 def cylinder_drag(
     coefficient: float, density: float, diameter: float, length: float, tilt_deg: float
 ) -> float:
-    """Drag over speed squared of a rod that falls broadside: c = ½ ρ C d L cos³(tilt), kg/m.
+    """Return drag over speed squared of a rod that falls broadside, ½ ρ C d L cos³(tilt), kg/m.
 
-    Only the flow across a tilted rod pushes on it: the square of that speed takes cos², and the
-    part of the force that points up one cos more (the cross-flow principle; S. F. Hoerner,
-    Fluid-Dynamic Drag, 1965, chapter III). That rods shield each other is left out.
+    Only the flow across a tilted rod exerts a force: its squared speed has the factor cos², and the
+    upward part of the force another cos (the cross-flow principle; S. F. Hoerner, Fluid-Dynamic
+    Drag, 1965, chapter III). Shielding between rods is left out.
 
     Parameters
     ----------
@@ -73,36 +74,18 @@ def cylinder_drag(
     density
         ρ of the air, kg/m³.
     diameter, length
-        Of the rod, m.
+        Diameter and length of the rod, m.
     tilt_deg
-        Of the rod against the horizontal.
+        Tilt of the rod from horizontal, degrees.
     """
     return 0.5 * coefficient * density * diameter * length * cos(radians(tilt_deg)) ** 3
 
 
-def drag_hits(
-    chain: Chain,
-    gains: Sequence[float],
-    kappas: Sequence[float],
-    drop: float,
-    gravity: float,
-    initial_speed: float = 0.0,
-) -> list[Hit]:
-    """Every impact of a fall in air, bottom rod first.
-
-    Parameters
-    ----------
-    gains
-        ΔV/V at each impact, as from `rig.model.fall.kicks`.
-    kappas
-        κ on the leg before each impact, 1/m, as from `leg_drags`.
-    drop, gravity, initial_speed
-        As in `rig.model.fall.hits`; none negative.
-    """
-    return hits(
-        *(chain, gains, drop, gravity, initial_speed),
-        lambda distance, speed, g, rod: drag_leg(distance, speed, g, kappas[rod]),
-    )
+def air_legs(kappas: Sequence[float]) -> Leg:
+    """Return the `leg` function of `rig.model.fall.hits`; κ before each impact, 1/m, or empty."""
+    if not kappas:
+        return free_leg
+    return lambda distance, speed, gravity, rod: drag_leg(distance, speed, gravity, kappas[rod])
 
 
 def drag_fall(
@@ -113,7 +96,7 @@ def drag_fall(
     gravity: float,
     initial_speed: float = 0.0,
 ) -> Fall:
-    """Δz, V and t of one fall in air; arguments as in `drag_hits`.
+    """Return Δz, V and t of a fall in air; arguments as in `rig.model.fall.hits` and `air_legs`.
 
     Δz keeps full relative precision as α → 0 and as drags become equal: it is summed from the
     impacts' own effects and, where κ changes from leg to leg, from those of κ' − κ.
@@ -121,7 +104,7 @@ def drag_fall(
     Raises
     ------
     DomainError
-        As `drag_leg`; and where a speed leaves the range of numbers.
+        As `drag_leg`; or a speed leaves the range of floats.
     """
     gained = separation = time = 0.0
     speed = twin = initial_speed
@@ -133,7 +116,7 @@ def drag_fall(
         grown, gained = _apart(gained, speed, twin, duration, gravity, free)
         separation += grown
         if kappa != free:
-            # So far as if this chain too had the free one's drag.
+            # Up to here as if this chain had the free chain's drag.
             slowed = _behind(distance, duration, speed, gravity, kappa, free)
             separation += slowed[0]
             gained += slowed[1]
@@ -146,12 +129,12 @@ def drag_fall(
 
 
 def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tuple[float, float]:
-    """Speed at the end of a leg in air, m/s, and the leg's duration, s.
+    """Return the speed at the end of a leg in air, m/s, and the leg's duration, s.
 
     Raises
     ------
     DomainError
-        Where the end is never reached, there being no gravity.
+        The end is never reached, without gravity.
     """
     if distance == 0.0:
         return speed, 0.0
@@ -172,14 +155,14 @@ def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tup
 
 
 def fallen(time: float, gravity: float, kappa: float, initial_speed: float = 0.0) -> float:
-    """How far a chain that strikes nothing has fallen after a time, m.
+    """Return the distance that a free chain has fallen after a time, m.
 
     ln(cosh x + r sinh x)/κ, with x = √(κg) t and r the initial speed over the terminal one.
     """
     rate = sqrt(kappa * gravity)
     x = rate * time
     if x <= 1.0:
-        # (cosh x + r sinh x − 1)/κ, which is the way without drag as κ → 0.
+        # (cosh x + r sinh x − 1)/κ, which is the distance without drag as κ → 0.
         half = time * _per(sinh, 0.5 * x)
         distance = 0.5 * gravity * half * half + initial_speed * time * _per(sinh, x)
         return distance * _per(log1p, kappa * distance)
@@ -187,7 +170,7 @@ def fallen(time: float, gravity: float, kappa: float, initial_speed: float = 0.0
 
 
 def falling_speed(time: float, gravity: float, kappa: float, initial_speed: float = 0.0) -> float:
-    """Speed after a time of a chain that strikes nothing, m/s."""
+    """Return the speed of a free chain after a time, m/s."""
     reach = time * _per(tanh, sqrt(kappa * gravity) * time)
     return (initial_speed + gravity * reach) / (1.0 + kappa * initial_speed * reach)
 
@@ -195,7 +178,7 @@ def falling_speed(time: float, gravity: float, kappa: float, initial_speed: floa
 def _apart(
     gained: float, speed: float, twin: float, time: float, gravity: float, kappa: float
 ) -> tuple[float, float]:
-    """How far two chains with one κ part in a time, and how much faster the one still is.
+    """Return the growth of the distance of two chains with equal κ, and their speed difference.
 
     From w = v − u at first: ln((C + κ v S)/(C + κ u S))/κ and w/((C + κ v S)(C + κ u S)), where
     C = cosh x, S = t sinh(x)/x and x = √(κg) t; both proportional to w, whatever it is.
@@ -212,13 +195,13 @@ def _apart(
 def _behind(
     distance: float, time: float, speed: float, gravity: float, kappa: float, free: float
 ) -> tuple[float, float]:
-    """How far a leg ends below one with the free chain's κ in the same time, and how much faster.
+    """Return how far below a leg with the free chain's κ a leg ends, and how much faster.
 
     Both are proportional to κ' − κ. They are summed as series in time of v' = g − κ'v² and of the
     difference d of both speeds, d' = −(κ' − κ)v² − κ(2v − d)d.
     """
     if max(kappa, free) * distance > _SERIES_BELOW:
-        # A plain difference loses no digits but those that κ' − κ itself has lost.
+        # A plain difference loses no more digits than κ' − κ itself.
         return (
             distance - fallen(time, gravity, free, speed),
             falling_speed(time, gravity, kappa, speed) - falling_speed(time, gravity, free, speed),
@@ -244,5 +227,5 @@ _SERIES_BELOW = 0.4
 
 
 def _per(function: Callable[[float], float], x: float) -> float:
-    """f(x)/x of a function whose slope at 0 is 1; so 1 at 0."""
+    """Return f(x)/x of a function whose slope at 0 is 1; 1 at 0."""
     return function(x) / x if x else 1.0

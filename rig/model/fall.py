@@ -1,6 +1,6 @@
 """The discrete fall: free fall between impacts, a speed step at each (section III.D).
 
-Two digits-losing forms are avoided on purpose. A leg of length d takes 2d/(V + V'), never
+Two forms that lose digits are avoided on purpose. A leg of length d takes 2d/(V + V'), never
 (V' − V)/g; and Δz is the running sum of (speed gained so far) × (leg time), never a difference of
 two heights. Δz then keeps full relative precision as α → 0, and g → 0 costs nothing.
 """
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Leg = Callable[[float, float, float, int], tuple[float, float]]
 
 SMALL, LARGE = 1e-100, 1e100
-"""Beyond these a square may leave the floats."""
+"""Range of sizes whose squares are floats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +31,9 @@ class Fall:
     Attributes
     ----------
     separation_m
-        Δz: how far the freely falling twin is above it.
+        Δz: height of the free chain's top rod above the contact point.
     speed_m_s
-        V: speed of the top rod just before.
+        V: speed of the top rod just before its impact.
     time_s
         Time since release.
     """
@@ -45,7 +45,7 @@ class Fall:
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """One rod's impact: when, and the chain's speed before and after, downward positive."""
+    """A rod's impact: time, and the chain's speed before and after, downward positive."""
 
     time_s: float
     speed_before: float
@@ -53,7 +53,7 @@ class Hit:
 
 
 def kicks(chain: Chain, alphas: Sequence[float], gamma: float) -> list[float]:
-    """Relative speed gain ΔV/V of the chain at each rod's impact, from Eq. 9.
+    """Return the relative speed gain ΔV/V of the chain at each rod's impact, from Eq. 9.
 
     ΔV = J/M with J = α m V / (1 + γ m/M), so ΔV/V = α / (γ + M/m).
 
@@ -67,8 +67,8 @@ def kicks(chain: Chain, alphas: Sequence[float], gamma: float) -> list[float]:
     Returns
     -------
     list of float
-        Shape ``(rods,)``; the top rod's is 0, there being nothing above it to pull on. Infinite
-        where the mass above is nothing beside the rod's own, and γ = 0.
+        Shape ``(rods,)``; 0 for the top rod, which has no mass above. Infinite if the mass above is
+        negligible beside the rod's own and γ = 0.
     """
     gains = [
         alpha / (gamma + ratio) if gamma + ratio else math.inf
@@ -85,7 +85,7 @@ def hits(
     initial_speed: float = 0.0,
     leg: Leg | None = None,
 ) -> list[Hit]:
-    """Every impact of a fall, bottom rod first.
+    """Return all impacts of a fall, bottom rod first.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def hits(
     initial_speed
         Downward speed at release, m/s.
     leg
-        Speed at the end and duration of the leg before a rod's impact, from the distance, the
-        speed before, gravity and the rod's number; free fall if not given.
+        Function of distance, initial speed, gravity and rod number that returns the final speed
+        and duration of the leg before a rod's impact; free fall if not given.
     """
     leg = leg or free_leg
     events: list[Hit] = []
@@ -121,7 +121,7 @@ def fall(
     gravity: float,
     initial_speed: float = 0.0,
 ) -> Fall:
-    """Δz, V and t of one fall, nothing else computed.
+    """Return Δz, V and t of a fall.
 
     Parameters
     ----------
@@ -133,17 +133,17 @@ def fall(
     Raises
     ------
     DomainError
-        Where nothing would ever move: no gravity and no initial speed. Where a speed
-        leaves the range of floats.
+        The chain would never move, without gravity and initial speed; or a speed leaves the range
+        of floats.
     """
     length = unit = 0
     if not (
         SMALL < chain.length + drop < LARGE and SMALL < gravity < LARGE and initial_speed < LARGE
     ):
-        # In units of the fall's own size no square over- or underflows. Units are powers of two:
-        # changing to them and back costs no digit.
+        # In units of the fall's own size no square over- or underflows. Units are powers of two, so
+        # that conversions are exact.
         length = math.frexp(chain.length + drop)[1]
-        # Of speed; what is 0 has no size.
+        # Exponents of speed; a zero has none.
         speeds = [(math.frexp(gravity)[1] + length) // 2] if gravity else []
         speeds += [math.frexp(initial_speed)[1]] if initial_speed else []
         unit = max(speeds, default=0)
@@ -156,7 +156,7 @@ def fall(
         raise never_falls()
     gained = separation = 0.0
     twice_g, root = 2.0 * gravity, math.sqrt
-    # `free_leg` written out: a call takes longer than its arithmetic (see ``./run bench bulk``).
+    # `free_leg` inlined: a call takes longer than its arithmetic (see ``./run bench bulk``).
     try:
         for gap, ratio in chain.legs:
             step = arrival * (alpha / (gamma + ratio))
@@ -177,12 +177,12 @@ def fall(
 
 
 def checked_fall(separation: float, speed: float, time: float) -> Fall:
-    """Return the end of a fall.
+    """Return the end of a fall from finite numbers.
 
     Raises
     ------
     DomainError
-        Where a number has left the range of floats.
+        A number has left the range of floats.
     """
     if not math.isfinite(separation + speed + time):
         raise DomainError(
@@ -192,21 +192,14 @@ def checked_fall(separation: float, speed: float, time: float) -> Fall:
     return Fall(separation, speed, time)
 
 
-def free_fall(
-    chain: Chain, drop: float, gravity: float, initial_speed: float = 0.0
-) -> tuple[float, float]:
-    """Speed of the top rod at the contact point and time since release, nothing being struck.
+def free_leg(distance: float, speed: float, gravity: float, _rod: int = 0) -> tuple[float, float]:
+    """Return the speed at the end of a free-fall leg, m/s, and its duration, s.
 
     Raises
     ------
     DomainError
-        Where nothing would ever move.
+        The chain would never move.
     """
-    return free_leg(drop + chain.length, initial_speed, gravity)
-
-
-def free_leg(distance: float, speed: float, gravity: float, _rod: int = 0) -> tuple[float, float]:
-    """Speed at the end of a free-fall leg and its duration."""
     if distance == 0.0:
         return speed, 0.0
     arrival = math.sqrt(speed * speed + 2.0 * gravity * distance)
@@ -216,7 +209,7 @@ def free_leg(distance: float, speed: float, gravity: float, _rod: int = 0) -> tu
 
 
 def never_falls() -> DomainError:
-    """The fault of a scene in which nothing would ever move."""
+    """Return the error for a scene in which the chain would never move."""
     return DomainError(
         "the chain never falls: no gravity and no initial speed", "give a gravity above zero"
     )

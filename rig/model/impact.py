@@ -12,8 +12,14 @@ from rig.units import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from typing import TypeVar
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from rig.model.surface import Surface
+
+    Number = TypeVar("Number", float, NDArray[np.float64])
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 """Names of the coefficients that a protocol states."""
@@ -22,16 +28,16 @@ _BASES = {(ALPHA,): "given", (PILE,): "pile", (BETA,): "level", (BETA, MU): "sur
 
 @dataclass(frozen=True, slots=True)
 class Impact:
-    """How one rod's impact pulls on the chain above it: J = α m V / (1 + γ m/M), Eq. 9.
+    """Coefficients of a rod's impulse on the chain above, J = α m V / (1 + γ m/M), Eq. 9.
 
     Attributes
     ----------
     alpha, gamma
         The coefficients of Eq. 9.
     basis
-        Where α comes from: ``surface``, ``level``, ``pile`` or ``given``.
+        Origin of α: ``surface``, ``level``, ``pile`` or ``given``.
     notes
-        Every way in which the case leaves the model's domain; empty inside it.
+        All departures from the model's domain; empty inside it.
     """
 
     alpha: float
@@ -40,11 +46,11 @@ class Impact:
     notes: tuple[str, ...] = ()
 
 
-def alpha_level(restitution: float, inertia: float = UNIFORM_ROD_INERTIA) -> float:
-    """α of a long chain on a level surface, Eq. 8; and of lift-off, N = αλV², Eq. S20.
+def alpha_level(restitution: Number, inertia: Number | float = UNIFORM_ROD_INERTIA) -> Number:
+    """Return α of a long chain on a level surface, Eq. 8; or of lift-off, N = αλV², Eq. S20.
 
-    There the surface pushes on a rod that is pulled up by one end, and `restitution` is β' between
-    rod and chain through the string: 0 where the string damps all bouncing.
+    At lift-off the surface pushes on a rod that is pulled up by an end, and `restitution` is β'
+    between rod and chain through the string: 0 if the string damps all bouncing.
     """
     return (1.0 + restitution) / 4.0 * (1.0 - inertia)
 
@@ -56,7 +62,7 @@ def alpha_inclined(
     inertia: float = UNIFORM_ROD_INERTIA,
     inertia_z: float | None = None,
 ) -> float:
-    """α of a long chain on an inclined surface, Eqs. 12 and 13.
+    """Return α of a long chain on an inclined surface, Eqs. 12 and 13.
 
     `inertia` is ξ_y and `inertia_z` is ξ_z, the same unless given. Eq. 13 is multiplied through
     by cos θ + μ sin θ, so that cot θ at 0° and tan θ at 90° are never formed.
@@ -64,15 +70,15 @@ def alpha_inclined(
     Raises
     ------
     DomainError
-        Where g(θ) ≤ 0: no finite impulse satisfies Eqs. S7 to S12.
+        g(θ) ≤ 0: no finite impulse satisfies Eqs. S7 to S12.
     """
     sin = math.sin(math.radians(incline_deg))
-    # Not cos θ: near 90° all its digits would be those of π/2 − θ, which radians do not hold.
+    # Not cos θ: near 90° the rounding of θ in radians would dominate.
     cos = math.sin(math.radians(90.0 - incline_deg))
     if cos == 0.0:
         return 0.0  # a wall: the contact has no vertical part
     free_rod = gamma_finite(inertia, inertia_z)
-    g = cos + free_rod * sin * (sin - friction * cos) / (cos + friction * sin)
+    g = contact_share(sin, cos, friction, free_rod)
     if g <= 0.0:
         raise DomainError(
             f"Eq. 13 is singular: g(θ) ≤ 0 at incline {incline_deg:g}°, "
@@ -82,14 +88,19 @@ def alpha_inclined(
     return alpha_level(restitution, inertia) * cos / g
 
 
-def gamma_finite(inertia: float, inertia_above: float | None = None) -> float:
-    """γ, by which the tension falls off near the chain's end, Eq. 10 (ξ' = ξ unless given)."""
+def contact_share(sin: Number, cos: Number, friction: Number, free_rod: Number) -> Number:
+    """Return g(θ) of Eq. 13 times cos θ + μ sin θ; `free_rod` is Eq. 10 of ξ_y and ξ_z."""
+    return cos + free_rod * sin * (sin - friction * cos) / (cos + friction * sin)
+
+
+def gamma_finite(inertia: Number, inertia_above: Number | None = None) -> Number:
+    """Return γ, which reduces the tension near the chain's end, Eq. 10 (ξ' = ξ unless given)."""
     above = inertia if inertia_above is None else inertia_above
     return 0.25 * (1.0 + inertia) * (1.0 + 1.0 / above)
 
 
 def stated_coefficients(surface: Surface, chain: Chain, incline_deg: float) -> dict[str, Quantity]:
-    """Return what α rests on, by name: α itself, a pile's β, or β and, inclined, μ."""
+    """Return the inputs of α by name: α itself, a pile's β, or β and, on an incline, μ."""
     if chain.alpha is not None:
         return {ALPHA: chain.alpha}
     if surface.pile is not None and incline_deg < surface.pile.below_deg:
@@ -100,7 +111,7 @@ def stated_coefficients(surface: Surface, chain: Chain, incline_deg: float) -> d
 def with_coefficients(
     surface: Surface, chain: Chain, values: Mapping[str, float]
 ) -> tuple[Surface, Chain]:
-    """Return a surface and a chain with other coefficients, by the names of the stated ones."""
+    """Return a surface and a chain with other coefficients, named as in `stated_coefficients`."""
     new: dict[str, Any] = {name: Quantity(value) for name, value in values.items()}
     if PILE in new and surface.pile is not None:
         surface = replace(surface, pile=replace(surface.pile, restitution=new[PILE]))
@@ -109,12 +120,12 @@ def with_coefficients(
 
 
 def impact_on(surface: Surface, chain: Chain, incline_deg: float) -> Impact:
-    """Coefficients for a chain on a surface, with every departure from the domain noted.
+    """Return the coefficients for a chain on a surface, with all departures from the domain.
 
     Raises
     ------
     DomainError
-        Where Eq. 13 has no finite solution.
+        Eq. 13 has no finite solution.
     """
     gamma, notes = chain.gamma, []
     stated = stated_coefficients(surface, chain, incline_deg)

@@ -1,16 +1,19 @@
-"""The paper's own scenes, its figures as numbers, and where its text and its equations part."""
+"""The paper's scenes, its figures as numbers, and differences between its text and equations."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import accumulate, pairwise
+from itertools import accumulate, pairwise, product
+from operator import mul
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from rig.model.chain import Chain
 from rig.model.continuum import UniformChain, end, separation_leading_order, speed
-from rig.model.fall import Fall, fall, free_fall, kicks
+from rig.model.fall import Fall, Hit, fall, free_leg, hits, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_level, impact_on
-from rig.model.motion import Motion
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 
@@ -27,29 +30,34 @@ PILE = Pile(30.0, Quantity(-0.37))
 SURFACE = Surface(Quantity(0.5, 0.05), Quantity(0.2, 0.02), PILE)
 BARE = replace(SURFACE, pile=None)
 UNIFORM = Chain((1.0,) * RODS, tuple(LENGTH * k / (RODS - 1) for k in range(RODS)))
-FREE_FALL_SPEED = free_fall(UNIFORM, DROP, GRAVITY)[0]
+FREE_FALL_SPEED = free_leg(DROP + LENGTH, 0.0, GRAVITY)[0]
 GRADED_DIAMETERS = tuple(d for d in (32e-3, 25e-3, 19e-3, 13e-3, 6.3e-3) for _ in range(4))
 MEASURED_GRADED_SEPARATION = 0.17
-"""Of the run in Fig. 4, m; read two frames before the impact."""
+"""Measured in the run of Fig. 4, m; read two frames before the impact."""
 TEXT_FREE_FALL_SPEED = 5.08
 """m/s, with Fig. 3."""
 TEXT_FOUNTAIN_ALPHAS = 0.10, 0.12
-"""α of lift-off from how high bead chains leap out of their beakers (section S V)."""
+"""α of lift-off from the height of bead chains leaping out of beakers (section S V)."""
 
 
-def graded() -> Chain:
-    """Chain of Fig. 4: thinner rods towards the top, equal gaps, mass as the square of d."""
+def graded_chain() -> Chain:
+    """Return the chain of Fig. 4: thinner rods towards the top, equal gaps, mass ∝ d²."""
     halves = [(lower + upper) / 2 for lower, upper in pairwise(GRADED_DIAMETERS)]
     gap = (LENGTH - sum(halves)) / len(halves)
     heights = (*accumulate((gap + half for half in halves[:-1]), initial=0.0), LENGTH)
     return Chain(tuple((d / GRADED_DIAMETERS[0]) ** 2 for d in GRADED_DIAMETERS), heights)
 
 
-def graded_motion() -> Motion:
-    """The fall of Fig. 4: the graded chain at 40°."""
-    chain = graded()
+def graded_fall() -> tuple[list[Hit], list[float]]:
+    """Return the impacts of the fall of Fig. 4, the graded chain at 40°, and Δz at each, m."""
+    chain = graded_chain()
     impact = impact_on(BARE, chain, MIDDLE_INCLINE)
-    return Motion(chain, kicks(chain, [impact.alpha] * chain.rods, impact.gamma), DROP, GRAVITY)
+    gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
+    impacts = hits(chain, gains, DROP, GRAVITY)
+    # Between impacts the speed difference of both chains is constant.
+    faster = accumulate(hit.speed_after - hit.speed_before for hit in impacts)
+    legs = (later.time_s - hit.time_s for hit, later in pairwise(impacts))
+    return impacts, [*accumulate(map(mul, faster, legs), initial=0.0)]
 
 
 def _fall(chain: Chain, impact: Impact) -> Fall:
@@ -57,23 +65,20 @@ def _fall(chain: Chain, impact: Impact) -> Fall:
 
 
 def figure_3(step_deg: float = 1.0) -> Columns:
-    """Δz and V against inclination, on the surface and, below 30°, on the pile.
+    """Return Δz and V against inclination, on the surface and, below 30°, on the pile.
 
-    Inclines at which the rod would not slide are left out of the first.
+    For the surface, inclines at which the rod would not slide are left out.
     """
     rows = []
-    steps = round(90.0 / step_deg)
-    for on_pile, surface in ((0.0, BARE), (1.0, SURFACE)):
-        for number in range(steps):
-            incline = number * step_deg
-            if on_pile and incline > PILE.below_deg:
-                continue
-            # The rule is strict; the curve is drawn up to the edge.
-            impact = impact_on(surface, UNIFORM, min(incline, 29.999) if on_pile else incline)
-            if impact.notes:
-                continue
-            fall_end = _fall(UNIFORM, impact)
-            rows.append((incline, on_pile, fall_end.separation_m, fall_end.speed_m_s))
+    inclines = [number * step_deg for number in range(round(90.0 / step_deg))]
+    for on_pile, incline in product((0.0, 1.0), inclines):
+        # The pile rule excludes 30°; the curve is drawn up to it.
+        surface, struck = (SURFACE, min(incline, 29.999)) if on_pile else (BARE, incline)
+        impact = impact_on(surface, UNIFORM, struck)
+        if impact.notes or (on_pile and incline > PILE.below_deg):
+            continue
+        fall_end = _fall(UNIFORM, impact)
+        rows.append((incline, on_pile, fall_end.separation_m, fall_end.speed_m_s))
     return _columns(("incline_deg", "pile", "separation_m", "speed_m_s"), rows)
 
 
@@ -82,25 +87,24 @@ def _columns(names: Sequence[str], rows: Sequence[Sequence[float]]) -> Columns:
 
 
 def figure_4() -> Columns:
-    """Height of the top rod against V² for the graded chain at 40°, striking and free.
+    """Return the height of the top rod against V² for the graded chain at 40°, striking and free.
 
-    Between impacts both are straight lines, so there are two points an impact: just before, and
+    Between impacts both are straight lines, so two points suffice for each impact: just before and
     just after.
     """
-    motion = graded_motion()
-    moments = [(0.0, 0.0)]
-    for hit in motion.hits:
-        moments += [(hit.time_s, hit.speed_before), (hit.time_s, hit.speed_after)]
-    rows = []
-    for time, velocity in moments[:-1]:  # the top rod's own impact pulls on nothing
-        instant = motion.at(time)
-        top = instant.height_m + motion.chain.length
-        rows.append((time, top, velocity**2, top + instant.separation_m, (GRAVITY * time) ** 2))
+    rows = [(0.0, DROP + LENGTH, 0.0, DROP + LENGTH, 0.0)]
+    for hit, separation, place in zip(*graded_fall(), graded_chain().heights, strict=True):
+        top, free_speed = LENGTH - place, GRAVITY * hit.time_s
+        rows += [
+            (hit.time_s, top, velocity**2, top + separation, free_speed**2)
+            for velocity in (hit.speed_before, hit.speed_after)
+        ]
+    rows.pop()  # the top rod's impact changes no speed
     return _columns(("time_s", "height_m", "speed2", "free_height_m", "free_speed2"), rows)
 
 
 def figure_6(points: int = 199) -> Columns:
-    """Δz and V against rod inertia ξ at 40°: discrete model, Eq. 14 and Eq. 15."""
+    """Return Δz and V against rod inertia ξ at 40°: discrete model, Eq. 14 and Eq. 15."""
     names = ("inertia", "separation_m", "speed_m_s", "eq15_separation_m", "eq14_speed_m_s")
     return _columns(names, [_inertia_row(n / (points + 1)) for n in range(1, points + 1)])
 
@@ -115,55 +119,44 @@ def _inertia_row(inertia: float) -> Sequence[float]:
 
 
 def claims() -> dict[int | None, dict[str, str]]:
-    """Numbers of the text and what the equations give for them, by the figure they are on.
+    """Return numbers of the text that differ from the equations' results, by their figure.
 
-    Where they part, computed here and now; `None` is for what no figure shows.
+    Results are computed here; the key is `None` for claims without a figure. The sentences are in
+    ``paper.txt``, a line for each claim after the number of its figure.
     """
-    at_80, at_40 = (
+    raised = [
         alpha_inclined(0.5, 0.2, incline) / alpha_inclined(0.5, 0.0, incline)
         for incline in (80.0, 40.0)
-    )
-    _, separation, fast, eq15, eq14 = _inertia_row(UNIFORM.inertia)
-    off = [
-        100 * abs(leading / exact - 1.0)
-        for _, exact, _, leading, _ in map(_inertia_row, (0.05, 0.9, 0.01))
     ]
-    motion = graded_motion()
-    final = motion.at(motion.end_s).separation_m
-    # The last frame is anywhere in the last 1/480 s; the one read is two before it.
-    early = motion.at(motion.end_s - 2.0 * FRAME_S).separation_m
-
+    rows = [_inertia_row(inertia) for inertia in (UNIFORM.inertia, 0.05, 0.9, 0.01)]
+    _, _, fast, _, eq14 = rows[0]
+    impacts, separations = graded_fall()
+    # The last frame is within 1/480 s before the impact; the frame read is two before that.
+    read_s = impacts[-1].time_s - 2.0 * FRAME_S
+    early = float(np.interp(read_s, [hit.time_s for hit in impacts], separations))
     # Δz of a chain far faster than its own fall makes it (S17), over that from rest, γs ≪ z₀.
-    larger = [
-        100 * end(UniformChain(LENGTH, PITCH, alpha, 0.0, 0.0, 0.0, 1.0)).separation_m
-        / end(UniformChain(LENGTH, PITCH, alpha, 0.0, 0.0, GRAVITY)).separation_m - 100
+    ratios = [
+        end(UniformChain(LENGTH, PITCH, alpha, 0.0, 0.0, 0.0, 1.0)).separation_m
+        / end(UniformChain(LENGTH, PITCH, alpha, 0.0, 0.0, GRAVITY)).separation_m
         for alpha in (1e-9, 0.1)
-    ]  # fmt: skip
+    ]
     lifted = alpha_level(0.0)
-    low, high = TEXT_FOUNTAIN_ALPHAS
-    return {
-        3: {
-            "friction raises α by 2.25 at 80°": f"{at_80:.3f} (and {at_40:.4f} at 40°, "
-            "where the text says about 20 %)",
-            f"free-fall speed {TEXT_FREE_FALL_SPEED:.2f} m/s": f"{FREE_FALL_SPEED:.3f} m/s "
-            f"from {DROP + LENGTH:.3f} m",
-        },
-        6: {
-            "Eq. 14 within 4 % of the discrete model": f"{abs(eq14 / fast - 1.0) * 100:.1f} % "
-            "at ξ = 1/3",
-            "Eq. 15 within 4 %": f"{abs(eq15 / separation - 1.0) * 100:.1f} % at ξ = 1/3, "
-            "{:.0f} % at 0.05, {:.0f} % at 0.9, {:.0f} % at 0.01".format(*off),
-            "Δz only 20 % larger for very large initial speeds (S17)": f"{larger[0]:.0f} % "
-            f"as α → 0, {larger[1]:.0f} % at α = 0.1",
-        },
-        None: {
-            f"lift-off (S20) similar to the fountains' α of {low:.2f} to {high:.2f}": (
-                f"{lifted:.3f}, {lifted / high:.1f} to {lifted / low:.1f} times that"
-            ),
-        },
-        4: {
-            f"graded chain: Δz = {MEASURED_GRADED_SEPARATION * 100:.0f} cm, measured": (
-                f"{final * 100:.1f} cm; {early * 100:.1f} cm two frames before the impact"
-            ),
-        },
+    values = {
+        "friction": raised,
+        "text_speed": TEXT_FREE_FALL_SPEED,
+        "free_fall_speed": FREE_FALL_SPEED,
+        "start": DROP + LENGTH,
+        "eq14": 100 * abs(eq14 / fast - 1.0),
+        "eq15": [100 * abs(leading / exact - 1.0) for _, exact, _, leading, _ in rows],
+        "larger": [100 * ratio - 100 for ratio in ratios],
+        "fountains": TEXT_FOUNTAIN_ALPHAS,
+        "lifted": lifted,
+        "above": [lifted / alpha for alpha in TEXT_FOUNTAIN_ALPHAS],
+        "graded": [100 * z for z in (MEASURED_GRADED_SEPARATION, separations[-1], early)],
     }
+    by_figure: dict[int | None, dict[str, str]] = {}
+    for line in Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines():
+        number, claim, equations = line.format_map(values).split(" | ")
+        figure = int(number) if number.isdigit() else None
+        by_figure.setdefault(figure, {})[claim] = equations
+    return by_figure

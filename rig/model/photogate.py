@@ -1,8 +1,8 @@
-"""A photogate from parts: its load and LED resistors, and how well it sees at the worst parts.
+"""Design of a photogate from parts: load and LED resistors, and the margins for the worst parts.
 
 The phototransistor feeds a load to ground, and the LED's current is trimmed until the lit beam
-gives twice the comparator's threshold. So the threshold is at half light, and equal loads make
-equal delays, whatever the parts. firmware/README.md has the formulas and their sources.
+gives twice the comparator's threshold. So the threshold is at half light, and equal loads give
+equal delays for all parts. firmware/README.md has the formulas and their sources.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ E12 = (10, 12, 15, 18, 22, 27, 33, 39, 47, 56, 68, 82)
 
 
 def design_photogate(distance_m: float, slit_m: float, led: str, detector: str) -> dict[str, float]:
-    """Choose the resistors of a gate for every pair of such parts; return them and what follows.
+    """Return resistors of a gate that suit all specimens of these parts, and derived values.
 
     Raises
     ------
     InputError
-        The weakest pair sees too little light.
+        The weakest pair receives too little light.
     """
     least, most, angle, daylight, time_s, at_ohm = DETECTORS[detector]
     share = min(1.0, 4 * slit_m / (math.pi * APERTURE_M))
@@ -61,6 +61,6 @@ def design_photogate(distance_m: float, slit_m: float, led: str, detector: str) 
 
 
 def next_standard(ohm: float) -> float:
-    """Round up to a value of the series E12."""
+    """Return a resistance rounded up to the E12 series, Ω."""
     decade = 10.0 ** (math.floor(math.log10(ohm)) - 1)
     return next((n * decade for n in E12 if n * decade > 0.999 * ohm), 100 * decade)

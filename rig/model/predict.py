@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
@@ -38,17 +39,17 @@ def predict(
     Parameters
     ----------
     initial_speed
-        Of both chains at release, downward, m/s.
+        Downward speed of both chains at release, m/s.
     kappas
         κ on the leg before each impact, 1/m, as from `rig.model.drag.leg_drags`; empty without
         air.
     drag_u
-        Relative standard uncertainty common to them.
+        Relative standard uncertainty common to all κ.
 
     Notes
     -----
-    Uncertainties are first order: each input is moved by ± its standard uncertainty, or, where
-    that would leave what is possible, by less and to one side; the slope counts either way.
+    Uncertainties are first order: each input is changed by ± its standard uncertainty, or by less
+    on the side where its possible range ends.
     """
     start, pull, height = initial_speed.value, gravity.value, max(0.0, drop.value + chain.length)
     if kappas:
@@ -58,36 +59,34 @@ def predict(
     else:
         free = free_leg(height, start, pull)
     air = ", drag" if kappas else ""
+    result = PredictedIncline(
+        incline_deg=incline_deg,
+        model=f"discrete{air}",
+        free_fall_speed_m_s=free[0],
+        in_domain=False,
+        notes=[],
+    )
     try:
         _check_order(chain, drop.value)
         impact = impact_on(surface, chain, incline_deg)
     except DomainError as error:
-        return PredictedIncline(
-            incline_deg=incline_deg,
-            model=f"discrete{air}",
-            free_fall_speed_m_s=free[0],
-            in_domain=False,
-            notes=[error.message],
-        )
+        return replace(result, notes=[error.message])
+    release = {"drop": drop.value, "gravity": pull, "speed": start}
+    centre = {"alpha": impact.alpha, "drag": 1.0, **release}
 
-    def fall_with(
-        alpha: float = impact.alpha,
-        drop: float = drop.value,
-        gravity: float = pull,
-        speed: float = start,
-        drag: float = 1.0,
-    ) -> Fall:
+    def fall_with(**moved: float) -> Fall:
+        alpha, drag, *place = (centre | moved).values()
         if not kappas:
-            return fall(chain, alpha, impact.gamma, drop, gravity, speed)
+            return fall(chain, alpha, impact.gamma, *place)
         gains = kicks(chain, [alpha] * chain.rods, impact.gamma)
-        return drag_fall(chain, gains, [drag * kappa for kappa in kappas], drop, gravity, speed)
+        return drag_fall(chain, gains, [drag * kappa for kappa in kappas], *place)
 
-    centre, notes = fall_with(), [*impact.notes]
+    end, notes = fall_with(), [*impact.notes]
     u: dict[str, float] = {}
     moves = {
         "alpha": _moved_alphas(chain, surface, incline_deg),
         "drop": steps(drop, least=0.0),
-        # Half of g is far enough for a slope, and a fall without gravity has no end.
+        # g is not reduced below half: a fall without gravity has no end.
         "gravity": steps(gravity, least=pull / 2),
         "speed": steps(initial_speed, least=0.0),
         "drag": steps(Quantity(1.0, drag_u), least=0.0),
@@ -107,25 +106,24 @@ def predict(
     if impact.basis == "pile":
         notes.append("rods gather on a pile: taken as level with the pile's restitution")
     basis = "" if impact.basis in {"surface", "level"} else f", {impact.basis}"
-    return PredictedIncline(
-        incline_deg=incline_deg,
+    return replace(
+        result,
         model=f"discrete{basis}{air}",
         alpha=impact.alpha,
         gamma=impact.gamma,
-        separation_m=centre.separation_m,
+        separation_m=end.separation_m,
         separation_u_m=u.get("separation_m"),
-        speed_m_s=centre.speed_m_s,
+        speed_m_s=end.speed_m_s,
         speed_u_m_s=u.get("speed_m_s"),
-        fall_time_s=centre.time_s,
+        fall_time_s=end.time_s,
         fall_time_u_s=u.get("time_s"),
-        free_fall_speed_m_s=free[0],
         in_domain=not impact.notes,
         notes=notes,
     )
 
 
 def _check_order(chain: Chain, drop_m: float) -> None:
-    """Make sure that rods touch the surface after the release, and from the bottom up."""
+    """Raise an error unless rods strike after the release, and from the bottom up."""
     if min([drop_m, *(gap for gap, _ in chain.legs)]) < 0.0:
         raise DomainError(
             "a rod touches the surface before the release or before a lower rod",
@@ -134,12 +132,12 @@ def _check_order(chain: Chain, drop_m: float) -> None:
 
 
 def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quantity:
-    """α of all rods together, with what the uncertainties of chain and surface make of it.
+    """Return α, with its uncertainty from those of chain and surface.
 
     Raises
     ------
     DomainError
-        Where Eq. 13 has no finite solution, or none within the uncertainty of μ.
+        Eq. 13 has no finite solution within the uncertainty of μ.
     """
     impact = impact_on(surface, chain, incline_deg)
     ends = _moved_alphas(chain, surface, incline_deg)
@@ -149,18 +147,26 @@ def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quanti
 def _moved_alphas(
     chain: Chain, surface: Surface, incline_deg: float
 ) -> Iterator[tuple[float, float, float]]:
-    """α with each of what it rests on moved down and up, and the weight."""
+    """Yield α with each coefficient changed down and up, and the weight."""
+    for _, low, high, weight in moved_coefficients(surface, chain, incline_deg):
+        yield impact_on(*low, incline_deg).alpha, impact_on(*high, incline_deg).alpha, weight
+
+
+def moved_coefficients(
+    surface: Surface, chain: Chain, incline_deg: float
+) -> Iterator[tuple[str, tuple[Surface, Chain], tuple[Surface, Chain], float]]:
+    """Yield the name of each input of α, the scene with it changed down and up, and the weight.
+
+    The weight is u over the distance between both values; exact inputs are left out.
+    """
     for name, stated in stated_coefficients(surface, chain, incline_deg).items():
-        for *ends, weight in steps(stated, least=LEAST.get(name, -math.inf)):
-            low, high = (
-                impact_on(*with_coefficients(surface, chain, {name: end}), incline_deg).alpha
-                for end in ends
-            )
-            yield low, high, weight
+        for *ends, weight in steps(stated, LEAST.get(name, -math.inf)):
+            low, high = (with_coefficients(surface, chain, {name: end}) for end in ends)
+            yield name, low, high, weight
 
 
 def steps(quantity: Quantity, least: float = -math.inf) -> Iterator[tuple[float, float, float]]:
-    """An input moved down and up by u, not below `least`; nothing where it is exact."""
+    """Yield an input changed down (not below `least`) and up by u, and the weight, unless exact."""
     low, high = max(least, quantity.value - quantity.u), quantity.value + quantity.u
     if high > low:
         yield low, high, quantity.u / (high - low)

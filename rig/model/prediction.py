@@ -1,4 +1,4 @@
-"""What the model says of one scene, with or without a surface."""
+"""The model's prediction for a scene, with or without a surface."""
 
 from __future__ import annotations
 
@@ -8,24 +8,23 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PredictedIncline:
-    """What the model says of one incline; `None` is what the scene does not have or tell.
+    """Prediction for an incline; `None` for quantities that do not apply.
 
     Attributes
     ----------
     incline_deg, impact_chain
-        What it is of; a chain is named where two are unlike.
+        Incline, and name of the striking chain if chains differ.
     model, alpha, gamma
-        What was computed, and the coefficients of Eq. 9.
+        Name of the model, and the coefficients of Eq. 9.
     separation_m, separation_u_m, speed_m_s, speed_u_m_s
-        Δz and V with the standard uncertainties that follow from those of β, μ (or α), drop,
-        gravity, initial speed and drag; without them also where Eq. 13 is singular within the
-        uncertainty of μ.
+        Δz and V with their standard uncertainties from those of β, μ (or α), drop height, gravity,
+        initial speed and drag; no uncertainties if Eq. 13 is singular within that of μ.
     fall_time_s, fall_time_u_s, free_fall_speed_m_s
-        Until the top rod strikes; and how fast it would be without any impact.
+        Time until the top rod strikes, and its speed then without any impacts.
     in_domain, notes
-        Whether the model describes the case, and what there is to say.
+        Whether the case is in the model's domain, and remarks.
     struck
-        Whether the scene has a surface; without one nothing has an uncertainty.
+        Whether the scene has a surface; without a surface there are no uncertainties.
     """
 
     incline_deg: float
@@ -46,11 +45,11 @@ class PredictedIncline:
 
     @property
     def label(self) -> str:
-        """Its incline and, where chains are unlike, the one that strikes."""
+        """Incline and, if chains differ, name of the striking chain."""
         return f"{self.incline_deg:g}°{f' {self.impact_chain}' if self.impact_chain else ''}"
 
     def json(self) -> dict[str, Any]:
-        """As ``rig predict --json`` prints it, without what the scene does not have."""
+        """Return the object that ``rig predict --json`` prints, without absent quantities."""
         absent = {"struck", "fall_time_u_s"}
         absent |= set() if self.struck else {"separation_u_m", "speed_u_m_s"}
         absent |= set() if self.impact_chain else {"impact_chain"}

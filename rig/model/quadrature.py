@@ -1,4 +1,4 @@
-"""A rule for smooth integrands on an interval."""
+"""Gauss–Legendre quadrature for smooth integrands on an interval."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class GaussRule(NamedTuple):
 
 @lru_cache(maxsize=64)
 def gauss(count: int) -> GaussRule:
-    """Gauss–Legendre rule of `count` nodes with its matrix of running integrals.
+    """Return the Gauss–Legendre rule of `count` nodes with its matrix of running integrals.
 
     The matrix comes from the expansion in Legendre polynomials, ∫P_k = (P_{k+1} − P_{k−1})/(2k+1),
     which loses no digits as `count` grows.
@@ -41,5 +41,5 @@ def gauss(count: int) -> GaussRule:
     steps = values[:, 2:] - values[:, :-2]  # (2k+1) ∫P_k from −1, for k = 1 … count − 1
     running = 0.5 * weights * (1.0 + nodes[:, None] + steps @ values[:, 1:-1].T)
     for array in (nodes, weights, running):
-        array.flags.writeable = False  # they are handed out again and again
+        array.flags.writeable = False  # cached arrays are shared
     return GaussRule(nodes, weights, running)

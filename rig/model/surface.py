@@ -1,4 +1,4 @@
-"""The surface a chain strikes."""
+"""The surface that a chain strikes, and the pile of rods on it."""
 
 from __future__ import annotations
 

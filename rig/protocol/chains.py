@@ -1,4 +1,4 @@
-"""The ``chains`` of a protocol: from rods as people describe them to masses, heights and widths."""
+"""The ``chains`` of a protocol: masses, heights and widths from the description of rods."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rig.protocol.masses import place_masses
 from rig.protocol.protocol import RodChain
 from rig.protocol.rods import check_apart, count_rods, list_rods, place_rods
 from rig.protocol.yamltree import Mapping, Sequence
-from rig.units import quoted
+from rig.units import quote
 
 _LONGEST_NAME = 32
 
@@ -26,8 +26,7 @@ def read_chains(top: Section) -> dict[str, RodChain | None]:
     Parameters
     ----------
     top
-        The root of the file: light beams need the rods' diameters, and one rod alone strikes no
-        surface.
+        The root of the file: gates need the rods' diameters, and a single rod strikes no surface.
 
     Returns
     -------
@@ -69,10 +68,10 @@ def read_chains(top: Section) -> dict[str, RodChain | None]:
 
 
 def _base_problem(base: str, read: Collection[str], candidates: list[str]) -> str:
-    """Say why a chain cannot be like another one, or nothing if it can."""
+    """Return why a chain cannot be `like` another; empty if it can."""
     if base not in candidates:
-        accepted = ", ".join(map(quoted, candidates)) or "no other chain is there"
-        return f"found {quoted(base)}; {fields.did_you_mean(base, candidates)}accepted: {accepted}"
+        accepted = ", ".join(map(quote, candidates)) or "no other chain is there"
+        return f"found {quote(base)}; {fields.did_you_mean(base, candidates)}accepted: {accepted}"
     return "" if base in read else "like refers back to itself; describe one chain in full"
 
 
@@ -95,7 +94,7 @@ def _build_chain(name: str, section: Section, top: Section) -> RodChain:
     Raises
     ------
     UnsoundError
-        If a key is faulty or does not fit to others, which is noted.
+        A key is faulty or does not fit others; the fault is noted.
     """
     is_object = section.is_sound("rods") and count_rods(section) == 1 and "surface" not in top
     if is_object:
@@ -120,5 +119,5 @@ def _build_chain(name: str, section: Section, top: Section) -> RodChain:
     chain = Chain(masses, heights, inertia, alpha=alpha, gamma=gamma)
     position_u, width_u = section["position_uncertainty"], section["width_uncertainty"]
     if is_object and "position_uncertainty" not in section:
-        position_u = 0.0  # it is where its drop says
+        position_u = 0.0  # the drop height gives its place
     return RodChain(name, chain, widths, tilt, position_u, width_u, diameters, rod_length, weighed)

@@ -1,7 +1,7 @@
-"""What the keys of a protocol have to do with each other, each rule once.
+"""Rules between keys of a protocol, each once.
 
-What a single key may be is in `rig.protocol.keys`; how the rods of a chain fit together in
-`rig.protocol.chains`, and the gates to the rods in `rig.protocol.gates`.
+Rules for single keys are in `rig.protocol.keys`; those for the rods of a chain in
+`rig.protocol.chains`, and those for gates and rods in `rig.protocol.gates`.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ MOST_RUNS = 100_000
 
 
 def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bool) -> None:
-    """Note whatever in a file does not suit the scene that it describes.
+    """Note all keys of a file that do not suit its scene.
 
     Parameters
     ----------
     top
         The root of the file.
     chains
-        By name, as read; `None` where one is faulty.
+        Chains by name, as read; `None` for a faulty chain.
     kept
-        Whether a session keeps this file, see `rig.protocol.reader.parse`.
+        Whether the file is stored in a session, see `rig.protocol.reader.parse`.
     """
     struck = "surface" in top
     count = len(chains)
     rods = () if None in chains.values() else tuple(filter(None, chains.values()))
-    if struck or {"gravity", "site"} <= top.keys.keys():  # without a surface it is measured
+    if struck or {"gravity", "site"} <= top.keys.keys():  # without a surface gravity is measured
         top.need("gravity", "site")
     if struck or "gates" in top:
         top.need("drop")
     if not struck and count > 1:
         top.fault("chains", f"found {count} chains; without a surface one is accepted")
-    # Of a chain that could not be read nobody knows whether it gives its α.
+    # A faulty chain is left out: it may or may not give its α.
     if top["surface"] and any(chain.chain.alpha is None for chain in rods):
         top["surface"].need("restitution")
     if "track" in top and (struck or any(chain.chain.rods > 1 for chain in rods)):
@@ -65,7 +65,7 @@ def check_scene(top: Section, chains: Mapping[str, RodChain | None], *, kept: bo
 
 
 def _check_drag(drag: Section, chains: Iterable[RodChain]) -> None:
-    """Note drag stated twice or not at all, and rods too little known for a coefficient."""
+    """Note drag stated twice or not at all, and missing rod data for a drag coefficient."""
     stated = drag.need("coefficient", "terminal_speed")
     if stated == "terminal_speed":
         drag.refuse("not used with terminal_speed; leave {} out", "air_density")
@@ -96,7 +96,7 @@ def _check_plan(plan: Section, *, struck: bool, turns: bool) -> None:
 
 
 def _is_on_board(contact: Section | None, chains: Iterable[RodChain]) -> bool:
-    """Whether heights are measured from a board; note what chains then lack."""
+    """Whether heights are measured from a board; notes keys that chains then lack."""
     if contact is None or contact["datum"] != "board":
         return False
     lacking = [f"chains.{rods.name}.{key}" for rods in chains for key in lacking_geometry(rods)[:1]]

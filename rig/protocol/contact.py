@@ -1,4 +1,4 @@
-"""Where rods strike: how high a rod's middle is as it touches a board, for any incline.
+"""Contact heights of rods: height of a rod's middle as it touches a board, for any incline.
 
 A cylinder of radius r and length L, tilted by τ along the level lines of a board inclined by θ,
 touches it with one end when its middle is L sin τ/2 + r √(1 − sin²τ cos²θ)/cos θ above the board,
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
-    """How high above a board each rod's middle is as it touches, m; bottom up.
+    """Return the height of each rod's middle above a board as it touches, m; bottom up.
 
     Parameters
     ----------
     chain
-        With nothing lacking, see `lacking_geometry`.
+        A chain with complete geometry, see `lacking_geometry`.
     incline_deg
-        Of the board, below 90.
+        Inclination of the board, below 90°.
     """
     sine, cosine = _sine(chain), math.cos(math.radians(incline_deg))
     end = 0.5 * chain.rod_length * sine if sine else 0.0
@@ -35,7 +35,7 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
 
 
 def lacking_geometry(chain: RodChain) -> tuple[str, ...]:
-    """Name the keys of a chain that `touching_heights` needs and that are not there."""
+    """Return the missing keys of a chain that `touching_heights` needs."""
     needed = {"diameter", "rod_length"} if _sine(chain) else {"diameter"}
     return tuple(key for key in chain.missing_keys if key in needed)
 
@@ -44,29 +44,29 @@ def _sine(chain: RodChain) -> float:
     return abs(math.sin(math.radians(chain.tilt_deg)))
 
 
-def higher_contacts(protocol: Protocol, incline_deg: float, chain: RodChain) -> tuple[float, ...]:
-    """How much higher each rod's middle is as it touches than that of the top rod, m; bottom up.
+def higher_contacts(incline_deg: float, chain: RodChain) -> tuple[float, ...]:
+    """Return each rod's contact height less that of the top rod, m; bottom up.
 
-    Nothing where heights are not measured from the board, which says how thick rods are.
+    Zero for a chain without complete geometry.
     """
-    if not protocol.contact.from_board:
+    if lacking_geometry(chain):
         return (0.0,) * chain.chain.rods
     heights = touching_heights(chain, incline_deg)
     return tuple(height - heights[-1] for height in heights)
 
 
 def as_struck(protocol: Protocol, incline_deg: float, struck: str) -> tuple[Chain, Quantity]:
-    """Return a chain, and its drop, whose rods all strike at the contact point when these do.
+    """Return an equivalent chain and drop height with all contact heights equal.
 
-    A rod that touches higher is one that hangs as much lower.
+    A rod that touches higher is moved down along the chain by the same height.
 
     Parameters
     ----------
     protocol
-        With heights counted from the contact point, see `at_contact`.
+        A protocol with heights relative to the contact point, see `at_contact`.
     """
     chain, drop = protocol.chains[struck].chain, protocol.drop
-    higher = higher_contacts(protocol, incline_deg, protocol.chains[struck])
+    higher = higher_contacts(incline_deg, protocol.chains[struck])
     if not any(higher):
         return chain, drop
     lowest = chain.heights[0] - higher[0]
@@ -75,12 +75,12 @@ def as_struck(protocol: Protocol, incline_deg: float, struck: str) -> tuple[Chai
 
 
 def contact_level(protocol: Protocol, incline_deg: float, struck: str) -> Quantity:
-    """How high above the zero of the heights the top rod's middle is as it touches, m.
+    """Return the contact height of the top rod's middle above the zero of the heights, m.
 
     Parameters
     ----------
     struck
-        Name of the chain that strikes.
+        Name of the striking chain.
     """
     level = protocol.contact.level
     if not protocol.contact.from_board or protocol.stated is not None:
@@ -90,18 +90,18 @@ def contact_level(protocol: Protocol, incline_deg: float, struck: str) -> Quanti
 
 
 def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Protocol:
-    """Count all heights of a run from its contact point, as everything that falls there does.
+    """Return a protocol with all heights relative to a run's contact point.
 
     Parameters
     ----------
     struck
-        Name of the chain that strikes; `None` where nothing is struck.
+        Name of the striking chain; `None` without a surface.
 
     Returns
     -------
     Protocol
-        With the same uncertainties, and the one it is made from; itself where its heights are
-        counted so already.
+        With the same uncertainties, and the original as `stated`; the same object if its heights
+        are relative to the contact point already.
     """
     if struck is None or protocol.stated is not None:
         return protocol

@@ -1,6 +1,6 @@
-"""A scene in words: its parts, gates, assumptions, plan and limits, and what was left out.
+"""Description of a scene in words: parts, gates, assumptions, plan and limits, and omissions.
 
-The words are in ``describe.txt``; here are the facts on which they depend.
+The words are in ``describe.txt``; this module computes the facts that they need.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rig.protocol.plan import PATTERNS, runs
 from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY, Protocol, RodChain
 from rig.units import UNITS, Quantity, format_quantity
 
-_EVEN = 1e-9  # metres by which rounding may change an even spacing
+_EVEN = 1e-9  # m, tolerance for an even spacing
 _BLOCKS = Path(__file__).with_suffix(".txt").read_text("utf-8").strip().split("\n\n")[1:]
 _SECTIONS = {heading: rows for heading, *rows in (block.split("\n") for block in _BLOCKS)}
 _STATED = [name for name in vars(Protocol) if not name.startswith("_")]
@@ -37,7 +37,7 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
     protocol
         A checked protocol.
     notes
-        What else is known of it, see `rig.predictions.notes`.
+        Further remarks, see `rig.predictions.notes`.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
 
 
 class _Words(Formatter):
-    """Writes a quantity in the unit that stands behind its colon."""
+    """Formatter that writes a quantity in the unit after its colon."""
 
     def format_field(self, value: Any, format_spec: str) -> Any:
         if format_spec not in UNITS:
@@ -66,13 +66,13 @@ _WORDS = _Words()
 
 
 def _holds(words: str, facts: Facts) -> bool:
-    """Whether all facts hold that some words name, and none that stands behind a ``!``."""
+    """Whether all named facts hold, and none that is marked by ``!``."""
     values = ((word, _WORDS.get_field(word.lstrip("!"), (), facts)[0]) for word in words.split())
     return all(bool(value) != word.startswith("!") for word, value in values)
 
 
 def _write(section: str, facts: Facts, parts: Iterable[Facts] = ({},)) -> list[str]:
-    """Return the lines of a section for which the facts are: once, or once for each part."""
+    """Return the lines of a section whose facts hold, once or once for each part."""
     text = ""
     for part in parts:
         all_facts = {**facts, **part}
@@ -83,7 +83,7 @@ def _write(section: str, facts: Facts, parts: Iterable[Facts] = ({},)) -> list[s
 
 
 def _list_facts(protocol: Protocol) -> dict[str, Any]:
-    """Return what a protocol states and what follows from it, by the words of the table."""
+    """Return stated and derived facts of a protocol, by their names in ``describe.txt``."""
     surface, track, plan = protocol.surface, protocol.track, protocol.plan
     gates, chains, planned = protocol.gates, protocol.chains.values(), runs(protocol)
     first, period = next(iter(protocol.chains)), len(PATTERNS[plan.order])
@@ -153,7 +153,7 @@ def _gate_facts(protocol: Protocol) -> Iterator[Facts]:
 
 
 def _prior_facts(protocol: Protocol, scene: Facts) -> Iterator[Facts]:
-    """List what is assumed where nothing was measured, as standard deviations."""
+    """Yield the assumed standard deviations of quantities that are not measured."""
     for name, key in SECTIONS["priors"].items():
         if _holds(key.scene, scene):
             value = getattr(protocol.priors, name)
@@ -163,7 +163,7 @@ def _prior_facts(protocol: Protocol, scene: Facts) -> Iterator[Facts]:
 
 
 def _touch_facts(protocol: Protocol) -> Iterator[Facts]:
-    """List at which heights rods touch the board, for each incline and chain."""
+    """Yield the contact heights of rods on the board, for each incline and chain."""
     inclines = dict.fromkeys(protocol.plan.inclines if protocol.contact.from_board else ())
     for incline, name in product(inclines, protocol.strikers):
         heights = [round(z, 4) for z in touching_heights(protocol.chains[name], incline)]
@@ -172,7 +172,7 @@ def _touch_facts(protocol: Protocol) -> Iterator[Facts]:
 
 
 def _lack_facts(wants: Mapping[str, Sequence[Any]]) -> Iterator[Facts]:
-    """List what boards lack; of gates, which are many alike, the first will do."""
+    """Yield the features that boards lack; for gates only the first."""
     for board, problems in wants.items():
         gates = [problem for problem in problems if problem.key.startswith("gates.")]
         for problem in [problem for problem in problems if problem not in gates] + gates[:1]:

@@ -19,31 +19,32 @@ if TYPE_CHECKING:
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
 SCENES: tuple[Scene, ...] = get_args(Scene)
 
-# Lowest first in importance: of the end speed first, then where the chain is before anything
-# strikes. Each is a height in m that is meant, and the share of the free way that it may take.
+# In order of importance: the lowest first, for the final speed, then those before the first strike.
+# Each is an intended height in m, and the largest share of the free distance.
 _LOW: dict[Side, tuple[tuple[float, float], ...]] = {
     "impact": ((0.025, 0.11), (0.070, 0.38), (0.130, 0.75), (0.045, 0.22)),
     "free": ((0.020, 0.08), (0.080, 0.44), (0.150, 0.87), (0.110, 0.62)),
 }
 _HIGH = (0.02, 0.15, 0.5, 0.9, 0.3, 0.7, 0.08, 0.4, 0.6, 0.8, 0.22, 0.98)
-"""Shares of the length near which gates between hanging rods are put, in order of importance."""
+"""Shares of the length for gates between hanging rods, in order of importance."""
 _CLEAR = 1.5e-3
-_FIRST = 0.06  # share of its way after which one object is first seen
-_LAST = 0.1  # of the drop, the lowest gate
+_FIRST = 0.06  # share of a single object's path before its first gate
+_LAST = 0.1  # height of the lowest gate as a share of the drop height
 
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What somebody has and wants, as written in a protocol file.
+    """Answers about a set-up, in the notation of a protocol file.
 
     Attributes
     ----------
     rods, length, diameter
-        Of a chain or a picket fence; of one object the last alone, its length in a beam.
+        Properties of a chain or a picket fence; for a single object only `diameter`, its length in
+        a beam.
     inclines
-        Of the board, or the one of the track.
+        Inclines of the board, or the incline of the track.
     gates
-        How many there are.
+        Number of gates.
     """
 
     title: str
@@ -57,19 +58,19 @@ class Draft:
     repeats: int
 
     def trial(self) -> Draft:
-        """Return the same with four drops, at the incline that stands in the middle."""
+        """Return the draft with four drops, at the middle incline."""
         inclines = [incline.strip() for incline in self.inclines.split(",") if incline.strip()]
         middle = inclines[len(inclines) // 2] if inclines else ""
         return replace(self, inclines=middle, repeats=4)
 
 
 def draft_text(draft: Draft) -> str:
-    """Write the protocol.
+    """Return the text of the protocol.
 
     Raises
     ------
     InputError
-        Where no protocol can be made of these answers: with what is wrong with each.
+        The answers do not make a protocol; lists the fault of each.
     """
     try:
         bare = parse(_text(draft, ""), draft.title)
@@ -83,11 +84,11 @@ def draft_text(draft: Draft) -> str:
 
 _WIDTH = 26
 _LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-"""Lines of a file behind the scenes that have them, all if none is named."""
+"""Lines of a file after the scenes that have them; all scenes if none is named."""
 
 
 def _text(draft: Draft, gates: str) -> str:
-    """Write the file around its gates; what is usual is as in the table of keys."""
+    """Return the text of the file with these gates; defaults are those of the table of keys."""
     scenes = ((line[:_WIDTH].split(), line[_WIDTH:]) for line in _LINES)
     lines = [text for scenes_of_line, text in scenes if draft.scene in (scenes_of_line or SCENES)]
     values = {name: str(getattr(draft, name)) for name in Draft.__slots__}
@@ -97,7 +98,7 @@ def _text(draft: Draft, gates: str) -> str:
 
 
 def _gates(protocol: Protocol, draft: Draft) -> str:
-    """Put the gates where hanging rods leave their beams clear."""
+    """Return the ``gates`` of the file, at heights that hanging rods leave clear."""
     text, channels = "gates:\n", count()
     for side, number in _share_gates(draft).items():
         heights = (
@@ -110,7 +111,7 @@ def _gates(protocol: Protocol, draft: Draft) -> str:
 
 
 def _share_gates(draft: Draft) -> dict[Side, int]:
-    """How many gates each side gets: of few, most where the free chain is seen."""
+    """Return the number of gates on each side; with few gates, most on the free side."""
     if draft.scene == "one-chain":
         return {"impact": draft.gates}
     if draft.scene != "two-chains":
@@ -123,7 +124,7 @@ def _share_gates(draft: Draft) -> dict[Side, int]:
 
 
 def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
-    """Low gates for the end, and some between hanging rods for the beginning."""
+    """Return heights of low gates for the end of a fall, and of some between hanging rods, m."""
     (rods, *_), drop = protocol.chains.values(), protocol.drop
     half = max(rods.widths) / 2.0
     low = half + _CLEAR
@@ -146,7 +147,7 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
 
 
 def _even(protocol: Protocol, number: int) -> list[float]:
-    """Evenly from near the lowest level up to just below where it begins."""
+    """Return even heights from near the lowest level up to just below the start, m."""
     (body,), drop = protocol.chains.values(), protocol.drop
     clear = max(body.widths) / 2.0 + max(_CLEAR, drop.u)
     first = drop.value - max(clear + _CLEAR, _FIRST * drop.value)

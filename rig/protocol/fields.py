@@ -1,8 +1,8 @@
-"""Reading a mapping by the table of keys: each value checked at its place, every fault kept.
+"""Reader of mappings by the table of keys: checks each value and collects all faults.
 
-A `Section` reads all its keys at once: what is faulty, or missing though it is required, is noted
-and becomes ``None``. So one pass over a file finds everything that is wrong with it, and what
-follows checks only what keys have to do with each other.
+A `Section` reads all its keys at once. A faulty or missing required value is noted and becomes
+``None``. So a single pass finds all faults of a file, and later checks deal only with relations
+between keys.
 """
 
 from __future__ import annotations
@@ -14,28 +14,28 @@ from typing import Any, NoReturn
 from rig.errors import Problem
 from rig.protocol import keys
 from rig.protocol.yamltree import Mapping, Node, Place, ScalarNode, Sequence
-from rig.units import UnitError, parse, quoted
+from rig.units import UnitError, parse, quote
 
 
 @dataclass(slots=True)
 class Faults:
-    """The problems noted so far in one file."""
+    """The problems noted so far in a file."""
 
     source: str
     problems: dict[tuple[int, int, str], Problem] = field(default_factory=dict)
 
     def add(self, place: Place, key: str, message: str) -> None:
-        """Note a problem; what a chain inherits by `like` is noted once, where it stands."""
+        """Note a problem; a fault that chains inherit by `like` is noted once, at its place."""
         at = (place.line, place.column, message)
         self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, message))
 
 
 class UnsoundError(Exception):
-    """What is described cannot be built; why is noted."""
+    """An object cannot be built from its section; the faults are noted."""
 
 
 class Section:
-    """One mapping of the file, read by the keys that the table has for it.
+    """A mapping of the file, read by its keys in the table.
 
     Parameters
     ----------
@@ -44,16 +44,16 @@ class Section:
     path
         Its key path in the file, empty for the root.
     table
-        The same in the table, see `rig.protocol.keys.ANY`.
+        Key path in the table, see `rig.protocol.keys.ANY`.
     faults
-        Where problems go.
+        Collects the problems.
     lenient
         Do not note missing keys (used when the chain named by `like` is itself faulty).
 
     Attributes
     ----------
     values
-        By key: as read, or the default; `None` where it is faulty, or missing without a default.
+        Values by key, as read, or defaults; `None` if faulty, or missing without a default.
     """
 
     def __init__(
@@ -86,11 +86,11 @@ class Section:
         return DEFAULTS[key.path]
 
     def is_sound(self, *names: str) -> bool:
-        """Whether nothing is faulty or missing: of these keys, or of all."""
+        """Whether none of these keys, by default of all, is faulty or missing."""
         return self._faulty.isdisjoint(names) if names else not self._faulty
 
     def need(self, *names: str) -> str | None:
-        """Return which of some keys is there: there must be one of them, and no more."""
+        """Return the one key of these that is given; notes a fault unless exactly one is."""
         first, *others = sorted(self.keys.keys() & set(names), key=self.keys.__getitem__) or ("",)
         for other in others:
             message = f"{first} is also given, on line {self.keys[first].line}; keep one of them"
@@ -98,7 +98,7 @@ class Section:
         if first:
             return None if others else first
         self._faulty.update(names)
-        # What seems to be missing may be a key that is spelt wrongly.
+        # A seemingly missing key may be misspelt.
         if not self.lenient and not any(did_you_mean(name, names) for name in self._unknown):
             examples = (f"{name}: {keys.example(self._accepted[name])}" for name in names)
             message = f"missing; write for example {', or '.join(examples)}"
@@ -106,30 +106,30 @@ class Section:
         return None
 
     def refuse(self, why: str, *names: str) -> None:
-        """Note those of some keys that are there although nothing can use them."""
+        """Note a fault for each of these keys that is given but not used."""
         for name in filter(self.__contains__, names):
             self.fault(name, why.format(name), at_key=True)
 
     def key(self, name: str) -> str:
-        """Return the full path of one of its keys."""
+        """Return the full path of a key."""
         return join(self.path, name)
 
     def place(self, name: str) -> Place:
-        """Return where the value of a key stands, or the mapping itself if it is missing."""
+        """Return the place of a key's value, or of the mapping if the key is missing."""
         return self.nodes[name].place if name in self.nodes else self.node.place
 
     def fault(self, name: str, message: str, *, at_key: bool = False) -> None:
-        """Note a problem with the value of a key (or with the key's being there)."""
+        """Note a problem with the value of a key, or with the key itself."""
         place = self.keys[name] if at_key else self.place(name)
         self.faults.add(place, self.key(name), message)
 
     def reject(self, name: str, message: str, *, at_key: bool = False) -> NoReturn:
-        """Note a problem with which nothing can be built from this section."""
+        """Note a problem and raise `UnsoundError`."""
         self.fault(name, message, at_key=at_key)
         raise UnsoundError
 
     def require_sound(self, *names: str) -> None:
-        """Build nothing where one of these keys, or of all, is faulty or missing."""
+        """Raise `UnsoundError` if one of these keys, by default of all, is faulty or missing."""
         if not self.is_sound(*names):
             raise UnsoundError
 
@@ -141,7 +141,7 @@ def _is_sound(value: Any) -> bool:
 
 
 def _unknown_key(name: str, accepted: Iterable[str]) -> str:
-    """Say what may be meant by a key that is not accepted."""
+    """Return the message for an unknown key, with a suggestion."""
     word, colon, _ = name.partition(":")
     if colon and word in accepted:  # {channel:0} is one key without a value
         return f"a blank is missing after the colon of {word}"
@@ -149,8 +149,8 @@ def _unknown_key(name: str, accepted: Iterable[str]) -> str:
 
 
 def join(path: str, key: str) -> str:
-    """Return a key path; a key that is no plain word is quoted, so that a line stays a line."""
-    word = key if key.isidentifier() and len(key) <= 40 else quoted(key)
+    """Return a key path; a key that is not a plain word is quoted, to keep the path on a line."""
+    word = key if key.isidentifier() and len(key) <= 40 else quote(key)
     return f"{path}.{word}" if path else word
 
 
@@ -166,7 +166,7 @@ def did_you_mean(word: str, accepted: Iterable[str]) -> str:
 def unique_entries(
     node: Mapping, path: str, faults: Faults
 ) -> tuple[dict[str, Place], dict[str, Node]]:
-    """Return the places and values of a mapping's keys, noting repeated keys and odd ones."""
+    """Return the places and values of a mapping's keys; notes repeated keys and non-scalar ones."""
     places: dict[str, Place] = {}
     values: dict[str, Node] = {}
     for key, value in node.entries:
@@ -185,8 +185,8 @@ def unique_entries(
 def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, faults: Faults) -> Any:
     """Return a value of the file in base units, or note a fault and return ``None``.
 
-    A mapping becomes a `Section` (or stays a node, where the file chooses its names), and a list a
-    tuple of values, of which faulty ones are ``None``.
+    A mapping becomes a `Section` (or stays a node if its keys are free names). A list becomes a
+    tuple of values, with ``None`` for faulty items.
     """
     match accepted, node:
         case keys.Either(kinds), _:
@@ -194,7 +194,7 @@ def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, fault
             for kind in kinds:
                 if (isinstance(kind, keys.ListOf), kind is keys.Plain.MAPPED) == shape:
                     value = read_value(kind, node, path, table, faults)
-                    # What may be a list, too, is alone a list of one.
+                    # A single value where a list is accepted is a list of one.
                     is_item = keys.ListOf(kind) in kinds and value is not None
                     return (value,) if is_item else value
         case keys.Plain.MAPPED, Mapping():
@@ -219,7 +219,7 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
     Raises
     ------
     UnitError
-        If it is not accepted: says what was found and what is accepted.
+        The value is not accepted; names the value and the accepted forms.
     """
     refusal, close = f"found {node}", ""
     match accepted:
@@ -249,7 +249,7 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
 
 
 def _form(accepted: keys.Accepted) -> str:
-    """Say how a value is written, where something else than that is found."""
+    """Return the accepted notation of a value, for messages."""
     match accepted:
         case keys.Range():
             return f"{accepted.dimension.noun}, {accepted}"
@@ -263,11 +263,11 @@ def _form(accepted: keys.Accepted) -> str:
 
 
 def _read_default(key: keys.Key) -> Any:
-    """Return the default of a key as if it stood in a file; `None` where there is none."""
+    """Return the default of a key in base units; `None` if there is none."""
     node = ScalarNode(key.default, plain=True, place=Place(1, 1))
     stated = key.default and not key.in_words
     return read_value(key.accepted, node, key.path, key.path, Faults("")) if stated else None
 
 
 DEFAULTS: dict[str, Any] = {path: _read_default(key) for path, key in keys.KEYS.items()}
-"""Each key that is left out, by its path, in base units; `None` where it then is not there."""
+"""Default of each key by its path, in base units; `None` without a default."""

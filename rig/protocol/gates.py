@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rig.units import Quantity
 
 CLEARANCE_M = 0.001
-"""A beam is some millimetres wide and a hanging chain sways: the least margin around a rod, m."""
+"""Least margin around a rod, m: a beam is some millimetres wide, and a hanging chain sways."""
 
 
 def check_sides(section: Section, *, surface: bool, chains: int) -> None:
@@ -48,7 +48,7 @@ def check_sides(section: Section, *, surface: bool, chains: int) -> None:
 
 
 def _sections(section: Section) -> Iterator[Section]:
-    """Gates of all sides that are mappings at all, in the order of the file's keys."""
+    """Return the gates of all sides that are mappings, in the order of the file's keys."""
     return (gate for side in SIDES for gate in section[side] or () if gate)
 
 
@@ -62,7 +62,7 @@ class HangingRod(NamedTuple):
 
 
 def hanging_rods(chains: Iterable[RodChain], drop: Quantity) -> list[HangingRod]:
-    """Return all rods that hang there, by the height where they begin to block a beam."""
+    """Return all hanging rods, sorted by the lower end of their shadow."""
     rods = []
     for chain in chains:
         places = zip(chain.chain.heights, chain.widths, strict=True)
@@ -78,7 +78,7 @@ def blocking_rod(rods: Iterable[HangingRod], height: float) -> HangingRod | None
 
 
 def check_clear(top: Section, chains: Collection[RodChain], inclines: Iterable[float]) -> None:
-    """Note gates that are blocked before the release, that nothing passes, or that are too low.
+    """Note gates that are blocked before the release, that no rod passes, or that are too low.
 
     The chains swap sides, so every gate is checked against every chain.
 
@@ -87,7 +87,7 @@ def check_clear(top: Section, chains: Collection[RodChain], inclines: Iterable[f
     top
         The root of the file, with its ``gates`` and a sound ``drop``.
     inclines
-        Of the board, where heights are measured from it.
+        Inclines of the board, if heights are measured from it.
     """
     drop, struck = top["drop"], "surface" in top
     rods = hanging_rods(chains, drop)
@@ -124,7 +124,7 @@ def _clear_heights(
     height: float, rods: Iterable[HangingRod], lowest: float, top: float
 ) -> list[float]:
     """Return the nearest heights below and above that no rod blocks, to 0.1 mm."""
-    # A rounded edge may still be a rounding error inside its rod: the next step is outside.
+    # A rounded edge may lie inside its rod by a rounding error: the next step is outside.
     below = {math.floor(rod.low * 1e4) - step for rod in rods for step in (0, 1)}
     above = {math.ceil(rod.high * 1e4) + step for rod in rods for step in (0, 1)}
     tenths = [z for z in below | above if blocking_rod(rods, z / 1e4) is None]
@@ -134,5 +134,5 @@ def _clear_heights(
 
 
 def _mm(height: float) -> str:
-    """Write a height as people set it, to 0.1 mm."""
+    """Return a height as text, to 0.1 mm."""
     return f"{height * 1e3:.1f} mm"

@@ -1,4 +1,4 @@
-"""Every key of a protocol file, in one table: what it may be, what it is by default, what it means.
+"""Table of all keys of a protocol file: accepted values, default and meaning.
 
 The reader checks a file by this table, `rig check --keys` prints it, `rig check --schema` makes the
 JSON Schema of editors from it, and `rig check` and `rig sweep` take ranges and words from it. A new
@@ -16,9 +16,9 @@ from typing import NamedTuple
 from rig.units import Dimension, Quantity, format_quantity
 
 ANY = "*"
-"""Stands in a path for names that the file chooses: of chains."""
+"""Placeholder in a path for names chosen by the file: those of chains."""
 EACH = "[]"
-"""Stands in a path for each item of a list."""
+"""Placeholder in a path for each item of a list."""
 BOOLEANS = {
     "true": True,
     "True": True,
@@ -27,18 +27,18 @@ BOOLEANS = {
     "False": False,
     "FALSE": False,
 }
-"""As YAML 1.2 writes them (core schema, section 10.3.2)."""
+"""Booleans of YAML 1.2 (core schema, section 10.3.2)."""
 
 
 MOST_RODS = 1000
-"""Of a chain, in all its groups."""
+"""Most rods of a chain, in all its groups."""
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """A quantity: accepted values in base units, and the unit in which to say so.
+    """Accepted values of a quantity in base units, and the unit for messages.
 
-    `exact` refuses a written uncertainty; it is empty where one is accepted.
+    `exact` is the message that refuses a written uncertainty; empty if an uncertainty is accepted.
     """
 
     dimension: Dimension
@@ -68,7 +68,7 @@ class Whole(NamedTuple):
 
 
 class OneOf(NamedTuple):
-    """One of these words."""
+    """A choice of words."""
 
     words: tuple[str, ...]
 
@@ -77,7 +77,7 @@ class OneOf(NamedTuple):
 
 
 class Either(NamedTuple):
-    """A value of one of these kinds, which are written differently."""
+    """A value of several kinds with different notations."""
 
     kinds: tuple[Accepted, ...]
 
@@ -95,7 +95,7 @@ class ListOf(NamedTuple):
 
 
 class Plain(StrEnum):
-    """Keys with values, those of the table or names that the file chooses; or any text."""
+    """A mapping, with keys of the table or names chosen by the file; or any text."""
 
     MAPPED = "keys"
     TEXT = "text"
@@ -105,28 +105,28 @@ Accepted = Range | Whole | OneOf | Either | ListOf | Plain
 
 
 class Key(NamedTuple):
-    """One key.
+    """A key of the table.
 
     Attributes
     ----------
     path
-        From the root, parts joined by dots; see `ANY` and `EACH`.
+        Path from the root, parts joined by dots; see `ANY` and `EACH`.
     accepted
-        What it may be.
+        Accepted values.
     default
-        What it is where it is left out, as written in a file; empty where it then is not there.
+        Default as written in a file; empty without a default.
     required
-        Whether it must be there.
+        Whether the key is required.
     in_words
-        Whether the default follows from something else, which it names.
+        Whether the default is a description of how it is derived.
     meaning
-        In words.
+        Meaning in words.
     example
-        As written in a file.
+        Example as written in a file.
     scene
-        What a scene needs for this key to matter: as ``describe.txt`` writes it.
+        Facts of a scene for which the key matters, as in ``describe.txt``.
     source
-        Where the default comes from.
+        Source of the default.
     """
 
     path: str
@@ -173,7 +173,7 @@ def read_key(row: str) -> Key:
     Parameters
     ----------
     row
-        Columns parted by ``|``, as the head of that file explains; the last two may be left out.
+        Columns separated by ``|``, as the head of that file explains; the last two are optional.
     """
     name, form, default, *texts = map(str.strip, row.split("|"))
     path, accepted = name.removesuffix("!"), _read_accepted(form)
@@ -184,7 +184,7 @@ def read_key(row: str) -> Key:
 _LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
 _ROWS = (read_key(line) for line in _LINES if line and not line.startswith("#"))
 KEYS = {key.path: key for key in _ROWS}
-"""By path, in the order in which a file is written."""
+"""Keys by path, in the order of a file."""
 
 SECTIONS: dict[str, dict[str, Key]] = {}
 """The keys of each mapping, by the mapping's path and their own names."""
@@ -194,7 +194,7 @@ for _key in KEYS.values():
 
 
 def range_of(path: str) -> Range:
-    """Return the accepted values of a key that is a quantity, or of each in its list."""
+    """Return the range of a key that is a quantity, or of the items of a list of quantities."""
     accepted = KEYS[path].accepted
     return next(kind for kind in getattr(accepted, "kinds", (accepted,)) if isinstance(kind, Range))
 
@@ -203,7 +203,7 @@ _BRACKETS = (("", "{", "}"), (f".{EACH}", "[{", "}]"), (f".{ANY}", "{A: {", ", â
 
 
 def example(key: Key) -> str:
-    """Return an example of a key as a file has it: its own, or its required keys with theirs."""
+    """Return an example of a key as in a file: its own, or those of its required keys."""
     if key.example:
         return key.example
     for part, before, after in _BRACKETS:

@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 def place_masses(chain: Section, heights: RodValues) -> RodValues:
     """Return the mass of each rod, kg, bottom up.
 
-    They are listed with one mass a rod; or follow ``{exponential: {bottom: …, top: …}}``, an even
-    ratio from each rod to the next; or ``{table: [{height: …, mass: …}, …]}``, straight from point
-    to point.
+    Masses are listed rod by rod; or follow ``{exponential: {bottom: …, top: …}}``, with a constant
+    ratio from each rod to the next; or ``{table: [{height: …, mass: …}, …]}``, with linear
+    interpolation.
 
     Parameters
     ----------
     chain
-        With its ``masses``.
+        The chain with its ``masses``.
     heights
-        Of the rods' middles above the bottom rod's, m.
+        Heights of the rods' middles above that of the bottom rod, m.
     """
     masses, rods = chain["masses"], len(heights)
     if isinstance(masses, tuple):
@@ -45,13 +45,13 @@ def place_masses(chain: Section, heights: RodValues) -> RodValues:
 
 
 def _interpolate(masses: Section, heights: RodValues) -> RodValues:
-    """Return masses that run straight between the points of a table."""
+    """Return masses by linear interpolation in a table."""
     points = [(point["height"], point["mass"]) for point in masses["table"]]
     for n, ((low, _), (high, _)) in enumerate(pairwise(points), start=1):
         if low >= high:
             masses["table"][n].reject("height", "heights must increase from point to point")
     lowest, highest = points[0][0], points[-1][0]
-    # A height that sums up from rods is a rounding above what was written.
+    # Rounding may raise a height that is summed from rods above the written value.
     if lowest > 0.0 or highest < heights[-1] * (1.0 - 1e-12):
         message = f"runs from {lowest:g} m to {highest:g} m; the rods are from 0 m"
         masses.reject("table", f"{message} to {heights[-1]:g} m")
@@ -59,7 +59,7 @@ def _interpolate(masses: Section, heights: RodValues) -> RodValues:
 
 
 def _mass_at(points: list[tuple[float, float]], height: float) -> float:
-    """Return the mass at a height that the points enclose."""
+    """Return the interpolated mass at a height within the points."""
     for (low, mass), (high, upper_mass) in pairwise(points):
         if height <= high:
             share = (height - low) / (high - low)

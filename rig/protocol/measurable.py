@@ -1,6 +1,6 @@
-"""What keeps a drop from being measured, said before anything is hung.
+"""Checks whether a drop can be measured, before anything is set up.
 
-The rig drops chains from rest, in air as it is; a recording ends at some time; a board has so many
+The rig drops chains from rest; the length of a recording is limited, as is a board's number of
 inputs and outputs.
 """
 
@@ -17,16 +17,16 @@ from rig.protocol.yamltree import load, place_of
 from rig.reasons import make_error
 
 LEAST_RECORD_MS = 1500
-"""Long enough for the drops of most labs, and then the same for all."""
-_SURE = 3.0  # standard uncertainties by which everything may make a fall longer
-_AIR = 1.5  # light rods, with a terminal speed of 10 m/s, take 1.4 times as long for 25 m
-_MARGIN_S = 0.25  # for the mechanism that lets go
+"""Length of a recording that suits most labs, ms."""
+_SURE = 3.0  # standard uncertainties by which inputs may prolong a fall
+_AIR = 1.5  # factor for drag: with a terminal speed of 10 m/s, 25 m take 1.4 times as long
+_MARGIN_S = 0.25  # for the release mechanism
 
 
 def longest_fall(protocol: Protocol) -> float:
-    """Time from the release to the last edge, if every uncertainty makes it longer, s.
+    """Return the longest time from the release to the last edge within the uncertainties, s.
 
-    That of free fall through √(2 h/g): an impact only makes a chain faster, α being above zero.
+    This is the time of free fall √(2 h/g): an impact only makes a chain faster, as α > 0.
     """
     chains, gates, gravity = protocol.chains.values(), protocol.gates, protocol.gravity
     lowest = min((gate.height for gate in gates.gates), default=0.0) if gates else 0.0
@@ -39,10 +39,10 @@ def longest_fall(protocol: Protocol) -> float:
 
 
 def record_ms(protocol: Protocol) -> int:
-    """How long after the release a drop is recorded, ms; at least `LEAST_RECORD_MS`.
+    """Return the recording time of a drop after the release, ms; at least `LEAST_RECORD_MS`.
 
-    The chain may hang until the pulse ends, and the air makes the fall longer. More than
-    `LONGEST_RECORD_MS` is too much for any board.
+    The chain may hang until the pulse ends, and drag prolongs the fall. No board records more than
+    `LONGEST_RECORD_MS`.
     """
     fall_s, skew_s = _AIR * longest_fall(protocol), protocol.accept.release_skew
     wanted_s = fall_s + protocol.release.pulse + skew_s + _MARGIN_S
@@ -50,14 +50,14 @@ def record_ms(protocol: Protocol) -> int:
 
 
 def unmeasurable(protocol: Protocol) -> list[str]:
-    """Return the reasons why a drop can only be predicted; none if it can be measured."""
+    """Return the reasons why a drop can only be predicted; empty if it can be measured."""
     if protocol.initial_speed == AT_REST:
         return []
     return [f"initial_speed: the rig releases {protocol.vocabulary.body} from rest"]
 
 
 def with_gates(protocol: Protocol, channels: Collection[int]) -> Protocol:
-    """Return a scene with those of its gates alone that are at some channels."""
+    """Return a scene with only the gates at these channels."""
     if protocol.gates is None:
         return protocol
     gates = tuple(gate for gate in protocol.gates.gates if gate.channel in channels)
@@ -78,12 +78,12 @@ def check_gates(protocol: Protocol) -> Gates:
 
 
 def check_measurable(protocol: Protocol) -> None:
-    """Refuse a protocol that can only be predicted.
+    """Raise an error for a protocol that can only be predicted.
 
     Raises
     ------
     InputError
-        With every reason.
+        The drop cannot be measured; lists all reasons.
     """
     if reasons := "; ".join(unmeasurable(protocol)):
         hint = "rig predict shows the prediction; leave these keys out to measure"
@@ -91,7 +91,7 @@ def check_measurable(protocol: Protocol) -> None:
 
 
 def too_long(protocol: Protocol) -> Problem | None:
-    """Say that a fall takes more time than any board can record, when it does."""
+    """Return the problem of a fall longer than any board's recording; `None` otherwise."""
     if record_ms(protocol) <= LONGEST_RECORD_MS:
         return None
     message = (
@@ -103,7 +103,7 @@ def too_long(protocol: Protocol) -> Problem | None:
 
 
 def _locate(protocol: Protocol, message: str, *path: str | int) -> Problem:
-    """Return a problem at the place of the file that a path leads to."""
+    """Return a problem at the place of a key path in the file."""
     place = place_of(load(protocol.text, protocol.source), *path)
     steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     key = "".join(steps).removeprefix(".")
@@ -111,7 +111,7 @@ def _locate(protocol: Protocol, message: str, *path: str | int) -> Problem:
 
 
 def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:
-    """Count for each chain the rods that pass a gate: those that hang above it."""
+    """Return the number of rods of each chain that hang above a gate and so pass it."""
     drop = protocol.drop.value
     return {
         name: sum(drop + height > gate.height for height in rods.chain.heights)
@@ -120,7 +120,7 @@ def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:
 
 
 def most_edges(protocol: Protocol) -> int:
-    """Count the edges of a drop whose rods all pass, with the chain on each side that has more."""
+    """Return the largest number of edges of a drop, over the chains that may hang on each side."""
     sides = map(protocol.gates.on, SIDES) if protocol.gates else ()
     passing = ([passing_rods(protocol, gate) for gate in gates] for gates in sides)
     most = (max(sum(rods[name] for rods in side) for name in protocol.chains) for side in passing)
@@ -128,7 +128,7 @@ def most_edges(protocol: Protocol) -> int:
 
 
 def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
-    """Say what a protocol wants of a board that it does not have, in the order of the file."""
+    """Return problems for features that a protocol needs and a board lacks, in file order."""
     problems = []
 
     def want(kind: str, least: float, value: str, has: str, *path: str | int) -> None:
@@ -154,9 +154,9 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
 
 
 def check_recordable(protocol: Protocol, board: Capabilities | None = None) -> None:
-    """Refuse a protocol whose drops no board, or not this one, can make and record.
+    """Raise an error for a protocol whose drops this board, or no board, can record.
 
-    Other timers have no such limits: what they recorded need only be measurable.
+    Imported recordings of other timers have no such limits; they need only be measurable.
 
     Raises
     ------

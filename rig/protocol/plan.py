@@ -1,4 +1,4 @@
-"""From a plan to the list of runs, in the order in which they are carried out."""
+"""Expansion of a plan into its runs, in the order of execution."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PATTERNS: dict[Order, tuple[int, ...]] = {"ABBA": (0, 1, 1, 0), "alternate": (0,
 
 
 def runs(protocol: Protocol) -> tuple[Run, ...]:
-    """Lay out every run of a protocol.
+    """Return all planned runs of a protocol.
 
     Within each incline the impact chain of runs 1, 2, 3, 4 … is A, B, B, A … (``ABBA``),
     A, B, A, B … (``alternate``) or always A (``fixed``), A being the chain named first.

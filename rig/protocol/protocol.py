@@ -1,4 +1,4 @@
-"""What a protocol file says, as plain data: the scene, the gates and the plan of runs.
+"""Content of a protocol file as plain data: the scene, the gates and the plan of runs.
 
 Lengths are metres, times seconds, angles degrees. Whatever a scene does not have is ``None`` or
 empty, and every later stage leaves it out.
@@ -30,7 +30,7 @@ SIDES: tuple[Side, ...] = ("impact", "free")
 
 @dataclass(frozen=True, slots=True)
 class RodChain:
-    """One physical chain: the mechanics of it and what a light beam sees.
+    """A physical chain: its mechanics, and its rods as seen by a beam.
 
     Attributes
     ----------
@@ -47,11 +47,11 @@ class RodChain:
     width_u
         Standard uncertainty of the effective width common to the rods, m.
     diameters
-        Of the rods, m; 0 where unknown; bottom up.
+        Diameters of the rods, m; 0 if unknown; bottom up.
     rod_length
-        Of every rod, m; 0 where unknown.
+        Length of the rods, m; 0 if unknown.
     weighed
-        Whether the masses are in kg; else only their ratios mean something.
+        Whether the masses are in kg; otherwise only their ratios are known.
     """
 
     name: str
@@ -66,14 +66,14 @@ class RodChain:
 
     @property
     def missing_keys(self) -> tuple[str, ...]:
-        """The keys of the rods that the file leaves open, though a scene may do without them."""
+        """Optional keys of the rods that the file does not give."""
         thinnest = min(self.diameters, default=0.0)
         values = {"mass": self.weighed, "diameter": thinnest, "rod_length": self.rod_length}
         return tuple(key for key, value in values.items() if not value)
 
 
 def vocabulary_of(chains: Collection[RodChain], *, struck: bool) -> Vocabulary:
-    """Return the words of what falls, or strikes a surface."""
+    """Return the vocabulary of a scene with these chains."""
     if all(rods.chain.rods == 1 for rods in chains):
         return OBJECT
     if struck:
@@ -89,9 +89,9 @@ class Gate:
     Attributes
     ----------
     height
-        m.
+        Height, m.
     stated
-        The same as the file has it, where it is counted from somewhere else there.
+        Height as in the file, m, if it has another zero there.
     """
 
     channel: int
@@ -136,7 +136,7 @@ class Gates:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Where rods strike.
+    """Contact of rods with the surface.
 
     Attributes
     ----------
@@ -144,10 +144,10 @@ class Contact:
         Height at which an undisturbed rod's middle touches the surface, above the zero of the gate
         heights, m.
     strike
-        How far above it the top rod strikes: on the rods that lie there, m.
+        Height of the top rod's strike above `level`, on the rods that lie there, m.
     from_board
-        Whether heights are measured from the board: where rods touch it follows from what they
-        are like, and `level` is what that leaves out.
+        Whether heights are measured from the board: then contact heights follow from the rods'
+        geometry, and `level` is a correction.
     """
 
     level: Quantity = DEFAULTS["contact.level"]
@@ -157,21 +157,21 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class InclinedTrack:
-    """What one object slides or rolls down.
+    """Inclined track down which an object slides or rolls.
 
     Attributes
     ----------
     incline_deg
-        Of the track, degrees.
+        Inclination of the track, degrees.
     rolling_inertia
-        I/(m r²) of what rolls; 0 of what slides.
+        I/(m r²) of a rolling object; 0 for a sliding one.
     """
 
     incline_deg: Quantity
     rolling_inertia: float = DEFAULTS["track.rolling_inertia"]
 
     def along(self, gravity: Quantity) -> Quantity:
-        """Acceleration without friction, g sin θ/(1 + I/(m r²)), m/s²."""
+        """Return the acceleration without friction, g sin θ/(1 + I/(m r²)), m/s²."""
         slope = radians(self.incline_deg.value)
         share = 1.0 / (1.0 + self.rolling_inertia)
         by_slope = gravity.value * cos(slope) * radians(self.incline_deg.u)
@@ -181,16 +181,16 @@ class InclinedTrack:
 
 @dataclass(frozen=True, slots=True)
 class Drag:
-    """Drag of the air, as the square of the speed.
+    """Drag proportional to the square of the speed.
 
     Attributes
     ----------
     coefficient
-        C of every rod across the flow; `None` where the terminal speed is given.
+        C of every rod across the flow; `None` if the terminal speed is given.
     air_density
         kg/m³; used with the coefficient.
     terminal_speed
-        At which drag balances the weight of a chain and of every part of it, m/s.
+        Speed at which drag balances the weight of a chain and of each of its parts, m/s.
     """
 
     coefficient: Quantity | None = None
@@ -215,7 +215,7 @@ class ReleasePulse:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """How the runs are laid out; `rig.protocol.plan.runs` expands it."""
+    """Layout of the runs, expanded by `rig.protocol.plan.runs`."""
 
     inclines: tuple[float, ...] = DEFAULTS["plan.incline"]
     repeats: int = DEFAULTS["plan.repeats"]
@@ -245,14 +245,14 @@ class Accept:
 
 
 GUESSED = 8.0
-"""Degrees of freedom of a scale that is known to a quarter of itself (GUM G.4.2, E.4.3)."""
+"""Degrees of freedom of an uncertainty that is known to 25 % (GUM G.4.2, E.4.3)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Priors:
-    """What is known beforehand of what nobody measures, as standard deviations in SI units.
+    """Assumed standard deviations of quantities that are not measured, SI units.
 
-    `rig.protocol.keys.KEYS` says of each what it is, and where it comes from.
+    `rig.protocol.keys.KEYS` has the meaning and source of each.
     """
 
     edge_floor: float = DEFAULTS["priors.edge_floor"]
@@ -282,34 +282,33 @@ class Protocol:
     chains
         By name. One chain: a single-chain or free-fall scene. Two: the two-chain experiment.
     gravity
-        What pulls along the way, m/s²: of what goes down a track only the share that its slope
-        leaves, see `InclinedTrack.along`.
+        Acceleration along the path, m/s²; on a track by `InclinedTrack.along`.
     surface
-        `None` where nothing is struck: the rig's calibration drop.
+        `None` without impacts, as in the rig's calibration drop.
     track
-        `None` of what falls; else all heights are lengths along the track.
+        `None` for a free fall; otherwise all heights are lengths along the track.
     drop
         Height of the bottom rod's middle above the contact point (with no surface: above the
-        datum of the gate heights) before release; `None` where no gates measure it.
+        datum of the gate heights) before release; `None` without gates that measure it.
     initial_speed
-        Of every chain as it is let go, downward, m/s.
+        Downward speed of all chains at release, m/s.
     drag
-        `None` where the air is left out.
+        Stated drag, if any.
     reference_u
-        Relative standard uncertainty of the 1 Hz reference, where one is wired.
+        Relative standard uncertainty of the 1 Hz reference, if one is wired.
     priors
-        Of what the edges are made of, besides.
+        Priors of all other effects on edges.
     gates
         `None` for a scene that is only predicted.
     blind
-        Whether numbers are kept back until the session is unblinded.
+        Whether results are withheld until the session is unblinded.
     notes
-        What its author wrote to it.
+        Notes of the author.
     text
-        The file as read, kept word for word in the session.
+        The file as read, stored word for word in the session.
     stated
-        The protocol that this one is made from, with heights as its file has them, where those of
-        this one are counted from a run's contact point: see `rig.protocol.contact`.
+        The original protocol with heights as in its file, if heights here are relative to a run's
+        contact point: see `rig.protocol.contact`.
     """
 
     title: str
@@ -333,7 +332,7 @@ class Protocol:
     source: str = ""
     stated: Protocol | None = None
 
-    def __hash__(self) -> int:  # all of it is compared, and this tells most of them apart
+    def __hash__(self) -> int:  # equality compares everything; this separates most protocols
         return hash((self.text, self.drop, self.gates))
 
     @property
@@ -343,21 +342,21 @@ class Protocol:
 
     @property
     def vocabulary(self) -> Vocabulary:
-        """The words of this kind of scene."""
+        """Vocabulary of this kind of scene."""
         if self.track:
             return TRACK
         return vocabulary_of(self.chains.values(), struck=self.surface is not None)
 
     @property
     def zero(self) -> str:
-        """What drop and gates' heights are counted from, in words."""
+        """Zero of the drop and gate heights, in words."""
         if self.surface is None:
             return "zero of the heights"
         return "board" if self.contact.from_board and self.stated is None else "contact point"
 
     @property
     def drop_from(self) -> str:
-        """Where the drop is measured, in words."""
+        """Zero and direction of the drop height, in words."""
         return f"above the {self.zero}" if self.track is None else "along the track"
 
     @property
@@ -367,7 +366,7 @@ class Protocol:
 
     @property
     def unlike_chains(self) -> bool:
-        """Whether it changes a result which of the two chains strikes."""
+        """Whether results depend on which of the two chains strikes."""
         in_air = self.drag is not None and self.drag.coefficient is not None
         chains = {
             (rods.chain, in_air and (rods.diameters, rods.rod_length, rods.tilt_deg))
@@ -377,20 +376,19 @@ class Protocol:
 
     @property
     def strikers(self) -> tuple[str, ...]:
-        """The chains whose strike makes a result of its own; like chains are one, the first."""
+        """Chains with separate results as striking chain; for like chains only the first."""
         names = tuple(self.chains)
         return names if self.unlike_chains and self.plan.order != "fixed" else names[:1]
 
     def condition(self, run: Run) -> Condition:
-        """Return what a run has in common with those that it is averaged with."""
+        """Return the condition of a run, for averages over runs."""
         return Condition(run.incline_deg, run.impact if self.unlike_chains else None)
 
 
 class Condition(NamedTuple):
-    """What runs have in common whose results are averaged.
+    """Condition that runs must share for their results to be averaged.
 
-    `impact_chain` is the one that strikes where that makes a result of its own; like chains are
-    one, and it is `None`.
+    `impact_chain` is the striking chain if results depend on it; `None` for like chains.
     """
 
     incline_deg: float
@@ -401,7 +399,7 @@ class Condition(NamedTuple):
         return f"{self.incline_deg:.15g} deg{chain}"
 
     def json(self) -> dict[str, float | str]:
-        """``incline_deg`` and, if there is one, ``impact_chain``."""
+        """Return ``incline_deg`` and, if there is one, ``impact_chain``."""
         chain = {} if self.impact_chain is None else {"impact_chain": self.impact_chain}
         return {"incline_deg": self.incline_deg, **chain}
 
@@ -415,11 +413,11 @@ class Run:
     number
         1, 2, 3 … in the order of execution.
     incline_deg
-        Surface inclination; 0 where there is no surface.
+        Surface inclination; 0 without a surface.
     impact
-        Name of the chain on the impact side; `None` where there is no surface.
+        Name of the chain on the impact side; `None` without a surface.
     free
-        Name of the chain on the free side; `None` where only one chain falls.
+        Name of the chain on the free side; `None` if only the impact chain falls.
     """
 
     number: int

@@ -1,7 +1,6 @@
-"""From a protocol file to a checked `Protocol`, or to every problem in it at once.
+"""Reader of protocol files: returns a checked `Protocol`, or reports all problems at once.
 
-`rig.protocol.keys` says what each key may be, `rig.protocol.checks` what keys have to do with each
-other.
+`rig.protocol.keys` has the rules for single keys, `rig.protocol.checks` those between keys.
 """
 
 from __future__ import annotations
@@ -77,8 +76,8 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
     source
         Its name, for messages and for the session.
     kept
-        Whether a session keeps this text, which cannot be changed any more: an order of turns,
-        which means nothing to a single chain, is passed over there.
+        Whether the text is stored in a session and cannot change any more: then an order of turns,
+        which has no meaning for a single chain, is ignored.
 
     Returns
     -------
@@ -88,7 +87,7 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
     Raises
     ------
     InputError
-        With every problem found.
+        The text has problems; lists all.
     """
     if len(text) > MAX_BYTES:
         raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
@@ -129,13 +128,13 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
 
 
 def _arguments(section: Section | None, **names: str) -> dict[str, Any]:
-    """Return the values of a section, some by the names that `rig.protocol.protocol` has."""
+    """Return the values of a section by name; `names` maps keys to attribute names."""
     values = section.values if section else {}
     return {names.get(name, name): value for name, value in values.items()}
 
 
 def _surface(section: Section) -> Surface:
-    """Return the surface; without a restitution, which no chain then needs, its is 0."""
+    """Return the surface; its restitution is 0 if not given, as no chain then needs it."""
     from rig.model.surface import Pile, Surface  # noqa: PLC0415 - only where something is struck
 
     restitution, pile = section["restitution"] or Quantity(0.0), section["pile"]

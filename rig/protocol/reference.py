@@ -1,4 +1,4 @@
-"""The table of keys as others read it: the page `docs/protocol.md`, and the JSON Schema of editors.
+"""Reference of the keys: the page `docs/protocol.md`, and the JSON Schema for editors.
 
 Tests read every example of the table with the reader itself.
 """
@@ -14,7 +14,7 @@ from rig.units import Dimension
 
 
 def page() -> str:
-    """Write the reference as Markdown."""
+    """Return the reference as Markdown."""
     rows = []
     for key in keys.KEYS.values():
         name = f"**`{key.path}`**" if key.required else f"`{key.path}`"
@@ -26,7 +26,7 @@ def page() -> str:
 
 
 def schema() -> dict[str, Any]:
-    """Make the JSON Schema (draft 2020-12) of a protocol file."""
+    """Return the JSON Schema (draft 2020-12) of a protocol file."""
     root = _object("", "A protocol of falling chains and photogates")
     return root | {"$schema": "https://json-schema.org/draft/2020-12/schema"}
 
@@ -42,7 +42,7 @@ def _object(path: str, description: str) -> dict[str, Any]:
     properties = {name: _property(key) for name, key in table.items()}
     head |= {"properties": properties, "additionalProperties": False}
     required = [name for name, key in table.items() if key.required]
-    # What a chain is like another one in, it need not say again.
+    # A chain may inherit required keys from another by `like`.
     return head | ({"required": required} if required and not path.endswith(keys.ANY) else {})
 
 
@@ -56,10 +56,10 @@ def _property(key: keys.Key) -> dict[str, Any]:
 
 
 def _values(path: str, accepted: keys.Accepted) -> dict[str, Any]:
-    """Return the schema of what a key may be."""
+    """Return the schema of the accepted values of a key."""
     match accepted:
         case keys.Range(dimension):
-            # A text with a unit, or a number where none is needed.
+            # A text with a unit, or a plain number for a dimensionless quantity.
             plain = dimension is Dimension.NUMBER
             return {"type": ["string", "number"] if plain else ["string"]}
         case keys.Whole(low, high):

@@ -1,4 +1,4 @@
-"""The rods of a chain: which there are, and where they hang."""
+"""The rods of a chain: diameters, masses and heights."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 
 RodValues = tuple[float, ...]
-"""One of each rod, bottom up."""
+"""A value for each rod, bottom up."""
 
 
 def count_rods(section: Section) -> int:
-    """Count the rods of a chain whose ``rods`` are sound."""
+    """Return the number of rods of a chain whose ``rods`` are sound."""
     rods = section["rods"]
     return rods if isinstance(rods, int) else sum(group["count"] for group in rods)
 
@@ -26,14 +26,14 @@ def count_rods(section: Section) -> int:
 def list_rods(section: Section, top: Section) -> tuple[RodValues, RodValues, bool]:
     """Return the rods of a chain of a file by its ``rods``, ``diameter`` and ``mass``, bottom up.
 
-    Masses are those given, else proportional to the cross-section (like material) with the
-    bottom rod's as 1, else all 1. One rod alone is any object, which may fall and never strikes.
+    Masses are those given; otherwise proportional to the cross-section (same material) with 1 for
+    the bottom rod; otherwise all 1. A single rod is any object, which may fall but not strike.
 
     Returns
     -------
     tuple
-        Diameters, m, 0 where unknown; masses; and whether these are in kg: else only their ratios
-        mean something.
+        Diameters, m, 0 if unknown; masses; and whether these are in kg: otherwise only their
+        ratios are known.
     """
     section.require_sound("rods", "diameter", "mass")
     total = count_rods(section)
@@ -57,7 +57,7 @@ def list_rods(section: Section, top: Section) -> tuple[RodValues, RodValues, boo
 
 
 def _list_values(section: Section, key: str, total: int) -> list[Any]:
-    """Return a group's or the chain's value for each rod, bottom up; `None` where there is none."""
+    """Return the value of each rod from its group or the chain, bottom up; `None` if missing."""
     groups = section["rods"]
     if isinstance(groups, int):
         return [section[key]] * total
@@ -70,8 +70,8 @@ def _list_values(section: Section, key: str, total: int) -> list[Any]:
 def place_rods(section: Section, diameters: RodValues) -> RodValues:
     """Return the heights of the rods' middles above the bottom rod's, m.
 
-    Equal gaps: neighbours i, i+1 are ``gap + (d_i + d_{i+1})/2`` apart, the gap being whatever
-    makes the whole chain as long as stated.
+    Equal gaps: neighbours i, i+1 are ``gap + (d_i + d_{i+1})/2`` apart, with the gap that gives the
+    stated length.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def check_apart(section: Section, heights: RodValues, widths: RodValues, rise: f
     heights, widths
         Of the rods, m, bottom up; shape ``(rods,)``.
     rise
-        Of one end of a tilted rod over the other, m; 0 where unknown.
+        Height of a tilted rod's upper end above its lower end, m; 0 if unknown.
     """
     key = "length" if "length" in section else "spacing"
     neighbours = zip(pairwise(heights), pairwise(widths), strict=True)

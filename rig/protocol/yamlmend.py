@@ -1,8 +1,8 @@
-"""What a text that is no YAML lacks: a quote, a bracket, a colon, a comma, an indent.
+"""Suggested corrections of invalid YAML: a quote, a bracket, a colon, a comma, an indent.
 
-The parser says where it stopped, in the words of its grammar. What people need is the smallest
-change that lets it go on; so the mistakes of ``yamlmend.txt`` are looked for around the place, and
-the parser itself judges each change.
+The parser reports where it stopped, in terms of its grammar. Users need the smallest change with
+which it continues. So the mistakes of ``yamlmend.txt`` are searched for around that place, and each
+change is tested by the parser.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import yaml
 
-from rig.units import quoted
+from rig.units import quote
 
 MOST_PARSED = 150_000
-"""Characters parsed in search of a change: about a second, and fifty changes of a page."""
+"""Most characters parsed in a search: about a second, or fifty changes of a page."""
 _CLOSING = {"[": "]", "{": "}"}
 _BRACKET_OR_QUOTED = re.compile(r"\"[^\"]*(?:\"|$)|'[^']*(?:'|$)|[\[\]{}]")
 _QUOTE = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|(?<![^\s\[{,:])(?P<open>[\"'])[^\n]*")
@@ -32,7 +32,7 @@ Mend = tuple[int, str, str]
 
 
 class _Span(NamedTuple):
-    """Where to look for a mistake: the place that its sentence points to, and what closes there."""
+    """Span of a search for a mistake, with the place of its message and the closing character."""
 
     begin: int
     end: int
@@ -46,9 +46,9 @@ def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
     Parameters
     ----------
     text
-        As it was parsed.
+        The parsed text.
     error
-        What the parser raised.
+        The parser's error.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
 
 
 def _reach(text: str) -> int | None:
-    """Return how far the parser gets; `None` if it meets no error."""
+    """Return the index at which the parser stops; `None` without an error."""
     try:
         for _ in yaml.parse(text, Loader=yaml.SafeLoader):
             pass
@@ -87,14 +87,14 @@ def _stop(error: yaml.MarkedYAMLError) -> int:
 
 
 def _list_spans(text: str, stop: int, at: int, begin: int) -> dict[str, list[_Span]]:
-    """Return the places of the table: around where the parser stopped, and what it began there.
+    """Return the spans of the table: around the stop of the parser, and of the open construct.
 
     Parameters
     ----------
     stop, at
-        Where it stopped, and the visible character next to that.
+        Index at which it stopped, and the visible character next to that.
     begin
-        Where that began which it could not finish.
+        Index of the construct that it could not finish.
     """
     start, end, first = _line_start(text, at), _line_end(text, at), _line_start(text, begin)
     before = _line_start(text, max(first - 1, 0))
@@ -127,7 +127,7 @@ def _list_spans(text: str, stop: int, at: int, begin: int) -> dict[str, list[_Sp
 
 
 def _list_mends(text: str, at: int, spans: dict[str, list[_Span]]) -> Iterator[Mend]:
-    """List changes that could let the parser go on, the likeliest first."""
+    """Yield changes with which the parser might continue, the likeliest first."""
     for where, rows in groupby(_MISTAKES, key=lambda row: row[0].split()[0]):
         if where == "indents":
             yield from _indents(text, at)
@@ -138,15 +138,15 @@ def _list_mends(text: str, at: int, spans: dict[str, list[_Span]]) -> Iterator[M
                 anchor = begin if span.anchor is None else span.anchor
                 pointed = match.start("at") if "at" in groups else anchor
                 word = match["word"] if "word" in groups else _word(text, pointed)
-                character = quoted(text[pointed : pointed + 1])
-                words = {"old": quoted(old), "word": quoted(word), "character": character}
+                character = quote(text[pointed : pointed + 1])
+                words = {"old": quote(old), "word": quote(word), "character": character}
                 message = sentence.format(**words, close=span.close, opened=text[anchor])
                 added = _NEW | {"close": span.close, "quoted": json.dumps(old, ensure_ascii=False)}
                 yield pointed, message, text[:begin] + added.get(new, new) + text[end:]
 
 
 def _find(pattern: str, text: str, span: _Span, order: str, at: int) -> list[re.Match[str]]:
-    """Return where a mistake may be: only ``here``, the one ``near`` the stop first, or all."""
+    """Return matches of a mistake: only ``here``, with those ``near`` the stop first, or all."""
     matches = [*re.compile(pattern, re.MULTILINE).finditer(text, span.begin, span.end)]
     if order == "near":
         matches.sort(key=lambda match: abs(match.start("old") - at))
@@ -158,7 +158,7 @@ def _word(text: str, index: int) -> str:
 
 
 def _indents(text: str, at: int) -> Iterator[Mend]:
-    """Give a line, or the one before it, the blanks and the hyphen of a line above or below."""
+    """Yield changes that give a line, or the previous one, the indent of a neighbouring line."""
     line_start = _line_start(text, at)
     before = _line_start(text, max(line_start - 1, 0))
     starts = [n + 1 for n in range(line_start) if text[n] == "\n"]
@@ -170,7 +170,7 @@ def _indents(text: str, at: int) -> Iterator[Mend]:
                 continue
             number = text.count("\n", 0, line) + 1
             if lead.endswith("- "):
-                message = f"a hyphen is missing: begin with {quoted(lead)}, as line {number} does"
+                message = f"a hyphen is missing: begin with {quote(lead)}, as line {number} does"
             else:
                 blanks = "1 blank" if indent == 1 else f"{indent} blanks"
                 message = f"begins with {blanks}: {len(lead)} are needed, as on line {number}"
@@ -178,7 +178,7 @@ def _indents(text: str, at: int) -> Iterator[Mend]:
 
 
 def _lead(text: str, start: int) -> str:
-    """Return the blanks that a line begins with, and the hyphen of an item of a list."""
+    """Return the indent of a line, with the hyphen of a list item."""
     lead = re.compile(r" *(?:- )?").match(text, start)
     return lead.group() if lead else ""
 
@@ -193,5 +193,5 @@ def _line_end(text: str, index: int) -> int:
 
 
 def _visible(text: str, index: int) -> int:
-    """Return an index, or at the end of a text that of its last character."""
+    """Return the index, or that of the last visible character at the end of a text."""
     return index if text[index:].strip() else max(len(text.rstrip()) - 1, 0)

@@ -1,8 +1,8 @@
-"""YAML text to a small tree in which every node knows its line and column.
+"""YAML parser that returns a tree whose nodes have line and column.
 
-The tree is built from the parser's events, not by its loader: no tag can make an object, every
-scalar stays the text that was written, repeated keys survive to be reported, and depth and size
-are bounded while reading, so that no file can exhaust the stack or the memory.
+The tree is built from the parser's events, not by its loader. So no tag can create an object,
+scalars remain text, repeated keys can be reported, and depth and size are bounded: no file can
+exhaust stack or memory.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ import yaml
 
 from rig.errors import InputError, Problem
 from rig.printable import one_line
-from rig.units import quoted
+from rig.units import quote
 
 MAX_DEPTH = 32
 MAX_NODES = 10_000
 _BREAK = re.compile(r"\r\n|[\n\r\x85\u2028\u2029]")
-"""Ends of lines in YAML 1.1, section 5.4: PyYAML counts lines by them."""
+"""Line breaks of YAML 1.1, section 5.4, by which PyYAML counts lines."""
 _TAB = re.compile(r"^[^\t#\n]*\t", re.MULTILINE)
-"""A tab outside comments: YAML takes it in some places and not in others."""
+"""A tab outside comments, which YAML accepts only in some places."""
 _EXCERPT = 72  # columns of a terminal of 80, less an indent
 
-# Scalars of the YAML 1.2 core schema (section 10.3.2); what matches nothing here is text, so
+# Scalars of the YAML 1.2 core schema (section 10.3.2); anything else is text, so
 # `on`, `yes`, `12:30:00` and `2024-01-01` are text and `1e-3` is a number.
 _CORE = (
     ("nothing", re.compile(r"null|Null|NULL|~|")),
@@ -47,7 +47,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class ScalarNode:
-    """A scalar as written; `plain` when it stood without quotes."""
+    """A scalar as written; `plain` if without quotes."""
 
     text: str
     plain: bool
@@ -55,14 +55,14 @@ class ScalarNode:
 
     @property
     def kind(self) -> str:
-        """What the core schema takes it for, as a noun."""
+        """Type of the scalar in the core schema, as a noun."""
         kinds = (kind for kind, pattern in _CORE if pattern.fullmatch(self.text))
         return next(kinds, "text") if self.plain else "text"
 
     def __str__(self) -> str:
         if self.kind == "nothing":
             return "nothing"
-        return quoted(self.text) if self.kind == "text" else self.text[:40]
+        return quote(self.text) if self.kind == "text" else self.text[:40]
 
 
 @dataclass(slots=True)
@@ -96,7 +96,7 @@ Node = ScalarNode | Sequence | Mapping
 
 
 def place_of(root: Node, *path: str | int) -> Place:
-    """Find where the value at a path of keys and list indices stands, or as much as is there."""
+    """Return the place of the value at a path of keys and indices, or of its last existing part."""
     node = root
     for step in path:
         items: dict[Any, Node] = dict(enumerate(getattr(node, "items", ())))
@@ -125,7 +125,7 @@ def load(text: str, source: str) -> Node:
     Raises
     ------
     InputError
-        If the text is no YAML, holds tabs, tags, several documents or none, or is nested or
+        The text is not YAML, has tabs, tags, several documents or none, or is nested or
         aliased beyond `MAX_DEPTH` and `MAX_NODES`; located.
     """
     body = "\n".join(_BREAK.split(text.removeprefix("\ufeff")))
@@ -141,7 +141,7 @@ def load(text: str, source: str) -> Node:
 
         index, message = explain(body, error)
     except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
-        # The parser lets a few int() and chr() errors of broken escapes and directives through.
+        # The parser leaks int() and chr() errors of broken escapes and directives.
         index, message = 0, "this file cannot be read; see its quotes and % lines"
     place = place_at(body, index)
     below = _excerpt(body, place)
@@ -149,7 +149,7 @@ def load(text: str, source: str) -> Node:
 
 
 class _RefusalError(Exception):
-    """What a protocol may not have although YAML does: its index in the text, and a sentence."""
+    """Valid YAML that a protocol may not contain: index in the text, and a message."""
 
 
 def place_at(text: str, index: int) -> Place:
@@ -159,7 +159,7 @@ def place_at(text: str, index: int) -> Place:
 
 
 def _excerpt(text: str, place: Place) -> str:
-    """Show a line, or of a long one the part around a place, with a caret below."""
+    """Return a line, or the part of a long line around a place, with a caret below."""
     begin = max(place.column - _EXCERPT // 2, 0)
     line = text.split("\n")[place.line - 1][begin:].replace("\t", " ")
     if not line.strip():
@@ -202,13 +202,13 @@ class _Builder:
         place = Place(event.start_mark.line + 1, event.start_mark.column + 1)
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
-                name = quoted(str(event.anchor))
+                name = quote(str(event.anchor))
                 raise _RefusalError(at, f"no anchor stands before the alias {name}")
             node, size = self.anchors[event.anchor]
         elif event.tag is not None:
-            raise _RefusalError(at, f"the tag {quoted(event.tag)} is not accepted; leave it out")
+            raise _RefusalError(at, f"the tag {quote(event.tag)} is not accepted; leave it out")
         elif isinstance(event, yaml.ScalarEvent):
-            # "\uD800" in double quotes makes half a character, which no file or database takes.
+            # "\uD800" in double quotes is a lone surrogate, which no file or database accepts.
             if any("\ud800" <= character <= "\udfff" for character in event.value):
                 raise _RefusalError(at, "half of a surrogate pair; write the character itself")
             node = ScalarNode(event.value, event.style is None, place)
@@ -219,7 +219,7 @@ class _Builder:
         else:
             parts = self._list(yaml.MappingEndEvent, depth)
             node = Mapping(place, list(zip(parts[::2], parts[1::2], strict=True)))
-        # The parts of a list were counted as they came, but for those of an alias.
+        # Items of a list were counted when read; those of an alias are counted here.
         self.nodes += size
         if self.nodes > MAX_NODES:
             raise _RefusalError(at, f"more than {MAX_NODES} values, aliases expanded")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +11,6 @@ from rig.usb.listing import path_of, serial_number_at, serial_ports
 
 if TYPE_CHECKING:
     from rig.link.messages import Identity
-
-log = logging.getLogger(__name__)
 
 SERIAL_NUMBER = "usb_serial_number"
 """In a session's record of who was there."""
@@ -95,20 +92,11 @@ class BoardLocator:
             It is not the board that it must be.
         """
         if self.bound and self._unique_id not in {None, identity.unique_id}:
-            raise _stranger(
-                f"id {identity.unique_id.hex()}, not {(self._unique_id or b'').hex()}", self.path
-            )
-        before, same = self.serial_number, self._unique_id == identity.unique_id
+            known = (self._unique_id or b"").hex()
+            raise _stranger(f"id {identity.unique_id.hex()}, not {known}", self.path)
         self._unique_id = identity.unique_id
         if "://" not in self.path:
             self.serial_number = serial_number_at(self.path)
-        if same and None not in {before, self.serial_number} and before != self.serial_number:
-            log.warning(
-                "two boards have the id %s (USB serial numbers %s and %s): erase the EEPROM of one",
-                identity.unique_id.hex(),
-                before,
-                self.serial_number,
-            )
         return {} if self.serial_number is None else {SERIAL_NUMBER: self.serial_number}
 
 

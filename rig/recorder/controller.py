@@ -1,30 +1,24 @@
-"""What clients can ask for, carried out on one port and one session file by one thread.
-
-`rig run` without a daemon calls a controller of its own, the daemon's worker one for its clients.
-"""
+"""What clients can ask for, carried out on one port and one session file by one thread."""
 
 from __future__ import annotations
 
 import logging
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.messages import TEST_RUN, Identity, RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.ports import completed, is_simulated
+from rig.ports import fill_url, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.reasons import Reason, error_of, make_error, make_reason, plain_reason
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
-from rig.recorder.feed import StateFeed
-from rig.recorder.interrupts import Interrupts, StoppedError
+from rig.recorder.interrupts import StoppedError
 from rig.recorder.opening import describe_session, latest_board, latest_states, open_for
 from rig.recorder.published import PublishedState, link_state
-from rig.recorder.recorder import Recorder
-from rig.recorder.sink import NullSink
+from rig.recorder.recorder import NullSink, Recorder
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -46,40 +40,31 @@ class Controller:
     ----------
     url
         The port, as the user named it.
-    interrupts
-        As for `Recorder`.
     published
         Where everything is shown.
     halted
         As for `Recorder`.
-    keep_port
-        Whether the port stays open between sessions.
 
     Attributes
     ----------
     recorder
         Connected, or `None`.
+    opened
+        The open session, or `None`.
     due
         Run and attempt of a drop that fell and was not collected yet.
     """
 
     def __init__(
-        self,
-        url: str,
-        interrupts: Interrupts | None = None,
-        *,
-        published: PublishedState | None = None,
-        halted: Callable[[], bool] = lambda: False,
-        keep_port: bool = False,
+        self, url: str, published: PublishedState, halted: Callable[[], bool] = lambda: False
     ) -> None:
         self.url = url
-        self.interrupts = Interrupts() if interrupts is None else interrupts
-        self.published = PublishedState() if published is None else published
+        self.published = published
         self.recorder: Recorder | None = None
         self.due: tuple[int, int] | None = None
         self._halted = halted
-        self._keep_port = keep_port and not is_simulated(url)
-        self._session: Session | None = None
+        self._keep_port = not is_simulated(url)  # between sessions
+        self.opened: Session | None = None
         self._protocol: Protocol | None = None
         self._line_url = url  # with all that a simulation is told
         self._locator = BoardLocator(url)
@@ -90,26 +75,21 @@ class Controller:
 
     @property
     def session(self) -> Session:
-        """The open session.
+        """The open session, which there must be.
 
         Raises
         ------
         SessionError
             There is none.
         """
-        if self._session is None:
+        if self.opened is None:
             raise make_error(SessionError, "no_session_open")
-        return self._session
+        return self.opened
 
     @property
     def armed(self) -> tuple[int, int] | None:
         """Run and attempt of the drop that waits for `fire`."""
         return None if self.recorder is None else self.recorder.armed
-
-    @property
-    def recording(self) -> bool:
-        """Whether a session is open."""
-        return self._session is not None
 
     def open_session(
         self, protocol: str, session: str, seed: int | None = None
@@ -138,15 +118,15 @@ class Controller:
         source, path = Path(protocol), Path(session)
         scene = reader.read(protocol)
         check_gates(scene)
-        fresh = completed(self.url, source, path, seed)
+        fresh = fill_url(self.url, source, path, seed)
         self.close_session()
         is_new = not path.exists()
-        opened = open_for(scene, source, fresh, path)
+        opened = self.opened = open_for(scene, source, fresh, path)
+        self._protocol = scene
         try:
             before = latest_board(opened)
-            self._line_url = completed(self.url, source, path, seed, before.get("port", ""))
+            self._line_url = fill_url(self.url, source, path, seed, before.get("port", ""))
             self._locator.seek(before.get(SERIAL_NUMBER))
-            self._session, self._protocol = opened, scene
             check_recordable(scene, self.connect().capabilities())
             self._locator.bound = True
             fetched = self.settle()
@@ -155,7 +135,7 @@ class Controller:
             # way of the next try, and where no byte went over the line there is nothing in it.
             empty = is_new and (isinstance(error, InputError) or not any(opened.byte_log()))
             try:
-                self._part_with(opened)
+                self.close_session()
             finally:
                 if empty:
                     path.unlink(missing_ok=True)
@@ -176,37 +156,28 @@ class Controller:
         SessionError
             None is open, that was recorded before, or the disk fails.
         """
-        session, protocol = self.session, self._protocol
-        assert protocol is not None
-        with self.interrupts.held():
-            session.unblind()
-        self.published.set(session=describe_session(session, protocol)[0])
+        self.session.unblind()
+        self.published.set(session=self.published.get("session") | {"blind": False})
 
     def close_session(self) -> None:
-        """Make safe and close the file, whole; nothing when none is open."""
-        if self._session is not None:
-            log.info("closed: %s", self._session.path)
-            self._part_with(self._session)
-
-    def _part_with(self, session: Session) -> None:
-        """Close a session; a port that shall stay open does."""
-        self._session = self._protocol = None
+        """Make safe and close the file, whole; a port that shall stay open does."""
+        session, self.opened, self._protocol = self.opened, None, None
+        if session is None:
+            return
+        log.info("closed: %s", session.path)
         self._locator.bound = False
         self._lost.clear()
         recorder, self.recorder, self.due = self.recorder, None, None
         port = None
         try:
-            if recorder is not None and self._keep_port:
-                with suppress(DeviceError):
-                    port = recorder.give_up()
-            if recorder is not None and port is None:
-                recorder.close()
+            if recorder is not None:
+                port = recorder.let_go(keep=self._keep_port)
         finally:
             session.close()
             self.published.plan(())
             self.published.set(session=None, drop=None, link=link_state("closed"))
-            if port is not None:
-                self.connect(port)
+        if port is not None:
+            self.connect(port)
 
     # ------------------------------------------------------------------ the link
 
@@ -219,24 +190,21 @@ class Controller:
             No such port, nobody there, another protocol version, another board than the session's.
         """
         if port is None and self.recorder is not None:
-            try:
-                port = self.recorder.give_up()
-            except DeviceError:
-                self.recorder.close()
-        sink = NullSink() if self._session is None else self._session
+            port = self.recorder.let_go(keep=True)
         self.recorder = None
         self.published.set(link=link_state("opening"))
         url = self._line_url
         if not is_simulated(url):
             url = self._locator.path if port is not None else self._locator.look()
-        feed, meet = StateFeed(self.published), self._locator.meet
-        recorder = Recorder(sink, url, self.interrupts, feed=feed, halted=self._halted, meet=meet)
-        identity = recorder.connect(port)
-        self.published.set(
-            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path}
+        sink = NullSink() if self.opened is None else self.opened
+        published, meet = self.published, self._locator.meet
+        self.recorder = Recorder(sink, url, published, self._halted, meet, port)
+        published.set(
+            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path},
+            link=link_state("up"),
+            phase="idle",
         )
-        self.recorder = recorder
-        self.published.set(link=link_state("up"), phase="idle")
+        identity = self.recorder.identity
         if port is None:
             log.info("up: %s, id %s", identity.board, identity.unique_id.hex())
         return identity
@@ -245,7 +213,7 @@ class Controller:
         """Let go of a port that fails."""
         recorder, self.recorder, self.due = self.recorder, None, None
         if recorder is not None:
-            recorder.close()
+            recorder.let_go()
 
     def settle(self) -> tuple[int, int] | None:
         """Settle what an earlier connection left: a drop the device holds, a run without a record.
@@ -269,7 +237,7 @@ class Controller:
             if held not in self.session.fired_ns():
                 run, attempt = held
                 raise make_error(DeviceError, "drop_of_another_session", run=run, attempt=attempt)
-            recorder.fetch(*held)
+            recorder.collect(*held, fresh=False)
             self._lost.pop(held, None)
         for run, attempt in self._without_drop(RunState.ARMED, RunState.FIRED):
             why = (make_reason("connection_ended"),)
@@ -283,30 +251,6 @@ class Controller:
         return [job for job in jobs if self.session.drop(*job) is None]
 
     # ------------------------------------------------------------------ drops
-
-    def has_unsaved(self) -> bool:
-        """Ask whether a drop is armed or falls, or fell and is in no file yet.
-
-        Raises
-        ------
-        RigError
-            The device or the disk does not answer, so it is not known.
-        """
-        if self._session is not None:
-            if not self._session.rescued:
-                self._session.commit()
-            if self._without_drop(RunState.FIRED):
-                return True  # on a board that may be away at the moment
-            if self._session.rescued:
-                return False  # nor can it be asked, since nothing of that could be logged
-        if self.recorder is None:
-            return False
-        if self.recorder.armed is not None:
-            return True
-        held = self.recorder.held()
-        if held is None or held[0] == TEST_RUN:
-            return False
-        return self._session is None or self._session.drop(*held) is None
 
     def wait(self, seconds: float) -> None:
         """Let time pass, see `Recorder.wait`."""
@@ -329,8 +273,8 @@ class Controller:
         """
         recorder, protocol = self._require_rest("arm")
         last = self.session.latest_state(run)
-        planned = self.published.has_run(run)
-        if not planned or attempt != (last.attempt if last else 0) + 1:
+        planned = self.published.get("session")["planned"]
+        if not 1 <= run <= planned or attempt != (last.attempt if last else 0) + 1:
             raise make_error(InputError, "not_next", run=run, attempt=attempt)
         self.session.require_presence()
         self._unarmed = None
@@ -339,11 +283,12 @@ class Controller:
     def notice(self) -> None:
         """Log that the device has disarmed itself, when it has."""
         recorder = self.recorder
-        if recorder is None or recorder.armed is None or recorder.lapsed is None:
-            return
-        refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, recorder.lapsed)
-        self.stop(*refusal.reasons)
-        self._unarmed = refusal
+        if recorder is not None and recorder.armed is not None:
+            reason = recorder.device.transcript.disarmed
+            if reason is not None:
+                refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, reason)
+                self.stop(*refusal.reasons)
+                self._unarmed = refusal
 
     def fire(self, token: int) -> None:
         """Let go. From here on the drop is collected whatever happens: call `finish`.

@@ -16,14 +16,9 @@ from rig.session.schema import RunState
 
 if TYPE_CHECKING:
     from rig.recorder.published import PublishedState
-    from rig.records import Drop
+    from rig.records import Drop, Edge
 
-_PHASES = {
-    wire.Phase.IDLE: "idle",
-    wire.Phase.ARMED: "armed",
-    wire.Phase.RECORDING: "recording",
-    wire.Phase.HOLDING: "storing",
-}
+_PHASES = dict(zip(wire.Phase, ("idle", "armed", "recording", "storing"), strict=True))
 
 
 class StateFeed:
@@ -38,10 +33,8 @@ class StateFeed:
     def __init__(self, published: PublishedState) -> None:
         self._published = published
         self._tick_hz = 0
-        self._label = 0
-        self._fire_tick: int | None = None
-        self._state = 0  # of the armed gates, at the last event shown
-        self._next = 0  # number of the event to come
+        self._label = 0  # of the drop that is armed or falls; 0 for none
+        self._gates = 0  # of the armed gates, at the last event shown
 
     def know(self, record: Record) -> None:
         """Take what became known on the line."""
@@ -56,10 +49,9 @@ class StateFeed:
             case wire.Disarmed():
                 self._published.set(phase="idle")
             case wire.Fired(tick=tick) if self._label:
-                self._fire_tick = tick
-                self._drop("fired")
+                self._show(state="fired", fire_tick=tick)
                 self._published.set(phase="recording")
-            case wire.EventsFrame(label=label) as frame if label == self._label:
+            case wire.EventsFrame(label=label) as frame if 0 != label == self._label:
                 self._events(frame)
             case wire.DropCertificate():
                 self._published.set(phase="storing")
@@ -67,31 +59,25 @@ class StateFeed:
     def state(self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...]) -> None:
         """Take a line of the log of run states."""
         self._published.run(run, attempt=attempt, state=str(state), **published_reasons(reasons))
+        label = wire.pack_label(run, attempt)
         if state is RunState.ARMED:
-            self._show_armed(run, attempt)
-        elif state is RunState.INTERRUPTED and self._label == wire.pack_label(run, attempt):
-            self._drop("interrupted")
+            self._label, self._gates = label, 0
+            self._published.replace_edges(())
+            self._begin(run, attempt, "armed")
+            self._published.set(phase="armed")
+        elif state is RunState.INTERRUPTED:
             self._label = 0
-
-    def _show_armed(self, run: int, attempt: int) -> None:
-        self._label = wire.pack_label(run, attempt)
-        self._fire_tick, self._state, self._next = None, 0, 0
-        self._published.replace_edges(())
-        self._drop("armed")
-        self._published.set(phase="armed")
+            drop = self._published.get("drop")  # perhaps of the connection before
+            if drop is not None and (drop["run"], drop["attempt"]) == (run, attempt):
+                self._show(state="interrupted")
 
     def show_drop(self, drop: Drop) -> None:
         """Show a drop as it was stored."""
-        self._label = wire.pack_label(*drop.job)
-        self._fire_tick = drop.fire_tick
-        self._next = drop.certificate.events if drop.certificate else len(drop.edges)
-        rows = () if self._blind else drop.edges
-        self._published.replace_edges(
-            (tick, channel, int(blocked)) for tick, channel, blocked in rows
-        )
-        self._drop("recorded")
-        self._published.set(phase="idle")
         self._label = 0
+        events = drop.certificate.events if drop.certificate else len(drop.edges)
+        self._published.replace_edges(() if self._blind else map(_row, drop.edges))
+        self._begin(*drop.job, "recorded", drop.fire_tick, events)
+        self._published.set(phase="idle")
 
     @property
     def _blind(self) -> bool:
@@ -99,30 +85,30 @@ class StateFeed:
         session = self._published.get("session")
         return session is not None and bool(session["blind"])
 
-    def _drop(self, state: str) -> None:
-        run, attempt = wire.unpack_label(self._label)
-        self._published.set(
-            drop={
-                "run": run,
-                "attempt": attempt,
-                "state": state,
-                "tick_hz": self._tick_hz,
-                "fire_tick": self._fire_tick,
-                "events": self._next,
-            }
-        )
+    def _begin(
+        self, run: int, attempt: int, state: str, fire_tick: int | None = None, events: int = 0
+    ) -> None:
+        job = {"run": run, "attempt": attempt, "tick_hz": self._tick_hz}
+        self._published.set(drop=job | {"state": state, "fire_tick": fire_tick, "events": events})
+
+    def _show(self, **changes: object) -> None:
+        self._published.set(drop=self._published.get("drop") | changes)
 
     def _events(self, frame: wire.EventsFrame) -> None:
-        if frame.first < self._next or self._fire_tick is None:
+        drop = self._published.get("drop")
+        number, fire_tick = drop["events"], drop["fire_tick"]
+        if frame.first < number or fire_tick is None:
             return
-        events = list(wire.EVENT.iter_unpack(frame.events))
-        state = self._state
-        if frame.first > self._next and events:
-            state = events[0][1]  # it is not known when the gates changed
-        rows = edges(events, state, ALL_GATES, self._fire_tick)
-        self._state = events[-1][1] if events else state
-        self._next = frame.first + len(events)
+        if frame.first > number and frame.snapshots:
+            self._gates = frame.snapshots[0].state  # it is not known when the gates changed
+        before = [self._gates, *(event.state for event in frame.snapshots)]
+        shown = ((*event, state) for event, state in zip(frame.snapshots, before, strict=False))
+        self._gates = before[-1]
         if not self._blind:
-            self._published.edges((tick, channel, int(blocked)) for tick, channel, blocked in rows)
-        self._published.set(gates={"blocked": self._state})
-        self._drop("fired")
+            self._published.edges(map(_row, edges(shown, ALL_GATES, fire_tick)))
+        self._published.set(gates={"blocked": self._gates})
+        self._show(state="fired", events=frame.first + len(frame.snapshots))
+
+
+def _row(edge: Edge) -> tuple[int, int, int]:
+    return edge.tick, edge.channel, int(edge.blocked)

@@ -16,16 +16,16 @@ class StoppedError(DeviceError):
 
 
 class Interrupts:
-    """Turns both signals into `KeyboardInterrupt` at moments when nothing is torn apart by it.
+    """Turns both signals into `KeyboardInterrupt` where somebody waits, and nowhere else.
 
-    An exception that may strike between any two instructions would now and then strike between a
-    byte and the log of it, or between a row and its count. Inside `held` a signal is only noted;
-    the exception comes at the end of the block. Whoever asks a third time is obeyed at once: a
-    port may hang for good.
+    An exception that may strike between any two instructions would now and then strike between an
+    answer and what follows from it. A signal is only noted; the exception comes where waiting is
+    `let_through`, or at the end. Whoever asks a third time is obeyed at once: a port may hang for
+    good.
     """
 
     def __init__(self) -> None:
-        self._held = 0
+        self._is_let_through = False
         self._asked = 0
 
     @contextmanager
@@ -42,17 +42,17 @@ class Interrupts:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+        self.check()
 
     @contextmanager
-    def held(self) -> Iterator[None]:
-        """Keep signals waiting until the end of the block; blocks may stand inside each other."""
-        self._held += 1
+    def let_through(self) -> Iterator[None]:
+        """Obey at once in a block: there is no record to tear."""
+        self._is_let_through = True
         try:
+            self.check()
             yield
         finally:
-            self._held -= 1
-        if not self._held:
-            self.check()
+            self._is_let_through = False
 
     def check(self) -> None:
         """Raise what is waiting.
@@ -68,5 +68,5 @@ class Interrupts:
 
     def _note(self, *_: object) -> None:
         self._asked += 1
-        if not self._held or self._asked >= _PATIENCE:
+        if self._is_let_through or self._asked >= _PATIENCE:
             self.check()

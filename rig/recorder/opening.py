@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
-from rig.reasons import Reason, make_error, published_reasons
+from rig.reasons import make_error, published_reasons
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -15,10 +15,6 @@ if TYPE_CHECKING:
 
     from rig.protocol.protocol import Protocol
     from rig.session.reading import Reader, StateEntry
-
-
-_PLANNED: tuple[int, str, tuple[Reason, ...]] = (0, "planned", ())
-"""Attempt, state and reasons of a run that the log does not name."""
 
 
 def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
@@ -35,17 +31,17 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
             truth_file(path).unlink(missing_ok=True)  # of a session that is gone
         return Session.create(path, protocol.text, source.name, simulated=simulated, origin=url)
     session = Session.open(path)
-    clash = None
+    code, values = "", {"path": str(path)}
     if session.protocol_text != protocol.text:
-        values = {"path": str(path), "source": session.protocol_source}
-        clash = make_error(SessionError, "other_protocol", **values)
+        code, values["source"] = "other_protocol", session.protocol_source
     elif session.simulated != simulated:
-        words = ("simulated", "a real port") if session.simulated else ("real", "a simulation")
-        values = {"path": str(path), "recorded": words[0], "port": url, "kind": words[1]}
-        clash = make_error(SessionError, "session_mixed", **values)
-    if clash is not None:
+        recorded, kind = (
+            ("simulated", "a real port") if session.simulated else ("real", "a simulation")
+        )
+        code, values = "session_mixed", values | {"recorded": recorded, "port": url, "kind": kind}
+    if code:
         session.close()
-        raise clash
+        raise make_error(SessionError, code, **values)
     return session
 
 
@@ -68,16 +64,15 @@ def describe_session(
     plan = []
     for run in runs(protocol):
         entry = latest.get(run.number)
-        attempt, state, reasons = (entry.attempt, entry.state, entry.reasons) if entry else _PLANNED
         plan.append(
             {
                 "run": run.number,
                 "incline_deg": run.incline_deg,
                 "impact": run.impact,
                 "free": run.free,
-                "attempt": attempt,
-                "state": str(state),
-                **published_reasons(reasons),
+                "attempt": entry.attempt if entry else 0,
+                "state": str(entry.state) if entry else "planned",
+                **published_reasons(entry.reasons if entry else ()),
             }
         )
     about = {

@@ -21,20 +21,11 @@ def link_state(state: str, error: object = None, retry_s: float | None = None) -
     return {"state": state, "error": error, "retry_s": retry_s}
 
 
-_FIRST: dict[str, Any] = {
-    "daemon": None,
-    "port": None,
+_EMPTY = "daemon", "port", "device", "statistics", "gates", "drop", "release_test", "session"
+_FIRST = dict.fromkeys((*_EMPTY, "control", "error")) | {
     "link": link_state("closed"),
-    "device": None,
-    "statistics": None,
-    "gates": None,
     "phase": "idle",
-    "drop": None,
-    "release_test": None,
-    "session": None,
-    "control": None,
     "clients": 0,
-    "error": None,
 }
 
 Edge3 = tuple[int, int, int]
@@ -57,17 +48,19 @@ class PublishedState:
         self.watched = False
         self._guard = threading.Lock()
         self._sections = dict(_FIRST)
+        self._phase = "idle"  # of the device
         self._runs: dict[int, dict[str, Any]] = {}
         self._edges: list[Edge3] = []
         self._n = 0
-        self._dirty: set[str] = set()
-        self._dirty_runs: set[int] = set()
+        self._dirty: set[str | int] = set()  # sections by name, runs by number
         self._sent = 0  # edges that went out
 
     def set(self, **sections: Any) -> None:
-        """Give sections new values; equal ones are no change."""
+        """Give sections new values; equal ones are no change. An error hides the device's phase."""
         with self._changing():
-            for name, value in sections.items():
+            self._phase = sections.get("phase", self._phase)
+            error = sections.get("error", self._sections["error"])
+            for name, value in (sections | {"phase": "trouble" if error else self._phase}).items():
                 if self._sections[name] != value:
                     self._sections[name] = value
                     self._dirty.add(name)
@@ -83,7 +76,7 @@ class PublishedState:
         with self._changing():
             if number in self._runs:
                 self._runs[number] = self._runs[number] | fields
-                self._dirty_runs.add(number)
+                self._dirty.add(number)
 
     def edges(self, more: Iterable[Edge3]) -> None:
         """Show more edges of the current drop."""
@@ -95,13 +88,7 @@ class PublishedState:
         """Show these edges instead."""
         with self._changing():
             self._edges = list(edges)[:EDGES_LIMIT]
-            self._sent = len(self._edges)
             self._dirty.add("edges")
-
-    def has_run(self, number: int) -> bool:
-        """Whether the plan has this run."""
-        with self._guard:
-            return number in self._runs
 
     def get(self, section: str) -> Any:
         """Read one section."""
@@ -113,6 +100,9 @@ class PublishedState:
         with self._guard:
             return {"n": self._n, "state": self._state()}
 
+    def _state(self) -> dict[str, Any]:
+        return self._sections | {"runs": [*self._runs.values()], "edges": [*self._edges]}
+
     def take(self) -> dict[str, Any] | None:
         """Return what changed since the last time, with its number; `None` for nothing."""
         with self._guard:
@@ -120,18 +110,15 @@ class PublishedState:
                 return None
             self._n += 1
             change: dict[str, Any] = {"n": self._n}
-            sections = self._state(edges="edges" in self._dirty)
-            if self._dirty:
-                change["set"] = {name: sections[name] for name in sorted(self._dirty)}
-            if self._dirty_runs and "runs" not in self._dirty:
-                change["runs"] = [self._runs[number] for number in sorted(self._dirty_runs)]
-            if "edges" in self._dirty:
-                self._sent = len(self._edges)
-            elif self._sent < len(self._edges):
+            state, dirty = self._state(), self._dirty
+            if replaced := {name: state[name] for name in state if name in dirty}:
+                change["set"] = replaced
+            if runs := [self._runs[number] for number in self._runs if number in dirty]:
+                change["runs"] = runs
+            if "edges" not in dirty and self._sent < len(self._edges):
                 change["edges"] = self._edges[self._sent :]
-                self._sent = len(self._edges)
-            self._dirty.clear()
-            self._dirty_runs.clear()
+            self._sent = len(self._edges)
+            dirty.clear()
             return change
 
     @contextmanager
@@ -146,8 +133,4 @@ class PublishedState:
 
     @property
     def _clean(self) -> bool:
-        return not self._dirty and not self._dirty_runs and self._sent >= len(self._edges)
-
-    def _state(self, *, edges: bool = True) -> dict[str, Any]:
-        state = self._sections | {"runs": list(self._runs.values())}
-        return state | {"edges": list(self._edges)} if edges else state
+        return not self._dirty and self._sent >= len(self._edges)

@@ -5,20 +5,19 @@ from __future__ import annotations
 import logging
 import random
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any
 
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.messages import Arm, DisarmReason, Identity, Phase, pack_label, unpack_label
+from rig.link.messages import Arm, Identity, Phase, pack_label, unpack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.reasons import Reason, make_error, sentences
 from rig.recorder.feed import StateFeed
-from rig.recorder.interrupts import Interrupts, StoppedError
-from rig.recorder.published import PublishedState
+from rig.recorder.interrupts import StoppedError
 from rig.records import ClockSample, Drop, Pulse
 from rig.session.schema import RunState
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
     from rig.link.transcript import Direction, Record
     from rig.protocol.protocol import Protocol
-    from rig.recorder.sink import NullSink
+    from rig.recorder.published import PublishedState
     from rig.session.store import Session
 
 log = logging.getLogger(__name__)
@@ -35,6 +34,19 @@ ARM_TIMEOUT_MS = 10_000
 _PING_S = 0.37  # mean distance of clock samples: in step with nothing
 _ARMED_S = 0.1  # at most, while armed: the device disarms itself when the host is silent
 _REFERENCE_S = 10.0  # between two questions for the latest pulse of the reference
+
+
+class NullSink:
+    """What a recorder uses of a session, of a device without one. Nothing is kept: it never arms.
+
+    It has no `add_drop` and no `add_state`: a drop is never forgotten, and a run belongs to a
+    session.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in {"log_bytes", "add_identity", "add_timing", "drop", "commit"}:
+            raise AttributeError(name)
+        return lambda *_args, **_names: None
 
 
 def arm_order(protocol: Protocol, label: int, timeout_ms: int, record_ms: int) -> Arm:
@@ -48,7 +60,8 @@ class Recorder:
     """The owner of the port and of the session.
 
     All bytes are put into the session before anything is done with them; a drop is committed before
-    the device is told to forget it.
+    the device is told to forget it. No signal may come meanwhile: it is the worker's thread that
+    works here.
 
     Parameters
     ----------
@@ -56,132 +69,86 @@ class Recorder:
         Open for writing.
     url
         The port.
-    interrupts
-        Kept waiting during each call; by default nobody's.
-    feed
-        What is told of everything that becomes known.
+    published
+        Where everything that becomes known is shown.
     halted
         Asked all the time whether everything shall be off.
     meet
         Called with who is there before anything is asked of it; gives what else is known of it.
+    port
+        What `let_go` returned, with a board that is running; else the port is opened.
 
     Attributes
     ----------
+    identity
+        Who is there.
     armed
         Run and attempt of the drop that waits for `fire`.
+
+    Raises
+    ------
+    DeviceError
+        No such port, nobody there, or another protocol version.
     """
 
     def __init__(
         self,
         session: Session | NullSink,
         url: str,
-        interrupts: Interrupts | None = None,
-        *,
-        feed: StateFeed | None = None,
-        halted: Callable[[], bool] = lambda: False,
-        meet: Callable[[Identity], dict[str, str]] = lambda _: {},
+        published: PublishedState,
+        halted: Callable[[], bool],
+        meet: Callable[[Identity], dict[str, str]],
+        port: Port | None = None,
     ) -> None:
         self.session = session
-        self.url = url
-        self.interrupts = Interrupts() if interrupts is None else interrupts
-        self._feed = feed or StateFeed(PublishedState())
+        self._feed = StateFeed(published)
         self._halted = halted
-        self._meet = meet
-        self._port: Port | None = None
-        self._device: Device | None = None
         self._uneven = random.Random(0)
         self.armed: tuple[int, int] | None = None
         self._sample: ClockSample | None = None  # the latest
-        self._host: HostWatch | None = None
-        self._reference_ns = 0  # when to ask for the next pulse
         self._disk_must_not_matter = False
-        self._checks: tuple[Callable[[], None], ...] = ()  # what may end a request now
+        self._is_endable = False  # whether a request may be left without its answer
+        self._port = open_port(url) if port is None else port
+        self.clock = port_clock(self._port)
+        self._host = HostWatch() if isinstance(self.clock, SystemClock) else None
+        self._reference_ns = self.clock.now_ns()  # when to ask for the next pulse
+        self.device = Device(self._port, self.clock, self._log, self._note, give_way=self._give_way)
+        try:
+            with self._endable():
+                self.identity = self.device.connect(BOOT_WAIT_S if port is None else 0.0)
+            record = self.identity.json() | {"port": told(url)} | meet(self.identity)
+            self.session.add_identity(record, self.clock.now_ns())
+            self.session.commit()
+        except BaseException:
+            self.let_go()
+            raise
 
-    def __enter__(self) -> Self:
-        self.connect()
-        return self
-
-    def __exit__(self, *_exc: object) -> None:
-        self.close()
-
-    def connect(self, port: Port | None = None) -> Identity:
-        """Learn who is there.
+    def let_go(self, *, keep: bool = False) -> Port | None:
+        """Make safe (an armed release is disarmed, a recording is left alone); let go of the port.
 
         Parameters
         ----------
-        port
-            What `give_up` returned, with a board that is running; else the port is opened.
+        keep
+            Whether the port stays open; that of a board which does not answer is closed.
 
-        Raises
-        ------
-        DeviceError
-            No such port, nobody there, or another protocol version.
+        Returns
+        -------
+        Port or None
+            The open port, for the next recorder.
         """
-        with self.interrupts.held():
-            self._port = open_port(self.url) if port is None else port
-            try:
-                self.clock = port_clock(self._port)
-                self._host = HostWatch() if isinstance(self.clock, SystemClock) else None
-                self._reference_ns = self.clock.now_ns()
-                self._device = Device(
-                    self._port, self.clock, self._log, self._note, give_way=self._give_way
-                )
-                identity = self._device.connect(BOOT_WAIT_S if port is None else 0.0)
-                record = identity.json() | {"port": told(self.url)} | self._meet(identity)
-                self.session.add_identity(record, self.clock.now_ns())
-                self.session.commit()
-            except BaseException:
-                self.close()
-                raise
-            return identity
-
-    def close(self) -> None:
-        """Make safe (an armed release is disarmed, a recording is left alone) and close."""
-        if self._port is None:
-            return
-        with self.interrupts.held():
-            try:
-                with suppress(DeviceError):
-                    if self.armed is not None:
-                        self.abort()
-            finally:
-                port, self._port = self._port, None
-                port.close()
-            self._log_rest()
-            self.session.commit()
-
-    def give_up(self) -> Port | None:
-        """Make safe and let go of the port without closing it; `None` when there is none."""
-        with self.interrupts.held():
-            if self.armed is not None:
-                self.abort()
-            port, self._port = self._port, None
-            self._log_rest()
-            return port
-
-    def _log_rest(self) -> None:
-        """Log what STOP sent past everything, and no request has followed."""
-        if self._device is not None:
-            with suppress(SessionError):  # it waits in memory
-                self._device.log_past()
-
-    @property
-    def device(self) -> Device:
-        """The device client.
-
-        Raises
-        ------
-        DeviceError
-            Before `connect` and after `close`.
-        """
-        if self._device is None or self._port is None:
-            raise make_error(DeviceError, "no_connection")
-        return self._device
-
-    @property
-    def lapsed(self) -> DisarmReason | None:
-        """Why the device disarmed itself since it was armed, as far as it has said so."""
-        return self._device.transcript.disarmed if self._device else None
+        kept = False
+        try:
+            with suppress(DeviceError):
+                if self.armed is not None:
+                    self.abort()
+                kept = keep
+        finally:
+            if not kept:
+                self._port.close()
+        with suppress(SessionError):  # what STOP sent past everything waits in memory
+            self.device.log_past()
+        self.session.commit()
+        return self._port if kept else None
 
     def wait(self, seconds: float) -> None:
         """Let time pass and use it to compare clocks, at uneven intervals.
@@ -196,12 +163,11 @@ class Recorder:
             longest_s = self.ping_gap_s()
             self.clock.sleep(min(rest_s, longest_s if self.armed is None else _ARMED_S))
             self.ping() if self.armed is None else self.look()
-        with self.interrupts.held():
-            self.session.commit()
+        self.session.commit()
 
     def look(self) -> None:
         """Ask what the device is doing, and let it know that somebody is there."""
-        with self.interrupts.held(), self._unless(self.interrupts.check, self._go_on):
+        with self._endable():
             self.device.status()
 
     def ping_gap_s(self) -> float:
@@ -210,14 +176,13 @@ class Recorder:
 
     def ping(self) -> None:
         """Take one clock sample, now and then one of the 1 Hz reference; not while armed."""
-        with self.interrupts.held():
-            if self._host is not None and (gap := self._host.look()) is not None:
-                self.session.add_timing(gap)
-            with self._unless(self.interrupts.check, self._go_on):
-                self._sample = self.device.ping()
-                if self.clock.now_ns() >= self._reference_ns:
-                    self._reference_ns = self.clock.now_ns() + round(_REFERENCE_S * 1e9)
-                    self.device.reference()
+        if self._host is not None and (gap := self._host.look()) is not None:
+            self.session.add_timing(gap)
+        with self._endable():
+            self._sample = self.device.ping()
+            if self.clock.now_ns() >= self._reference_ns:
+                self._reference_ns = self.clock.now_ns() + round(_REFERENCE_S * 1e9)
+                self.device.reference()
 
     def statistics(self) -> dict[str, object]:
         """Count what went over the line since it is up, see rig/daemon/API.md."""
@@ -228,8 +193,7 @@ class Recorder:
 
     def held(self) -> tuple[int, int] | None:
         """Run and attempt of a drop the device still holds, or `None`."""
-        with self.interrupts.held():
-            state = self.device.status()
+        state = self.device.status()
         if state.phase in {Phase.HOLDING, Phase.RECORDING} and state.label:
             return unpack_label(state.label)
         return None
@@ -249,16 +213,15 @@ class Recorder:
         """
         label = pack_label(run, attempt)
         order = arm_order(protocol, label, ARM_TIMEOUT_MS, record_ms(protocol))
-        with self.interrupts.held():
-            try:
-                with self._unless(self.interrupts.check, self._go_on):
-                    token = self.device.arm(order)
-            except (StoppedError, KeyboardInterrupt):
-                self.abort()  # the device may have heard what it did not answer
-                raise
-            self.armed = run, attempt
-            self.state(run, attempt, RunState.ARMED)
-            return token
+        try:
+            with self._endable():
+                token = self.device.arm(order)
+        except StoppedError:
+            self.abort()  # the device may have heard what it did not answer
+            raise
+        self.armed = run, attempt
+        self.state(run, attempt, RunState.ARMED)
+        return token
 
     def fire(self, token: int) -> None:
         """Let go. What was armed is on the disk as fired before the request leaves.
@@ -269,98 +232,96 @@ class Recorder:
             Nothing was let go: a beam was disturbed, or the device has disarmed itself.
         """
         run, attempt = self.armed or (0, 0)
-        with self.interrupts.held():
-            with self._unless(self.interrupts.check, self._go_on):
-                self.device.status()  # a slow disk may take most of the silence allowed, twice
-            self.state(run, attempt, RunState.FIRED)
-            self.interrupts.check()  # whoever asked to stop until now sees nothing fall
-            self._go_on()
-            try:
-                with self._unless(self._go_on):
-                    self.device.fire(token)
-            except (StoppedError, DeviceRefusedError) as ended:
-                # A STOP that overtook the answer makes the device refuse the repeated request.
-                if isinstance(ended, StoppedError) or self._halted():
-                    self.abort()
-                    if self.held() == (run, attempt):
-                        self.armed = None  # it had heard: what fell is collected
-                raise
-            self.armed = None  # from here on there is a recording, which `close` leaves alone
+        self.look()  # a slow disk may take most of the silence allowed, twice
+        self.state(run, attempt, RunState.FIRED)
+        self.go_on()  # whoever asked to stop until now sees nothing fall
+        try:
+            with self._endable():
+                self.device.fire(token)
+        except (StoppedError, DeviceRefusedError) as ended:
+            # A STOP that overtook the answer makes the device refuse the repeated request.
+            if isinstance(ended, StoppedError) or self._halted():
+                self.abort()
+                if self.held() == (run, attempt):
+                    self.armed = None  # it had heard: what fell is collected
+            raise
+        self.armed = None  # from here on there is a recording, which `let_go` leaves alone
 
-    def collect(self, run: int, attempt: int) -> Drop:
-        """Read the drop whole, store it, and only then let the device forget it."""
-        with self.interrupts.held():
-            return self._keep(self.device.collect(pack_label(run, attempt), stop=self._halted))
+    def collect(self, run: int, attempt: int, *, fresh: bool = True) -> Drop:
+        """Read the drop whole, store it, and only then let the device forget it.
 
-    def fetch(self, run: int, attempt: int) -> Drop | None:
-        """Read a held drop; `None` when the session has it and only the device did not know.
+        Parameters
+        ----------
+        run, attempt
+            Of the drop.
+        fresh
+            Whether it has just been let go, so that STOP ends its recording; else it may be in the
+            session already, and only the device does not know.
 
         Raises
         ------
         DeviceError
             The session has another drop of this run and attempt, or the device is in trouble.
         """
-        with self.interrupts.held():
-            drop = self.device.collect(pack_label(run, attempt), timeout=0.0)
-            stored = self.session.drop(run, attempt)
-            if stored is None:
-                return self._keep(drop)
-            if stored.certificate != drop.certificate or stored.fire_tick != drop.fire_tick:
-                raise make_error(DeviceError, "drop_differs", run=run, attempt=attempt)
-            self._acknowledge(drop)
-            return None
+        label = pack_label(run, attempt)
+        timeout, stop = (None, self._halted) if fresh else (0.0, None)
+        drop = self.device.collect(label, timeout, stop)
+        stored = self.session.drop(run, attempt)
+        if stored is None:
+            self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
+            self.state(run, attempt, RunState.RECORDED, drop.faults)
+            log.info("run %d, attempt %d: recorded, %d edges", run, attempt, len(drop.edges))
+            self._feed.show_drop(drop)
+        elif (stored.certificate, stored.fire_tick) != (drop.certificate, drop.fire_tick):
+            raise make_error(DeviceError, "drop_differs", run=run, attempt=attempt)
+        if drop.certificate is not None:
+            self.device.acknowledge(label, drop.certificate.crc32)
+            self.session.commit()
+        return drop
 
     def abort(self) -> None:
         """Switch everything off, even when the disk does not take the record of it any more."""
-        with self.interrupts.held():
-            self._disk_must_not_matter = True
-            try:
-                self.device.abort()
-                self.armed = None
-            finally:
-                self._disk_must_not_matter = False
+        self._disk_must_not_matter = True
+        try:
+            self.device.abort()
+            self.armed = None
+        finally:
+            self._disk_must_not_matter = False
 
     def state(
         self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
     ) -> None:
         """Log where a run stands, on the disk when this returns."""
-        with self.interrupts.held():
-            self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
-            self.session.commit()
-            if state is RunState.INTERRUPTED:
-                log.info("run %d, attempt %d: interrupted: %s", run, attempt, sentences(reasons))
-            self._feed.state(run, attempt, state, reasons)
+        self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
+        self.session.commit()
+        if state is RunState.INTERRUPTED:
+            log.info("run %d, attempt %d: interrupted: %s", run, attempt, sentences(reasons))
+        self._feed.state(run, attempt, state, reasons)
 
-    @contextmanager
-    def _unless(self, *checks: Callable[[], None]) -> Iterator[None]:
-        """Let these end what gets no answer: on a bad line a request is repeated for seconds."""
-        self._checks = checks
-        try:
-            yield
-        finally:
-            self._checks = ()
+    def go_on(self) -> None:
+        """Go on unless everything shall be off.
 
-    def _give_way(self) -> None:
-        self._halted()  # also tells whoever owns this that the device is being waited for
-        for check in self._checks:
-            check()
-
-    def _go_on(self) -> None:
+        Raises
+        ------
+        StoppedError
+            By a client's STOP, or because the one in control was lost.
+        """
         if self._halted():
             raise make_error(StoppedError, "switched_off")
 
-    def _keep(self, drop: Drop) -> Drop:
-        self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
-        self.state(drop.run, drop.attempt, RunState.RECORDED, drop.faults)
-        log.info("run %d, attempt %d: recorded, %d edges", drop.run, drop.attempt, len(drop.edges))
-        self._feed.show_drop(drop)
-        self._acknowledge(drop)
-        return drop
+    @contextmanager
+    def _endable(self) -> Iterator[None]:
+        """Let STOP end what gets no answer: on a bad line a request is repeated for seconds."""
+        self._is_endable = True
+        try:
+            yield
+        finally:
+            self._is_endable = False
 
-    def _acknowledge(self, drop: Drop) -> None:
-        if drop.certificate is not None:
-            self.device.acknowledge(pack_label(*drop.job), drop.certificate.crc32)
-            self.session.commit()
+    def _give_way(self) -> None:
+        is_halted = self._halted()  # also tells whoever owns this that the device is waited for
+        if is_halted and self._is_endable:
+            self.go_on()
 
     def _log(self, direction: Direction, host_ns: int, data: bytes) -> None:
         try:

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rig.errors import DeviceError
 from rig.link.messages import TEST_RUN, Phase, pack_label
-from rig.reasons import make_error
-from rig.recorder.interrupts import StoppedError
 from rig.recorder.recorder import arm_order
 
 if TYPE_CHECKING:
@@ -47,21 +45,19 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
         It was stopped; the release is off.
     """
     device, pulse_s = recorder.device, protocol.release.pulse
-    with recorder.interrupts.held():
-        record_ms = round(pulse_s * 1e3) + _AFTER_MS
-        token = device.arm(arm_order(protocol, _LABEL, _TIMEOUT_MS, record_ms))
-        try:
-            recorder.interrupts.check()
-            _insist(not halted())
-            device.fire(token)
-            drop = device.collect(_LABEL, stop=halted)
-        except BaseException:
-            with suppress(DeviceError):
-                device.abort()
-                forget(recorder)
-            raise
-        forget(recorder)
-    _insist(not halted())
+    record_ms = round(pulse_s * 1e3) + _AFTER_MS
+    token = device.arm(arm_order(protocol, _LABEL, _TIMEOUT_MS, record_ms))
+    try:
+        recorder.go_on()
+        device.fire(token)
+        drop = device.collect(_LABEL, stop=halted)
+    except BaseException:
+        with suppress(DeviceError):
+            device.abort()
+            forget(recorder)
+        raise
+    forget(recorder)
+    recorder.go_on()
     sensed = drop.certificate.release_sense if drop.certificate else None
     return {
         "pulse_s": pulse_s,
@@ -75,18 +71,12 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
 def forget(recorder: Recorder) -> None:
     """Let the device forget a test's drop, when it holds one: it would forbid the next."""
     device = recorder.device
-    with recorder.interrupts.held():
-        state = device.status()
-        if state.label != _LABEL or state.phase not in {Phase.RECORDING, Phase.HOLDING}:
-            return
-        if state.phase is Phase.RECORDING:
-            device.abort()
-        certificate = device.collect(_LABEL, timeout=0.0).certificate
-        if certificate is not None:
-            device.acknowledge(_LABEL, certificate.crc32)
-        device.status()  # whoever watches sees that it is at rest again
-
-
-def _insist(wanted: bool) -> None:
-    if not wanted:
-        raise make_error(StoppedError, "release_test_stopped")
+    state = device.status()
+    if state.label != _LABEL or state.phase not in {Phase.RECORDING, Phase.HOLDING}:
+        return
+    if state.phase is Phase.RECORDING:
+        device.abort()
+    certificate = device.collect(_LABEL, timeout=0.0).certificate
+    if certificate is not None:
+        device.acknowledge(_LABEL, certificate.crc32)
+    device.status()  # whoever watches sees that it is at rest again

@@ -1,1 +1,1 @@
-"""What is whole in a session file, and saving what can be read of a damaged one."""
+"""Examination of session files, and recovery of readable data from damaged ones."""

@@ -1,4 +1,4 @@
-"""Each drop twice: as the session stored it, and as its bytes give it again."""
+"""Recovery of drops from their stored rows and from the raw bytes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class RecoveredDrop(NamedTuple):
-    """A drop, what can be said of it, and what was stored about it besides."""
+    """A drop with the result of its check and its further stored data."""
 
     drop: Drop
     fate: Fate
@@ -26,7 +26,7 @@ class RecoveredDrop(NamedTuple):
 
 
 def recover_drops(rows: Rows) -> list[RecoveredDrop]:
-    """Give the best of every drop, in the order of recording.
+    """Return the best version of every drop, in the order of recording.
 
     The device's CRC-32 over a drop's events is in the bytes, not in the edges: where the two
     differ, a drop that the bytes give without a fault is the right one.
@@ -43,7 +43,7 @@ def recover_drops(rows: Rows) -> list[RecoveredDrop]:
         best = _best(stored, replayed.get(stored.job), fate)
         drops.append(RecoveredDrop(best, fate, values["host_ns"], values["provenance"]))
     stored_jobs = {each.drop.job for each in drops}
-    # What was never stored is only worth having whole.
+    # Drops that were never stored are recovered only if complete.
     return drops + [
         RecoveredDrop(drop, Fate.RESTORED)
         for job, drop in sorted(replayed.items())
@@ -57,5 +57,5 @@ def _best(stored: Drop, replayed: Drop | None, fate: Fate) -> Drop:
     if replayed is not None and fate is Fate.RESTORED:
         return replayed
     torn = max((stored, replayed or stored), key=lambda drop: len(drop.edges))
-    # A drop that is not whole any more is void: its missing edges are no missed rods.
+    # An incomplete drop is void: its lost edges are not missed rods.
     return replace(torn, faults=(*torn.faults, make_reason("record_torn")))

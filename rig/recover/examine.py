@@ -1,4 +1,4 @@
-"""What a session file is, and what of it is whole."""
+"""Examination of a session file: identity, damage, and readable drops."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 
 _NUMBERED = {name: table.meaning for name, table in TABLES.items() if table.numbered}
 FAULTS = ("damaged: ", "lost: ")
-"""How lines begin that say what is wrong with a file."""
+"""Prefixes of lines about faults of a file."""
 _GOOD = (Fate.CONFIRMED, Fate.IMPORTED)
 _FORMAT, _APPLICATION = 60, 68
-"""Where SQLite's header has ``user_version`` and ``application_id``."""
+"""Offsets of ``user_version`` and ``application_id`` in SQLite's header."""
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
 
 @dataclass(frozen=True, slots=True)
 class ExaminedFile:
-    """A session file after a look at it.
+    """Result of the examination of a session file.
 
     Attributes
     ----------
     snapshot, rows
-        What was read: the file, and the rows in it.
+        The file as read, and its rows.
     drops
-        The best of each drop.
+        The best version of each drop.
     foreign
-        Why it is no session at all; empty for a session.
+        Why it is not a session; empty for a session.
     damage
-        What is wrong with the file.
+        Faults of the file.
     lost
-        What nothing brings back.
+        Data that cannot be recovered.
     """
 
     snapshot: SessionCopy
@@ -51,23 +51,23 @@ class ExaminedFile:
 
     @property
     def whole(self) -> bool:
-        """Whether it is a session with nothing wrong."""
+        """Whether it is a session without any fault."""
         return not (self.foreign or self.troubles)
 
     @property
     def troubles(self) -> list[str]:
-        """Everything that is not as it should be, one sentence each."""
+        """All faults, a sentence each."""
         doubtful = [_describe_fate(drop) for drop in self.drops if drop.fate not in _GOOD]
         return list(dict.fromkeys([*self.damage, *self.lost, *doubtful]))
 
 
 def examine(path: str | Path) -> ExaminedFile:
-    """Look at a session file, which stays as it is.
+    """Examine a session file without changing it.
 
     Raises
     ------
     SessionError
-        It cannot be read at all.
+        The file cannot be read at all.
     """
     snapshot = take_snapshot(path)
     pages = Pages(snapshot.data)
@@ -96,7 +96,7 @@ def examine(path: str | Path) -> ExaminedFile:
 
 
 def describe(session: ExaminedFile) -> list[str]:
-    """Say it in lines, safe for a terminal whatever stands in the file."""
+    """Return the result as lines that are safe for a terminal."""
     return [printable(line).replace("\n", " ").replace("\t", " ") for line in _lines(session)]
 
 

@@ -1,8 +1,8 @@
-"""The records in a SQLite file's pages, read as bytes: a damaged one costs no other.
+"""Reader of records from the raw pages of an SQLite file, which skips damaged records.
 
-SQLite reads a table from its root down, and what a damaged page points at is lost to it. Here every
-page is read by itself, wherever it belongs. The format is https://www.sqlite.org/fileformat2.html;
-sections are given where they are used.
+SQLite reads a table from its root page down, and loses all pages below a damaged page. Here every
+page is read independently. The format is https://www.sqlite.org/fileformat2.html; comments refer to
+its sections.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import TypeAlias
 
 Value: TypeAlias = int | float | str | bytes | None
 Cell: TypeAlias = tuple[int | None, tuple[Value, ...]]
-"""A record and its number, `None` in an index, and in a table that is kept as one."""
+"""Record and its number; `None` in an index, or in a table without row numbers."""
 
 MAGIC = b"SQLite format 3\0"
 _HEADER = 100  # bytes before the first page's b-tree, section 1.3
-_USUAL_PAGE = 4096  # what SQLite makes, unless told otherwise
+_USUAL_PAGE = 4096  # SQLite's default
 TABLE_LEAF, INDEX_LEAF, INDEX_INTERIOR = 0x0D, 0x0A, 0x02
 _SIZES = {1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 7: 8}  # serial type → bytes, section 2.1
 _CONSTANTS = {0: None, 8: 0, 9: 1}  # serial type → value, same section
@@ -29,15 +29,15 @@ class Pages:
     Attributes
     ----------
     known
-        Whether the first of them says that it is SQLite's.
+        Whether the first page has SQLite's header.
     pages
-        Those that are there, by number from 1.
+        Existing pages, by number from 1.
     usable
         Bytes of a page that SQLite uses.
     expected
-        How many pages there should be, 0 when nobody says.
+        Number of pages by the header; 0 if unknown.
     missing
-        How many of these are not there.
+        Number of missing pages.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -50,26 +50,26 @@ class Pages:
         self.usable, self.expected = size, 0
         self.known = count > 0 and data.startswith(MAGIC)
         if self.known:
-            # A log that is not there may have held the rest; a wild number says nothing.
+            # The rest may have been in a missing log; an absurd number is ignored.
             expected = self.header(28)
             self.expected = expected if expected < 4 * count + 1000 else 0
             self.usable -= data[20] if data[20] < size // 2 else 0
         self.missing = sum(n not in self.pages for n in range(1, self.expected + 1))
 
     def header(self, at: int) -> int:
-        """Return the number at a place of the file's header, section 1.3."""
+        """Return the number at an offset of the file's header, section 1.3."""
         return int.from_bytes(self.pages.get(1, b"")[at : at + 4], "big")
 
 
 def read_cells(pages: Pages, number: int) -> Iterator[Cell | None]:
-    """Read all records of a page, `None` for each that is none; a page without records has none.
+    """Yield all records of a page, `None` for each unreadable one; none for other pages.
 
     Parameters
     ----------
     pages
         The database.
     number
-        Of the page.
+        Number of the page.
     """
     page = pages.pages[number]
     start = _HEADER if number == 1 else 0
@@ -100,7 +100,7 @@ def _cell(pages: Pages, page: bytes, kind: int, at: int) -> Cell:
 
 
 def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:
-    """Put a record together from its page and the pages it flows over to."""
+    """Return the bytes of a record from its page and its overflow pages."""
     usable = pages.usable
     limit = usable - 35 if kind == TABLE_LEAF else (usable - 12) * 64 // 255 - 23
     if size > len(pages.pages) * usable:
@@ -152,7 +152,7 @@ def _value(kind: int, data: bytes) -> Value:
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
-    """Read SQLite's number of variable length: 7 bits a byte, at most 9 bytes, big end first."""
+    """Return SQLite's number of variable length: 7 bits a byte, at most 9 bytes, big-endian."""
     value = 0
     for n in range(8):
         byte = data[at + n]

@@ -1,4 +1,4 @@
-"""Which table a record is of, told by its shape: a torn file need not have its schema any more."""
+"""Assignment of records to tables by their shape, as a damaged file may lack its schema."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from rig.session.hashes import check_chain
 from rig.session.rows import RowError, check_row
 from rig.session.schema import TABLES, Row
 
-_TRIP_NS = 60 * 10**9  # no answer takes longer
+_TRIP_NS = 60 * 10**9  # longest round trip of an answer
 
 
 @dataclass
 class Rows:
-    """The rows of a session by table, each by its key; `bad` counts unreadable ones.
+    """The rows of a session by table and key; `bad` counts unreadable ones.
 
-    The key is the row's number, and of an edge the drop's number and its own.
+    The key is the row's number; for an edge, the drop's number and its own.
     """
 
     tables: dict[str, dict[Row, Row]] = field(default_factory=lambda: {name: {} for name in TABLES})
     bad: int = 0
 
     def add(self, rowid: int | None, row: Row) -> None:
-        """Put a record where it belongs by its shape; what is no row of a session is left out."""
-        if row[:1] == (None,):  # SQLite leaves the number out of the record
+        """Add a record to the table of its shape; records of no table are left out."""
+        if row[:1] == (None,):  # SQLite omits the number from the record
             row = (rowid, *row[1:])
         for name, table in TABLES.items():
             if (rowid is None) == (table.key > 1) and len(row) in table.lengths:
@@ -39,12 +39,12 @@ class Rows:
                         return
 
     def in_order(self, table: str) -> list[Row]:
-        """List the rows of a table by key."""
+        """Return the rows of a table by key."""
         return [row for _, row in sorted(self.tables[table].items())]
 
     @property
     def meta(self) -> dict[str, str]:
-        """What is known of the session."""
+        """Metadata of the session."""
         return dict(self.tables["meta"].values())
 
     @property
@@ -54,29 +54,28 @@ class Rows:
 
     @property
     def protocol_altered(self) -> bool:
-        """Whether its text is there, and known not to be the one of the session's beginning."""
+        """Whether the protocol's text exists but does not match its stored hash."""
         if self.protocol is None:
             return False
         digest = hashlib.sha256(self.protocol[1].encode()).hexdigest()
         return self.meta.get("protocol_sha256", digest) != digest
 
     def gaps(self, table: str) -> int:
-        """Count the rows that are missing: a session numbers its rows from 1 without gaps."""
+        """Return the number of missing rows: a session numbers rows from 1 without gaps."""
         numbers = self.tables[table]
         hashed = (last for _, covered, last, _ in self.tables["hash"].values() if covered == table)
         return int(max([0, *hashed, *(number for (number,) in numbers)])) - len(numbers)
 
     def chain_faults(self) -> list[str]:
-        """List what the chain of hashes says was altered; nothing where there is no chain."""
+        """Return the alterations by the hash chain; empty without a chain."""
         return check_chain(self.tables)
 
 
 def find_rows(pages: Pages) -> Rows:
-    """Read every record of every page.
+    """Return the rows of all records of all pages.
 
-    A page that SQLite has given back may still hold what another holds by now. Raw records are
-    never altered, so both say the same, and the first counts. Results are left out: they are
-    computed again.
+    A free page may still contain records that another page has now. Raw records are never altered,
+    so both are equal, and the first counts. Results are left out, as they can be computed again.
     """
     cells = [cell for number in pages.pages for cell in read_cells(pages, number)]
     rows = Rows(bad=cells.count(None))

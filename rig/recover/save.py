@@ -1,4 +1,4 @@
-"""Writing what can be read into a session of its own."""
+"""Recovery: writes all readable data of a damaged session into a new session."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def save(examined: ExaminedFile, target: str | Path, protocol: str | None = None) -> list[str]:
-    """Write a new session with everything that could be read.
+    """Write a new session with all readable data.
 
     Parameters
     ----------
@@ -26,17 +26,17 @@ def save(examined: ExaminedFile, target: str | Path, protocol: str | None = None
     target
         The new file.
     protocol
-        The protocol file, for a session that has lost it.
+        Path of the protocol file, for a session that has lost its protocol.
 
     Returns
     -------
     list of str
-        What could not be saved, and what had to be guessed; empty when nothing.
+        Data that could not be saved, and assumptions; empty if there are none.
 
     Raises
     ------
     SessionError
-        It is no session, its protocol is lost and not given, or the new file cannot be made.
+        It is not a session, its protocol is lost and not given, or the new file cannot be created.
     """
     if examined.foreign:
         raise SessionError(f"{examined.snapshot.path} is not a session file: {examined.foreign}")
@@ -48,7 +48,7 @@ def save(examined: ExaminedFile, target: str | Path, protocol: str | None = None
         for table in ("identity", "ping", "reference", "host_break", "bytes", "attachment"):
             session.add_rows(table, [row[1:] for row in rows.in_order(table)])
         notes += _drops(session, examined)
-        # The chain of hashes begins with these rows: it proves nothing of how they came to be.
+        # The hash chain begins with these rows: it proves nothing about their origin.
         session.add_rows("hash", [(OLDER, 0, b"")])
         session.commit()
     return [*examined.lost, *notes]
@@ -68,7 +68,7 @@ def _protocol(examined: ExaminedFile, file: str | None) -> tuple[str, str]:
 
 
 def _find_world(examined: ExaminedFile) -> tuple[bool, list[str]]:
-    """Say whether the data are simulated; where nobody knows they are stamped so."""
+    """Return whether the data are simulated (assumed if unknown), and remarks."""
     if world := examined.rows.meta.get("simulated", ""):
         return world == "true", []
     for identity in examined.rows.in_order("identity"):
@@ -79,7 +79,7 @@ def _find_world(examined: ExaminedFile) -> tuple[bool, list[str]]:
 
 
 def _drops(session: Session, examined: ExaminedFile) -> list[str]:
-    """Add drops and the log of states; a drop that no state tells of gets one."""
+    """Add drops and the log of states; a drop without a state gets one."""
     jobs = set()
     for drop, _, host_ns, provenance in examined.drops:
         if drop.job not in jobs:

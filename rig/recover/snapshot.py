@@ -1,4 +1,4 @@
-"""A session file as it is now, without changing it."""
+"""Snapshot of a session file, without changing it."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from rig.session.store import Session
 
 
 class SessionCopy(NamedTuple):
-    """A session file.
+    """Content and state of a session file.
 
     Attributes
     ----------
     path
-        Where it is.
+        Path of the file.
     data
-        The file, with all that the ``-wal`` file beside it has to add to it.
+        Content of the file, merged with its log (``-wal``).
     logged
-        How many pages that has; `None` without it.
+        Number of pages of the log; `None` without a log.
     writer
-        Process that has it open for writing, in words; empty without one.
+        Name of the process that writes the file; empty without a writer.
     writable
         Whether this user may write it.
     trouble
-        Why SQLite, or this program, cannot read it; empty when both can.
+        Why SQLite, or this program, cannot read it; empty if both can.
     """
 
     path: Path
@@ -45,12 +45,12 @@ class SessionCopy(NamedTuple):
 
 
 def take_snapshot(path: str | Path) -> SessionCopy:
-    """Read a session file and ask SQLite about a copy of it.
+    """Return the content of a session file, and test a copy of it with SQLite.
 
     Raises
     ------
     SessionError
-        There is nothing that can be read.
+        The file cannot be read.
     """
     place = Path(os.path.realpath(path))
     writer, logged = writer_of(place), None
@@ -68,7 +68,7 @@ def take_snapshot(path: str | Path) -> SessionCopy:
 
 
 def _copy_beside_writer(place: Path, copy: Path) -> None:
-    """Let SQLite copy it: bytes that change meanwhile would not fit together."""
+    """Copy a file with SQLite, as a plain copy beside a writer may be inconsistent."""
     try:
         with closing(open_database(place, "ro")) as source, closing(sqlite3.connect(copy)) as new:
             source.backup(new)
@@ -77,7 +77,7 @@ def _copy_beside_writer(place: Path, copy: Path) -> None:
 
 
 def _fold_in(copy: Path) -> int:
-    """Let SQLite bring its log into the copy, up to the last whole commit; count its pages."""
+    """Merge the log into the copy, up to the last complete commit; return its number of pages."""
     try:
         with closing(sqlite3.connect(copy)) as connection:
             connection.execute("PRAGMA writable_schema = on")  # also into one that is damaged
@@ -88,7 +88,7 @@ def _fold_in(copy: Path) -> int:
 
 
 def _trouble(copy: Path, name: str) -> str:
-    """Say what SQLite, or this program, has against a copy; empty when both can read it."""
+    """Return why SQLite, or this program, cannot read a copy; empty if both can."""
     try:
         with closing(sqlite3.connect(copy)) as connection:
             complaints = [str(text) for (text,) in connection.execute("PRAGMA integrity_check(20)")]

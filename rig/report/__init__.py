@@ -1,1 +1,1 @@
-"""Pictures and pages made from results."""
+"""Figures, tables and pages from results."""

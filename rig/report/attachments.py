@@ -1,13 +1,13 @@
-"""What a page carries inside itself, to be saved by whoever reads it, as far as it stays small."""
+"""Files attached to a page for its readers, within a limit of size."""
 
 from __future__ import annotations
 
 import base64
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.bundle.archive import zipped
+from rig.bundle.archive import zip_files
 from rig.bundle.tables import csv_files
-from rig.ready import shipped
+from rig.ready import find_resource
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 METHOD = "method.md"
 _DATA = 120_000
-"""Bytes of an attached file at most, so that the page of 108 drops stays under 0.8 MB."""
+"""Most bytes of an attached file, so that the page of 108 drops stays under 0.8 MB."""
 _ROWS = 5_000
 """Edges and pings whose tables take as much: with budgets of drops 22 to 24 bytes each, packed."""
 _LARGE = ("edges.csv", "budget.csv", "pings.csv")
 
 
 class Attachment(NamedTuple):
-    """A file inside a page: its name, media type, bytes in letters, and what is in it."""
+    """A file inside a page: name, media type, encoded bytes and description."""
 
     name: str
     kind: str
@@ -36,7 +36,7 @@ class Attachment(NamedTuple):
 def attachments(
     session: Reader, outcome: SessionResults, drops: Iterable[Drop]
 ) -> list[Attachment]:
-    """Pack a session's tables; without those that are too large for a page to carry."""
+    """Return a session's tables as attachments, without those too large for a page."""
     few = sum(len(drop.edges) for drop in drops) + len(session.pings()) <= _ROWS
     tables = csv_files(session, outcome.json(), outcome.clock, () if few else _LARGE)
     tables |= {"protocol.yaml": session.protocol_text}
@@ -47,7 +47,7 @@ def attachments(
         else "results as CSV files, with the protocol; rig export also writes budgets and edges"
     )
     rows = [
-        ("data.zip", "application/zip", zipped(contents), words),
+        ("data.zip", "application/zip", zip_files(contents), words),
         ("summary.csv", "text/csv", contents["summary.csv"], "means only"),
         (METHOD, "text/markdown", method_page().encode(), "the whole method"),
     ]
@@ -60,5 +60,5 @@ def attachments(
 
 
 def method_page() -> str:
-    """Return the page on the method as Markdown; it travels with the program."""
-    return shipped(f"docs/{METHOD}").read_text("utf-8")
+    """Return the page on the method as Markdown, which is part of the program."""
+    return find_resource(f"docs/{METHOD}").read_text("utf-8")

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rig.ctrl_c import ctrl_c_waits
-from rig.errors import InputError
-from rig.files import make_folder, replacing, write_atomic
+from rig.files import make_folder, write_atomic
 from rig.report.figure import csv_table
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
 Kind = Literal["svg", "png", "pdf"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+ENDINGS = tuple(f".{kind}" for kind in KINDS)
 _UNSAID: dict[Kind, tuple[str, ...]] = {
     "svg": ("Date", "Creator", "Format", "Type"),
     "png": ("Software",),
@@ -30,7 +30,7 @@ _UNSAID: dict[Kind, tuple[str, ...]] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Have figures look alike in the block, which Ctrl-C does not interrupt."""
+    """Apply the common style of figures inside the block, and defer Ctrl-C."""
     import matplotlib as mpl  # noqa: PLC0415 - half a second that a headless run never pays
 
     with ctrl_c_waits(), mpl.rc_context(fname=Path(__file__).with_suffix(".mplstyle")):
@@ -38,12 +38,12 @@ def style() -> Iterator[None]:
 
 
 def drawing_file(drawing: Figure, kind: Kind, description: str = "") -> bytes:
-    """Return what matplotlib drew as a file of a kind; the same drawing gives the same bytes.
+    """Return a matplotlib figure as a file; the same figure gives the same bytes.
 
     Parameters
     ----------
     description
-        What the figure says of itself in the file's metadata.
+        Description for the file's metadata.
     """
     written = io.BytesIO()
     metadata: dict[str, Any] = dict.fromkeys(_UNSAID[kind])
@@ -60,34 +60,16 @@ def figure_file(figure: Chart, kind: Kind) -> bytes:
     return drawing_file(plot(figure), kind, figure.facts or figure.title)
 
 
-def kind_of(path: Path) -> Kind:
-    """Tell by a file's ending how a figure is to be written.
-
-    Raises
-    ------
-    InputError
-        It is none of those that there are.
-    """
-    kind = path.suffix.removeprefix(".")
-    if kind not in KINDS:
-        raise InputError(
-            f"{path}: unknown figure format; accepted: {', '.join(f'.{kind}' for kind in KINDS)}",
-            f"for example {path.with_suffix('.svg')}",
-        )
-    return kind
-
-
 def write_figure(path: Path, figure: Chart) -> None:
-    """Write a figure as its file's ending says, whole or not at all.
+    """Write a figure in the format of the file's suffix (default SVG), completely or not at all.
 
     Raises
     ------
     InputError
-        If it says nothing, or the file cannot be written.
+        The file cannot be written.
     """
-    content = figure_file(figure, kind_of(path))
-    with replacing(path) as stream:
-        stream.write(content)
+    kind = next((kind for kind in KINDS if path.suffix == f".{kind}"), KINDS[0])
+    write_atomic(path, figure_file(figure, kind))
 
 
 def write_figures(folder: str | Path, figures: Sequence[Chart]) -> None:

@@ -1,4 +1,4 @@
-"""Tables, for the terminal and the page alike, as `columns.txt` describes them."""
+"""Tables of terminal and page, as described in `columns.txt`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Part:
     Attributes
     ----------
     head, rows
-        Headings of columns and whether they are of numbers; the text of each row's cells.
+        Column headings, each with whether the column is numeric; the text of each row's cells.
     """
 
     heading: str
@@ -46,7 +46,7 @@ class Part:
 
     @property
     def lines(self) -> list[str]:
-        """All of it, for a terminal."""
+        """All lines for a terminal."""
         return ["", self.heading, *self.table, *self.sentences]
 
 
@@ -57,18 +57,18 @@ def table_parts(
     derived: Mapping[str, Callable[[Any], Any]] = _NOTHING,
     row: Measurand | None = None,
 ) -> Iterator[Part]:
-    """Yield a table of ``columns.txt``; nothing where there is nothing to say.
+    """Yield a table of ``columns.txt``, unless it is empty.
 
     Parameters
     ----------
     name
-        Of the table there.
+        Name of the table.
     words
-        Said of it too.
+        Further sentences.
     derived
-        What the table calls with ``()``, by name.
+        Functions that the table calls with ``()``, by name.
     row
-        The measurand of all its records; without it each record has its own, or none.
+        The measurand of all records; if not given, each record may have its own.
     """
     records, table = list(records), _TABLES[name]
     written = partial(str.format, row=row, first=records[0] if records else None)
@@ -84,7 +84,7 @@ def table_parts(
     if records or words:
         sentences = [written(table.words), *words] if table.words else list(words)
         heading = written(table.heading)
-        # Not for what begins with a symbol, since g is not G.
+        # Not for headings that begin with a symbol: g is not G.
         heading = heading[:1].upper() + heading[1:]
         rows = [*zip(*(cells for _, cells in columns), strict=True)]
         yield Part(heading, sentences, [head for head, _ in columns], rows)
@@ -96,7 +96,7 @@ def heading_of(name: str) -> str:
 
 
 def records_in(name: str, whole: Any) -> list[Any]:
-    """Return a table's records where its heading says; of groups, each with each of its members."""
+    """Return a table's records by the path in its heading; for groups, each with each member."""
     place, _, members = _TABLES[name].place.partition("*")
     records = value_at(whole, place) or () if place else ()
     if members:
@@ -112,7 +112,7 @@ class _Table(NamedTuple):
 
 
 def read_tables(text: str) -> Iterator[tuple[str, _Table]]:
-    """Yield names with what stands below them in a file such as ``columns.txt``."""
+    """Yield names and tables of a file such as ``columns.txt``."""
     for block in text.split("\n[")[1:]:
         (name, heading, *place), *rows = (
             re.split(r"\] | {2,}", line) for line in block.strip().split("\n")
@@ -142,15 +142,15 @@ def _cell(
 def value_at(
     record: Any, place: str, derived: Mapping[str, Callable[[Any], Any]] = _NOTHING
 ) -> Any:
-    """Follow a place such as ``run.incline_deg`` or ``0.edges()``; ``-`` is the record itself.
+    """Return the value at a path such as ``run.incline_deg`` or ``0.edges()``; ``-`` is the record.
 
-    Nothing has nothing further along. A mapping inside a record may lack a key, and where the place
-    ends with ``?``, as ``impact_chain?``, the record itself.
+    `None` has no further parts. A mapping inside a record may lack a key; the record itself only if
+    the path ends with ``?``, as in ``impact_chain?``.
 
     Raises
     ------
     AttributeError, KeyError
-        A record has no such attribute or key: a column would else be left out in silence.
+        A record has no such attribute or key: otherwise a column would be lost silently.
     """
     value = record
     for step in place.split("."):
@@ -172,12 +172,12 @@ def _text(value: object, *_: object) -> str:
 
 
 def _verdict(error: float | None, *_: object) -> str:
-    """Say what a normalized error means; nothing where nothing was compared."""
+    """Return a normalized error in words; empty without a comparison."""
     return "" if error is None else "agrees" if abs(error) <= 1.0 else "disagrees"
 
 
-def _predicted(model: Any, row: Measurand) -> str:
-    """Write what the model says; one that knows its numbers exactly has no ±."""
+def _prediction(model: Any, row: Measurand) -> str:
+    """Return the model's value as text; without ± if it is exact."""
     if model is None or not model.u:
         return fixed(model and model.value * row.scale, row.decimals)
     return plus_minus(Measured(model.value, model.u), row.scale)
@@ -185,7 +185,7 @@ def _predicted(model: Any, row: Measurand) -> str:
 
 _TABLES = dict(read_tables(Path(__file__).with_suffix(".txt").read_text("utf-8")))
 _WORDS = ("words", "verdict", "quantity", "symbol")
-"""Ways that write no numbers."""
+"""Formats of columns without numbers."""
 _WAYS: dict[str, Callable[..., str]] = {
     "words": _text,
     "text": _text,
@@ -197,7 +197,7 @@ _WAYS: dict[str, Callable[..., str]] = {
     "p": lambda value, _: "" if value is None else f"{value:.2g}",
     "fixed": lambda value, _, decimals, scale=1.0: fixed(value and value * scale, int(decimals)),
     "fine": lambda value, row: fixed(value and value * row.fine_scale, row.fine_decimals),
-    "predicted": _predicted,
+    "predicted": _prediction,
     "plus_minus": lambda value, _, scale=1.0: plus_minus(value, scale),
     "usual": lambda value, row: plus_minus(value, row.scale, row.decimals),
     "small": lambda value, row: plus_minus(value, row.fine_scale, row.fine_decimals),

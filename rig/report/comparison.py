@@ -1,4 +1,4 @@
-"""Sessions beside each other: tables, a figure and a page of their differences."""
+"""Comparison of sessions: tables, a figure and a page of their differences."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def shared_lines(results: TogetherResults) -> list[str]:
-    """Say which errors the sessions have in common."""
+    """Return lines about the errors that sessions share."""
     owners = defaultdict[str, list[str]](list)
     for owner, groups in results.fit.shared.items():
         for group in (group for group in groups if len(group) > 1):
@@ -34,8 +34,8 @@ def shared_lines(results: TogetherResults) -> list[str]:
 def pooled_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means over all sessions of each scene, as lines of text."""
     yield from ["SIMULATED DATA"] * results.simulated
-    for scene in results.fit.pooled:
-        yield from [f"{', '.join(scene.sessions)}:", *summary_table(scene.summary).splitlines()]
+    for names, summary in results.fit.pooled.items():
+        yield from [f"{', '.join(names)}:", *summary_table(summary).splitlines()]
     yield from shared_lines(results)
 
 
@@ -56,7 +56,7 @@ def comparison_page(results: TogetherResults) -> str:
 
 
 def draw_comparison(results: TogetherResults) -> Chart:
-    """Draw all differences with U (95 %), a panel for each measurand, zero as a line."""
+    """Return all differences with U (95 %), a panel for each measurand, zero as a line."""
     panels = (_panel(row, differences) for row, differences in _differences(results) if differences)
     return replace(chart("differences", *panels), simulated=results.simulated)
 
@@ -75,7 +75,7 @@ def _panel(row: Measurand, differences: Sequence[MeanDifference]) -> dict[str, A
 
 
 def _runs(mean: MeanDifference | Incline) -> str:
-    """Say of which runs a mean or a difference is, where a session has several kinds."""
+    """Return the condition of a mean or difference in words; empty for an acceleration."""
     names = mean.means if isinstance(mean, Incline) else [mean.quantity]
     return "" if acceleration_in(names) else str(mean.condition)
 

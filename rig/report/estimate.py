@@ -1,4 +1,4 @@
-"""What `rig estimate` finds, in words and tables, for the terminal and the page alike."""
+"""Results of `rig estimate` in words and tables, for terminal and page."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rig.estimate.rods import resolution
+from rig.estimate.session import is_identified
 from rig.report.columns import heading_of, records_in, table_parts
 from rig.report.numbers import MINUS, decimals_for, fixed, plus_minus
 from rig.report.templates import lines
@@ -21,13 +22,13 @@ if TYPE_CHECKING:
 
 SYMBOLS = {"alpha": "α", "restitution": "β", "friction": "μ", "pile_restitution": "β of the pile"}
 _TEXT = ("coefficients", "alphas", "end", "impulses", "comparison", "failed")
-"""In order; each is made by itself, and none where there is nothing to say."""
+"""Tables in order; each is made independently, and left out if empty."""
 _PAGE = (*_TEXT, "inclines", "rods")
-"""A page has a record for each rod too, or rods known by their sum."""
+"""Tables of a page, with a record for each rod, or for rods identified only by their sum."""
 
 
 def estimate_text(found: SessionEstimate, sections: Sections, *, simulated: bool) -> str:
-    """Write everything for a terminal; what cannot be written is noted in `sections`."""
+    """Return all results for a terminal; failed sections are noted in `sections`."""
     text = ["SIMULATED DATA"] if simulated else []
     text.append(f"{found.drops} good drop{'s' * (found.drops > 1)}, {found.edges} edges")
     for part in page_parts(found, sections, _TEXT):
@@ -38,7 +39,7 @@ def estimate_text(found: SessionEstimate, sections: Sections, *, simulated: bool
 def page_parts(
     found: SessionEstimate, sections: Sections, names: Iterable[str] = _PAGE
 ) -> Iterator[Part]:
-    """Yield tables of ``columns.txt``, each made alone."""
+    """Yield tables of ``columns.txt``; a failed table does not affect the others."""
 
     def make(name: str) -> list[Part]:
         words = lines("estimated", name, found, resolution, _correlation)
@@ -50,7 +51,7 @@ def page_parts(
 
 
 def symbol(name: str) -> str:
-    """Write a coefficient as its symbol; of given α's each has its chain's name."""
+    """Return the symbol of a coefficient; stated α have their chain's name."""
     what, _, chain = name.partition(" ")
     return SYMBOLS[what] + (f" of {chain}" if chain else "")
 
@@ -65,19 +66,19 @@ def _correlation(coefficients: Coefficients) -> list[str]:
 
 
 def _contact(found: SessionEstimate, alpha: ConditionAlpha) -> str:
-    """Say where the rods touch at the incline of an α, mm."""
-    for point in found.coefficients.contact if found.coefficients else ():
-        if point.incline_deg == alpha.condition.incline_deg:
-            return plus_minus(point.height, 1e3) if point.identified else "not identified"
-    return ""
+    """Return the contact height at the incline of an α as text, mm."""
+    heights = found.coefficients.contact if found.coefficients else {}
+    if (height := heights.get(alpha.condition.incline_deg)) is None:
+        return ""
+    return plus_minus(height, 1e3) if is_identified(height) else "not identified"
 
 
 def _posterior(coefficient: Coefficient) -> str:
-    digits = decimals_for(2.0 * coefficient.sd)
-    return f"{fixed(coefficient.low, digits)} … {fixed(coefficient.high, digits)}"
+    digits = decimals_for(2.0 * coefficient.posterior["u"])
+    return " … ".join(fixed(coefficient.posterior[end], digits) for end in ("low", "high"))
 
 
-def _stated(coefficient: Coefficient) -> str:
+def _format_stated(coefficient: Coefficient) -> str:
     u = f" (u {coefficient.stated.u:g})" if coefficient.stated.u else ""
     return f"{coefficient.stated.value:g}".replace("-", MINUS) + u
 
@@ -88,14 +89,14 @@ def _worst(compared: Iterable[Any]) -> float | None:
 
 
 def _rod(gain: Gain) -> str:
-    """Count rods as people do, from 1."""
+    """Return the numbers of rods as text, counted from 1."""
     return "–".join(str(1 + rod) for rod in dict.fromkeys((gain.first, gain.last)))
 
 
 _CELLS: dict[str, Callable[[Any], Any]] = {
     "symbol": symbol,
     "posterior": _posterior,
-    "stated": _stated,
+    "stated": _format_stated,
     "source": lambda coefficient: "edges" if coefficient.identified else "held",
     "worst": _worst,
     "rod": _rod,

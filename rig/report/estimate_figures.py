@@ -1,4 +1,4 @@
-"""Figures of what `rig estimate` finds."""
+"""Figures of the results of `rig estimate`."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 
 _STYLES = (("ring", "model"), ("square", "second"), ("mean", "ink"))
 _SHARES = (0.683, 0.95)
-_FEWEST = 4  # points of the grid in the larger region
+_FEWEST = 4  # least number of grid points in the larger region
 
 
 def estimate_pictures(found: SessionEstimate, sections: Sections) -> dict[str, Chart]:
-    """Draw everything there is, by file name without its ending.
+    """Return all available figures, by file name without suffix.
 
     Parameters
     ----------
     found
-        From ``rig estimate``.
+        Results of ``rig estimate``.
     sections
-        Where a picture that cannot be drawn is noted.
+        Collects the names of failed figures.
     """
     drawn = {
         name: sections.make(f"The picture of the {name}", partial(draw, found))
@@ -41,7 +41,7 @@ def estimate_pictures(found: SessionEstimate, sections: Sections) -> dict[str, C
 
 
 def _alpha(found: SessionEstimate) -> Chart | None:
-    """α against incline, and below it every run's residual."""
+    """Return the figure of α against incline, with every run's residual below."""
     if found.alphas is None:
         return None
     runs, inclines = found.alphas.runs, found.alphas.inclines
@@ -50,32 +50,32 @@ def _alpha(found: SessionEstimate) -> Chart | None:
 
 
 def _impulses(found: SessionEstimate) -> Chart | None:
-    """ΔV of every rod beside Eq. 9, and the normalized errors of all inclines."""
+    """Return the figure of each rod's ΔV with Eq. 9, and the normalized errors of all inclines."""
     lines = found.impulses or ()
-    inclines = [{**style, "line": line, "gains": line.gains} for line, style in _styled(lines)]
+    inclines = [{**style, "line": line, "gains": line.gains} for line, style in _style_lines(lines)]
     sources = {"inclines": inclines, "gains": [gain for line in lines for gain in line.gains]}
     return chart("impulses", sources) if lines else None
 
 
 def _curves(found: SessionEstimate) -> Chart | None:
-    """Δz(t) and V²(z) with bands (Fig. 4)."""
-    drops = [{**style, "drop": drop} for drop, style in _styled(found.curves or ())]
+    """Return the figure of Δz(t) and V²(z) with bands (Fig. 4)."""
+    drops = [{**style, "drop": drop} for drop, style in _style_lines(found.curves or ())]
     apart = any(drop["drop"].separation for drop in drops)
     return chart("curves" if apart else "speeds", {"drops": drops}) if drops else None
 
 
 def _posterior(found: SessionEstimate) -> Chart | None:
-    """Draw the regions of β and μ that hold 68.3 % and 95 %; `None` where they have no spread."""
+    """Return the figure of the 68.3 % and 95 % regions of β and μ; `None` without a spread."""
     fit = found.coefficients
     best = {parameter.name: parameter.least_squares for parameter in fit.parameters} if fit else {}
-    if not fit or not fit.posterior or not {"restitution", "friction"} <= best.keys():
+    if not fit or not {"restitution", "friction"} <= best.keys():
         return None
     regions = _regions(fit.posterior)
     return None if regions is None else chart("posterior", {"best": [best], "traces": [regions]})
 
 
 def _regions(mixture: Posterior) -> Trace | None:
-    """Return what share the smallest region holds on whose edge a point lies, with two levels."""
+    """Return the probability inside the density contour through each point, with two levels."""
     beta, mu = (mixture.names.index(name) for name in ("restitution", "friction"))
     kept = mixture.weights > 1e-6 * mixture.weights.max()
     logs, sds = np.log(mixture.weights[kept]), mixture.sds[kept, beta]
@@ -83,7 +83,7 @@ def _regions(mixture: Posterior) -> Trace | None:
     low, high = (means - 4.5 * sds).min(), (means + 4.5 * sds).max()
     if np.ptp(places) <= 0.0 or high <= low:
         return None
-    # Smooth from node to node: more of them for the eye.
+    # Interpolate between nodes, for a smooth contour.
     nodes, grid = np.linspace(places.min(), places.max(), 161), np.linspace(low, high, 121)
     logs, centre, width = (np.interp(nodes, places, values) for values in (logs, means, sds))
     density = np.exp(logs - 0.5 * ((grid[:, None] - centre) / width) ** 2) / width
@@ -91,12 +91,12 @@ def _regions(mixture: Posterior) -> Trace | None:
     held = np.empty(density.size)
     held[densest] = np.cumsum(density.ravel()[densest]) / density.sum()
     if not _FEWEST < np.sum(held < _SHARES[1]) < held.size:
-        return None  # narrower than the grid
+        return None  # the region is narrower than the grid
     return Trace("", nodes.tolist(), grid.tolist(), "levels", MODEL, _SHARES, z=held.tolist())
 
 
-def _styled(lines: Sequence[Any]) -> Iterator[tuple[Any, dict[str, str]]]:
-    """Pick at most three, the outermost and one between, each with a look of its own."""
+def _style_lines(lines: Sequence[Any]) -> Iterator[tuple[Any, dict[str, str]]]:
+    """Yield at most three items, the outermost and one between, each with its own style."""
     number = len(lines)
     if number > len(_STYLES):
         lines = [lines[n] for n in (number // 3, number * 2 // 3, number - 1)]

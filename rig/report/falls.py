@@ -1,8 +1,8 @@
-"""One fall as its edges tell it: where the object or chain was, when, and how fast.
+"""Height and speed during a fall from single shadows, for figures.
 
-Each shadow of a known rod in a known beam is a point: its middle in time, and the rod's width over
-its duration T, which is the speed then. The rod's own middle is aT²/8 short of the beam by then,
-under a constant acceleration a: between impacts, that of gravity. Release, acceleration and Δz are
+Each shadow of an identified rod in a beam gives a point: the middle of its time, and the rod's
+width over its duration T, the speed at that time. The rod's middle is then aT²/8 before the beam
+for a constant acceleration a: between impacts, that of gravity. Release, acceleration and Δz are
 those of the session's results.
 """
 
@@ -33,14 +33,14 @@ _MOMENTS = 200
 
 
 class Passages(NamedTuple):
-    """Where a top rod or object was: of shadows their middles, in order of time.
+    """Points of a top rod or object at the middles of shadows, in order of time.
 
     Attributes
     ----------
     time
-        s.
+        Time, s.
     height, speed
-        Of the top rod or object, m and m/s.
+        Height and speed of the top rod or object, m and m/s.
     """
 
     time: Array
@@ -49,23 +49,23 @@ class Passages(NamedTuple):
 
     @property
     def squared_speed(self) -> Array:
-        """Of the top rod or object, m²/s²."""
+        """Squared speed of the top rod or object, m²/s²."""
         return self.speed**2
 
 
 def passages(
     protocol: Protocol, drop: Drop, hz: float | Fraction, result: DropResult, side: Side
 ) -> Passages:
-    """Read where a chain or an object was from the edges that were matched.
+    """Return the points of a chain or object from its matched edges.
 
     Parameters
     ----------
     hz
         Calibrated ticks per second.
     result
-        Which edge is of which rod.
+        Result with the matches of edges to rods.
     side
-        Of the gates.
+        Side of the gates.
     """
     name = result.run.impact if side == "impact" else result.run.free
     gates = {gate.channel: gate for gate in protocol.gates.on(side)} if protocol.gates else {}
@@ -92,7 +92,7 @@ def passages(
 def fall_figures(
     protocol: Protocol, drop: Drop, hz: float | Fraction, result: DropResult
 ) -> Iterator[Chart]:
-    """Yield the pictures of one good drop: its fall first, then what shows the impacts."""
+    """Yield the figures of a good drop: its fall first, then those of the impacts."""
     run, values, head = result.run, result.quantities, f"Run {result.run.number}"
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     if result.verdict not in GOOD or protocol.gates is None:
@@ -115,7 +115,7 @@ def fall_figures(
     u = 2.0 * np.hypot(protocol.gates.height_u, protocol.gates.datum_u)
     if free.time.size > 2 and RELEASE_SKEW.name in values:
         skew = values[RELEASE_SKEW.name]
-        # The free chain's way, from all its passages, at the moments of the striking one's.
+        # The free chain's path from all its passages, at the times of the striking chain's.
         higher = np.mean(free.height - twin.heights(free.time - released - skew.value)[0])
         points = twin.heights(time)[0] + higher - struck.height
         name, expected = "separation", twin.heights(moments)[0] - expected
@@ -140,13 +140,13 @@ def fall_figures(
 
 
 def _object(protocol: Protocol, gates: Gates, seen: Passages, result: DropResult) -> dict[str, Any]:
-    """Return z(t) and v(t) of an object, with the acceleration as the slope, and what is left."""
+    """Return z(t) and v(t) of an object with the fitted acceleration, and their residuals."""
     row = acceleration_in(result.quantities)
     assert row is not None
     pull = result.quantities[row.name]
     (rods,) = protocol.chains.values()
     time = seen.time - seen.time[0]
-    # Height and speed at the first beam are as they fit best; the acceleration is the result.
+    # Height and speed at the first beam are fitted; the acceleration is the session's result.
     start = np.polyfit(time, seen.height + 0.5 * pull.value * time**2, 1)
     height = np.poly1d([-0.5 * pull.value, *start])
     speed, u_speed = -height.deriv(), 2.0 * seen.speed * rods.width_u / rods.widths[0]
@@ -165,6 +165,6 @@ def _object(protocol: Protocol, gates: Gates, seen: Passages, result: DropResult
 
 
 def _errors(values: Array, expected: Array, u: Array | float) -> Array:
-    """Return what is left over in units of U: nothing finite where nothing has a U."""
+    """Return residuals in units of U; not finite without a U."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray((values - expected) / u)

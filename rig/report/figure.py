@@ -1,7 +1,7 @@
-"""A figure as plain data: what is drawn, and not how.
+"""Figures as plain data, independent of the drawing.
 
-Whoever draws it (`rig.report.plot` for pages and files) or writes it (`csv_table`) adds nothing
-to it.
+`rig.report.plot` draws them for pages and files, `csv_table` writes them as tables; neither adds
+data.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 COLUMN_PT, WIDE_PT = 244.0, 400.0
-"""A journal's column of 86 mm, which is a telephone's width too, and the width of a page."""
+"""Width of a journal's column, 86 mm, also for telephones, and of a page."""
 _FIGURES = dict(read_tables(Path(__file__).with_name("figures.txt").read_text("utf-8")))
-_FEW = 40  # points that are drawn large
+_FEW = 40  # most points that are drawn large
 _LINES = {"zero": (0.0,), "unity": (-1.0, 1.0)}
 _BARE = ("points", "cross")  # roles without bars
 _COLUMNS = ("panel", "x_axis", "y_axis", "series", "x", "y", "U95", "begins")
@@ -31,29 +31,29 @@ _COLUMNS = ("panel", "x_axis", "y_axis", "series", "x", "y", "U95", "begins")
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What is drawn in one way.
+    """A series of data drawn in the same way.
 
     Attributes
     ----------
     label
-        Written beside it; empty writes nothing.
+        Label beside the series; may be empty.
     x, y
-        In units of the axes.
+        Coordinates in units of the axes.
     role
-        How it looks. A `line`, `dash` or `thick` line joins its points, with a gap where one is not
+        Style. A `line`, `dash` or `thick` line joins its points, with a gap where one is not
         a number; a `band` fills y ± u; a `level` or `limit` is a line across the panel at each y; a
         `shade` fills the panel between two y, a `gap` between two x; `points` are small, `mean`,
         `ring` and `square` large, with bars of u; a `cross` does not set the scale; a `bar` lies
         from `base` to x; `words` are only the label, outwards from the point; a `map` shades the
         grid of x and y by z, in steps at the levels u, and `levels` are numbered lines there.
     u
-        Half-widths along y, or along x where `across`.
+        Half-widths along y, or along x if `across`.
     base
-        Where each bar begins.
+        Start of each bar.
     z
-        Of a grid, row by row.
+        Values of a grid, row by row.
     color
-        A place in `rig.report.looks.COLORS`.
+        Index into `rig.report.looks.COLORS`.
     """
 
     label: str
@@ -78,9 +78,9 @@ class PlotAxis:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Series on two axes, so many points high; neighbours with equal x axes share one.
+    """Series on two axes, with a height in points; neighbours with equal x axes share an axis.
 
-    Where the panel is `true`, a unit is as long on both axes.
+    If `true`, both axes have the same scale.
     """
 
     x: PlotAxis
@@ -91,7 +91,7 @@ class Panel:
 
     @property
     def whole(self) -> bool:
-        """Whether nothing lies between whole numbers of x, such as of runs."""
+        """Whether all x are whole numbers, such as those of runs."""
         return all(place.is_integer() for trace in self.series for place in trace.x)
 
 
@@ -102,17 +102,17 @@ class Chart:
     Attributes
     ----------
     title
-        What is shown, for who hears the page.
+        Title for screen readers.
     caption
-        One line below the figure.
+        Line below the figure.
     simulated
-        Whether to stamp it.
+        Whether to mark the figure as simulated.
     foot
-        Lines below the panels, for a figure that stands alone.
+        Lines below the panels of a separate figure.
     width
-        As a file, points.
+        Width as a file, points.
     facts
-        For programs, in the file's metadata.
+        Metadata of the file, for programs.
     """
 
     title: str
@@ -125,15 +125,15 @@ class Chart:
 
 
 def chart(name: str, *panels: Mapping[str, Any], **values: object) -> Chart:
-    """Draw a figure as ``figures.txt`` describes it.
+    """Return a figure as described in ``figures.txt``.
 
     Parameters
     ----------
     panels
-        All its panels are drawn for each: the records of their series, by name, what their labels
-        ask for, and options of both axes.
+        Data of panels, each for all panels of the figure: records of their series by name, values
+        for labels, and options of both axes.
     values
-        What title and caption ask for.
+        Values for title and caption.
     """
     title, caption, rows, _ = _FIGURES[name]
     drawn = [panel for sources in panels for panel in _panels(rows, {**_LINES, **sources})]
@@ -141,7 +141,7 @@ def chart(name: str, *panels: Mapping[str, Any], **values: object) -> Chart:
 
 
 def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[Panel]:
-    """Draw panels from their rows; without those that only lines cross, but for maps."""
+    """Return panels from their rows, without panels that have only lines across, except maps."""
     panels: list[Panel] = []
     scale = 1.0
     for kind, *cells in rows:
@@ -162,7 +162,7 @@ def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[P
 def _traces(
     role: str, cells: Sequence[str], sources: Mapping[str, Any], scale: float
 ) -> Iterator[Trace]:
-    """Draw records as one series, or each group of records as a series of its own."""
+    """Yield records as a single series, or each group of records as its own series."""
     paint, label, source, *places = cells
     name, grouped, key = source.partition("*")
     for group in sources.get(name, ()) if grouped else [sources]:
@@ -189,7 +189,7 @@ def _traces(
 
 
 def _points(cells: Sequence[str], sources: Mapping[str, Any]) -> list[Sequence[Any]]:
-    """Find the coordinates of all records that have both, or of columns of equal length."""
+    """Return the coordinates of all records with both, or of columns of equal length."""
     name, *places = (_written(cell, sources) for cell in cells)
     if name == "-":
         columns = [value_at(sources, place) for place in places]
@@ -207,17 +207,17 @@ def _written(cell: str, values: Mapping[str, Any]) -> str:
 
 
 def residual_panels(x: PlotAxis, ratios: Iterable[Sequence[float]]) -> list[Panel]:
-    """Draw the panel below a curve: what is left over in units of U, ±1 shaded.
+    """Return the panel below a curve: residuals in units of U, ±1 shaded.
 
     Parameters
     ----------
     ratios
-        Each at its place; those that are no numbers are left out, for there is no U.
+        Residuals in units of U; NaN, for points without U, are left out.
 
     Returns
     -------
     list of Panel
-        None where there is nothing to show.
+        Empty without residuals.
     """
     points = [point for point in ratios if math.isfinite(point[1])]
     most = 1.1 * max([2.0, *(abs(ratio) for _, ratio in points)])
@@ -227,7 +227,7 @@ def residual_panels(x: PlotAxis, ratios: Iterable[Sequence[float]]) -> list[Pane
 
 
 def csv_table(figure: Chart) -> str:
-    """Write all numbers of a figure as CSV, a row a point."""
+    """Return all numbers of a figure as CSV, a row for each point."""
     rows = [
         [number, panel.x.label, panel.y.label, series.label or series.role, *point]
         for number, panel in enumerate(figure.panels, 1)

@@ -1,4 +1,4 @@
-"""Figures of a session's results: what `figures.txt` draws, from the results alone."""
+"""Figures of a session's results, as described in `figures.txt`."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     Groups = list[dict[str, Any]]
 
 FEWEST_INCLINES = 3
-"""Below, a curve against incline says less than the runs themselves."""
+"""Least number of inclines for a curve; with fewer, runs are shown instead."""
 _GAP_DEG = 2.0  # the curve has a point each degree
 _SEGMENTS = {"surface": ("line", "model ± U"), "pile": ("dash", "pile")}
 _HIDDEN = " Shaded inclines: the rods would not slide, the model has no answer."
 _CHAINS = " If A and B differ above, the chains differ."
 _SMALL = 6.0
-"""Percent of U² below which a source is among the others: its name would have no room."""
+"""Percent of U² below which a source is merged with the others, for lack of room."""
 
 
 def result_figure(
@@ -43,14 +43,14 @@ def result_figure(
     bars: Bars = "U95",
     site_m_s2: float | None = None,
 ) -> Chart | None:
-    """Draw a session's result: against incline, or run by run where that is one.
+    """Return the figure of results against incline, or by run for a single incline.
 
     Parameters
     ----------
     curves
-        The model, as `rig.analysis.curves.model_curves` gives it; empty draws none.
+        Predictions of `rig.analysis.curves.model_curves`; may be empty.
     bars
-        What the bars on means stand for.
+        Meaning of the bars on means.
     site_m_s2
         Expected gravity, for scenes without a surface.
     """
@@ -63,7 +63,7 @@ def result_figure(
     inclines = {run.run.incline_deg for run in analysis.runs}
     if len(inclines) < FEWEST_INCLINES or acceleration_in(measured):
         return chart("runs", *(_by_run(analysis, row, site_m_s2) for row in rows), title=title)
-    gaps = _unanswered(curves)
+    gaps = _model_gaps(curves)
     sources = (
         {
             "row": row,
@@ -81,19 +81,19 @@ def result_figure(
 
 
 def runs_figure(analysis: Analysis, skew_limit_s: float | None = None) -> Chart | None:
-    """Draw every run in order: Δz less its prediction (or mean), and the release skew below.
+    """Return the figure of all runs in order: Δz less its prediction (or mean), and release skew.
 
     Parameters
     ----------
     skew_limit_s
-        Beyond which a run is void, s; `None` draws no limits.
+        Limit beyond which a run is void, s; `None` draws no limits.
 
     Returns
     -------
     Chart or None
-        `None` where there are no two chains.
+        `None` unless there are two chains.
     """
-    # Runs are compared with the model, or with their mean where it has no answer.
+    # Runs are compared with the model, or with their mean without a prediction.
     predicted = any(line.predicted for line in analysis.summary)
     references = {
         line.condition: reference.value
@@ -111,7 +111,7 @@ def runs_figure(analysis: Analysis, skew_limit_s: float | None = None) -> Chart 
 
 
 def budget_figure(summary: Sequence[Incline]) -> Chart | None:
-    """Draw for each quantity which share of U² of its means each source makes.
+    """Return the figure of each source's share of U² of the means, for each quantity.
 
     Returns
     -------
@@ -119,11 +119,11 @@ def budget_figure(summary: Sequence[Incline]) -> Chart | None:
         `None` where no mean has a budget.
     """
     budgets = {row: parts for row in averaged() if (parts := variance_shares(summary, row))}
-    colors: dict[str, int] = {}  # the same of a source for all quantities
+    colors: dict[str, int] = {}  # a source has the same colour for all quantities
     panels = [
         {
             "name": "share of U² of the mean (%)" if row == [*budgets][-1] else "",
-            "parts": [*_stacked(parts, colors)],
+            "parts": [*_stack_bar(parts, colors)],
             "x_axis": {"limits": (0.0, 100.0)},
             "y_axis": {"names": {0.0: row.symbol}, "limits": (-2.0, 0.6)},
         }
@@ -133,13 +133,13 @@ def budget_figure(summary: Sequence[Incline]) -> Chart | None:
 
 
 def variance_shares(summary: Sequence[Incline], row: Measurand) -> dict[str, float]:
-    """Return how many percent of the variance of the means each source makes, scatter too."""
+    """Return the share of each source, including scatter, in the means' variance, percent."""
     squares = defaultdict[str, float](float)
     for line in summary:
         mean = line.means.get(row.name)
         if mean is not None and mean.u and "common" in mean.budget:
             causes = line.causes.get(row.name, {})
-            # What the runs have in common, parted as their own budgets part it.
+            # Split the common part in proportion to the runs' own budgets.
             part = (mean.budget["common"] / mean.u) ** 2 / (sum(u**2 for u in causes.values()) or 1)
             squares["runs"] += (mean.budget.get("runs", 0.0) / mean.u) ** 2
             for cause, u in causes.items():
@@ -148,17 +148,17 @@ def variance_shares(summary: Sequence[Incline], row: Measurand) -> dict[str, flo
     return {name: 100.0 * square / total for name, square in squares.items() if total}
 
 
-def _unanswered(curves: Mapping[str, Any]) -> Groups:
-    """Inclines between those of the model's curves for which it has no answer, degrees."""
+def _model_gaps(curves: Mapping[str, Any]) -> Groups:
+    """Return gaps of the model's curves, inclines without a prediction, degrees."""
     inclines = sorted(set(curves.get("incline_deg", ())))
     return [{"ends": ends} for ends in pairwise(inclines) if ends[1] - ends[0] > _GAP_DEG]
 
 
-def _stacked(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dict[str, Any]]:
-    """Lay one bar, source after source, the largest first."""
+def _stack_bar(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dict[str, Any]]:
+    """Yield the segments of a bar, a source each, the largest first."""
     begin = 0.0
     for name, share in sorted(parts.items(), key=lambda part: -part[1]):
-        # Sources beyond the colours are among the others.
+        # Sources without a colour are merged with the others.
         color = colors.get(name) or dict(enumerate(PARTS)).get(len(colors))
         if share > _SMALL and color is not None:
             colors[name], points = color, [(begin + share, 0.0, begin)]
@@ -170,21 +170,21 @@ def _stacked(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dic
 
 
 def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Iterator[dict[str, Any]]:
-    """Part the model's curve: on the surface, on the pile, and of unlike chains."""
+    """Yield the segments of the model's curve: on the surface, on the pile, for unlike chains."""
     if row.name not in curves:
         return
     names = curves.get("segments") or ["surface"] * len(curves["incline_deg"])
     columns = (curves[name] for name in ("incline_deg", row.name, row.key("U95")))
     first = names[0].partition(", ")[2]
     for name, points in groupby(zip(names, *columns, strict=True), key=itemgetter(0)):
-        where, _, chain = name.partition(", ")  # unlike chains have curves of their own
+        where, _, chain = name.partition(", ")  # unlike chains have separate curves
         role, words = _SEGMENTS[where]
         color, label = "model" if chain == first else "second", f"{words}, {chain}".rstrip(", ")
         yield {"role": role, "color": color, "label": label, "points": [*points]}
 
 
 def _by_run(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> dict[str, Any]:
-    """Say what a measurand is in each run, its mean with U as a strip, and what is expected."""
+    """Return a measurand in each run, its mean with U as a band, and the expected value."""
     means = means_of(analysis.summary, row)
     expected = [site_m_s2] if acceleration_in([row.name]) else []
     expected += [value_of(mean.line.predicted.get(row.name)) for mean in means]
@@ -208,10 +208,10 @@ def _by_run(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> dict
 def _runs_by_chain(
     analysis: Analysis, row: Measurand, references: Mapping[Condition, float] | None = None
 ) -> Groups:
-    """Part a quantity of every run: a series for each chain that strikes, crosses for void runs."""
+    """Return a quantity of all runs, a series for each striking chain; crosses for void runs."""
     points = defaultdict[str, list[Any]](list)
     for run in sorted(analysis.runs, key=attrgetter("run.number")):
-        like = Condition(run.run.incline_deg)  # where it makes no difference which one strikes
+        like = Condition(run.run.incline_deg)  # for like chains
         own = like._replace(impact_chain=run.run.impact)
         reference = references.get(own, references.get(like)) if references is not None else 0.0
         value = run.quantities.get(row.name)

@@ -1,4 +1,4 @@
-"""What a session says in plain sentences: on its card, below its results, and of its plan."""
+"""Plain sentences about a session: its card, remarks on its results, deviations from its plan."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 MOST_NUMBERS = 3
 _REFERENCES = {GRAVITY: "the protocol's gravity", ACCELERATION: "the acceleration without friction"}
-"""What strikes nothing is compared with."""
+"""Reference values of scenes without impacts."""
 NONE = "No deviations: every planned run was recorded once, in the planned order."
 
 
 class Number(NamedTuple):
-    """A number for a card: what it is, its value ± U, its unit, and of which incline."""
+    """A number for a card: quantity, value ± U, unit and incline."""
 
     quantity: str
     value: str
@@ -41,25 +41,25 @@ class Number(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What it is, and where."""
+        """Quantity and incline in words."""
         return f"{self.quantity} at {self.place}" if self.place else self.quantity
 
 
 class ModelCheck(NamedTuple):
-    """Whether measurement and prediction agree, in one sentence."""
+    """Agreement of measurement and prediction, with a sentence."""
 
     sentence: str
     agrees: bool
 
 
 def finding(analysis: Analysis) -> str:
-    """Say how many drops there were, what they gave with U, and whether the model agrees."""
+    """Return a sentence with the number of drops, the result with U, and the model check."""
     summary = analysis.summary
     return sentence("finding", analysis, headline(summary), verdict(summary).sentence)
 
 
 def headline(summary: Sequence[Incline]) -> list[Number]:
-    """Choose at most three numbers: the largest and least mean, or what one differs by."""
+    """Return at most three numbers: the largest and smallest mean, or a mean and its difference."""
     numbers: list[Number] = []
     for row in averaged():
         means = sorted(means_of(summary, row), key=lambda mean: -mean.mean.value)
@@ -72,22 +72,22 @@ def headline(summary: Sequence[Incline]) -> list[Number]:
         if len(summary) == 1 and row.name in summary[0].differences:
             difference = summary[0].differences[row.name]
             value = plus_minus(difference, row.fine_scale, row.fine_decimals)
-            numbers.append(Number(f"{row.symbol} − {_expected(row)}", value, row.fine))
+            numbers.append(Number(f"{row.symbol} − {_reference(row)}", value, row.fine))
     return numbers[:MOST_NUMBERS]
 
 
 def verdict(summary: Sequence[Incline]) -> ModelCheck:
-    """Say in one sentence whether means and predictions agree within U."""
+    """Return whether means and predictions agree within U, with a sentence."""
     rows = [row for row in averaged() if any(row.name in line.differences for line in summary)]
     off = [mean for row in rows for mean in means_of(summary, row) if abs(mean.error or 0.0) > 1.0]
     worst = max(off, key=lambda mean: abs(mean.error or 0.0), default=None)
     row = worst.row if worst else next(iter(rows), None)
     where = f" at {_place(worst.line)}" if worst and len(summary) > 1 else ""
-    expected = _expected(row) if row else ""
+    expected = _reference(row) if row else ""
     return ModelCheck(sentence("verdict", summary, rows, off, worst, expected, where), not off)
 
 
-def _expected(row: Measurand) -> str:
+def _reference(row: Measurand) -> str:
     return _REFERENCES.get(row, "the model")
 
 
@@ -109,7 +109,7 @@ def remarks(results: SessionResults) -> list[str]:
 
 
 def common_lines(summary: Sequence[Incline]) -> list[str]:
-    """Name the largest systematic errors that all means share."""
+    """Return lines about the largest systematic errors that all means share."""
     causes: dict[str, None] = {}
     for row in averaged():
         budgets = [line.causes[row.name] for line in summary if line.causes.get(row.name)]
@@ -121,7 +121,7 @@ def common_lines(summary: Sequence[Incline]) -> list[str]:
 
 
 def void_lines(analysis: Analysis) -> list[str]:
-    """Return why drops are void, a line for each kind of reason, and what to do about them."""
+    """Return lines about void drops, one for each kind of reason, with a remedy."""
     voids = [drop for drop in analysis.drops if drop.verdict == "void"]
     kinds = defaultdict[Any, list[Any]](list)
     for drop in voids:
@@ -134,7 +134,7 @@ def void_lines(analysis: Analysis) -> list[str]:
 
 
 def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
-    """Say what times are corrected by, and how well that is known.
+    """Return lines about the correction of times and its uncertainty.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def clock_lines(calibration: Mapping[str, Any]) -> list[str]:
 
 
 def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEntry]) -> list[str]:
-    """List what was omitted, repeated, interrupted, rejected or recorded in another order.
+    """Return sentences about omitted, repeated, interrupted, rejected or reordered runs.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEnt
     Returns
     -------
     list of str
-        Sentences; `NONE` alone where there is no deviation.
+        Sentences; only `NONE` without deviations.
     """
     first = dict.fromkeys(entry.run for entry in states if entry.state is RunState.RECORDED)
     late = [after for before, after in pairwise(first) if after < before]

@@ -1,4 +1,4 @@
-"""Colours of all figures, on light and on dark pages, as `looks.txt` names them."""
+"""Colours of all figures, on light and dark pages, as named in `looks.txt`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ _ROWS = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
 COLORS = [row.split()[1:] for row in _ROWS if not row.startswith("#")]
 INK, MODEL, SECOND = 0, 1, 2
 PARTS = (1, 3, 4, 5, 6, 7)
-"""Colours of parts of a whole."""
+"""Colours for the segments of stacked bars."""
 REST, MUTED, RULE, PAPER = 8, 9, 10, 11
 
 SIZE = 8.0
-"""Points, of all type in a figure."""
+"""Font size in figures, points."""

@@ -1,7 +1,7 @@
-"""Where emitters and receivers go: both posts from the side, the board at its inclines, the slots.
+"""Mounting drawing of emitters and receivers: posts from the side, board at its inclines, slots.
 
-Rods hang along the level lines of the board, and a beam crosses them front to back: so it runs up
-the slope and into the board, unless there is a slot, or its uphill part stands before the board.
+Rods hang along the level lines of the board, and a beam crosses them from front to back. So the
+beam meets the board uphill, unless the board has a slot, or the uphill part is before the board.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 _SIDES = {"impact": (-1, "line", "second"), "free": (1, "dash", "model")}
 _WIDTH_PT = 530.0
-_NEAR_M = 0.16  # what is drawn larger once more
+_NEAR_M = 0.16  # height of the enlarged detail
 _POST_M = 0.12  # from the chains to the posts, as drawn
 _LOW_M = -0.02  # shown below the zero
 _MM = 1e3
 
 
 def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
-    """Draw how the gates of a protocol are mounted; lengths are in mm.
+    """Return the mounting drawing of a protocol's gates; lengths are in mm.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
         near = max(_NEAR_M, 1.5 * min(gate.height for gate in gates.gates))
         lowest = f"close to the {protocol.zero}" if inclines else "lowest gates"
         whole = "posts and beams, from the side"
-        # What lies below is named in the other view, where there is room.
+        # Gates below are labelled in the other view, which has room.
         above = _side_view(protocol, gates, 1.04 * max(highest, hanging), near, whole)
         below = _side_view(protocol, gates, near, 0.0, lowest)
         figure = chart("mounting", above, below, title=protocol.title)
@@ -56,29 +56,29 @@ def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
 
 
 def face_below(protocol: Protocol, incline_deg: float) -> float:
-    """How far the board's face is under the zero of the heights, m."""
+    """Return the depth of the board's face below the zero of the heights, m."""
     if protocol.contact.from_board:
-        return 0.0  # heights are counted from there
+        return 0.0  # heights are relative to the board
     thick = max((d for c in protocol.chains.values() for d in c.diameters), default=0.0)
     return thick / 2 / math.cos(math.radians(incline_deg))
 
 
 def beam_ends(protocol: Protocol, height: float, incline_deg: float) -> tuple[float, float]:
-    """Say where a beam meets the board.
+    """Return where a beam meets the board.
 
     Parameters
     ----------
     protocol
         The scene.
     height
-        Of the beam above the contact point, m.
+        Height of the beam above the contact point, m.
     incline_deg
-        Of the board, above 0.
+        Inclination of the board, above 0.
 
     Returns
     -------
     float, float
-        How far uphill of the chain, level, m; how far up along the board's face, from the point
+        Horizontal distance uphill of the chain, m; distance along the board's face from the point
         under the chain, m.
     """
     slope = math.radians(incline_deg)
@@ -91,7 +91,7 @@ def _inclines(protocol: Protocol) -> list[float]:
 
 
 def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, Any]:
-    """Draw a track from the side, with beams across it; all lengths are along it, from one mark."""
+    """Return a track from the side with its beams; all lengths are along the track from a mark."""
     slope, start = math.radians(track.incline_deg.value), protocol.drop.value
 
     def at(along: float, above: float = 0.0) -> Point:
@@ -115,13 +115,13 @@ def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, 
 def _side_view(
     protocol: Protocol, gates: Gates, top: float, named_above: float, title: str
 ) -> dict[str, Any]:
-    """Draw what is below a height, to scale, and name gates; uphill is to the right."""
+    """Return the part below a height, to scale, with names of gates; uphill is to the right."""
     inclines = _inclines(protocol)
     post = _POST_M if top > 2 * _POST_M else top / 2
     chain = next(iter(protocol.chains.values()))
     beams, boards = [], []
     for place, incline in enumerate(inclines):
-        away = top * (0.3 if place % 2 else 0.45)  # neighbours' names would meet
+        away = top * (0.3 if place % 2 else 0.45)  # neighbours' names would overlap
         slope, face = math.radians(incline), face_below(protocol, incline)
         at = away * math.cos(slope), away * math.sin(slope) - face
         ends = [(y, y * math.tan(slope) - face) for y in (-0.5 * post, 1.2 * post)]

@@ -1,4 +1,4 @@
-"""Numbers as a physicist writes them: the uncertainty decides the digits."""
+"""Formatting of numbers: the uncertainty determines the digits."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
 
 
 def value_of(quantity: object) -> float | None:
-    """Best estimate of a quantity, or a bare number; `None` where there is none that is finite."""
+    """Return the best estimate of a quantity, or a bare number; `None` if not finite."""
     value = getattr(quantity, "value", quantity)
     return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Write a number with that many decimals and a true minus sign; nothing for `None`."""
+    """Return a number with `decimals` decimals and a true minus sign; empty for `None`."""
     if value is None:
         return ""
     return f"{value:z.{decimals}f}".replace("-", MINUS)
 
 
 def signed(text: str) -> str:
-    """Give negative numbers within a sentence a true minus sign."""
+    """Return a sentence with true minus signs in negative numbers."""
     return _NEGATIVE.sub(MINUS, text)
 
 
 def degrees(incline_deg: float) -> str:
-    """Write an inclination."""
+    """Return an inclination as text."""
     return f"{incline_deg:g}".replace("-", MINUS)
 
 
 def decimals_for(uncertainty: float | None, default: int = 3) -> int:
-    """Decimals that show two significant digits of an uncertainty (GUM 7.2.6)."""
+    """Return the decimals that show two significant digits of an uncertainty (GUM 7.2.6)."""
     if uncertainty is None or uncertainty <= 0:
         return default
-    exponent = f"{uncertainty:.1e}".partition("e")[2]  # of 0.0996 that of 0.10
+    exponent = f"{uncertainty:.1e}".partition("e")[2]  # after rounding: 0.0996 counts as 0.10
     return min(max(1 - int(exponent), 0), 9)
 
 
 def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
-    """Write ``value ± U95`` with the digits U95 deserves; nothing where there is no value.
+    """Return ``value ± U95`` with two significant digits of U95; empty without a value.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
     scale
         Factor to the unit of the column, for example 100 from m to cm.
     default
-        Decimals where there is no uncertainty.
+        Decimals without an uncertainty.
     """
     value, expanded = value_of(quantity), value_of(getattr(quantity, "expanded", None))
     if value is None or expanded is None:
@@ -67,12 +67,12 @@ def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:
 
 
 def with_unit(quantity: object, row: Measurand) -> str:
-    """Write a measurand ± U in its usual unit."""
+    """Return a measurand ± U in its usual unit."""
     return f"{plus_minus(quantity, row.scale, row.decimals)} {row.unit}"
 
 
 def ranges(noun: str, numbers: Iterable[int]) -> str:
-    """Write numbers, neighbours together: runs 3, 5–8."""
+    """Return numbers with consecutive ones as ranges: runs 3, 5–8."""
     places = {number: place for place, number in enumerate(sorted(set(numbers)))}
     spans = [[*span] for _, span in groupby(places, lambda number: number - places[number])]
     names = ["–".join(str(end) for end in dict.fromkeys((each[0], each[-1]))) for each in spans]

@@ -1,4 +1,4 @@
-"""The paper's figures, drawn anew from its equations."""
+"""The paper's figures, computed from its equations."""
 
 from __future__ import annotations
 
@@ -22,21 +22,19 @@ _NO_LINE = "No line from just above 0° to arctan μ = 11.3°: the rods would no
 def paper_figure(
     number: int, resolved: Columns | None = None
 ) -> tuple[Chart, dict[str, list[float]]]:
-    """Draw one of the paper's figures.
+    """Return a figure of the paper, and its numbers.
 
     Parameters
     ----------
     number
         3 (Δz and V against inclination), 4 (height against V²) or 6 (against rod inertia).
     resolved
-        What falls in the resolved world give for it, to be drawn too; see
-        `rig.bench.resolved_paper`. Of figures 3 and 4 only.
+        Results of falls in the resolved world to be drawn as well; only for figures 3 and 4.
 
     Returns
     -------
     figure, columns
-        The figure, with what the text says of it and the equations do not below it; and its
-        numbers.
+        The figure, with claims of the text that differ from the equations below; and its numbers.
     """
     columns = getattr(paper, f"figure_{number}")()
     foot = [
@@ -49,10 +47,10 @@ def paper_figure(
 
 
 def _figure_3(model: Columns, resolved: Columns) -> Iterator[dict[str, Any]]:
-    """Δz above, V below; of resolved falls the means with their standard deviations."""
+    """Yield Δz above, V below; for resolved falls the means with standard deviations."""
     rows = [dict(zip(model, row, strict=True)) for row in zip(*model.values(), strict=True)]
     surface = [row for row in rows if not row["pile"]]
-    # The rods do not slide between level and arctan μ: no line across.
+    # Rods do not slide between 0° and arctan μ: the curve has a gap there.
     start = surface[0]["incline_deg"] == 0.0
     for row in (SEPARATION, SPEED):
         yield {
@@ -70,13 +68,13 @@ def _figure_3(model: Columns, resolved: Columns) -> Iterator[dict[str, Any]]:
 
 
 def _figure_4(model: Columns, resolved: Columns) -> Iterator[dict[str, Any]]:
-    """Height against V², with the separation at the end; the paper's own point is hollow."""
+    """Yield height against V², with the final separation; the paper's point is hollow."""
     measured = [(model["free_speed2"][-1], paper.MEASURED_GRADED_SEPARATION)]
     yield {"model": model, "measured": measured, "resolved": resolved}
 
 
 def _figure_6(model: Columns, _: Columns) -> Iterator[dict[str, Any]]:
-    """Against ξ, with the closed forms beside the discrete model."""
+    """Yield Δz and V against ξ, with the closed forms and the discrete model."""
     for row, number in ((SEPARATION, 15), (SPEED, 14)):
         yield {"row": row, "number": number, "model": model}
 

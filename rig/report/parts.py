@@ -1,4 +1,4 @@
-"""Tables of a session's results, for the page and the terminal alike."""
+"""Tables of a session's results, for page and terminal."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 
 Bars = Literal["U95", "u", "SE", "SD", "half-SD"]
-"""What the bars on a mean stand for, which is the reader's choice: its expanded or standard
-uncertainty, its standard error by scatter alone, the standard deviation of one run, or half of it,
-as in Pantaleone's figures."""
+"""Meaning of the bars on a mean, chosen by the user: its expanded or standard uncertainty, its
+standard error by scatter alone, the standard deviation of a run, or half of that, as in
+Pantaleone's figures."""
 LABELS: dict[Bars, str] = {
     "U95": "U (95 %)",
     "u": "u",
@@ -35,7 +35,7 @@ LABELS: dict[Bars, str] = {
 
 
 class Mean(NamedTuple):
-    """A measurand of a line of the summary that has its mean, as tables ask for it."""
+    """Mean of a measurand in a line of the summary, with properties for tables."""
 
     line: Incline
     row: Measurand
@@ -57,7 +57,7 @@ class Mean(NamedTuple):
 
     @property
     def bars(self) -> dict[Bars, float | None]:
-        """Half the length of each kind of bar; `None` for the scatter of a single run."""
+        """Half-length of each kind of bar; `None` for the scatter of a single run."""
         sd = self.line.deviations.get(self.row.name)
         return {
             "U95": self.mean.expanded,
@@ -69,26 +69,26 @@ class Mean(NamedTuple):
 
 
 def means_of(summary: Sequence[Incline], *rows: Measurand) -> list[Mean]:
-    """Return the lines that have a mean of a measurand, for each of those named, or for all."""
+    """Return the means of these measurands, by default of all, in all lines of the summary."""
     return [
         Mean(line, row) for row in rows or averaged() for line in summary if row.name in line.means
     ]
 
 
 def summary_incline(line: Incline) -> str:
-    """Write the inclination of a mean; nothing where nothing is struck, so nothing is inclined."""
+    """Return the inclination of a mean as text; empty without a surface."""
     return "" if acceleration_in(line.means) else degrees(line.incline_deg)
 
 
 def means_parts(summary: Sequence[Incline]) -> list[Part]:
-    """Return the means of each measurand beside the model; unlike chains have a line each."""
+    """Return tables of means with the model's values, with a line for each unlike chain."""
     return [part for row in averaged() for part in tables("model", means_of(summary, row), row=row)]
 
 
 def tables(
     name: str, records: Iterable[Any], words: Iterable[str] = (), row: Measurand | None = None
 ) -> Iterator[Part]:
-    """Yield a table of ``columns.txt`` of means, of drops, or of what both have."""
+    """Yield a table of ``columns.txt`` for means or drops."""
     return table_parts(name, records, words, _CELLS, row)
 
 
@@ -110,12 +110,12 @@ _CELLS: dict[str, Callable[[Any], str]] = {
 
 
 def summary_table(summary: Sequence[Incline]) -> str:
-    """Write the summary as aligned text, a block for each measurand, none wider than 80.
+    """Return the summary as aligned text, a block for each measurand, at most 80 columns wide.
 
     Returns
     -------
     str
-        Lines without an end of line at the last; one sentence where there is no summary.
+        Lines without a final newline; a sentence if there is no summary.
     """
     blocks = ["\n".join(part.table) for part in means_parts(summary)]
     return "\n\n".join(blocks) or "No accepted runs, so no summary."

@@ -1,4 +1,4 @@
-"""A page as PDF, without a browser: by WeasyPrint (the extra ``pdf``)."""
+"""Conversion of a page to PDF by WeasyPrint (the extra ``pdf``), without a browser."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _DRAWN = re.compile(r'(?<=<figure class="fig">).*?(?=<figcaption>)', re.DOTALL)
 
 
 def write_pdf(path: str, html: str, figures: Sequence[Chart]) -> None:
-    """Set a page on paper: figures as in their own files, what is attached as attachments.
+    """Write a page as PDF, with figures as in their files, and attachments.
 
     Parameters
     ----------
     html, figures
-        As `rig.report.templates.page_html` gives them.
+        Results of `rig.report.templates.page_html`.
     """
     charts = iter(figures)
 

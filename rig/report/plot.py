@@ -1,4 +1,4 @@
-"""Figures as matplotlib draws them, their series named beside them, for files and for pages."""
+"""Drawing of figures with matplotlib, with labels beside the series, for files and pages."""
 
 from __future__ import annotations
 
@@ -29,19 +29,21 @@ _LETTER, _TYPED = 0.57 * SIZE, 0.61 * SIZE
 """Mean width of the digits and letters of the fonts in question, and those of a typewriter."""
 _LINE = 1.25 * SIZE
 _GAP_PT, _RIGHT_PT, _NEAR_PT = 8.0, 9.0, 4.0
-_DIGITS = 6  # of numbers at an axis
-_PLACES = 16  # along a series, where its name may stand
-_CROWDED = 500  # points that a name may rather hide than touch another
+_DIGITS = 6  # most digits of numbers on an axis
+_PLACES = 16  # candidate positions of a label along a series
+_CROWDED = 500  # cost of touching another label, in hidden points
 _AWAY, _FAR_PT = (16.0, 24.0, 32.0, 40.0, 48.0, 56.0), 20.0
-"""How far names may stand off a line, and how much farther rather than to hide a point, points."""
+"""Distances of labels from a line, and the further distance worth a hidden point, points."""
 _FAINT: dict[str, Any] = {"alpha": 0.2, "linewidth": 0.0}
 _PAGE = (
     (r"<metadata>.*?</metadata>|<defs>\s*<style.*?</defs>|<!--.*?-->", ""),
     (r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1"),
     (r'<g id="[^"]*"', "<g"),
     (r" ?(font: |font-family|font-size)[^;\"]*;?|\n *", " "),
+    (r' transform="rotate\(-0 [^"]*"|<g */>', ""),
+    (r">\s+<", "><"),
 )
-"""What a page has no use for: it has a style sheet of its own."""
+"""What SVG has that a page with its own style sheet does not need."""
 _AREAS = ("bar", "band", "map", "levels")
 _LINES = ("line", "dash", "level", "limit")
 _LOOKS = tomllib.loads(Path(__file__).with_name("roles.toml").read_text("utf-8"))
@@ -49,7 +51,7 @@ _LOOKS["ring"]["markerfacecolor"] = COLORS[PAPER][0]
 
 
 def plot(chart: Chart, width: float | None = None) -> Figure:
-    """Draw a figure in a width, points; by default in its own."""
+    """Return a figure drawn with a width in points, by default its own."""
     width = width or chart.width
     letters = int(width / _TYPED)
     foot = [
@@ -86,22 +88,22 @@ def plot(chart: Chart, width: float | None = None) -> Figure:
                 _draw(axes, trace)
             axes.autoscale_view()
             if panel.whole and np.ptp(axes.get_xlim()) < 1.0:
-                axes.margins(x=10.0)  # of a single run
+                axes.margins(x=10.0)  # for a single run
         for panel, axes in zip(panels, figure.axes, strict=True):
             _name_series(axes, panel)
     return figure
 
 
 def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:
-    """Return SVG for a page, of a class and with names of its own, in the page's colours."""
+    """Return SVG for a page, with a class, unique ids and the page's colours."""
     svg = drawing_file(plot(chart, width), "svg").decode()
     svg = svg[svg.index("<svg") :]
     for pattern, words in _PAGE:
         svg = re.sub(pattern, words, svg, flags=re.DOTALL)
-    # One decimal, and no space where a letter parts numbers.
+    # One decimal, and no space where a letter separates numbers.
     terse = partial(re.sub, r"(\.\d)\d+| +(?=[A-Zz])|(?<=[A-Z]) +", r"\1")
     svg = re.sub(r"<[^>]*>", lambda tag: terse(tag[0]), svg)
-    # Two figures have the same marks, and one of them may be hidden.
+    # Make ids unique: two figures have the same ids, and one may be hidden.
     svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{mark}-", svg)
     rules = ""
     for number, look in enumerate(sorted(set(re.findall(r' style="([^"]*)"', svg)))):
@@ -147,7 +149,7 @@ def _draw(axes: Axes, trace: Trace) -> None:
             axes.barh(y, x - trace.base, 0.72, trace.base, color=color)
         case "map" | "levels":
             _draw_map(axes, trace)
-        case "words" | "cross":  # texts do not set the scale of y
+        case "words" | "cross":  # texts do not affect the scale of y
             cross = trace.role == "cross"
             side, words = (
                 ("center", "×") if cross else ("left" if x[0] > 0 else "right", trace.label)
@@ -178,7 +180,7 @@ def _draw_map(axes: Axes, trace: Trace) -> None:
 
 
 def _name_series(axes: Axes, panel: Panel) -> None:
-    """Write each series' name beside it, where it hides least."""
+    """Write each series' label beside it, where it hides least."""
     lines = (trace for trace in panel.series if trace.y and trace.role not in _AREAS)
     taken = np.vstack([np.empty((0, 2)), *(_shown(axes, trace) for trace in lines)])
     left, bottom, right, top = axes.bbox.extents
@@ -189,7 +191,7 @@ def _name_series(axes: Axes, panel: Panel) -> None:
         bar, places = trace.role == "bar", _shown(axes, trace)
         wide = len(trace.label) * _LETTER
         rows = [-4.0 - row * _LINE for row in range(1, 5)] if bar else [3.0, -SIZE - 2.0, -3.0]
-        if trace.role in {"level", "limit"}:  # among bars, a name may stand off its line
+        if trace.role in {"level", "limit"}:  # among bars, a label may be away from its line
             rows += [(2 * up - 1) * away for away in _AWAY for up in (0, 1)]
         offsets = [(dx, dy) for dy in rows for dx in (-wide / 2, 5.0, -wide - 5.0)]
         step = slice(None, None, max(1, len(places) // _PLACES))
@@ -210,13 +212,13 @@ def _name_series(axes: Axes, panel: Panel) -> None:
 
 
 def _meet(low: Array, high: Array, starts: Array, ends: Array) -> Any:
-    """Count for each box how many others it meets."""
+    """Return the number of other boxes that each box overlaps."""
     across, up = np.moveaxis((low[:, None] < ends) & (starts < high[:, None]), 2, 0)
     return (across & up).sum(axis=1)
 
 
 def _shown(axes: Axes, trace: Trace) -> Array:
-    """Return points on the drawing along what a series shows, none far from the next."""
+    """Return closely spaced points along a series, in drawing coordinates."""
     x, y, u = (np.array(values, float) for values in (trace.x, trace.y, trace.u))
     if trace.role == "bar":
         x, y = (x + trace.base) / 2, y - 0.36

@@ -1,6 +1,6 @@
-"""The report of a session: what its template asks for, see `session.html`.
+"""Data of a session's report for its template `session.html`.
 
-It computes nothing: all numbers are those of the session's results.
+All numbers come from the session's results; nothing is computed here.
 """
 
 from __future__ import annotations
@@ -14,12 +14,10 @@ from typing import TYPE_CHECKING, Any
 from rig import __version__
 from rig.analysis import curves
 from rig.analysis.result import GOOD
-from rig.films import read_films
 from rig.measurands import SEPARATION
 from rig.protocol import plan
 from rig.report import attachments, estimate, figures, finding, parts, timeline
 from rig.report.falls import fall_figures
-from rig.report.film import film_figure
 from rig.report.numbers import value_of
 from rig.results import improvements, protocol_of
 from rig.results.whole import notes
@@ -45,21 +43,21 @@ def session_page(
     estimated: SessionEstimate | None,
     sections: Sections,
 ) -> dict[str, Any]:
-    """Return what `session.html` asks for; its sections are made as they are written.
+    """Return the data for `session.html`; sections are made when the template writes them.
 
     Parameters
     ----------
     session, outcome
         The session's results.
     bars
-        What the bars on means stand for.
+        Meaning of the bars on means.
     estimated
-        What `rig estimate` says of the impacts, where that is wanted.
+        Results of `rig estimate`, if wanted.
     sections
-        Where a section that cannot be made is noted.
+        Collects the names of failed sections.
     """
     protocol = protocol_of(session)
-    # Each was compared with its bytes as it was analysed; of those that are damaged none is drawn.
+    # The analysis checked each drop against its bytes; damaged drops are not drawn.
     whole = [drop for drop in outcome.analysis.drops if not drop.damaged]
     records = ((session.drop(drop.run.number, drop.attempt), drop) for drop in whole)
     return {
@@ -78,39 +76,29 @@ def session_page(
         "created": datetime.fromisoformat(session.meta["created"]),
         "notes": notes(session),
         "fall": _best_fall,
-        "fallen": _films,
         "versions": {"rig": __version__} | {name: version(name) for name in ("numpy", "scipy")},
         **{module.__name__.rpartition(".")[2]: module for module in _MODULES},
     }
 
 
 def _make(sections: Sections, words: str, make: Callable[..., Any], *arguments: Any) -> list[Any]:
-    """Return what a section consists of, less what there is not; nothing where that fails."""
+    """Return the parts of a section without empty ones; an empty list if it fails."""
 
-    def listed() -> list[Any]:
+    def list_parts() -> list[Any]:
         parts = make(*arguments)
         many = isinstance(parts, Iterable) and not isinstance(parts, Mapping)
         return [part for part in (parts if many else [parts]) if part is not None]
 
-    return sections.make(words, listed) or []
+    return sections.make(words, list_parts) or []
 
 
 def _best_fall(
     protocol: Protocol, timed: Iterable[tuple[Drop, Any, DropResult]]
 ) -> Iterator[Chart]:
-    """Draw the good run that shows most: where the separation is largest, else the first."""
+    """Return the figures of the good run with the largest separation, or of the first."""
     good = [drop for drop in timed if drop[-1].verdict in GOOD]
     good.sort(key=lambda drop: -(value_of(drop[-1].quantities.get(SEPARATION.name)) or 0.0))
     return fall_figures(protocol, *good[0]) if good else iter(())
-
-
-def _films(session: Reader, runs: Iterable[DropResult]) -> Iterator[Chart]:
-    """Draw how simulated chains fell: the first that counts, and the first that does not."""
-    films = read_films(session.path) if session.simulated else {}
-    drops = [(films.get((drop.run.number, drop.attempt)), drop.verdict in GOOD) for drop in runs]
-    for counts in (True, False):
-        shown = [film for film, good in drops if film is not None and good is counts]
-        yield from map(film_figure, shown[:1])
 
 
 _MODULES = attachments, curves, estimate, figures, finding, improvements, parts, plan, timeline

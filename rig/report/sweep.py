@@ -1,4 +1,4 @@
-"""A sweep as a picture: curves along one parameter, or maps over two."""
+"""Figure of a sweep: curves along a parameter, or maps over two."""
 
 from __future__ import annotations
 
@@ -26,54 +26,54 @@ if TYPE_CHECKING:
 
 _LEVELS = 7
 _SPAN = 0.995
-"""Share of the values that the levels span: next to a singular Eq. 13 speeds have no bound."""
+"""Share of the values within the levels: near a singular Eq. 13 speeds are unbounded."""
 
 
 def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Chart:
-    """Draw a sweep of one axis or two.
+    """Return the figure of a sweep of one axis or two.
 
     Parameters
     ----------
     facts
-        Its provenance: named below the picture, and whole in the file's metadata.
+        Provenance: named below the figure, and complete in the file's metadata.
     layout, swept
-        The first of two axes goes to the right.
+        Axes and values of the sweep; the first of two axes is horizontal.
 
     Returns
     -------
     Chart
-        Where the model has no answer the picture is empty; where the point lies beyond its domain,
-        lines are dashed. Levels span what is found inside the domain.
+        Points without a solution are empty; outside the model's domain lines are dashed. Levels
+        cover the values inside the domain.
     """
     rows = (SEPARATION, SPEED) if layout.two_chains else (SPEED,)
     panels = (_panel(row, layout, swept) for row in rows)
     labels = {variable.column: variable.label for variable in VARIABLES.values()}
     foot = str(render("sweep.txt", facts=facts, labels=labels)).split("\n")
-    kind = "map" if len(layout.grid.axes) > 1 else "sweep"
+    kind = "map" if len(layout.axes) > 1 else "sweep"
     figure = chart(kind, *panels, title=facts["title"])
     record = json.dumps(facts, ensure_ascii=False)
     return replace(figure, caption=foot[-1], foot=foot, width=WIDE_PT, facts=record)
 
 
 def _panel(row: Measurand, layout: Layout, swept: Swept) -> dict[str, Any]:
-    """Draw one quantity: along an axis, or as a map, whose own axis says what its levels are."""
+    """Return a quantity along an axis, or as a map with an axis for its levels."""
     values: Floats = getattr(swept, row.name)
     axes: dict[str, Any] = {"row": row}
-    for name, axis in zip("xy", layout.grid.axes, strict=False):
-        axes[name] = VARIABLES[axis.name].label
-        axes[f"{name}_axis"] = {"limits": (axis.values[0], axis.values[-1])}
+    for name, (varied, numbers) in zip("xy", layout.axes.items(), strict=False):
+        axes[name] = VARIABLES[varied].label
+        axes[f"{name}_axis"] = {"limits": (numbers[0], numbers[-1])}
     if "y" in axes:
         return {**axes, "traces": _map(row, layout, values, swept)}
-    # The step from the pile to the surface is no part of either curve.
+    # The step from the pile to the surface belongs to neither curve.
     piled = (swept.notes & PILE) > 0
     curves = (np.where(piled == below, values, np.nan) for below in (False, True))
     parts = [{"whole": part, "inside": np.where(swept.in_domain, part, np.nan)} for part in curves]
-    return {**axes, "places": layout.grid.axes[0].values, "parts": parts}
+    return {**axes, "places": next(iter(layout.axes.values())), "parts": parts}
 
 
 def _map(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:
-    """Yield the whole map, and the levels inside the model's domain."""
-    across, up = (list(axis.values) for axis in layout.grid.axes)
+    """Yield the map, and its levels inside the model's domain."""
+    across, up = map(list, layout.axes.values())
     whole = row.scale * values.T
     inside = np.where(swept.in_domain.T, whole, np.nan)
     shown = inside[np.isfinite(inside)]

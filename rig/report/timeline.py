@@ -19,22 +19,22 @@ if TYPE_CHECKING:
 _LEFT, _WIDTH, _LANE = 112, 640, 15
 _STEPS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 _MOST_NUMBERS = 12
-_LONGEST = 2.0  # times as long as most: what falls later in a drop is not drawn
+_LONGEST = 2.0  # longest time shown, in units of the median drop
 _ROOM = 480_000
-"""Characters of all timelines together, see `rig.report.attachments`."""
+"""Most characters of all timelines together, see `rig.report.attachments`."""
 _AROUND = 900  # characters of a timeline's frame and caption
-_FINE = 2  # steps of a pixel: whole numbers keep a page with a hundred drops small
+_FINE = 2  # steps in a pixel: whole numbers keep a page with a hundred drops small
 
 
 class Lanes(NamedTuple):
-    """What all timelines of a page have in common: gates from the top down, and the time shown."""
+    """Common layout of all timelines of a page: gates from the top down, and the time range."""
 
     gates: tuple[Gate, ...]
     span_ms: float
 
     @property
     def ticks(self) -> list[tuple[int, float]]:
-        """Milliseconds on that axis, and where they are."""
+        """Ticks of the time axis, ms, and their positions."""
         step = next((ms for ms in _STEPS_MS if self.span_ms / ms <= _MOST_NUMBERS), 1000)
         per_ms = _WIDTH / self.span_ms
         return [(ms, _LEFT + ms * per_ms) for ms in range(0, int(self.span_ms) + 1, step)]
@@ -51,7 +51,7 @@ class Timeline(NamedTuple):
 def timelines(
     gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
 ) -> tuple[Lanes, list[Timeline]]:
-    """Draw when each beam was blocked, as far as there is room.
+    """Return the timelines of blocked beams, within the limit of size.
 
     Parameters
     ----------
@@ -61,11 +61,11 @@ def timelines(
     Returns
     -------
     Lanes, list of Timeline
-        What all have in common; the drops that are drawn.
+        Common layout, and the timelines of the drops that fit.
     """
     shared = lanes(gates, timed)
     drawn = [timeline(shared, *drop) for drop in timed]
-    # Those that do not count come first where not all have room.
+    # If not all fit, drops that are not accepted come first.
     drawn.sort(key=lambda drop: drop.result.verdict == "accepted")
     sizes = accumulate(len(drop.bars) + len(drop.odd) + _AROUND for drop in drawn)
     return shared, [
@@ -76,25 +76,25 @@ def timelines(
 def lanes(
     gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
 ) -> Lanes:
-    """Sort gates, the side that strikes first, and find the time that all drops need."""
+    """Return the layout: gates sorted with the impact side first, and the time range."""
     ordered = sorted(gates, key=lambda gate: (gate.side != "impact", -gate.height))
     spans = [times[-1] for drop, hz, _ in timed if (times := _times_ms(drop, hz))] or [1.0]
     return Lanes(tuple(ordered), max(1.0, min(max(spans), _LONGEST * median(spans))))
 
 
 def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult) -> Timeline:
-    """Draw when each beam was blocked.
+    """Return the timeline of a drop's blocked beams.
 
     Parameters
     ----------
     lanes
-        Of all drops of the page.
+        Common layout of the page.
     drop
         The raw record.
     hz
         Calibrated ticks per second.
     result
-        Which of its edges were matched; where none was, none is unexplained.
+        Result with the matched edges; without matches, no edge counts as unexplained.
     """
     end = _FINE * _WIDTH
     places = [round(ms * end / lanes.span_ms) for ms in _times_ms(drop, hz)]
@@ -105,7 +105,7 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
             channels[edge.channel].append((place, edge.blocked, n in result.matches))
     for number, gate in enumerate(lanes.gates):
         y, own = _LANE * (_FINE * number + 1), channels[gate.channel]
-        # From each change to the next; an edge like the one before changes nothing.
+        # Bars run from each change to the next; an edge without a change has no effect.
         states = [(0, bool(drop.initial_state >> gate.channel & 1), True), *own, (end, None, True)]
         changes = [next(same) for _, same in groupby(states, key=itemgetter(1))]
         pen, lane = 0, ""
@@ -122,6 +122,6 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
 def _times_ms(drop: Drop, hz: float | Fraction) -> list[float]:
     """Return the time of each edge, ms."""
     times = [1e3 * float(edge.tick / hz) for edge in drop.edges]
-    # Imported edges are counted from a whole second, not from the release.
+    # Imported times are relative to a whole second, not to the release.
     begin = 0.0 if drop.fire_tick is not None and times[:1] >= [0.0] else min(times, default=0.0)
     return [time - begin for time in times]

@@ -1,4 +1,4 @@
-"""The circuits around a board, with the parts that a scene has and no others."""
+"""Wiring diagram of a board, with only the parts that a scene needs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _OPTIONAL = re.compile(r"gate-\d+|release-\d+|reference|sync|sense")
 
 
 def wiring_drawing(protocol: Protocol, board: str) -> str:
-    """Draw a protocol's gates and release at a board's pins, as SVG.
+    """Return the wiring of a protocol's gates and release at a board's pins, as SVG.
 
     Parameters
     ----------

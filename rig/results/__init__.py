@@ -1,4 +1,4 @@
-"""Everything that is derived from a session file, and can be derived again at any time."""
+"""Results of a session file: all derived data, which can be computed again at any time."""
 
 from rig.clock.calibration import Calibration
 from rig.results.blind import check_open, kept_back
@@ -6,9 +6,8 @@ from rig.results.whole import (
     SessionResults,
     calibration,
     complete_analysis,
-    detailed,
     protocol_of,
-    rejected,
+    rejected_drops,
     results,
 )
 
@@ -18,9 +17,8 @@ __all__ = [
     "calibration",
     "check_open",
     "complete_analysis",
-    "detailed",
     "kept_back",
     "protocol_of",
-    "rejected",
+    "rejected_drops",
     "results",
 ]

@@ -1,8 +1,9 @@
-"""What a blind session keeps back until it is unblinded: here, below all that shows results.
+"""Blind sessions: results withheld until the session is unblinded.
 
-A protocol with ``blind: true`` is blind by what it says itself, and until `Session.unblind` has put
-the moment into the session file, once. Until then of a drop is told how it was let go, which edges
-there were and whether it counts; not what was measured, nor means, fits and what follows from them.
+A session is blind if its protocol has ``blind: true``, until `Session.unblind` stores the time of
+unblinding in the session file, once. Until then release skews, edge counts and verdicts are shown;
+measured values, means, fits and everything derived from them are withheld. This happens here, below
+all code that shows results.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ if TYPE_CHECKING:
 
 
 def kept_back(session: Reader, protocol: Protocol) -> bool:
-    """Whether a session's numbers must not be seen yet."""
+    """Whether a session's results are still withheld."""
     return protocol.blind and not session.unblinded
 
 
 def check_open(session: Reader, protocol: Protocol) -> None:
-    """Refuse to work with numbers that must not be seen yet.
+    """Raise an error if a session's results are still withheld.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def check_open(session: Reader, protocol: Protocol) -> None:
 
 
 def veiled_drop(result: DropResult) -> DropResult:
-    """Leave out what a drop measured."""
+    """Return a drop's result without measured values."""
     shown_names = {RELEASE_SKEW.name} & result.quantities.keys()
     return replace(
         result,
@@ -53,8 +54,8 @@ def veiled_drop(result: DropResult) -> DropResult:
     )
 
 
-def veiled(analysis: Analysis) -> Analysis:
-    """Leave out what drops measured, and all that follows from it."""
+def veil(analysis: Analysis) -> Analysis:
+    """Return an analysis without measured values and everything derived from them."""
     return Analysis(
         tuple(map(veiled_drop, analysis.runs)), tuple(map(veiled_drop, analysis.superseded)), ()
     )

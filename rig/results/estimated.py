@@ -1,4 +1,4 @@
-"""What `rig estimate` and a report say of the impacts: kept, or estimated now."""
+"""Impact parameters for `rig estimate` and reports, from the cache or estimated anew."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def session_estimate(
     *,
     fresh: bool = False,
 ) -> SessionEstimate:
-    """Return what the impacts of a session have in common, kept or estimated now.
+    """Return the impact parameters of a session, from the cache or estimated anew.
 
     Parameters
     ----------
     results
-        Of `results`, with its joint fit where that was made.
+        Results of the session, with the joint fit if it was made.
     progress, fresh
-        As there.
+        As for `rig.results.results`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What to measure next: which stated guess makes most of a mean's uncertainty."""
+"""Advice what to measure better: the inputs with the largest share of a mean's uncertainty."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ if TYPE_CHECKING:
     from rig.measurands import Measurand
 
 _BETTER = 10.0
-"""Times as well as stated that something is measured."""
+"""Assumed improvement of an input's uncertainty, a factor."""
 _NAMED = 2
-"""Guesses named, the largest first."""
+"""Number of inputs named, the most effective first."""
 _WORTH = 0.9
-"""Share of U to which measuring one must bring it at least."""
+"""Largest ratio of new to present U at which an improvement is worth naming."""
 
 
 class Improvement(NamedTuple):
-    """What a better measurement of one thing would do to the means of one quantity.
+    """Effect of a better input on the means of a quantity.
 
     Attributes
     ----------
     measurand
         The quantity.
     line
-        Of the budget.
+        Line of the budget.
     now, then
-        Root mean square of U95 over inclines, and what it would be at most, SI.
+        Root mean square of U95 over inclines, and its upper bound with the better input, SI.
     """
 
     measurand: Measurand
@@ -43,13 +43,13 @@ class Improvement(NamedTuple):
     then: float
 
     def json(self) -> dict[str, Any]:
-        """One member of ``measure_next``."""
+        """Return a member of ``measure_next``."""
         names = {"quantity": self.measurand.name, "measure": self.line, "times_better": _BETTER}
         return names | {"U95": self.now, "U95_at_most": self.then}
 
     @property
     def sentence(self) -> str:
-        """It in words."""
+        """The improvement in words."""
         row, present = self.measurand, self.now * self.measurand.fine_scale
         then, digits = self.then * row.fine_scale, max(0, 1 - math.floor(math.log10(present)))
         return (
@@ -59,11 +59,11 @@ class Improvement(NamedTuple):
 
 
 def improvements(summary: Sequence[Incline]) -> Iterator[Improvement]:
-    """Yield what is worth measuring better, of each quantity the most worthwhile first.
+    """Yield the worthwhile improvements of each quantity, the most effective first.
 
-    A variance is a concave function of what a prior leaves open, and a line of the budget is its
-    slope: without it the variance is at most what the other lines make. Of the degrees of freedom
-    the least is supposed, that what is left has them all.
+    A variance is a concave function of a prior's variance, and a line of the budget is its slope:
+    without that line, the variance is at most the sum of the others. The degrees of freedom are a
+    lower bound, as if the remaining lines had them all.
     """
     for row in averaged():
         lines = [line for line in summary if line.causes.get(row.name)]
@@ -81,7 +81,7 @@ def improvements(summary: Sequence[Incline]) -> Iterator[Improvement]:
 
 
 def _without(line: Incline, name: str, cause: str) -> float:
-    """Return U95 of a mean with one cause so much smaller."""
+    """Return U95 of a mean with one budget line `_BETTER` times smaller."""
     mean, part = line.means[name], line.causes[name].get(cause, 0.0)
     rest = mean.u**2 - (1.0 - _BETTER**-2) * min(part, mean.budget["common"]) ** 2
     return replace(mean, u=math.sqrt(rest), degrees=mean.degrees * (rest / mean.u**2) ** 2).expanded

@@ -1,4 +1,4 @@
-"""What drops say by themselves: found out once of each, by whichever process comes first."""
+"""Cache of the drops' own summaries, shared by all processes."""
 
 from __future__ import annotations
 
@@ -18,48 +18,41 @@ if TYPE_CHECKING:
 
 
 class KnownDrops:
-    """The `known` of `rig.analysis.session.analyze`, kept beyond this process.
+    """The `summaries` of `rig.analysis.session.analyze`, stored on disk.
 
     Parameters
     ----------
     protocol
-        Of all drops, with the beams that its timer had.
+        Protocol of all drops, with the beams of its timer.
     blind
-        Whether nothing may be kept but in memory.
+        Whether not to store any summary.
     fresh
-        Whether to forget what was kept.
+        Whether to ignore stored summaries.
     """
 
     def __init__(self, protocol: Protocol, *, blind: bool = False, fresh: bool = False) -> None:
         gates = () if protocol.gates is None else protocol.gates.gates
         self._content = None if blind else (protocol.text, [gate.channel for gate in gates])
         self._fresh = fresh
-        self._held: dict[str, DropSummary] = {}
 
     def get(self, drop: Drop) -> DropSummary | None:
-        """Return what is known of a drop; `None` for nothing."""
-        digest = digest_of(drop)
-        summary = self._held.get(digest)
-        if summary is None and (stored := self._entry(digest).find()) is not None:
-            summary = stored.whole()
-        return summary
+        """Return the summary of a drop; `None` if there is none."""
+        stored = self._entry(drop).find()
+        return stored and stored.whole()
 
     def __setitem__(self, drop: Drop, summary: DropSummary) -> None:
-        digest = digest_of(drop)
-        if self._content is None:
-            self._held[digest] = summary
-        self._entry(digest).keep(summary)
+        self._entry(drop).write(summary)
 
-    def _entry(self, digest: str) -> CacheEntry[DropSummary]:
-        return CacheEntry(DropSummary, self._content, digest, fresh=self._fresh)
+    def _entry(self, drop: Drop) -> CacheEntry[DropSummary]:
+        return CacheEntry(DropSummary, self._content, digest_of(drop), fresh=self._fresh)
 
 
 def digest_of(drop: Drop) -> str:
-    """SHA-256 of everything that a drop's record says."""
+    """Return the SHA-256 of a drop's whole record."""
     return sha256(f"{edges_digest(drop)} {replace(drop, edges=())}".encode()).hexdigest()
 
 
 def edges_digest(drop: Drop) -> str:
-    """SHA-256 of the edges of a drop, whichever run it was."""
+    """Return the SHA-256 of a drop's edges, independent of its run."""
     edges = np.fromiter(chain.from_iterable(drop.edges), np.int64, 3 * len(drop.edges))
     return sha256(edges.tobytes() + b"%d" % drop.tick_hz).hexdigest()

@@ -1,6 +1,6 @@
-"""Several sessions as one: their results in one joint fit, and what they differ by.
+"""Joint results of several sessions, and differences between them.
 
-Each session counts once, and is finished, undamaged, unblinded and of the same kind of scene.
+Each session counts once; it must be finished, undamaged, unblinded and of the same kind of scene.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.averages import difference
+from rig.analysis.averages import combine
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import GOOD
 from rig.analysis.several import SessionPart, fit_sessions
@@ -22,7 +22,7 @@ from rig.results.blind import check_open
 from rig.results.whole import complete_analysis, protocol_of, results
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from rig.analysis.result import DropResult, Measured
     from rig.analysis.session import Analysis, Progress
@@ -32,12 +32,10 @@ if TYPE_CHECKING:
     from rig.results.whole import SessionResults
     from rig.session.reading import Reader
 
-    Runs = Sequence[DropResult]
-
 
 @dataclass(frozen=True, slots=True)
 class MeanDifference:
-    """A session's mean less that of the reference, the first of the sessions.
+    """A session's mean less that of the reference, which is the first session.
 
     Attributes
     ----------
@@ -46,9 +44,9 @@ class MeanDifference:
     session, reference
         Names of the sessions.
     condition
-        Of the session's runs.
+        Condition of the session's runs.
     value
-        Of the difference, with its uncertainty.
+        The difference with its uncertainty.
     """
 
     quantity: str
@@ -58,7 +56,7 @@ class MeanDifference:
     value: Measured
 
     def json(self) -> dict[str, Any]:
-        """One member of ``differences``."""
+        """Return a member of ``differences``."""
         sessions = attributes(self, "session", "reference")
         value = self.value.json() | attributes(self.value, "normalized_error", "budget")
         return sessions | self.condition.json() | {"quantity": self.quantity} | value
@@ -66,14 +64,14 @@ class MeanDifference:
 
 @dataclass(frozen=True, slots=True)
 class TogetherResults:
-    """All that follows from several sessions.
+    """Results of several sessions.
 
     Attributes
     ----------
     sessions
-        What each says by itself, by name, in the order given.
+        Each session's own results, by name, in the order given.
     fit
-        Of all.
+        Joint fit of all sessions.
     """
 
     sessions: Mapping[str, SessionResults]
@@ -87,10 +85,10 @@ class TogetherResults:
     @property
     def summary(self) -> tuple[Incline, ...]:
         """Means over the runs of all sessions of a scene."""
-        return tuple(line for scene in self.fit.pooled for line in scene.summary)
+        return tuple(line for summary in self.fit.pooled.values() for line in summary)
 
     def analyses(self) -> list[tuple[str, Analysis]]:
-        """Return the analysis of each session, in the light of all, by its name."""
+        """Return the analysis of each session from the joint fit, by name."""
         return [(part.name, part.analysis) for part in self.fit.parts]
 
     @property
@@ -99,7 +97,7 @@ class TogetherResults:
         return any(run.verdict == "void" for _, item in self.analyses() for run in item.runs)
 
     def json(self) -> dict[str, Any]:
-        """As ``rig analyze A B --json`` prints it."""
+        """Return the object that ``rig analyze A B --json`` prints."""
         joint = self.fit.joint
         return {
             "simulated": self.simulated,
@@ -107,31 +105,31 @@ class TogetherResults:
                 {"session": name, "simulated": item.simulated, "calibration": item.calibration}
                 for name, item in self.sessions.items()
             ],
-            "shared": self._shared(),
+            "shared": self._shared_json(),
             "runs": [
                 {"session": name, **run.json()}
                 for name, analysis in self.analyses()
                 for run in analysis.runs
             ],
             "summary": [
-                {"sessions": list(scene.sessions), **line.json()}
-                for scene in self.fit.pooled
-                for line in scene.summary
+                {"sessions": list(names), **line.json()}
+                for names, summary in self.fit.pooled.items()
+                for line in summary
             ],
             **({} if joint is None else {"learned": joint.json()}),
         }
 
-    def _shared(self) -> list[dict[str, Any]]:
+    def _shared_json(self) -> list[dict[str, Any]]:
         return [
             {"what": owner, "sessions": [list(group) for group in groups]}
             for owner, groups in self.fit.shared.items()
         ]
 
     def comparison_json(self) -> dict[str, Any]:
-        """As ``rig compare --json`` prints it."""
+        """Return the object that ``rig compare --json`` prints."""
         return {
             "simulated": self.simulated,
-            "shared": self._shared(),
+            "shared": self._shared_json(),
             "means": [
                 {"session": part.name, **line.json()}
                 for part in self.fit.parts
@@ -141,10 +139,10 @@ class TogetherResults:
         }
 
     def differences(self) -> list[MeanDifference]:
-        """Return each session's means less those of the first, where both have the condition.
+        """Return each session's means less those of the first, for conditions of both.
 
-        Chains need not have the same names: where none that strikes is alike, a single mean at the
-        same incline is taken.
+        Chains may have different names: if no striking chain has the same name, a single mean at
+        the same incline is used.
 
         Raises
         ------
@@ -152,39 +150,28 @@ class TogetherResults:
             No session has runs like those of the first.
         """
         first, *rest = self.fit.parts
-        differences = [
-            MeanDifference(row.name, part.name, first.name, condition, difference(*values))
-            for part in rest
-            for condition, *sets in _pairs(part, first)
-            for row in averaged()
-            if (values := [_values(runs, row.name) for runs in sets]) and all(values)
-        ]
+        reference = _cases(first)
+        differences = []
+        for part in rest:
+            for condition, runs in _cases(part).items():
+                alike = [key for key in reference if key.incline_deg == condition.incline_deg]
+                same = [key for key in alike if key.impact_chain == condition.impact_chain] or alike
+                pair = runs, reference[same[0]] if len(same) == 1 else []
+                for row in averaged() if pair[1] else ():
+                    if all(row.name in run.quantities for member in pair for run in member):
+                        values = [[run.quantities[row.name] for run in member] for member in pair]
+                        names = row.name, part.name, first.name
+                        difference = combine(values, (1.0, -1.0))
+                        differences.append(MeanDifference(*names, condition, difference))
         if not differences:
             raise make_error(InputError, "nothing_to_compare", path=first.name)
         return differences
 
 
-def _pairs(part: SessionPart, first: SessionPart) -> Iterator[tuple[Condition, Runs, Runs]]:
-    """Yield good runs of a session with those of the first under a like condition."""
-    cases, reference = (
-        {member.protocol.condition(runs[0].run): runs for runs in _good_runs(member)}
-        for member in (part, first)
-    )
-    for condition, runs in cases.items():
-        alike = [key for key in reference if key.incline_deg == condition.incline_deg]
-        same = [key for key in alike if key.impact_chain == condition.impact_chain] or alike
-        if len(same) == 1:
-            yield condition, runs, reference[same[0]]
-
-
-def _good_runs(part: SessionPart) -> list[list[DropResult]]:
-    return good_cases(part.protocol, part.analysis.runs)
-
-
-def _values(runs: Runs, name: str) -> list[Measured]:
-    """Return a measurand of runs, which all must have it: else nothing."""
-    values = [run.quantities[name] for run in runs if name in run.quantities]
-    return values if len(values) == len(runs) else []
+def _cases(part: SessionPart) -> dict[Condition, list[DropResult]]:
+    """Return the good runs of a session, by condition."""
+    cases = good_cases(part.protocol, part.analysis.runs)
+    return {part.protocol.condition(runs[0].run): runs for runs in cases}
 
 
 def results_together(
@@ -200,63 +187,61 @@ def results_together(
     Parameters
     ----------
     files
-        Open, for reading at least.
+        Open sessions.
     same_rig
         See `rig.analysis.several.same_owners`.
     unfinished
         Whether planned runs may be missing.
     fresh, progress
-        As for `rig.results.results`, for one session after the other.
+        As for `rig.results.results`, for each session in turn.
 
     Raises
     ------
     InputError, SessionError
         A session cannot be added to the others.
     """
-    parts, own = [], []
+    parts: list[SessionPart] = []
+    own: list[SessionResults] = []
     for name, session in zip(_names(files), files, strict=True):
-        protocol = protocol_of(session)
+        protocol, path = protocol_of(session), str(session.path)
         check_open(session, protocol)
-        session_results = results(session, progress, fresh=fresh, with_joint_fit=True)
-        own.append(session_results)
-        _check_whole(session, session_results, len(planned_runs(protocol)), unfinished=unfinished)
-        analysis = complete_analysis(session, session_results, progress)
+        outcome = results(session, progress, fresh=fresh)
+        planned = len(planned_runs(protocol))
+        _check_whole(path, outcome.analysis, planned, unfinished=unfinished)
+        analysis = complete_analysis(session, outcome, progress)
         boards = [identity.get("unique_id", "") for _, identity in session.identities()]
         parts.append(SessionPart(name, protocol, analysis, str(boards[-1] if boards else "")))
+        own.append(outcome)
     _check_repeats(files, own)
     sessions = dict(zip(_names(files), own, strict=True))
     return TogetherResults(sessions, fit_sessions(parts, same_rig=same_rig))
 
 
 def _names(files: Sequence[Reader]) -> list[str]:
-    """Name sessions by their files, with folders where these do not tell them apart."""
+    """Return session names: file names, or full paths if file names are not unique."""
     names = [session.path.name for session in files]
     return names if len(set(names)) == len(names) else [str(session.path) for session in files]
 
 
-def _check_repeats(files: Sequence[Reader], part: Sequence[SessionResults]) -> None:
-    """Refuse to count drops more than once: a session named twice, its copy, or that continued."""
-    recorded = [
-        (session.path, {*result.edges}) for session, result in zip(files, part, strict=True)
-    ]
+def _check_repeats(files: Sequence[Reader], own: Sequence[SessionResults]) -> None:
+    """Raise an error if drops would count twice: the same session, its copy or continuation."""
+    recorded = [(str(file.path), {*part.edges}) for file, part in zip(files, own, strict=True)]
     for (path, edges), (other_path, rest) in combinations(recorded, 2):
         common = len(edges & rest)
-        # Of few edges and a coarse timer single drops may happen to be alike.
+        # With few edges and a coarse timer, single drops may be equal by chance.
         if common and common == min(len(edges), len(rest)):
-            paths = {"path": str(other_path), "other": str(path)}
-            raise make_error(InputError, "session_repeated", **paths, drops=common)
+            values = {"path": other_path, "other": path, "drops": common}
+            raise make_error(InputError, "session_repeated", **values)
 
 
-def _check_whole(session: Reader, item: SessionResults, planned: int, *, unfinished: bool) -> None:
-    """Refuse a session that is damaged, or lacks runs."""
-    path, runs = str(session.path), item.analysis.runs
-    if item.analysis.damaged:
-        records = "; ".join(item.analysis.damage)
+def _check_whole(path: str, analysis: Analysis, planned: int, *, unfinished: bool) -> None:
+    """Raise an error for a session that is damaged, or lacks runs."""
+    if analysis.damaged:
+        records = "; ".join(analysis.damage)
         raise make_error(InputError, "records_damaged", path=path, records=records)
-    missing = planned - len(runs)
+    missing = planned - len(analysis.runs)
     if missing and not unfinished:
-        raise make_error(
-            InputError, "session_unfinished", path=path, missing=missing, planned=planned
-        )
-    if not any(run.verdict in GOOD for run in runs):
+        counts = {"missing": missing, "planned": planned}
+        raise make_error(InputError, "session_unfinished", path=path, **counts)
+    if not any(run.verdict in GOOD for run in analysis.runs):
         raise make_error(InputError, "session_no_results", path=path)

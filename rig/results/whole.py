@@ -1,12 +1,12 @@
-"""The whole analysis of a session: what `rig analyze` says."""
+"""Complete results of a session, as `rig analyze` prints them."""
 
 from __future__ import annotations
 
 import os
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from rig.analysis.gravity import check_gravity
 from rig.analysis.session import analyze
@@ -16,7 +16,7 @@ from rig.protocol import reader
 from rig.protocol.measurable import with_gates
 from rig.reasons import notes_in
 from rig.records import Job
-from rig.results.blind import check_open, kept_back, veiled
+from rig.results.blind import check_open, kept_back, veil
 from rig.results.improvements import improvements
 from rig.results.known_drops import KnownDrops, edges_digest
 from rig.session.schema import RunState
@@ -34,47 +34,33 @@ if TYPE_CHECKING:
     from rig.session.reading import Reader
 
 _MOST_PROCESSES = 4
-"""Each takes 150 MB, and what is not done drop by drop is done by one."""
-
-
-class Finished(NamedTuple):
-    """What is kept of a session, from which all results follow at once.
-
-    Attributes
-    ----------
-    analysis
-        Of all drops, without what only a joint fit needs; veiled where the session is blind.
-    time_scales
-        The calibration that each drop has, by run and attempt.
-    edges
-        A digest of the edges of each drop that has any.
-    """
-
-    analysis: Analysis
-    time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
-    edges: tuple[str, ...]
+"""Each process takes 150 MB, and only work drop by drop runs in parallel."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionResults:
-    """All that follows from a session.
+    """All results of a session, as they are stored.
 
     Attributes
     ----------
-    analysis, time_scales, edges
-        See `Finished`.
+    analysis
+        Analysis of all drops; without values if the session is blind.
+    time_scales
+        Calibration of each drop, by run and attempt.
+    edges
+        Digest of the edges of each drop that has any.
     gravity
-        What the free chain says of it; `None` where there is none that can be asked.
+        Check of gravity by the free chain; `None` if there is no suitable chain.
     simulated
-        Whether no chain ever fell.
+        Whether the session is simulated.
     clock
-        The time scale.
+        Calibration of the clock.
     blind
-        Whether what was measured is kept back.
+        Whether measured values are withheld.
     digest
-        Of the records, as `rig.session.reading.Reader.digest` gives it.
+        Digest of the records by `rig.session.reading.Reader.digest`.
     complete
-        The analysis with its joint fit, where that was just made and asked for.
+        Analysis with its joint fit; `None` if these are stored results.
     """
 
     analysis: Analysis
@@ -85,11 +71,11 @@ class SessionResults:
     clock: Calibration
     blind: bool
     digest: str | None
-    complete: Analysis | None = None
+    complete: Analysis | None = field(default=None, compare=False)
 
     @property
     def calibration(self) -> dict[str, Any]:
-        """``calibration`` of `json`: what is known of the clock, what free fall says included."""
+        """``calibration`` of `json`: the clock's calibration with the check by gravity."""
         fields, check = self.clock.said, self.gravity
         if check is None:
             return fields
@@ -102,16 +88,16 @@ class SessionResults:
         return self.analysis.summary
 
     def analyses(self) -> list[tuple[str, Analysis]]:
-        """Return the analysis of each session by its name, which alone needs none."""
+        """Return the analysis with an empty name, like those of several sessions."""
         return [("", self.analysis)]
 
     def records(self) -> list[dict[str, Any]]:
-        """Return each drop as JSON has it, those with a later attempt last."""
+        """Return each drop as JSON data, superseded attempts last."""
         fields = self.json()
         return [*fields["runs"], *fields.get("superseded", [])]
 
     def json(self) -> dict[str, Any]:
-        """As `rig analyze --json` prints it."""
+        """Return the object that `rig analyze --json` prints."""
         fields = self.analysis.json()
         for run in (*fields["runs"], *fields.get("superseded", [])):
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
@@ -122,9 +108,9 @@ class SessionResults:
 
 
 def protocol_of(session: Reader) -> Protocol:
-    """Read the protocol as the session keeps it, with the beams that its timer had.
+    """Return the protocol stored in the session, with only the beams that its timer had.
 
-    Other timers may have had fewer than the protocol; a board's beams are those of the protocol.
+    Timers other than our boards may have fewer beams than the protocol.
     """
     protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
     had = next((board["beams"] for _, board in session.identities() if "beams" in board), None)
@@ -132,59 +118,40 @@ def protocol_of(session: Reader) -> Protocol:
 
 
 def calibration(session: Reader) -> Calibration:
-    """Calibrate a session's clock from everything it recorded."""
+    """Return the calibration of a session's clock from all records."""
     return Calibrator().look(session, protocol_of(session).reference_u)
 
 
 def results(
     session: Reader,
     progress: Progress | None = None,
-    drops: KnownDrops | None = None,
     *,
     fresh: bool = False,
-    with_joint_fit: bool = False,
 ) -> SessionResults:
-    """Return the results of a session: those that are kept, or else analyse it.
+    """Return the results of a session, from the cache or by a new analysis.
 
     Parameters
     ----------
     session
-        Open, for reading at least.
+        The open session.
     progress
-        Called with the number of drops done and the number of all.
-    drops
-        What its drops say by themselves, where a live analysis has found that out.
+        Called with the number of drops done and the total.
     fresh
-        Whether to analyse it in any case.
-    with_joint_fit
-        Whether a joint fit that is made may stay in memory, for `complete_analysis`.
+        Whether to ignore the cache.
     """
-    protocol = protocol_of(session)
-    complete = None
     with session.snapshot():
-        digest, blind = session.digest(), kept_back(session, protocol)
-        entry = CacheEntry(Finished, digest, fresh=fresh)
-        clock = Calibrator().look(session, protocol.reference_u)
-        finished = entry.find()
-        if finished is None:
-            drops = drops or KnownDrops(protocol, blind=blind, fresh=fresh)
-            complete, scales, edges = _analyze(session, protocol, clock, drops, progress)
-            stored = veiled(complete) if blind else replace(complete, joint=None, adjusted={})
-            finished = entry.keep(Finished(stored, scales, edges))
-    gravity = check_gravity(protocol, finished.analysis.runs)
-    held = complete if with_joint_fit and not blind else None
-    return SessionResults(*finished, gravity, session.simulated, clock, blind, digest, held)
+        entry = CacheEntry(SessionResults, session.digest(), fresh=fresh)
+        stored = entry.find()
+        if stored is not None:  # the course of a clock's rate is not stored
+            return replace(stored, clock=calibration(session))
+        new = _analyze(session, progress, fresh=fresh)
+        return replace(entry.keep(new), clock=new.clock, complete=new.complete)
 
 
-def _analyze(
-    session: Reader,
-    protocol: Protocol,
-    clock: Calibration,
-    known_drops: KnownDrops,
-    progress: Progress | None,
-) -> tuple[Analysis, dict[tuple[int, int], dict[str, Any]], tuple[str, ...]]:
-    """Analyse all drops, read one by one, with their time scales and digests of their edges."""
-    scales: dict[tuple[int, int], dict[str, Any]] = {}
+def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> SessionResults:
+    """Return the results of a session by a new analysis, with its joint fit."""
+    protocol = protocol_of(session)
+    scales: dict[tuple[int, int], Mapping[str, Any]] = {}
     edges: list[str] = []
 
     def scale(drop: Drop) -> TimeScale:
@@ -192,17 +159,23 @@ def _analyze(
         edges.extend([edges_digest(drop)] if drop.edges else [])
         return clock.scale(drop)
 
+    digest, blind = session.digest(), kept_back(session, protocol)
+    clock = Calibrator().look(session, protocol.reference_u)
     total = sum(entry.state is RunState.RECORDED for entry in session.states())
-    drops, causes = session.drops(), rejected(session)
-    analysis = analyze(protocol, drops, scale, causes, progress, known_drops, total, _processors())
-    return analysis, scales, tuple(edges)
+    known = KnownDrops(protocol, blind=blind, fresh=fresh)
+    causes, arguments = rejected_drops(session), (progress, known, total, _processors())
+    complete = analyze(protocol, session.drops(), scale, causes, *arguments)
+    analysis = veil(complete) if blind else complete
+    gravity = check_gravity(protocol, analysis.runs)
+    outcome = analysis, scales, tuple(edges), gravity, session.simulated, clock, blind, digest
+    return SessionResults(*outcome, None if blind else complete)
 
 
 def _processors() -> int:
-    """Return how many processors may be used.
+    """Return the number of processes that may be used.
 
-    Each process but the first runs the main program's file once more up to its guard, and only of
-    this program's own is it known that it has one.
+    A spawned process imports the main program's file again. Only for our own programs is it certain
+    that a ``__main__`` guard protects it.
     """
     program = getattr(sys.modules["__main__"], "__file__", None) or ""
     if Path(program).stem != "rig" and Path(program).parent != Path(__file__).parents[1]:
@@ -211,41 +184,30 @@ def _processors() -> int:
 
 
 def complete_analysis(
-    session: Reader, results: SessionResults, progress: Progress | None = None
+    session: Reader, known: SessionResults | None = None, progress: Progress | None = None
 ) -> Analysis:
-    """Return the analysis with its joint fit; where only results were kept it is made again.
+    """Return the analysis with its joint fit, computed again if it is not in `known` results.
 
     Raises
     ------
     SessionError
         The session is blind.
     """
-    return results.complete or detailed(session, progress)[0]
-
-
-def detailed(session: Reader, progress: Progress | None = None) -> tuple[Analysis, Calibration]:
-    """Analyse a session and keep everything, each edge's rod too.
-
-    Raises
-    ------
-    SessionError
-        The session is blind.
-    """
-    protocol = protocol_of(session)
-    check_open(session, protocol)
+    check_open(session, protocol_of(session))
     with session.snapshot():
-        clock = Calibrator().look(session, protocol.reference_u)
-        return _analyze(session, protocol, clock, KnownDrops(protocol), progress)[0], clock
+        analysis = (known and known.complete) or _analyze(session, progress, fresh=False).complete
+    assert analysis is not None
+    return analysis
 
 
-def rejected(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:
-    """Drops whose last state is that the operator rejected them, with the causes."""
+def rejected_drops(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:
+    """Return the causes of drops that the operator rejected, by run and attempt."""
     last = {(entry.run, entry.attempt): entry for entry in session.states()}
     return {key: entry.reasons for key, entry in last.items() if entry.state is RunState.REJECTED}
 
 
 def notes(session: Reader) -> dict[Job, str]:
-    """What operators noted to drops, of each the latest note, in order of recording."""
+    """Return the operators' latest notes on drops, in order of recording."""
     last = {Job(entry.run, entry.attempt): entry for entry in session.states()}
     texts = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last.items()}
     return {job: text for job, text in texts.items() if text}

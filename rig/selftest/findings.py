@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
-from rig.reasons import Reason, make_reason, remedies
+from rig.errors import DeviceError, RigError, SessionError
+from rig.reasons import Reason, make_error, make_reason, remedies
 
 _ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
 
@@ -20,8 +21,7 @@ class Verdict(StrEnum):
     NOT_POSSIBLE = "not possible here"
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(NamedTuple):
     """What a check found, in words, and where all is not well the reason."""
 
     name: str
@@ -35,9 +35,9 @@ class Finding:
         return "; ".join(remedies([self.reason])) if self.reason else ""
 
     @property
-    def line(self) -> str:
-        """Name, verdict and words in one line."""
-        return ": ".join(filter(None, (self.name, self.verdict, self.what)))
+    def failed(self) -> bool:
+        """Whether something is wrong."""
+        return self.verdict is Verdict.FAILED
 
     def json(self) -> dict[str, object]:
         """Return it as JSON has it."""
@@ -46,58 +46,48 @@ class Finding:
         return {**words, "reason_codes": codes}
 
     def __str__(self) -> str:
-        return f"{self.name}: {self.what}" + (f"\n  do: {self.advice}" if self.advice else "")
+        line = ": ".join(filter(None, (self.name, self.verdict, self.what)))
+        return line + (f"\n  do: {self.advice}" if self.advice else "")
 
 
-def explain(name: str, reason: Reason, verdict: Verdict = Verdict.FAILED) -> Finding:
-    """Return what a check found where all is not well."""
-    return Finding(name, reason.text, verdict, reason)
-
-
-class CheckEndedError(Exception):
-    """A check ended with a reason, a code of `rig.wordings` with its values."""
-
-    verdict = Verdict.FAILED
-
-    def __init__(self, code: str, **values: object) -> None:
-        self.reason = make_reason(code, **values)
-        super().__init__(self.reason.text)
-
-
-class CheckFailedError(CheckEndedError):
-    """The board did not do what it must."""
-
-
-class NotPossibleError(CheckEndedError):
-    """The check needs something that is not here."""
-
-    verdict = Verdict.NOT_POSSIBLE
+class NotPossibleError(DeviceError):
+    """A check needs something that is not here."""
 
 
 def make_check(name: str, check: Callable[..., str | None], *facts: object) -> Finding:
     """Make a check; give what it returned, in words, or the reason for which it ended."""
     try:
         return Finding(name, check(*facts) or "")
-    except CheckEndedError as end:
-        return explain(name, end.reason, end.verdict)
+    except NotPossibleError as error:
+        return explain(name, error, Verdict.NOT_POSSIBLE)
+    except (DeviceError, SessionError) as error:
+        return explain(name, error)
 
 
-def wrong_answer(request: str, expected: object, answer: object) -> CheckFailedError:
+def explain(name: str, error: RigError, verdict: Verdict = Verdict.FAILED) -> Finding:
+    """Return what a check found where all is not well."""
+    plain = make_reason("failed", text=error.message, hint=error.hint)
+    reason = next(iter(error.reasons), plain)
+    return Finding(name, reason.text, verdict, reason)
+
+
+def wrong_answer(request: str, expected: object, answer: object) -> DeviceError:
     """Return the failure of a board that gave another answer than expected."""
     expected, answer = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
-    return CheckFailedError("wrong_answer", request=request, expected=expected, answer=answer)
+    values = {"request": request, "expected": expected, "answer": answer}
+    return make_error(DeviceError, "wrong_answer", **values)
 
 
 def fail_if(broken: object, code: str, **values: object) -> None:
     """Let a check fail for a reason if that is so."""
     if broken:
-        raise CheckFailedError(code, **values)
+        raise make_error(DeviceError, code, **values)
 
 
 def need(present: object, needed: str) -> None:
     """Let a check be impossible, by saying what it needs, unless that is there."""
     if not present:
-        raise NotPossibleError("check_needs", needed=needed)
+        raise make_error(NotPossibleError, "check_needs", needed=needed)
 
 
 def insist(request: str, answer: object, expected: object) -> None:

@@ -10,12 +10,11 @@ from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
-from rig.link.assembly import ticks_since
 from rig.link.gatewatch import name_gates
 from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
 from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
+from rig.selftest.checks import identify
 from rig.selftest.findings import fail_if, insist
-from rig.selftest.requests import identify
 
 RELEASE, SYNC, QUIET = 1, 2, 4
 """Gates of the judge: at the board's release 0, at its sync output, and at ground."""
@@ -54,20 +53,21 @@ class JudgeBoard(BoardUnderTest):
         recorded, judged = self._pulse(board, BEAMS, _LONG_US, AT_BEAMS)
         self.rate = _flanks(recorded, AT_BEAMS)[1] / judged.certificate.pulse_ticks
         hz = board.identity.tick_hz
-        off = self.rate * self.identity.tick_hz / hz - 1
-        _limit("the clocks differ by", [1e6 * off], 2e6 * RESONATOR_TOLERANCE, "ppm")
+        ppm = 1e6 * (self.rate * self.identity.tick_hz / hz - 1)
+        _limit("the clocks differ by", [ppm], 2e6 * RESONATOR_TOLERANCE, "ppm")
         errors, skews = [], []
         for n in range(board.options.drops):
             recorded, judged = self._pulse(board, BEAMS, 1 + _STEP_US * n, AT_BEAMS)
             skew, length = _flanks(recorded, AT_BEAMS)
             errors.append(1e9 / hz * (length - judged.certificate.pulse_ticks * self.rate))
             skews.append(1e9 / hz * skew)
-        _limit("a stamp is off by", errors + skews, 1e9 / hz * board.identity.late_ticks, "ns")
+        late_ns = 1e9 / hz * board.identity.late_ticks
+        worst = _limit("a stamp is off by", errors, late_ns, "ns")
+        widest = _limit("gates differ by", skews, late_ns, "ns")
         scatter = f"{stdev(errors) / 2**0.5:.0f} ns" if len(errors) > 1 else "unknown"
-        worst = max(map(abs, errors))
         return (
-            f"clock {1e6 * off:+.2f} ppm; scatter {scatter}, two stamps {worst:.0f} ns at most; "
-            f"skew {max(skews):.0f} ns"
+            f"clock {ppm:+.2f} ppm; scatter {scatter}, two stamps {worst:.0f} ns at most; "
+            f"skew {widest:.0f} ns"
         )
 
     def measure_release(self, board: BoardUnderTest) -> str:
@@ -75,93 +75,82 @@ class JudgeBoard(BoardUnderTest):
         us = 1e6 / board.identity.tick_hz
         ordered, written, skews = [], [], []
         for pulse_us in _PULSES_US:
-            record_ms = 100 + pulse_us // 1000
-            order = {"release": 1, "pulse_us": pulse_us, "record_ms": record_ms}
-            watch = {"gates": RELEASE | SYNC, "record_ms": record_ms + 50}
-            token, judge_token = self._arm_both(board, order | {"gates": AT_BEAMS}, watch)
+            own = {"gates": AT_BEAMS, "release": 1, "pulse_us": pulse_us}
+            token, judge_token = self._arm_both(board, own, gates=RELEASE | SYNC)
             self.fire(judge_token)
             board.fire(token)
-            recorded, judged = _finish(board), _finish(self)
+            seal, judged = board.collect_drop().certificate, self.collect_drop()
             (on, off), (high, _) = _changes(judged, RELEASE), _changes(judged, SYNC)
-            length = (off - on) * self.rate
-            ordered.append(length * us - pulse_us)
-            written.append((length - recorded.certificate.pulse_ticks) * us)
+            ordered.append((off - on) * self.rate * us - pulse_us)
+            written.append(((off - on) * self.rate - seal.pulse_ticks) * us)
             skews.append((high - on) * self.rate * us)
-        _limit("a pulse is off by", ordered, _PULSE_LIMIT_US, "µs")
         late_us = board.identity.late_ticks * us
-        _limit("a pulse and its record differ by", written + skews, late_us, "µs")
-        worst = (f"{1e3 * max(map(abs, us)):.0f} ns" for us in (ordered, written, skews))
+        off_us = _limit("a pulse is off by", ordered, _PULSE_LIMIT_US, "µs")
+        record_us = _limit("a pulse and its record differ by", written, late_us, "µs")
+        skew_us = _limit("release and sync differ by", skews, late_us, "µs")
+        worst = (f"{1e3 * us:.0f} ns" for us in (off_us, record_us, skew_us))
         return "{} off at most; its record {}; sync {} from the release".format(*worst)
 
     def measure_stop(self, board: BoardUnderTest) -> str:
         """See that the emergency stop ends a pulse in time, and that a spike does not."""
-        delays, release = [], {"release": 1, "pulse_us": _LONG_US}  # or to the recording's end
+        delays, pulse = [], {"release": 1, "pulse_us": _LONG_US}
         for _ in range(max(1, board.options.drops // 4)):
-            recorded, _ = self._pulse(board, STOP, 10_000, AT_STOP, **release)
+            recorded, _ = self._pulse(board, STOP, 10_000, AT_STOP, **pulse)
             seal = recorded.certificate
             insist("the stop in a pulse", PulseEnd(seal.pulse_end).name, "STOPPED")
             ticks = seal.pulse_ticks - _changes(recorded, AT_STOP)[0]
             delays.append(1e6 / board.identity.tick_hz * ticks)
-        _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
-        recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **release)
+        worst = _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
+        recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **pulse)
         insist("a spike", PulseEnd(recorded.certificate.pulse_end).name, "ORDERED")
-        return f"after {max(delays):.0f} µs at most; {_SPIKE_US} µs are ignored"
+        return f"after {worst:.0f} µs at most; {_SPIKE_US} µs are ignored"
 
     def open_stop(self, board: BoardUnderTest) -> None:
         """See that an open emergency stop disarms the board and forbids arming."""
-        order = {"release": STOP, "pulse_us": _LONG_US, "record_ms": _LONG_US // 1000}
-        _, judge_token = self._arm_both(board, {"gates": AT_BEAMS}, order)
+        own = {"gates": AT_BEAMS}
+        _, judge_token = self._arm_both(board, own, release=STOP, pulse_us=_LONG_US)
         self.fire(judge_token)
         board.wait_disarmed("an open stop", DisarmReason.STOPPED, 0.1)
-        board.refuse(board.order(gates=AT_BEAMS), RefusalReason.STOPPED)
-        _finish(self)
+        answer = board.request(board.order(**own), wire.DeviceMessage)
+        insist("Arm", answer, wire.Refused(RefusalReason.STOPPED, 0))
+        self.collect_drop()
 
     def disturb_beam(self, board: BoardUnderTest) -> None:
         """See that a beam that was broken since ARM forbids firing."""
-        order = {"release": BEAMS, "pulse_us": 1000}
-        token, judge_token = self._arm_both(board, {"gates": AT_BEAMS}, order)
+        own = {"gates": AT_BEAMS}
+        token, judge_token = self._arm_both(board, own, release=BEAMS, pulse_us=1000)
         self.fire(judge_token)
-        _finish(self)
+        self.collect_drop()
         board.refuse(wire.Fire(token), RefusalReason.GATE_UNSTEADY, AT_BEAMS)
 
     def _pulse(
         self, board: BoardUnderTest, output: int, length_us: int, gates: int, **own: int
     ) -> tuple[RecordedDrop, RecordedDrop]:
         """Pulse an output of the judge while the board records; give both records."""
-        record_ms = 100 + length_us // 1000
-        order = {"release": output, "pulse_us": length_us, "record_ms": record_ms}
-        own |= {"gates": gates, "record_ms": record_ms}
-        token, judge_token = self._arm_both(board, own, order)
+        own["gates"] = gates
+        token, judge_token = self._arm_both(board, own, release=output, pulse_us=length_us)
         board.fire(token)
         self.fire(judge_token)
-        return _finish(board), _finish(self)
+        return board.collect_drop(), self.collect_drop()
 
     def _arm_both(
-        self, board: BoardUnderTest, own: dict[str, int], order: dict[str, int]
+        self, board: BoardUnderTest, own: dict[str, int], gates: int = QUIET, **order: int
     ) -> tuple[int, int]:
         """Arm both at once, when both releases have rested; give the tokens."""
-        self.settle()
-        board.need_idle()
-        order = {"gates": QUIET} | order
-        self.arm(**order)
-        token = board.arm(**own)
-        return token, self.arm(**order)
-
-
-def _finish(board: BoardUnderTest) -> RecordedDrop:
-    return board.acknowledge(board.collect_drop(1000))
+        record_ms = 100 + max(order.get("pulse_us", 0), own.get("pulse_us", 0)) // 1000
+        # The judge goes on until the board has ended, which its sync output shows.
+        order |= {"gates": gates, "record_ms": record_ms + 50}
+        self.prepare(**order)
+        token = board.prepare(**own, record_ms=record_ms)
+        return token, self.prepare(**order)
 
 
 def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:
     """Give the ticks since FIRE at which a gate changed: once, and back."""
-    changes, state = [], 0
-    for event in recorded.events:
-        if (event.state ^ state) & gate:
-            changes.append(ticks_since(recorded.certificate.fire_tick, event.tick))
-        state = event.state
-    edges = len(changes)
+    ticks = [edge.tick for edge in recorded.edges if gate >> edge.channel & 1]
+    edges = len(ticks)
     fail_if(edges != 2, "judged_edges", gates_listed=name_gates(gate), edges=edges)
-    return changes[0], changes[1]
+    return ticks[0], ticks[1]
 
 
 def _flanks(recorded: RecordedDrop, gates: int) -> tuple[int, int]:
@@ -171,7 +160,9 @@ def _flanks(recorded: RecordedDrop, gates: int) -> tuple[int, int]:
     return max(max(rises) - min(rises), max(falls) - min(falls)), falls[0] - rises[0]
 
 
-def _limit(what: str, values: list[float], limit: float, unit: str) -> None:
+def _limit(what: str, values: list[float], limit: float, unit: str) -> float:
+    """Insist on a limit that no value may exceed in size; give the greatest."""
     worst = max(map(abs, values))
     measured, allowed = (f"{value:.3g} {unit}" for value in (worst, limit))
     fail_if(worst > limit, "judged_limit", text=what, measured=measured, limit=allowed)
+    return worst

@@ -1,4 +1,4 @@
-"""Making and opening the SQLite file under a session, and knowing a foreign one."""
+"""Creation and opening of a session's SQLite file, with checks for foreign files."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ _READING = f"{_GUARDS} PRAGMA query_only = ON;"
 # macOS: fsync alone leaves data in the drive's cache.
 _DURABLE = "PRAGMA synchronous = FULL; PRAGMA fullfsync = ON; PRAGMA checkpoint_fullfsync = ON;"
 _WRITING = f"{_GUARDS} PRAGMA journal_mode = WAL; {_DURABLE}"
-_BUSY_S = 2.0  # only a program other than this one can hold the database for longer
+_BUSY_S = 2.0  # only another program can lock the database for longer
 
 
 def build(path: Path, first: Record) -> None:
-    """Make a new session file, whole or not at all.
+    """Create a new session file, completely or not at all.
 
     Parameters
     ----------
     path
-        Where nothing is yet; the caller holds its lock.
+        Path without a file; the caller holds its lock.
     first
         The first rows, by table.
 
     Raises
     ------
     SessionError
-        If something is there, or the place cannot be written.
+        The path exists, or cannot be written.
     """
     if path.exists():
         raise make_error(SessionError, "session_there", path=path)
@@ -58,12 +58,12 @@ def build(path: Path, first: Record) -> None:
 
 
 def check_place(path: Path) -> None:
-    """Refuse what cannot be a session before SQLite touches it.
+    """Raise an error for a path that cannot be a session, before SQLite opens it.
 
     Raises
     ------
     SessionError
-        For a missing file, an empty file, and what is no file.
+        The file is missing, empty, or not a regular file.
     """
     try:
         require_file(path)
@@ -80,10 +80,10 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
     Raises
     ------
     SessionError
-        If it is something else, newer than this program, damaged or not permitted.
+        It is not a session, newer than this program, damaged or not permitted.
     """
-    # Never read the header by hand: closing a second handle on the file would drop the POSIX
-    # locks of a writer in this very process.
+    # Never read the header directly: closing a second handle on the file would drop the POSIX
+    # locks of a writer in this process.
     with translate_errors(path), ExitStack() as undo:
         connection = _reading(path) if readonly else open_database(path, "rw")
         undo.callback(connection.close)
@@ -96,13 +96,13 @@ def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:
 
 
 def open_database(path: Path, mode: str) -> sqlite3.Connection:
-    """Open a file as SQLite's, whatever is in it."""
+    """Open a file with SQLite, without any checks."""
     uri = f"{path.as_uri()}?mode={mode}"
     return sqlite3.connect(uri, uri=True, timeout=_BUSY_S, isolation_level=None)
 
 
 def copy_session(path: Path, folder: Path) -> Path:
-    """Copy a session that nobody writes, with the log (``-wal``) beside it.
+    """Copy a session without a writer, with the log (``-wal``) beside it.
 
     Raises
     ------
@@ -118,8 +118,8 @@ def copy_session(path: Path, folder: Path) -> Path:
 
 
 def _reading(path: Path) -> sqlite3.Connection:
-    """Open a session so that its file, and what lies beside it, stay as they are."""
-    # A log whose writer is gone would be brought into the file by whoever closes it last.
+    """Open a session read-only, without changes to its file and the files beside it."""
+    # SQLite would merge the log of a dead writer into the file on close.
     leftover = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
     if leftover and not writer_of(path):
         memory = sqlite3.connect(":memory:", isolation_level=None)
@@ -127,14 +127,14 @@ def _reading(path: Path) -> sqlite3.Connection:
             copy = copy_session(path, Path(folder))
             with closing(open_database(copy, "rw")) as source:
                 source.backup(memory)
-        if not writer_of(path):  # else it may have been copied in the middle of a write
+        if not writer_of(path):  # otherwise the copy may be in the middle of a write
             return memory
         memory.close()
-    # WAL keeps a log and shared memory beside the database. A read-only handle would make them
-    # and could not take them away again, so where writing is allowed the guard is query_only.
+    # WAL keeps a log and shared memory beside the database. A read-only handle would create them
+    # and could not remove them again, so where writing is allowed the guard is query_only.
     if os.access(path, os.W_OK) and os.access(path.parent, os.W_OK):
         return open_database(path, "rw")
-    # Without a log nobody is writing: on a CD or a write-protected share the file may be read
-    # as it stands.
+    # Without a log there is no writer: on a CD or a write-protected share the file may be read
+    # as it is.
     logged = path.with_name(path.name + "-wal").exists()
     return open_database(path, "ro" if logged else "ro&immutable=1")

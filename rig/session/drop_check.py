@@ -1,6 +1,6 @@
-"""Whether a stored drop is the one that was recorded: its bytes say so, or its certificate's CRC.
+"""Check of a stored drop against its raw bytes, or against the CRC of its certificate.
 
-Everyone who reads drops, for results or to save what is left of a file, asks here.
+All readers of drops, for results or for recovery, use this check.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
 
 _U32 = (1 << 32) - 1
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
-"""What certificates of older formats do not have."""
+"""Fields that certificates of older formats do not have."""
 
 
 class Fate(StrEnum):
-    """What can be said of a drop, in the words that are shown."""
+    """Result of the check of a drop, in the words shown to users."""
 
     CONFIRMED = "whole, and the bytes say the same"
     IMPORTED = "whole; it came from a file, so there are no bytes to compare"
@@ -32,19 +32,19 @@ class Fate(StrEnum):
 
     @property
     def whole(self) -> bool:
-        """Whether the stored record is the one that was made."""
+        """Whether the stored record counts as the recorded one."""
         return self in {Fate.CONFIRMED, Fate.IMPORTED, Fate.UNCONFIRMED}
 
 
 class ByteReplay:
-    """What the bytes of a session say, read as they grow.
+    """Records decoded from the bytes of a session, incrementally.
 
     Attributes
     ----------
     fed
-        Number of chunks taken.
+        Number of chunks decoded.
     records
-        All that was told but the messages themselves, in order.
+        All decoded records in order, without the messages themselves.
     """
 
     def __init__(self) -> None:
@@ -53,42 +53,42 @@ class ByteReplay:
         self._transcript = Transcript()
 
     def feed(self, chunks: Iterable[tuple[int, Literal["rx", "tx"], bytes]]) -> None:
-        """Take the next chunks: host time, direction and bytes."""
+        """Decode the next chunks: host time, direction and bytes."""
         for host_ns, direction, data in chunks:
             self.fed += 1
             records: Iterable[Record] = self._transcript.feed(direction, host_ns, data)
             self.records += [record for record in records if not isinstance(record, Incoming)]
 
     def acknowledged_drops(self) -> list[Drop]:
-        """List the drops that the host has read enough of, without those of no plan."""
+        """Return the drops that the host acknowledged, without test runs."""
         return [told for told in self.records if isinstance(told, Drop) and told.run != TEST_RUN]
 
     def unfinished_drops(self) -> list[Drop]:
-        """List the drops that were never acknowledged, as far as they are there."""
+        """Return the received parts of drops that were never acknowledged, without test runs."""
         return [drop for drop in self._transcript.unfinished_drops() if drop.run != TEST_RUN]
 
     def drops(self) -> dict[Job, Drop]:
-        """Give every drop once, as it was told last."""
+        """Return the latest version of every drop."""
         drops = [*self.unfinished_drops(), *self.acknowledged_drops()]
         return {drop.job: drop for drop in drops}
 
 
 def check_drop(stored: Drop, replayed: Mapping[Job, Drop]) -> Fate:
-    """Compare a stored drop with what the bytes say, and where they are damaged, with itself.
+    """Compare a stored drop with its bytes or, if these are damaged, with its own certificate.
 
     Parameters
     ----------
     stored
-        As its rows give it.
+        The drop from its rows.
     replayed
-        From `ByteReplay.drops`.
+        Drops of `ByteReplay.drops`.
     """
     again = replayed.get(stored.job)
     if again is None:
         told = [(drop.certificate, drop.fire_tick) for drop in replayed.values()]
         moved = stored.certificate and (stored.certificate, stored.fire_tick) in told
         if moved or not _sound(stored):
-            return Fate.PARTIAL  # at best the bytes have it under another name
+            return Fate.PARTIAL  # the bytes may have it under another name
         return Fate.IMPORTED if stored.certificate is None else Fate.UNCONFIRMED
     if as_old_as(stored, again) == stored:
         return Fate.CONFIRMED
@@ -100,7 +100,7 @@ def check_drop(stored: Drop, replayed: Mapping[Job, Drop]) -> Fate:
 
 
 def as_old_as(stored: Drop, drop: Drop) -> Drop:
-    """Leave out what the format of the stored drop did not keep: of certificates and of faults."""
+    """Return `drop` without certificate and fault data that the stored drop's format lacks."""
     if [fault.code for fault in stored.faults] == [fault.code for fault in drop.faults]:
         drop = replace(drop, faults=stored.faults)  # older formats keep sentences without values
     if stored.certificate is None or drop.certificate is None:
@@ -112,7 +112,7 @@ def as_old_as(stored: Drop, drop: Drop) -> Drop:
 
 
 def _sound(drop: Drop) -> bool:
-    """Whether nothing in a stored record contradicts it; one with faults is void by itself."""
+    """Whether a stored record is consistent; a record with faults is void anyway."""
     if drop.damage or drop.faults:
         return not drop.damage
     seen = drop.certificate
@@ -120,9 +120,9 @@ def _sound(drop: Drop) -> bool:
 
 
 def _account_holds(drop: Drop, seen: Certificate) -> bool | None:
-    """Whether edges are what the certificate says, their number and the CRC of their events.
+    """Whether number and CRC of the events match the certificate.
 
-    `None` where pulses too short to be seen leave it open: nobody knows when these events were.
+    `None` if undecided: the events of pulses too short to be stored are unknown.
     """
     events = [(tick, [*edges]) for tick, edges in groupby(drop.edges, lambda edge: edge.tick)]
     if not len(events) <= seen.events <= len(drop.edges) + seen.glitches:
@@ -133,7 +133,7 @@ def _account_holds(drop: Drop, seen: Certificate) -> bool | None:
 
 
 def _crc32(drop: Drop, fire_tick: int, events: Iterable[tuple[int, list[Edge]]]) -> int:
-    """CRC-32 of the events that edges were made of, as `rig.link.assembly.edges` reads them."""
+    """Return the CRC-32 of the events of these edges, see `rig.link.assembly.edges`."""
     state, snapshots = drop.initial_state, []
     for tick, edges in events:
         for _, channel, blocked in edges:

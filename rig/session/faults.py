@@ -1,4 +1,4 @@
-"""What is wrong with a session file in the user's words, each with what to do next."""
+"""Translation of errors with a session file into messages with a remedy."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from rig.reasons import make_error
 from rig.wordings import WORDINGS
 
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
-"""What SQLite raises; where it names what is damaged by bytes that are no text, the second."""
+"""Errors raised by SQLite; the second for a damaged name whose bytes are not text."""
 _SAME = {
     "sqlite_busy": "session_locked",
     "sqlite_locked": "session_locked",
     "sqlite_notadb": "not_a_session",
     "sqlite_perm": "sqlite_cantopen",
 }
-"""Errors of SQLite about which there is no more to say than another code does."""
+"""Codes of SQLite errors that have the message of another code."""
 _OTHERS = {
     sqlite3.Error: "sqlite_failed",
     UnicodeDecodeError: "sqlite_corrupt",
     OSError: "session_unreadable",
-    Exception: "sqlite_constraint",  # what Python does not put into a row
+    Exception: "sqlite_constraint",  # values that Python's sqlite3 refuses
 }
-"""What else there is, the narrower first."""
+"""Other errors, the most specific first."""
 
 
 def as_session_error(path: Path, error: Exception) -> SessionError:
-    """Translate an error of SQLite, of the disk or of a row; its own words are kept."""
+    """Return the `SessionError` for an error of SQLite, the disk or a row, with its own message."""
     name = getattr(error, "sqlite_errorname", "")  # absent on errors of the Python wrapper
     primary = "_".join(name.lower().split("_")[:2])  # of SQLITE_IOERR_WRITE
     other = next(code for kind, code in _OTHERS.items() if isinstance(error, kind))
@@ -40,7 +40,7 @@ def as_session_error(path: Path, error: Exception) -> SessionError:
 
 @contextmanager
 def translate_errors(path: Path) -> Iterator[None]:
-    """Raise what makes a session unreadable inside the block as `SessionError`."""
+    """Translate errors of SQLite, the disk or a row inside the block into `SessionError`."""
     try:
         yield
     except SessionError:

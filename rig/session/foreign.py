@@ -1,8 +1,7 @@
-"""A file that somebody sent is opened as foreign input: nothing in it runs, and nothing runs away.
+"""Protection against foreign session files: no code of the file runs, and cost is bounded.
 
-SQLite would expand a view that stands in a table's place, run what a trigger says, and compute a
-column that is defined by an expression. So the schema is compared with the known one before the
-first row is read.
+SQLite would expand a view in place of a table, run triggers, and compute generated columns. So the
+schema is compared with the known schema before the first row is read.
 """
 
 from __future__ import annotations
@@ -18,23 +17,23 @@ from rig.reasons import make_error
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, Row, create_script
 
 LONGEST_VALUE = 1 << 26
-"""Bytes of one value; the longest that is ever written is a protocol or a burst of edges."""
-_STEPS = 1 << 20  # of SQLite's machine, between two looks at how many there were
+"""Most bytes of a value; the longest ever written is a protocol or a burst of edges."""
+_STEPS = 1 << 20  # steps of SQLite's virtual machine between two checks
 _MOST_STEPS = 1 << 31
-"""Of one statement: reading a session of a day takes a hundredth."""
-_OF_ANALYZE = {"sqlite_stat1", "sqlite_stat4"}  # left behind by somebody's ANALYZE
+"""Most steps of a statement: reading a session of a day takes a hundredth."""
+_OF_ANALYZE = {"sqlite_stat1", "sqlite_stat4"}  # created by the statement ANALYZE
 
 
 def limit_steps(connection: sqlite3.Connection) -> None:
-    """Have statements end that take far more steps, from now on, than any session needs."""
+    """Abort statements of this connection that take far more steps than any session needs."""
     looks = repeat(False, _MOST_STEPS // _STEPS)
     connection.set_progress_handler(lambda: next(looks, True), _STEPS)
 
 
 def check_schema(path: Path, connection: sqlite3.Connection) -> int:
-    """Compare a file's tables, indices and triggers with those that this program makes.
+    """Compare a file's tables, indices and triggers with those of this program.
 
-    From now on it is bounded too what one value may cost, whatever the file says of its length.
+    This also limits the size of values for this connection, whatever length the file claims.
 
     Returns
     -------
@@ -44,10 +43,10 @@ def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     Raises
     ------
     SessionError
-        It is no session, a newer one, or its tables are others or built in another way.
+        It is not a session, or newer than this program, or its tables differ.
     """
-    # Not `trusted_schema = OFF`: SQLite then refuses the json_valid of our own tables, and once
-    # all has been compared there is nothing else in the file that could run.
+    # Not `trusted_schema = OFF`: SQLite then refuses the json_valid of our own tables. After the
+    # comparison, the file has no other code.
     connection.execute("PRAGMA cell_size_check = ON")
     connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
     (application,) = connection.execute("PRAGMA application_id").fetchone()
@@ -79,7 +78,7 @@ def _schema_of(version: int) -> dict[str, Row]:
 
 
 def _schema(connection: sqlite3.Connection) -> dict[str, Row]:
-    """Give by name what there is: tables with their columns, all else as it is written."""
+    """Return the schema by name: tables with their columns, other objects as their SQL."""
     kinds = {name: tuple(how) for _, name, *how in connection.execute("PRAGMA table_list")}
     shapes: dict[str, Row] = {}
     rows = connection.execute("SELECT type, name, tbl_name, sql FROM main.sqlite_master")

@@ -1,8 +1,8 @@
-"""A chain of hashes over all rows of a session: what was altered, removed or reordered shows.
+"""Hash chain over all rows of a session, which detects altered, removed or reordered rows.
 
 Each commit adds, in its own transaction, a row of table ``hash`` for every table that grew: the
-SHA-256 of the hash before and of the new rows. There is no secret in it: whoever computes the chain
-anew, or cuts off its end, hides an alteration. Only a signature of the whole file prevents that.
+SHA-256 of the previous hash and the new rows. The chain has no secret: an alteration can be hidden
+by a new chain, or by a cut at its end. Only a signature of the whole file prevents that.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ HASHED = [name for name in TABLES if name != "hash"]
 
 
 class ChainEnd(NamedTuple):
-    """Where a chain ends: the last row of each table that it covers, and the last hash."""
+    """End of a chain: the last row of each table that it covers, and the last hash."""
 
     last: Mapping[str, int]
     digest: bytes
 
 
 def extend_chain(connection: sqlite3.Connection, end: ChainEnd | None = None) -> ChainEnd:
-    """Hash all rows that no hash covers, in the open transaction.
+    """Add hashes for all new rows, in the open transaction.
 
     Parameters
     ----------
     end
-        Where the committed chain ends, if that is known; to read it takes time with its length.
+        End of the committed chain, if known; reading it takes time in proportion to its length.
 
     Returns
     -------
     ChainEnd
-        Where it ends once the transaction is committed.
+        End of the chain once the transaction is committed.
     """
     if end is None:
         covered = connection.execute("SELECT covered, MAX(last) FROM hash GROUP BY covered")
@@ -48,7 +48,7 @@ def extend_chain(connection: sqlite3.Connection, end: ChainEnd | None = None) ->
         end = ChainEnd(dict(covered), tip[0] if tip else b"")
     last, digest = {**end.last}, end.digest
     for table in HASHED:
-        # A row that has no number of its own goes by that of another: an edge by its drop's.
+        # A row without a number uses that of another: an edge uses its drop's.
         order = TABLES[table].order
         number = order.partition(",")[0]
         sql = f'SELECT {number}, * FROM "{table}" WHERE {number} > ? ORDER BY {order}'  # noqa: S608
@@ -66,12 +66,12 @@ def check_chain(tables: Mapping[str, Mapping[Row, Row]]) -> list[str]:
     Parameters
     ----------
     tables
-        The rows of each by their keys, which begin with the number that the chain goes by.
+        Rows of each table by their keys, which begin with the number used by the chain.
 
     Returns
     -------
     list of str
-        What was altered, a line each; empty where everything agrees, or where there is no chain.
+        A line for each alteration; empty if all rows agree, or without a chain.
     """
     faults: list[str] = []
     ahead = {table: deque(sorted(tables[table].items())) for table in HASHED}
@@ -96,12 +96,12 @@ def check_chain(tables: Mapping[str, Mapping[Row, Row]]) -> list[str]:
 
 
 def protocol_first(links: Sequence[Sequence[Any]]) -> bool | None:
-    """Whether the protocol was hashed, once, before any run; `None` where there is no whole chain.
+    """Whether the protocol was hashed once, before any run; `None` without a complete chain.
 
     Parameters
     ----------
     links
-        The rows of table ``hash`` in order, in which `check_chain` finds no fault.
+        The rows of table ``hash`` in order, without faults by `check_chain`.
     """
     tables = [table for _, table, *_ in links]
     if not tables or OLDER in tables:
@@ -111,8 +111,8 @@ def protocol_first(links: Sequence[Sequence[Any]]) -> bool | None:
 
 
 def _digest(before: bytes, table: str, rows: Iterable[Sequence[Any]]) -> bytes:
-    # A later format may add columns, which are empty in the rows of this one. JSON writes the same
-    # text with every version of Python.
+    # Columns of later formats are empty in rows of this format. JSON text is the same with every
+    # version of Python.
     text = json.dumps([table, *map(_strip, rows)], default=bytes.hex)
     return hashlib.sha256(before + text.encode()).digest()
 

@@ -1,4 +1,4 @@
-"""Writes that wait in memory until the disk has them, so that a full disk costs no data."""
+"""Journal of writes, kept in memory until they are on disk, so that a full disk loses no data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BAD_ROW = (
     ValueError,
     TypeError,
 )
-"""Errors of the row itself: trying again cannot help. All others are the disk's."""
+"""Errors of the row itself, for which a retry cannot help. All others are errors of the disk."""
 
 
 class Journal:
@@ -42,20 +42,20 @@ class Journal:
     pending
         Records not yet on the disk.
     begun_s
-        When the disk began with the write under way, by the monotonic clock; `None` for none.
+        Monotonic time at which the present write began, s; `None` without a write.
     """
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self._connection = connection
         self._path = path
         self.pending: list[Record] = []
-        self._applied = 0  # how many of the pending the open transaction holds
+        self._applied = 0  # number of pending records in the open transaction
         self.begun_s: float | None = None
-        self._chain_end: ChainEnd | None = None  # as committed, once that is known
+        self._chain_end: ChainEnd | None = None  # end of the committed chain, once known
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Time a write; when the disk fails all that is pending is applied anew by the next."""
+        """Time a write; if the disk fails, the next write applies all pending records anew."""
         self.begun_s = monotonic()
         try:
             yield
@@ -71,11 +71,11 @@ class Journal:
         Raises
         ------
         SessionError
-            If the rows are refused (they are forgotten) or the disk fails (they are kept).
+            The rows are refused (they are dropped) or the disk fails (they are kept).
         """
-        # What waits is in the open transaction. Without one the disk has failed, then wait for
-        # commit(): trying the whole backlog at every row would be quadratic, and the caller
-        # already knows.
+        # Pending records are in the open transaction. Without a transaction the disk has failed;
+        # then wait for commit(): a retry of the backlog for every row would take quadratic time,
+        # and the caller knows already.
         failed = bool(self.pending) and not self._connection.in_transaction
         self.pending.append(record)
         if not failed:
@@ -85,34 +85,34 @@ class Journal:
                 raise as_session_error(self._path, refusal) from refusal
 
     def commit(self) -> None:
-        """Make everything added so far durable.
+        """Write all added records to the disk.
 
         Raises
         ------
         SessionError
-            If the disk fails; nothing is forgotten and a later call tries again.
+            The disk fails; all records are kept, and a later call tries again.
         """
         if self.pending:
             with self._writing():
                 self._commit()
 
     def save(self, place: Path) -> int:
-        """Write what is committed and what waits into a new file; nothing waits any more.
+        """Write committed and pending records into a new file, and clear the pending ones.
 
         Parameters
         ----------
         place
-            Where nothing is yet.
+            Path of the new file.
 
         Returns
         -------
         int
-            How many records it refuses.
+            Number of refused records.
 
         Raises
         ------
         sqlite3.Error, OSError
-            It cannot be read, or not be written there.
+            The session cannot be read, or the new file not written.
         """
         self._connection.rollback()
         with closing(sqlite3.connect(place, isolation_level=None)) as target:
@@ -137,7 +137,7 @@ class Journal:
             raise as_session_error(self._path, refusal) from refusal
 
     def _run(self) -> Exception | None:
-        """Apply what is pending; records that are refused are left out, the last one returned."""
+        """Apply pending records; drop refused ones, and return the last error."""
         refusal: Exception | None = None
         if not self._connection.in_transaction:
             self._applied = 0
@@ -162,6 +162,6 @@ class Journal:
             self._connection.execute("ROLLBACK TO record")
             raise
         finally:
-            # When the disk failed SQLite has already rolled everything back, savepoint included.
+            # If the disk failed, SQLite has rolled everything back, including the savepoint.
             if self._connection.in_transaction:
                 self._connection.execute("RELEASE record")

@@ -1,4 +1,4 @@
-"""One writer at a time: an advisory lock that no crash can leave behind."""
+"""Writer lock of a session: an advisory lock that ends with its process."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from rig.errors import SessionError
 from rig.reasons import make_error
 
 _POLL_S = 0.0025
-_LOOK_S = 0.01  # whoever looks for a writer has the lock for microseconds
-_NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
+_LOOK_S = 0.01  # a check for a writer holds the lock for microseconds
+_CODES = dict.fromkeys((errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS), "disk_knows_no_locks")
+# The lock is the first file of a new session: without its folder both are missing.
+_CODES[errno.ENOENT] = "session_unmade"
 
 
 class WriterLock:
     """An exclusive lock on ``FILE.lock`` beside the session.
 
-    The kernel drops the lock when its process ends, however it ends, so a killed writer blocks
-    nobody. The lock has a file of its own because closing any second handle on the database
+    The kernel drops the lock when its process ends, so a killed writer blocks no other process. The
+    lock has a file of its own because closing any second handle on the database
     would silently drop the POSIX locks SQLite holds on it in this process.
 
     Raises
     ------
     SessionError
-        If another process (or another `Session` here) holds it, or the folder cannot be written.
+        Another process (or another `Session` here) holds it, or the folder cannot be written.
     """
 
     def __init__(self, session: Path) -> None:
@@ -38,31 +40,28 @@ class WriterLock:
         )
         try:
             with suppress(FileNotFoundError):
-                # A hard link has a lock and a log of its own: two writers would destroy the file.
+                # A hard link has its own lock and log: two writers would destroy the file.
                 if session.stat().st_nlink > 1:
                     raise make_error(SessionError, "session_two_names", path=session)
-            session.parent.stat()  # filelock would make it
+            session.parent.stat()  # filelock would create it
             self._lock.acquire()
-            if has_fcntl:  # elsewhere the lock's file cannot be written, or says who has it
+            if has_fcntl:  # on other systems a locked file cannot be written
                 self.path.write_text(f"{os.getpid()}\n", "ascii")
         except Timeout:
             holder = _holder(self.path)
             raise make_error(SessionError, "session_in_use", path=session, holder=holder) from None
+        except SessionError:
+            raise
         except OSError as error:
             self._lock.release()
-            if isinstance(error, SessionError):
-                raise
-            if error.errno in _NO_LOCKS:
-                raise make_error(SessionError, "disk_knows_no_locks", path=session) from error
-            # The lock is the first file that a session makes: without its folder there is neither.
-            code = "session_unmade" if isinstance(error, FileNotFoundError) else "cannot_lock"
+            code = _CODES.get(error.errno or 0, "cannot_lock")
             raise make_error(SessionError, code, path=session, text=error) from error
 
     def release(self) -> None:
-        """Give the lock up and take its file away; further calls do nothing."""
+        """Release the lock and remove its file; further calls do nothing."""
         if self._lock.is_locked:
-            # A folder made read-only meanwhile: a stale *file* blocks nobody. While it is locked,
-            # for then nobody else locks a name that is gone.
+            # If the folder has become read-only, a stale *file* does no harm. Remove the file while
+            # it is locked, so that no other process locks a removed name.
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
             self._lock.release()
@@ -80,13 +79,14 @@ def _holder(lock: Path) -> str:
 
 
 def writer_of(session: Path) -> str:
-    """Name the process that has a session open for writing; empty without one."""
+    """Return the name of the process that writes a session; empty without a writer."""
     lock = _place(session)
     with suppress(OSError), lock.open("rb") as file:
-        from filelock import lock_descriptor  # noqa: PLC0415 - only where somebody may write
+        from filelock import FileLock, SoftFileLock, lock_descriptor  # noqa: PLC0415 - rare
 
+        is_soft = FileLock is SoftFileLock  # its file is the lock
         for pause_s in (_LOOK_S, 0.0):
-            if lock_descriptor(file.fileno(), blocking=False):
+            if not is_soft and lock_descriptor(file.fileno(), blocking=False):
                 return ""
             time.sleep(pause_s)
         return _holder(lock)

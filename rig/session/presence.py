@@ -1,4 +1,4 @@
-"""Whether the file at a path is still the one that is open: files are moved, synced and deleted."""
+"""Check that the file at a path is still the open file, not moved, replaced or deleted."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 class Presence:
-    """What was at a path when it was opened.
+    """Identity and size of a session's file when it was opened.
 
-    SQLite goes on with a file that has no name any more: what is committed then is nowhere. A
-    session only grows, so one that is smaller than it was has been cut.
+    SQLite continues with a file that has been deleted, and later commits are lost. A session only
+    grows, so a smaller file has been cut.
 
     Parameters
     ----------
@@ -24,9 +24,9 @@ class Presence:
         self._known = {file: _stat(file) for file in (path, self._log)}
 
     def remove_log(self) -> None:
-        """Take away the log of a file that is elsewhere, once it is empty.
+        """Remove the empty log of a file that has moved.
 
-        SQLite leaves it, and would apply it to any other file that comes to this place.
+        SQLite leaves the log, and would apply it to any other file at this path.
         """
         known, now = self._known[self._log], _stat(self._log)
         if known and now and os.path.samestat(known, now) and now.st_size == 0:
@@ -35,7 +35,7 @@ class Presence:
                 self._path.with_name(self._path.name + "-shm").unlink()
 
     def trouble(self) -> str:
-        """Say in words what has become of it; empty while it is there."""
+        """Return in words what happened to the file; empty if it is unchanged."""
         for path, before in self._known.items():
             now = _stat(path)
             if before is not None:

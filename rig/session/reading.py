@@ -1,4 +1,4 @@
-"""Reading a session: raw records, the log of states and facts."""
+"""Reader of a session: raw records, the log of run states, and metadata."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ Direction = Literal["rx", "tx"]
 
 
 UNBLINDED = "unblinded"
-"""The one fact that may be added later."""
+"""The only key of the metadata that may be added later."""
 MOST_EDGES = 1 << 22
-"""Of a drop that no certificate bounds: no timer that works gives more in an hour."""
+"""Most edges of a drop without a certificate: no working timer gives more in an hour."""
 _AT_ONCE = 256
-"""Rows that are fetched in one go."""
+"""Rows fetched at once."""
 _AFTER = "WHERE id > ? ORDER BY id"
-"""All but the first so many rows: nothing is ever deleted, so their numbers have no gaps."""
+"""SQL for the rows after a given number: rows are never deleted, so numbers have no gaps."""
 _ALWAYS = {"created", "rig_version", "simulated", "origin", "protocol_sha256"}
 
 
 class StateEntry(NamedTuple):
-    """One line of the log of run states."""
+    """An entry of the log of run states."""
 
     run: int
     attempt: int
@@ -52,7 +52,7 @@ class StateEntry(NamedTuple):
 
 
 class ByteChunk(NamedTuple):
-    """Bytes that went one way, and when the last of them did."""
+    """Bytes in one direction, with the host time of the last."""
 
     host_ns: int
     direction: Direction
@@ -60,7 +60,7 @@ class ByteChunk(NamedTuple):
 
 
 class AttachedFile(NamedTuple):
-    """A file that was attached to a session, and when (UTC)."""
+    """A file attached to a session, with its time (UTC)."""
 
     added: str
     name: str
@@ -68,21 +68,21 @@ class AttachedFile(NamedTuple):
 
 
 class Reader:
-    """Everything that can be asked of an open session.
+    """Read access to an open session.
 
     Parameters
     ----------
     path
-        For messages.
+        Path for messages.
     connection
-        Checked to be a session.
+        Connection to a checked session.
 
     Attributes
     ----------
     readonly
-        Whether nothing can be added.
+        Whether the session cannot be written.
     meta
-        Facts fixed when the file was made: created, rig_version, origin and more.
+        Metadata fixed at creation: created, rig_version, origin and more.
     """
 
     readonly = True
@@ -102,8 +102,8 @@ class Reader:
 
     @contextmanager
     def snapshot(self) -> Iterator[None]:
-        """See the records as they stand at the first question, whatever another adds meanwhile."""
-        begins = self.readonly and not self.connection.in_transaction  # else it alone writes
+        """Read all records inside the block as of the first query, in spite of a writer."""
+        begins = self.readonly and not self.connection.in_transaction  # a writer is alone
         if begins:
             self.connection.execute("BEGIN")
         try:
@@ -114,13 +114,13 @@ class Reader:
 
     @property
     def connection(self) -> sqlite3.Connection:
-        """The open file, for another way to read it too."""
+        """The open SQLite connection."""
         if self._connection is None:
             raise make_error(SessionError, "session_closed", path=self.path)
         return self._connection
 
     def digest(self) -> str | None:
-        """Return the SHA-256 of all records as they stand; `None` where they are not the file's."""
+        """Return the SHA-256 of all records; `None` if they do not come from a session file."""
         with translate_errors(self.path):
             return hashlib.sha256(self.connection.serialize()).hexdigest()
 
@@ -131,12 +131,12 @@ class Reader:
 
     @property
     def unblinded(self) -> str:
-        """When the numbers of a blind session were shown; empty before."""
+        """Time at which a blind session was unblinded; empty before."""
         return self.meta.get(UNBLINDED, "")
 
     @property
     def protocol_text(self) -> str:
-        """The protocol file word for word."""
+        """Text of the protocol file, word for word."""
         text = str(self._protocol()[2])
         if hashlib.sha256(text.encode()).hexdigest() != self.meta["protocol_sha256"]:
             raise self._damage("its protocol was altered")
@@ -144,44 +144,44 @@ class Reader:
 
     @property
     def protocol_source(self) -> str:
-        """The protocol file's name when the session was made."""
+        """Name of the protocol file at the session's creation."""
         return str(self._protocol()[1])
 
     def identities(self) -> list[tuple[int, dict[str, Any]]]:
-        """Host time and content of every identity, in order."""
+        """Return host time and content of every identity record, in order."""
         rows = self._rows("identity", "ORDER BY id")
         return [(host_ns, read_identity(text)) for _, host_ns, text in rows]
 
     def byte_log(self, after: int = 0) -> Iterator[ByteChunk]:
-        """All bytes in both directions, in order, but for the first so many chunks.
+        """Return all chunks of bytes in order, without the first `after`.
 
-        They are read as they are asked for.
+        The iterator reads them lazily.
         """
         return self._records(ByteChunk, "bytes", _AFTER, after)
 
     def pings(self, after: int = 0) -> list[ClockSample]:
-        """Clock samples in order, all but the first so many."""
+        """Return the clock samples in order, without the first `after`."""
         return [*self._records(ClockSample, "ping", _AFTER, after)]
 
     def pulses(self) -> list[Pulse]:
-        """All pulses of the 1 Hz reference that were asked for, in order."""
+        """Return all recorded pulses of the 1 Hz reference, in order."""
         return [*self._records(Pulse, "reference", _AFTER, 0)]
 
     def host_breaks(self) -> list[HostBreak]:
-        """When the host slept or its clock was set, in order."""
+        """Return all breaks of the host's clock (sleep, or clock set), in order."""
         return [*self._records(HostBreak, "host_break", _AFTER, 0)]
 
     def attached_files(self) -> list[AttachedFile]:
-        """All files that were attached, in order."""
+        """Return all attached files, in order."""
         return [*self._records(AttachedFile, "attachment", _AFTER, 0)]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
-        """Every attempt at every run, in the order of recording, compared with its bytes.
+        """Return all recorded drops in the order of recording, checked against their bytes.
 
         Parameters
         ----------
         replay
-            Of this session's bytes, from an earlier call: only what is new is read then.
+            Replay of this session's bytes from an earlier call, so that only new bytes are read.
         """
         rows = [*self._raw("drop", "ORDER BY id")]
         replay = ByteReplay() if replay is None else replay
@@ -191,37 +191,37 @@ class Reader:
             yield self._drop(row, replayed)
 
     def drop(self, run: int, attempt: int) -> Drop | None:
-        """Return one recorded attempt, without a look at its bytes; `None` if there is none."""
+        """Return a recorded attempt without a check of its bytes; `None` if there is none."""
         rows = self._raw("drop", "WHERE run = ? AND attempt = ?", run, attempt)
         return next((self._drop(row, {}) for row in list(rows)), None)
 
     def latest_drops(self, run: int | None = None) -> list[Drop]:
-        """Return the last attempt at each run, by run, or at one run, compared with its bytes."""
+        """Return the last attempt at each run, or at one run, checked against its bytes."""
         drops = (drop for drop in self.drops() if run in {None, drop.run})
         return [*{drop.run: drop for drop in sorted(drops, key=lambda drop: drop.job)}.values()]
 
     def states(self, run: int | None = None) -> list[StateEntry]:
-        """Return the log of run states, in order: the whole of it, or of one run."""
+        """Return the log of run states in order, of all runs or of one."""
         which = "WHERE ?1 IS NULL OR run = ?1 ORDER BY id"
         return [*self._records(_state, "run_state", which, run)]
 
     def fired_ns(self) -> dict[tuple[int, int], int]:
-        """Return by run and attempt when the host's log says that it was fired."""
+        """Return the host time of firing from the log of states, by run and attempt."""
         states = self.states()
         return {entry[:2]: entry.host_ns for entry in states if entry.state is RunState.FIRED}
 
     def latest_state(self, run: int) -> StateEntry | None:
-        """Where a run stands; `None` when the log does not name it."""
+        """Return the latest state of a run; `None` if it has none."""
         which = "WHERE run = ? ORDER BY id DESC LIMIT 1"
         return next(self._records(_state, "run_state", which, run), None)
 
     def check(self) -> None:
-        """Read everything there is once.
+        """Read all records once.
 
         Raises
         ------
         SessionError
-            Something of it cannot be read.
+            A record cannot be read.
         """
         for table in TABLES:
             if table not in {"drop", "edge"}:
@@ -232,7 +232,7 @@ class Reader:
         _ = self.protocol_text
 
     def _raw(self, table: str, which: str, *values: object) -> Iterator[Row]:
-        """Read rows as they are; `table` and `which` are of this module only."""
+        """Return rows unchecked; `table` and `which` are constants of this module."""
 
         def fetch() -> list[Row]:
             with translate_errors(self.path):
@@ -242,19 +242,19 @@ class Reader:
             if self.readonly:
                 limit_steps(self.connection)
             cursor = self.connection.execute(f'SELECT * FROM "{table}" {which}', values)  # noqa: S608
-        # No generator: where one is left half read, Python ends it by its own hand, and a Ctrl-C
-        # that comes meanwhile is shown and lost.
+        # Not a generator: Python closes an unfinished generator by itself, and a Ctrl-C during
+        # that is printed and lost.
         return chain.from_iterable(iter(fetch, []))
 
     def _rows(self, table: str, which: str = "", *values: object) -> Iterator[Row]:
-        """Read rows, each of them checked.
+        """Return rows, each checked.
 
         Raises
         ------
         SessionError
-            Which value of which row cannot be.
+            A row has an invalid value; names both.
         """
-        # A file of an older format that was opened read-only has not all tables.
+        # A file of an older format that is open read-only may lack tables.
         if TABLES[table].since > 1 and not any(self._raw("sqlite_master", "WHERE name = ?", table)):
             return
         for row in self._raw(table, which, *values):
@@ -279,7 +279,7 @@ class Reader:
         return row
 
     def _drop(self, row: Row, replayed: Mapping[Job, Drop]) -> Drop:
-        self._check("drop", row[:3])  # else nobody knows which drop it is
+        self._check("drop", row[:3])  # without these the drop is unknown
         try:
             check_row("drop", row)
             stored = drop_of(row, self._edges(row))
@@ -288,7 +288,7 @@ class Reader:
             why = stored.damage or "its edges do not agree with its bytes or its certificate"
         except RowError as error:
             why = str(error)
-        # Of its numbers none can be trusted.
+        # No other value of the row can be trusted.
         return Drop(row[1], row[2], tick_hz=1, edges=(), damage=why)
 
     def _damage(self, text: str) -> SessionError:
@@ -296,7 +296,7 @@ class Reader:
 
     def _edges(self, row: Row) -> list[Row]:
         number, events = row[0], named_values(row)["events"]
-        # An event is a change of one gate or more.
+        # An event is a change of one or more gates.
         most = MOST_EDGES if events is None else min(MOST_EDGES, GATES * events)
         edges = [*self._raw("edge", 'WHERE "drop" = ? ORDER BY idx LIMIT ?', number, most + 1)]
         for edge in edges:

@@ -1,4 +1,4 @@
-"""Rows of a session: checked by the rules of their columns, and a drop of its rows and back."""
+"""Rows of a session: checks by column, and conversion between a drop and its rows."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from rig.session.schema import TABLES, Record, read_reasons, write_reasons
 _DROP = TABLES["drop"].names()
 _ACCOUNT = [field.name for field in fields(Certificate)]
 _CERTIFIED = [field.name for field in fields(Certificate) if field.default is not None]
-"""What every certificate has, whatever the format of the file."""
+"""Columns of every certificate, in all formats of the file."""
 _PLAIN = [field.name for field in fields(Drop) if field.name in {*_DROP} - {"faults"}]
-"""What a drop has as its row has it."""
+"""Columns that a drop has unchanged."""
 
 
 class RowError(ValueError):
-    """A row with a value that cannot be."""
+    """A row with an invalid value."""
 
 
 def check_row(table: str, row: Sequence[object]) -> None:
@@ -35,7 +35,7 @@ def check_row(table: str, row: Sequence[object]) -> None:
     Raises
     ------
     RowError
-        Which value cannot be, where, and what is accepted.
+        A value is invalid; names value, place and accepted values.
     """
     for column, value in zip(TABLES[table].columns, row, strict=False):
         if not column.accepts(value):
@@ -54,10 +54,10 @@ def named_values(row: Sequence[Any]) -> dict[str, Any]:
 
 
 def drop_of(row: Sequence[Any], edges: Iterable[Sequence[Any]]) -> Drop:
-    """Make a drop of its row and the rows of its edges, all checked; it is damaged without some."""
+    """Return the drop of checked rows of the drop and its edges; damaged if edges are missing."""
     values, edges = named_values(row), [*edges]
     torn = any(edge[1] != number for number, edge in enumerate(edges))
-    # What an older format has not, its certificate has not either.
+    # Certificates of older formats lack some columns.
     account: dict[str, Any] = {name: values.get(name) for name in _ACCOUNT}
     return Drop(
         **{name: values[name] for name in _PLAIN},

@@ -1,6 +1,6 @@
-"""The tables of a session file: made, upgraded, read and checked as ``tables.txt`` declares them.
+"""Tables of a session file as declared in ``tables.txt``: creation, upgrade, reading and checks.
 
-Triggers keep raw records as they were made.
+Triggers prevent changes of raw records.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ APPLICATION_ID = 0x43485247
 """``CHRG`` in the SQLite header: this database is a chain-rig session."""
 
 SCHEMA_VERSION = 5
-"""In SQLite's ``user_version``; a program refuses files with a higher one."""
+"""Stored in SQLite's ``user_version``; a program refuses files with a higher version."""
 
 OLDER = "older"
-"""In place of a table in the chain of hashes: rows were there before it began."""
+"""Replaces a table's name in the hash chain: rows existed before the chain began."""
 _OLD_NOTE = "note: "
 
 
 class RunState(StrEnum):
-    """Where a planned run stands; the log of these is only ever added to."""
+    """State of a planned run; the log of states is append-only."""
 
     PLANNED = "planned"
     ARMED = "armed"
@@ -47,7 +47,7 @@ class RunState(StrEnum):
 
 
 class _Kind(NamedTuple):
-    """A kind of value: its type and check in SQL, with {} for the column, and what it accepts."""
+    """A kind of value: SQL type and check, with {} for the column, and accepted values."""
 
     type_name: str
     check: str
@@ -72,7 +72,7 @@ def _json(accepted: str, read: Callable[[str], object]) -> _Kind:
     def accepts(value: Any) -> bool:
         try:
             read(value)
-            # JSON's escapes can name halves of characters, which no file or screen takes.
+            # JSON escapes can contain lone surrogates, which no file or screen accepts.
             json.dumps(json.loads(value), ensure_ascii=False).encode()
         except (TypeError, ValueError, RecursionError):
             return False
@@ -82,12 +82,12 @@ def _json(accepted: str, read: Callable[[str], object]) -> _Kind:
 
 
 def read_identity(record: str) -> dict[str, Any]:
-    """Read what a device or another timer is; what is calculated with must be possible.
+    """Return the identity of a device or another timer; values used in calculations are checked.
 
     Raises
     ------
     TypeError, ValueError
-        It is something else.
+        The record is not a valid identity.
     """
     members = json.loads(record)
     if not isinstance(members, dict):
@@ -99,17 +99,17 @@ def read_identity(record: str) -> dict[str, Any]:
 
 
 def write_reasons(reasons: Iterable[Reason]) -> str:
-    """Write reasons as a row has them."""
+    """Return reasons as text of a row."""
     return encodable(json.dumps([reason.record() for reason in reasons], ensure_ascii=False))
 
 
 def read_reasons(text: str) -> tuple[Reason, ...]:
-    """Read what `write_reasons` wrote, or the list of sentences of an old file.
+    """Return the reasons of a text by `write_reasons`, or of a list of sentences of an old file.
 
     Raises
     ------
     TypeError, ValueError
-        It is something else.
+        The text is neither.
     """
     rows = json.loads(text)
     if not isinstance(rows, list):
@@ -125,8 +125,8 @@ def _read_reason(row: object) -> Reason:
 
 
 _U32, _INT64 = (1 << 32) - 1, (1 << 63) - 1
-_NS = (1 << 62) - 1  # two of them can be added: 146 years
-_MOST_HZ = 10**12  # of imported times, whose unit is 1 ps; boards count far slower
+_NS = (1 << 62) - 1  # the sum of two fits 64 bits: 146 years
+_MOST_HZ = 10**12  # imported times have the unit 1 ps; boards count far slower
 _KINDS = {
     "row": _whole(1, _INT64),
     "only": _whole(1, 1, " CHECK ({} = 1)"),
@@ -156,10 +156,10 @@ _IDENTITY: dict[str, Callable[[Any], bool]] = {
 
 
 class TableColumn:
-    """A column: its name, its SQL, its age and its meaning.
+    """A column: name, SQL, first format and meaning.
 
-    `accepts` tells whether a value may stand here, and `accepted` says it in words; `since` is the
-    first format of the file that has it.
+    `accepts` is the check of a value, `accepted` describes valid values in words, and `since` is
+    the first format with the column.
     """
 
     def __init__(self, row: str, table_since: int) -> None:
@@ -167,7 +167,7 @@ class TableColumn:
         word, *options = kind.split()
         optional = "empty" in options
         type_name, check, self.accepted, accepts = _KINDS[word]
-        # A plain function, since every value of a file is asked for.
+        # A plain function for speed, as it is called for every value of a file.
         self.accepts: Callable[[Any], bool] = (
             (lambda value: value is None or accepts(value)) if optional else accepts
         )
@@ -178,24 +178,24 @@ class TableColumn:
 
 
 class SessionTable:
-    """A table that only grows.
+    """An append-only table.
 
     Attributes
     ----------
     columns
-        In order; those of later formats come last.
+        Columns in order; those of later formats come last.
     since
-        The first format of the file that has it.
+        The first format with the table.
     meaning
-        What its rows are.
+        Meaning of its rows.
     numbered
         Whether its rows are numbered from 1.
     lengths
-        How many columns it has, in any format.
+        Numbers of columns in all formats.
     order
-        By which its rows are in order, for SQL: their number, or the columns of a longer key.
+        SQL order of its rows: their number, or the columns of a longer key.
     key
-        How many columns the key has: more than one where SQLite gives a row no number.
+        Number of columns of the key: more than one if SQLite does not number the rows.
     insert
         Statement that adds a row of all columns; an empty id is numbered.
     """
@@ -213,16 +213,16 @@ class SessionTable:
         self.insert = f'INSERT INTO "{name}" VALUES ({values})'  # noqa: S608 - of tables.txt
 
     def names(self, version: int = SCHEMA_VERSION) -> list[str]:
-        """List the columns that a format has."""
+        """Return the names of a format's columns."""
         return [column.name for column in self.columns if column.since <= version]
 
     def script(self, version: int) -> str:
-        """Return the script that makes it, as a format has it."""
+        """Return the script that creates the table in a format."""
         name, parts = self._name, [c.sql for c in self.columns if c.since <= version]
         parts += [f"UNIQUE ({columns})" for columns in self._also]
         parts += [f"PRIMARY KEY ({self._key})"] if self.key > 1 else []
         taken = " OR ".join([_same(self._key), *(f"({_same(columns)})" for columns in self._also)])
-        # "INSERT OR REPLACE" deletes without asking the delete trigger, so it has one of its own.
+        # "INSERT OR REPLACE" deletes without the delete trigger, so it has its own trigger.
         refuse = f"SELECT RAISE(ABORT, '{name}: raw records are never altered');"
         return f"""
 CREATE TABLE "{name}" ({", ".join(parts)}) STRICT{", WITHOUT ROWID" if self.key > 1 else ""};
@@ -248,7 +248,7 @@ def _read_tables(page: str) -> dict[str, SessionTable]:
 
 
 TABLES = _read_tables(Path(__file__).with_name("tables.txt").read_text("utf-8"))
-"""By name, in the order in which a commit's rows are hashed."""
+"""Tables by name, in the order in which a commit's rows are hashed."""
 
 _BESIDES = """
 CREATE INDEX run_state_by_run ON run_state (run, id);
@@ -260,14 +260,14 @@ CREATE TABLE result (run INTEGER NOT NULL, attempt INTEGER NOT NULL, analysis_ve
 
 
 def create_script(version: int = SCHEMA_VERSION) -> str:
-    """Return the script that makes an empty session of a format inside a transaction."""
+    """Return the script that creates an empty session of a format inside a transaction."""
     tables = "".join(table.script(version) for table in TABLES.values() if table.since <= version)
     numbers = f"PRAGMA application_id = {APPLICATION_ID};\nPRAGMA user_version = {version};\n"
     return tables + _BESIDES + numbers
 
 
 def upgrade_script(version: int) -> str:
-    """Return the script that makes a file of the format before one of this format."""
+    """Return the script that upgrades a file to this format from the previous one."""
     script = ""
     for name, table in TABLES.items():
         if table.since == version:

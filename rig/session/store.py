@@ -1,4 +1,4 @@
-"""The session: one SQLite file that holds everything that happened, in order."""
+"""The session: an SQLite file with all records of an experiment, in order."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ _TIMINGS = {ClockSample: "ping", Pulse: "reference", HostBreak: "host_break"}
 
 
 class Session(Reader):
-    """An open session file; make one with `create` or `open`.
+    """An open session file; use `create` or `open`.
 
-    Whatever is added waits in one open transaction until `commit`, which returns when the disk
-    has it. Raw records can be added, never altered. One thread uses a session; any number of
+    Added records wait in an open transaction until `commit`, which returns when they are on disk.
+    Raw records can be added, never altered. A session belongs to a single thread; any number of
     read-only sessions may be open on the same file.
     """
 
@@ -50,8 +50,8 @@ class Session(Reader):
         self._journal = Journal(connection, path)
         self._presence = Presence(path)
         self._loss: SessionError | None = None
-        self.rescued = False  # saved elsewhere, whole, since the file is not at its place any more
-        # Counted here, not by SQLite, so that a commit tried again writes the same rows.
+        self.rescued = False  # saved completely elsewhere, as the file was moved or deleted
+        # Counted here, not by SQLite, so that a repeated commit writes the same rows.
         self._last_drop = max((row[0] for row in self._raw("drop", "")), default=0)
 
     @classmethod
@@ -64,23 +64,23 @@ class Session(Reader):
         simulated: bool,
         origin: str,
     ) -> Session:
-        """Make a new session file and open it for writing.
+        """Create a new session file and open it for writing.
 
         Parameters
         ----------
         path
-            Must not exist yet.
+            Path of the file, which must not exist.
         protocol_text, protocol_source
             The protocol file word for word, and its name.
         simulated
-            Whether the data come from a simulation; kept for good and stamped on every result.
+            Whether the data come from a simulation; permanent, and marked on every result.
         origin
             The port's URL, or the name of the imported file.
 
         Raises
         ------
         SessionError
-            If something is already there or the place cannot be written.
+            The path exists or cannot be written.
         """
         meta = {
             "created": _now(),
@@ -104,13 +104,13 @@ class Session(Reader):
         path
             The file.
         readonly
-            Works beside a writer and on write-protected files.
+            Whether to open it read-only, beside a writer or on write-protected media.
 
         Raises
         ------
         SessionError
-            If it is missing, something else, newer than this program, damaged, or already being
-            written by another process.
+            It is missing, not a session, newer than this program, damaged, or already being written
+            by another process.
         """
         place = Path(os.path.realpath(path))
         check_place(place)
@@ -132,23 +132,23 @@ class Session(Reader):
 
     @property
     def pending(self) -> int:
-        """Number of records that no `commit` has made durable yet."""
+        """Number of records that are not committed yet."""
         return len(self._journal.pending)
 
     @property
     def write_s(self) -> float:
-        """How long the disk has been at the write under way; 0 for none. For other threads too."""
+        """Duration of the present write so far, s; 0 without a write. Safe in any thread."""
         begun_s = self._journal.begun_s
         return 0.0 if begun_s is None else monotonic() - begun_s
 
     def commit(self) -> None:
-        """Return when everything added so far is on the disk.
+        """Write all added records to the disk, and return when they are durable.
 
         Raises
         ------
         SessionError
-            If the disk is full or fails: the records are kept in memory; call again. If the file
-            was moved, deleted, replaced or cut: all is saved beside it, and this one is over.
+            The disk is full or fails: records are kept in memory; call again. Or the file was
+            moved, deleted, replaced or cut: everything is saved beside it, and the session ends.
         """
         try:
             self._writable().commit()
@@ -158,12 +158,12 @@ class Session(Reader):
         self.require_presence()
 
     def require_presence(self) -> None:
-        """See that the file is still at its place; save what there is where it is not.
+        """Check that the file is still at its path; otherwise save all records elsewhere.
 
         Raises
         ------
         SessionError
-            It is not; with the name of the file that has everything.
+            It is not; names the file with all records.
         """
         if self._loss is None and (trouble := self._presence.trouble()):
             self._loss = self._rescue(trouble)
@@ -171,18 +171,18 @@ class Session(Reader):
             raise self._loss
 
     def settle(self) -> None:
-        """Bring what is in the log (``-wal``) into the file, so that a copy of it alone is whole.
+        """Merge the log (``-wal``) into the file, so that a copy of the file alone is complete.
 
-        A reader that is at it may keep the last of it back until the next time.
+        A concurrent reader may delay the last part until the next call.
         """
         with translate_errors(self.path):
             self.connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         self.require_presence()
 
     def _rescue(self, trouble: str) -> SessionError:
-        """Save what the open file and this memory have; give the error that says where.
+        """Save all committed and pending records, and return the error that names the new file.
 
-        All goes into the open file too: it is whole then, wherever it was moved.
+        Pending records also go into the open file, which is then complete wherever it was moved.
         """
         with suppress(SessionError):
             self._journal.commit()
@@ -208,7 +208,7 @@ class Session(Reader):
         Raises
         ------
         SessionError
-            If the last commit fails; the file is closed nevertheless.
+            The last commit fails; the file is closed nevertheless.
         """
         if self._connection is None:
             return
@@ -226,7 +226,7 @@ class Session(Reader):
                 self._lock.release()
 
     def _fold_in(self) -> None:
-        """Leave one file to copy, even while a reader keeps the log from being removed."""
+        """Merge the log into the file, so that the file alone can be copied despite readers."""
         with suppress(sqlite3.Error):
             self.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
@@ -234,21 +234,21 @@ class Session(Reader):
         return self
 
     def __exit__(self, *_exc: object) -> None:
-        self.close()  # also after an error: what was measured stays measured
+        self.close()  # also after an error, to keep all measured data
 
     # ------------------------------------------------------------------ adding
 
     def add_rows(self, table: str, rows: Iterable[Sequence[object]]) -> None:
-        """Add rows to a table, all or none; those with a number get the next ones."""
+        """Add rows to a table, all or none; numbered rows get the next numbers."""
         values = [(None, *row) if TABLES[table].numbered else row for row in rows]
         self._writable().add({table: values})
 
     def log_bytes(self, direction: Direction, host_ns: int, data: bytes) -> None:
-        """Add bytes exchanged with the device, as they came or went."""
+        """Add raw bytes received from or sent to the device."""
         self.add_rows("bytes", [(host_ns, direction, bytes(data))])
 
     def add_identity(self, identity: Mapping[str, object], host_ns: int) -> None:
-        """Add what a device said it is, each time it says so."""
+        """Add an identity record of a device, once for each identification."""
         self.add_rows("identity", [(host_ns, json.dumps(dict(identity)))])
 
     def add_timing(self, record: ClockSample | Pulse | HostBreak) -> None:
@@ -256,16 +256,16 @@ class Session(Reader):
         self.add_rows(_TIMINGS[type(record)], [record])
 
     def add_drop(self, drop: Drop, *, host_ns: int | None = None, provenance: str = "") -> None:
-        """Add the raw record of one drop with its edges, all or nothing.
+        """Add the raw record of a drop with its edges, all or nothing.
 
         Parameters
         ----------
         drop
-            A new pair of run and attempt.
+            Drop with a new pair of run and attempt.
         host_ns
-            Host time at which the record was complete, where known.
+            Host time at which the record was complete, if known.
         provenance
-            How the record came here, for example ``device`` or the imported file.
+            Origin of the record, for example ``device`` or the imported file.
         """
         journal = self._writable()
         self._last_drop += 1
@@ -274,7 +274,7 @@ class Session(Reader):
     def add_state(
         self, run: int, attempt: int, state: RunState, host_ns: int, reasons: Sequence[Reason] = ()
     ) -> None:
-        """Add one line to the log of run states."""
+        """Add an entry to the log of run states."""
         self.add_rows("run_state", [(run, attempt, str(state), write_reasons(reasons), host_ns)])
 
     def attach(self, name: str, data: bytes) -> None:
@@ -282,12 +282,12 @@ class Session(Reader):
         self.add_rows("attachment", [(_now(), encodable(name), data)])
 
     def unblind(self) -> None:
-        """Record, once and on the disk, that from now on the numbers may be seen.
+        """Record, once and on disk, that results may be shown from now on.
 
         Raises
         ------
         SessionError
-            That was recorded before, or the disk fails.
+            The session is already unblinded, or the disk fails.
         """
         now = _now()
         self.add_rows("meta", [(UNBLINDED, now)])
@@ -308,6 +308,6 @@ def _now() -> str:
 
 
 def _unused_name(path: Path) -> Path:
-    """Name a file beside a session that is not there yet."""
+    """Return an unused file name beside a session."""
     names = (path.with_name(f"{path.name}.saved-{number}") for number in count(1))
     return next(name for name in names if not name.exists())

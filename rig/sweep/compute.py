@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from rig.model.batch import FallBatch, Flags, Floats, Impacts, falls, given_impacts, surface_impacts
+from rig.model.batch import Flags, Floats, Impacts, falls, given_impacts, surface_impacts
 from rig.model.chain import XI
 
 if TYPE_CHECKING:
@@ -90,9 +90,9 @@ def compute(
     show
         Called with the number of points done after each piece.
     """
-    size = layout.grid.size
+    size = layout.size
     separation, speed, notes = np.empty(size), np.empty(size), np.empty(size, np.uint8)
-    under_way: dict[Future[FallBatch], slice] = {}
+    under_way: dict[Future[Floats], slice] = {}
     done = 0
 
     def collect() -> None:
@@ -104,12 +104,10 @@ def compute(
             show(done)
 
     try:
-        for place in layout.grid.chunks(length):
+        for place in layout.chunks(length):
             if len(under_way) >= slots:
                 collect()
-            values = layout.fixed | {
-                axis.name: np.array(axis.values)[along] for axis, along in layout.grid.places(place)
-            }
+            values = layout.fixed_values | layout.along_axes(place)
             impacts = _impacts(layout, values)
             notes[place] = _notes(layout, values, impacts)
             inputs = values["drop"], values["gravity"], values.get("initial_speed", 0.0)
@@ -123,7 +121,7 @@ def compute(
             future.cancel()
     separation += layout.longer_m
     notes[np.isnan(separation)] = NO_ANSWER
-    shape = layout.grid.shape
+    shape = layout.shape
     return Swept(separation.reshape(shape), speed.reshape(shape), notes.reshape(shape))
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from rig import __version__
 from rig.errors import RigError
+from rig.reasons import make_error
 
 PATIENCE_S = 8.0
 
@@ -53,9 +54,8 @@ def executor(jobs: int | None, address: str | None) -> Iterator[tuple[Executor, 
     try:
         yield client.get_executor(pure=False), sum(client.nthreads().values())
     except (KilledWorker, CommClosedError, CancelledError) as error:
-        raise ClusterError(
-            f"--cluster {address}: broke off ({_first_line(error)})", "nothing was written"
-        ) from error
+        cause = _first_line(error)
+        raise make_error(ClusterError, "cluster_lost", address=address, cause=cause) from error
     finally:
         client.close(timeout=PATIENCE_S)
 
@@ -76,21 +76,17 @@ def _connect(address: str) -> Any:
     try:
         client, versions = answer.result(1.25 * PATIENCE_S)
     except Exception as error:  # whatever answers there may answer anything
-        raise ClusterError(
-            f"--cluster {address}: cannot be reached ({_first_line(error)})",
-            "is its scheduler running? an address is like tcp://lab-server:8786",
-        ) from error
+        words = {"address": address, "cause": _first_line(error)}
+        raise make_error(ClusterError, "cluster_unreachable", **words) from error
     unlike = {worker: theirs for worker, theirs in versions.items() if theirs != __version__}
     if versions and not unlike:
         return client
     client.close(timeout=1.0)
     if not versions:
-        raise ClusterError(f"--cluster {address}: has no workers", f"dask worker {address}")
+        raise make_error(ClusterError, "cluster_empty", address=address)
     worker, theirs = unlike.popitem()
-    raise ClusterError(
-        f"--cluster {address}: chainrig {__version__} is here, on {worker} is {theirs}",
-        "install the same chainrig for the workers",
-    )
+    words = {"address": address, "version": __version__, "worker": worker, "other": theirs}
+    raise make_error(ClusterError, "cluster_unlike", **words)
 
 
 def _ask(address: str, answer: Future[tuple[Any, dict[str, str]]]) -> None:

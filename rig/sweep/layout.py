@@ -12,14 +12,14 @@ import numpy as np
 
 from rig.errors import InputError
 from rig.protocol.fields import did_you_mean
+from rig.reasons import make_error
 from rig.sweep.variables import VARIABLES, scene_values
-from rig.units import UnitError, parse, quoted
+from rig.units import UnitError, parse, quote
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from rig.model.batch import Floats
     from rig.model.chain import Chain
     from rig.model.surface import Pile
     from rig.protocol.protocol import Protocol
@@ -31,31 +31,47 @@ _EXAMPLE = "write for example restitution=-0.4..0.9:200 or incline=40deg"
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
-    """One varied parameter and its values, rising or as the plan lists them.
+class Layout:
+    """One sweep, ready to be computed: all combinations of the axes' values, the last fastest.
 
     Attributes
     ----------
-    name
-        One of `rig.sweep.variables.VARIABLES`.
     values
-        In SI, angles in degrees.
+        Of each parameter, in SI, angles in degrees, rising or as the plan lists them. Those with
+        several are the axes.
+    layered
+        Whether the first axis are the plan's inclines, there being several and none asked for.
+    chain
+        The one that strikes.
+    longer_m
+        How much longer the free chain is; it adds to every separation.
+    pile
+        The surface's rule for rods that gather, if it has one and it matters.
+    two_chains
+        Whether a chain falls freely beside it; without, Δz is from a twin that nobody hung.
     """
 
-    name: str
-    values: tuple[float, ...]
+    values: dict[str, tuple[float, ...]]
+    layered: bool
+    chain: Chain
+    longer_m: float
+    pile: Pile | None
+    two_chains: bool
 
+    @property
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        """Values of the parameters that vary."""
+        return {name: numbers for name, numbers in self.values.items() if len(numbers) > 1}
 
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """All combinations of the axes' values; the last axis runs fastest."""
-
-    axes: tuple[Axis, ...]
+    @property
+    def fixed_values(self) -> dict[str, float]:
+        """Values of the others."""
+        return {name: numbers[0] for name, numbers in self.values.items() if len(numbers) == 1}
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Number of values along each axis."""
-        return tuple(len(axis.values) for axis in self.axes)
+        return tuple(map(len, self.axes.values()))
 
     @property
     def size(self) -> int:
@@ -67,40 +83,11 @@ class Grid:
         for start in range(0, self.size, length):
             yield slice(start, min(start + length, self.size))
 
-    def places(self, points: slice) -> Iterator[tuple[Axis, NDArray[np.intp]]]:
-        """Which of an axis's values each point of a piece has, axis by axis."""
+    def along_axes(self, points: slice) -> dict[str, Floats]:
+        """Return the values of a piece's points, axis by axis."""
         numbers = np.unravel_index(np.arange(points.start, points.stop), self.shape)
-        return zip(self.axes, numbers, strict=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """One sweep, ready to be computed.
-
-    Attributes
-    ----------
-    grid
-    layered
-        Whether the first axis are the plan's inclines, there being several and none asked for.
-    fixed
-        The parameters without an axis, in SI, angles in degrees.
-    chain
-        The one that strikes.
-    longer_m
-        How much longer the free chain is; it adds to every separation.
-    pile
-        The surface's rule for rods that gather, if it has one and it matters.
-    two_chains
-        Whether a chain falls freely beside it; without, Δz is from a twin that nobody hung.
-    """
-
-    grid: Grid
-    layered: bool
-    fixed: dict[str, float]
-    chain: Chain
-    longer_m: float
-    pile: Pile | None
-    two_chains: bool
+        axes = zip(self.axes.items(), numbers, strict=True)
+        return {name: np.array(values)[places] for (name, values), places in axes}
 
 
 def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
@@ -121,24 +108,20 @@ def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
     scene = scene_values(protocol)
     varied = read_vary(vary, tuple(scene))
     stated = {name: values for name, values in scene.items() if name not in varied}
-    values = stated | varied
-    grid = Grid(tuple(Axis(name, numbers) for name, numbers in values.items() if len(numbers) > 1))
-    if grid.size > MOST_POINTS:
-        shape = " × ".join(map(str, grid.shape))
-        raise InputError(
-            f"{shape} are {grid.size} points; at most {MOST_POINTS} are accepted",
-            "vary less, or hold the incline with --vary incline=40deg",
-        )
     first, *twins = (rods.chain for rods in protocol.chains.values())
-    return Layout(
-        grid=grid,
+    layout = Layout(
+        values=stated | varied,
         layered=any(len(numbers) > 1 for numbers in stated.values()),
-        fixed={name: numbers[0] for name, numbers in values.items() if len(numbers) == 1},
         chain=first,
         longer_m=twins[0].length - first.length if twins else 0.0,
         pile=protocol.surface.pile if protocol.surface and "incline" in scene else None,
         two_chains=protocol.two_chains,
     )
+    if layout.size > MOST_POINTS:
+        shape = " × ".join(map(str, layout.shape))
+        size = {"points": layout.size, "most": MOST_POINTS}
+        raise make_error(InputError, "sweep_too_large", shape=shape, **size)
+    return layout
 
 
 class _FaultError(Exception):
@@ -173,13 +156,13 @@ def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[flo
             name, values = _read(text, names, varied_values)
         except _FaultError as fault:
             column, message = fault.args
-            problems.append(f"--vary {quoted(text, 80)}, column {column + 1}: {message}")
+            problems.append(f"--vary {quote(text, 80)}, column {column + 1}: {message}")
         else:
             varied_values[name] = values
     if problems:
         raise InputError("\n".join(problems))
     if all(len(values) == 1 for values in varied_values.values()):
-        raise InputError("nothing is varied", f"{_EXAMPLE.partition(' or')[0]} behind --vary")
+        raise make_error(InputError, "nothing_varied")
     return varied_values
 
 
@@ -209,7 +192,11 @@ def _read(text: str, names: Sequence[str], taken: Container[str]) -> tuple[str, 
         raise _FaultError(middle, f"found {high.strip()}; it must be more than {low.strip()}")
     if not colon:
         raise _FaultError(middle + len(high), f"say how many values: {text.strip()}:81")
-    return name, spaced(*ends, _count(count, middle + len(high) + 1))
+    digits, column = count.strip(), middle + len(high) + 1
+    if not (re.fullmatch("[0-9]{1,9}", digits) and 2 <= int(digits) <= MOST_VALUES):
+        message = f"found {quote(digits)}; a whole number from 2 to {MOST_VALUES} is wanted"
+        raise _FaultError(column, message)
+    return name, linspace(*ends, int(digits))
 
 
 def _value(name: str, text: str, column: int) -> float:
@@ -225,15 +212,7 @@ def _value(name: str, text: str, column: int) -> float:
     return read.value
 
 
-def _count(text: str, column: int) -> int:
-    digits = text.strip()
-    if re.fullmatch("[0-9]{1,9}", digits) and 2 <= int(digits) <= MOST_VALUES:
-        return int(digits)
-    message = f"found {quoted(digits)}; a whole number from 2 to {MOST_VALUES} is wanted"
-    raise _FaultError(column, message)
-
-
-def spaced(low: float, high: float, count: int) -> tuple[float, ...]:
+def linspace(low: float, high: float, count: int) -> tuple[float, ...]:
     """Return `count` evenly spaced numbers from `low` to `high`, both among them.
 
     Each is the float nearest to what a person finds by decimal arithmetic: 0 to 0.9 in nine steps

@@ -13,12 +13,15 @@ from rig.sweep.compute import NOTES, Swept
 from rig.sweep.variables import VARIABLES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
 
     from rig.protocol.protocol import Protocol
     from rig.sweep.layout import Layout
 
 _ROWS = 20_000  # made into text together; a whole sweep's would not fit
+_RESULTS = ("separation_m", "speed_m_s", "in_domain", "notes")
 
 
 def provenance(protocol: Protocol, layout: Layout) -> dict[str, Any]:
@@ -33,11 +36,10 @@ def provenance(protocol: Protocol, layout: Layout) -> dict[str, Any]:
             "rods": layout.chain.rods,
             "length_m": layout.chain.length,
         },
-        "fixed": {VARIABLES[name].column: value for name, value in layout.fixed.items()},
+        "fixed": {VARIABLES[name].column: value for name, value in layout.fixed_values.items()},
         "axes": {
-            VARIABLES[axis.name].column: f"{axis.values[0]} to {axis.values[-1]}, "
-            f"{len(axis.values)} values"
-            for axis in layout.grid.axes
+            VARIABLES[name].column: f"{values[0]} to {values[-1]}, {len(values)} values"
+            for name, values in layout.axes.items()
         },
         "notes": {str(bit): meaning for bit, meaning in NOTES.items()},
     }
@@ -55,24 +57,19 @@ def write_csv(stream: BinaryIO, facts: Mapping[str, Any], layout: Layout, swept:
     An empty value means that the model has no answer there.
     """
     head = [f"# {name}: {json.dumps(fact, ensure_ascii=False)}" for name, fact in facts.items()]
-    columns = [VARIABLES[axis.name].column for axis in layout.grid.axes]
-    columns += ["separation_m", "speed_m_s", "in_domain", "notes"]
+    columns = [*(VARIABLES[name].column for name in layout.axes), *_RESULTS]
     stream.write("\n".join([*head, ",".join(columns), ""]).encode())
-    for rows in layout.grid.chunks(_ROWS):
-        lines = zip(*_text(layout, swept, rows), strict=True)
+    for rows in layout.chunks(_ROWS):
+        # Flags as 1 and 0.
+        results = (1 * getattr(swept, name).reshape(-1)[rows] for name in _RESULTS)
+        lines = zip(*map(_text, [*layout.along_axes(rows).values(), *results]), strict=True)
         stream.write(("\n".join(map(",".join, lines)) + "\n").encode())
 
 
-def _text(layout: Layout, swept: Swept, rows: slice) -> Iterator[list[str]]:
-    """Each column of some rows; numbers have the digits that give the same float back."""
-    for axis, places in layout.grid.places(rows):
-        values = list(map(repr, axis.values))
-        yield [values[number] for number in places.tolist()]
-    for column in (swept.separation_m, swept.speed_m_s):
-        # The only number that is not equal to itself is NaN.
-        yield [repr(x) if x == x else "" for x in column.reshape(-1)[rows].tolist()]  # noqa: PLR0124
-    yield ["1" if inside else "0" for inside in swept.in_domain.reshape(-1)[rows].tolist()]
-    yield list(map(str, swept.notes.reshape(-1)[rows].tolist()))
+def _text(column: NDArray[Any]) -> list[str]:
+    """Write numbers with the digits that give the same float back."""
+    # The only number that is not equal to itself is NaN.
+    return [repr(x) if x == x else "" for x in column.tolist()]  # noqa: PLR0124
 
 
 def write_npz(
@@ -84,18 +81,10 @@ def write_npz(
     dimensions of ``separation_m``, ``speed_m_s``, ``in_domain`` and ``notes``; ``metadata`` is the
     provenance as JSON and ``protocol`` the protocol's text.
     """
-    names = [VARIABLES[axis.name].column for axis in layout.grid.axes]
     arrays: dict[str, Any] = {
-        name: np.array(axis.values) for name, axis in zip(names, layout.grid.axes, strict=True)
+        VARIABLES[name].column: np.array(values) for name, values in layout.axes.items()
     }
-    np.savez(
-        stream,
-        axes=np.array(names),
-        separation_m=swept.separation_m,
-        speed_m_s=swept.speed_m_s,
-        in_domain=swept.in_domain,
-        notes=swept.notes,
-        metadata=np.array(json.dumps(facts, ensure_ascii=False)),
-        protocol=np.array(text),
-        **arrays,
-    )
+    arrays["axes"] = np.array(list(arrays))
+    arrays |= {name: getattr(swept, name) for name in _RESULTS}
+    metadata = np.array(json.dumps(facts, ensure_ascii=False))
+    np.savez(stream, metadata=metadata, protocol=np.array(text), **arrays)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.model.chain import XI
+from rig.model.impact import BETA, MU
 from rig.protocol.keys import Range, range_of
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
@@ -32,21 +36,12 @@ class Variable:
     label: str
 
 
+_ROWS = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
 VARIABLES = {
-    "incline": Variable(range_of("plan.incline"), "incline_deg", "inclination of the surface (°)"),
-    "restitution": Variable(range_of("surface.restitution"), "restitution", "restitution β"),
-    "friction": Variable(range_of("surface.friction"), "friction", "friction μ"),
-    "inertia": Variable(
-        range_of("chains.*.inertia"), "inertia", "moment of inertia of the rods, I/(m L²)"
-    ),
-    "alpha": Variable(range_of("chains.*.alpha"), "alpha", "impact coefficient α"),
-    "gamma": Variable(range_of("chains.*.gamma"), "gamma", "impact coefficient γ"),
-    "drop": Variable(range_of("drop"), "drop_m", "drop (m)"),
-    "initial_speed": Variable(
-        range_of("initial_speed"), "initial_speed_m_s", "initial speed (m/s)"
-    ),
-    "gravity": Variable(range_of("gravity"), "gravity_m_s2", "gravity (m/s²)"),
+    name: Variable(range_of(key), column, label)
+    for name, key, column, label in (re.split(r" +\| ", row) for row in _ROWS)
 }
+"""By name; ``variables.txt`` has the name, the key of a protocol that has its range, and these."""
 
 
 def scene_values(protocol: Protocol) -> dict[str, tuple[float, ...]]:
@@ -62,29 +57,19 @@ def scene_values(protocol: Protocol) -> dict[str, tuple[float, ...]]:
         If nothing is struck in this scene, or it has air.
     """
     if protocol.surface is None:
-        raise InputError(
-            f"{protocol.source}: the scene has no surface, so there is no impact to map",
-            "name a protocol with a surface",
-        )
+        raise make_error(InputError, "sweep_of_no_surface", protocol=protocol.source)
     if protocol.drag is not None:
-        raise InputError(
-            f"{protocol.source}: the scene has drag, which a sweep cannot compute",
-            "leave drag out of the protocol, or use rig predict for single falls",
-        )
+        raise make_error(InputError, "sweep_in_air", protocol=protocol.source)
     chain = next(iter(protocol.chains.values())).chain
-    values: dict[str, tuple[float, ...]] = {}
+    stated: dict[str, tuple[float, ...]] = {}
+    values: dict[str, float | None] = {}
     if chain.alpha is None:
-        values["incline"] = protocol.plan.inclines
-        values["restitution"] = (protocol.surface.restitution.value,)
-        values["friction"] = (protocol.surface.friction.value,)
-        values["inertia"] = (chain.inertia / XI,)
-        if chain.gamma is not None:
-            values["gamma"] = (chain.gamma,)
+        stated["incline"] = protocol.plan.inclines
+        values |= {name: getattr(protocol.surface, name).value for name in (BETA, MU)}
+        values |= {"inertia": chain.inertia / XI, "gamma": chain.gamma}
     else:
-        values["alpha"] = (chain.alpha.value,)
-        values["gamma"] = (chain.gamma or 0.0,)
-    values["drop"] = (protocol.drop.value,)
-    if protocol.initial_speed.value:
-        values["initial_speed"] = (protocol.initial_speed.value,)
-    values["gravity"] = (protocol.gravity.value,)
-    return values
+        values |= {"alpha": chain.alpha.value, "gamma": chain.gamma or 0.0}
+    values["drop"] = protocol.drop.value
+    values["initial_speed"] = protocol.initial_speed.value or None
+    values["gravity"] = protocol.gravity.value
+    return stated | {name: (value,) for name, value in values.items() if value is not None}

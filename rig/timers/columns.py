@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
-VALUES = (SAMPLED, ("state", "cleared"), ("edge",), ())
+VALUES = (SAMPLED, ("state", "cleared"), ("edge",))
 """Roles that say what happened; of a table that has several, the first are read."""
 _MOST_COLUMNS = 200
 _BESIDE = 0.1
@@ -60,6 +60,8 @@ class TimerColumn:
         ``blocked`` or ``clear`` where the heading says what all its times did to the beam.
     numbered
         Whether it is one of times side by side: ``t1``, ``Stop 2``.
+    wrap
+        Where a counter of µs or ms in 32 bits begins anew, ps; 0 for others.
     """
 
     at: int
@@ -71,6 +73,7 @@ class TimerColumn:
     run: str = ""
     state: str = ""
     numbered: bool = False
+    wrap: int = 0
 
     @property
     def meaning(self) -> str:
@@ -117,13 +120,10 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     """
     width = max(len(row.texts) for row in rows)
     if width > _MOST_COLUMNS:
-        values = {"columns": width, "limit": _MOST_COLUMNS}
-        file.problems.refuse(rows[0].line, 1, "too_many_columns", **values)
-    if all(len(row.texts) != width for row in block.headings):
-        # One without a heading has that of the block above.
-        block.headings += [row for row in block.above if not row.is_mark]
+        limits = {"columns": width, "limit": _MOST_COLUMNS}
+        file.problems.refuse(rows[0].line, 1, "too_many_columns", **limits)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
-    facts = {n: _facts_of_values(texts, len(rows)) for n, texts in cells.items() if texts}
+    facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     heading = block.find_heading(facts, width)
     if heading is None:  # settings may stand beside samples
         beside = {n for n in facts if len(cells[n]) < _BESIDE * len(rows)}
@@ -131,15 +131,19 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
             row._replace(texts=[t * (n in beside) for n, t in enumerate(row.texts)]) for row in rows
         ]
         facts = {n: fact for n, fact in facts.items() if n not in beside}
+    filled = [len(cells[n]) for n, fact in facts.items() if "levels" in fact]
     table = {
         "single": len(facts) == 1,
         "rising": any({"rises", "fractions"} <= fact for fact in facts.values()),
         "listed": _is_each_row_rising(rows, width),
         "digital": all("levels" in fact for fact in facts.values()),
+        "rated": block.find_time_base() is not None,
+        "paired": len(filled) == 2,
+        "several": len(filled) > 2,
+        # Without states of each input in each row, a row says a single one's.
+        "gaps": 2 * sum(filled) < (len(filled) + 1) * len(rows),
     }
-    if table["digital"]:
-        table["rated"] = block.find_time_base() is not None
-    shared = {fact for fact, holds in table.items() if holds}
+    shared = _held(table)
     columns = [_read_heading(block, heading, n, fact | shared) for n, fact in facts.items()]
     if heading is None:
         inputs = [column for column in columns if column.role in SAMPLED]
@@ -154,12 +158,14 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         if column.power != finest[column.gate, column.run, column.state]:
             column.role = "coarse"
     unclear = [column for column in columns if "|" in column.role]
-    for column in unclear if len(unclear) == 1 else ():  # of several, falls cannot decide
-        readings = column.role.split("|")
-        file.ways, column.role = max(file.ways, len(readings)), readings[file.way % len(readings)]
-    for column in columns:
-        if column.role == "time" and not column.has_unit:
-            file.has_unit, file.is_counted = False, file.is_counted or column.power is None
+    readings = unclear[0].role.split("|") if unclear else []
+    # Two that may be the same two are one each; of others, falls cannot decide.
+    is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
+    for n, column in enumerate(unclear if is_open else ()):
+        file.ways, column.role = len(readings), readings[(file.way + n) % len(readings)]
+    clocks = [column for column in columns if column.role == "time"]
+    file.has_unit &= all(clock.has_unit for clock in clocks)
+    file.is_counted |= any(clock.power is None for clock in clocks)
     _check_columns(columns, heading, rows[0], file.problems)
     return columns
 
@@ -175,13 +181,9 @@ def _check_columns(
     columns: Sequence[TimerColumn], heading: Row | None, first: Row, problems: ProblemList
 ) -> None:
     """Refuse columns without a heading that may be something else, and units that are none."""
-    counts, above = Counter(column.role for column in columns), heading or first
-    repeated = max(counts["state"], counts["edge"], counts["gate"]) > 1
-    # Two traces of an oscilloscope stand beside each other, each with its times.
-    is_timed = counts["time"] in {1, counts["volts"] or 1} or counts["level"] > 0
-    is_listed = all(column.numbered for column in columns)
-    if heading is None and (repeated or counts["other"] or not (is_timed or is_listed)):
-        place = first.place(columns[min(2, len(columns) - 1)].at)
+    roles_there, above = {column.role for column in columns}, heading or first
+    if heading is None and "other" in roles_there:
+        place = first.place(next(column.at for column in columns if column.role == "other"))
         problems.add(*place, "", "no_heading", columns=len(columns))
     for column in columns if heading else ():
         place, unit = above.place(column.at), vocabulary.unit_of(column.name)
@@ -190,7 +192,7 @@ def _check_columns(
             problems.add(*place, column.name, "ambiguous", **values)
         elif column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
             problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
-    if not counts.keys() & {"time", *SAMPLED}:
+    if not roles_there & {"time", *SAMPLED}:
         durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
         code = "durations" if durations else "no_time_column"
         problems.add(above.line, 1, "", code, numbers=durations)
@@ -201,48 +203,50 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
     name = heading.cell(n) if heading else ""
     column = TimerColumn(n, name or f"column {n + 1}", run=find_label(name, "run"))
-    name = name.replace(column.run, " ") if column.run else name
     prefix, colon, rest = name.partition(":")
     if colon and rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
-    units = [name, *(row.cell(n) for row in reversed(block.headings) if row.has_units)]
-    units = [vocabulary.unit_of(text) for text in units]
+    texts = (name, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
+    units = list(map(vocabulary.unit_of, texts))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
     numbers = (row.cell(n) for row in block.headings if row.has_numbers)
     column.gate = next(filter(None, itertools.chain(labels, numbers)), "")
     is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
-    facts = facts | vocabulary.roles_in(name) | ({"time"} if is_bare_unit else set())
-    facts |= {"timed"} if unit in POWERS else {{"v": "volt", "": "unitless"}.get(unit, "")}
-    facts |= set() if heading and (heading.line or heading.cell(n)) else {"bare"}
-    facts |= {"labelled"} if column.gate else set()
-    facts |= {"numbered"} if column.run else set()
+    is_named = heading is not None and (heading.line or heading.cell(n))
+    named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
+    named |= {"unitless": not unit, "bare": not is_named, "first": not n}
+    named |= {"labelled": column.gate, "numbered": column.run}
+    facts = facts | vocabulary.roles_in(name) | _held(named)
     column.role = next(
         role
         for role, rule in vocabulary.read_rows("columns.txt", ":")
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
     if column.role == "time":
-        power = POWERS.get(unit if unit or "_" in name else normal(name))
+        power = POWERS.get(unit or normal(name))
         column.has_unit = power is not None or "suffixed" in facts
         # Fractions are seconds, and so are small whole numbers.
         column.power = power if power is not None or "counted" in facts else 0
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = bool({"moment", "listed"} & facts)
+        if "counted" in facts and column.power in {None, 3, 6}:
+            column.wrap = 2**32 * 10 ** (12 - (column.power or 0))
     return column
 
 
-def _facts_of_values(texts: Sequence[str], rows: int) -> set[str]:
+def _facts_of_values(texts: Sequence[str]) -> set[str]:
     """Return what holds of the values of a column, of which some may be missing."""
     kinds = [vocabulary.kinds_of(text) for text in texts]
     numbers = [float(text) for text in texts if is_number(text)]
-    is_whole = all(vocabulary.number_of(t) is not None and not set(t) & set(".,+-") for t in texts)
+    is_whole = all(map(form("whole").fullmatch, texts))
     steps, is_numeric = {b - a for a, b in itertools.pairwise(numbers)}, len(numbers) == len(texts)
-    is_count = all(form("count").fullmatch(text) for text in texts)
+    is_count = all(map(form("count").fullmatch, texts))
     facts = {
         "levels": all("state" in kind for kind in kinds),
         "suffixed": all({"timed", "clock"} & kind for kind in kinds),
         "plain": not any({"blocked", "clear"} & kind for kind in kinds),
+        "signals": all({"high", "low"} & kind for kind in kinds),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
         "counts": is_numeric and is_whole and numbers[0] in {0, 1} and steps == {1.0},
@@ -252,8 +256,11 @@ def _facts_of_values(texts: Sequence[str], rows: int) -> set[str]:
         "words": not numbers,
         "short": len(texts) < 3,
         "many": len(texts) > 30,
-        "gaps": len(texts) < rows,
     }
+    return _held(facts)
+
+
+def _held(facts: Mapping[str, object]) -> set[str]:
     return {fact for fact, holds in facts.items() if holds}
 
 
@@ -267,26 +274,22 @@ def find_signals(columns: Sequence[TimerColumn]) -> list[Signal]:
     signals = []
     for clock in times:
         own = [value for value in values if _clock_of(value, times) is clock]
-        is_only = all(other is clock or other.run != clock.run for other in times)
         named = Counter(map(_label_of, own))
         for n, value in enumerate(own, 1):
             is_beside = is_sampled or len(own) > 1
-            label = _label_of(value) if is_beside else clock.gate or value.gate * (not is_only)
+            label = _label_of(value) if is_beside else clock.gate or value.gate
             label += f" ({n})" if is_sampled and named[label] > 1 else ""
             signals.append(Signal(clock, value, clock.run or value.run, label))
         if not own and not is_sampled:
-            is_lone = sum(other.gate == clock.gate for other in times) == 1
-            is_named = is_lone and clock.gate in clock.name and not (clock.run or clock.state)
-            label = clock.name if clock.gate and is_named else clock.gate
-            signals.append(Signal(clock, None, clock.run, label))
+            signals.append(Signal(clock, None, clock.run, clock.gate))
     return signals
 
 
 def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:
     """Return the times of a value: of its run and gate, else those nearest to its left."""
     beside = [clock for clock in times if clock.run in {value.run, ""} or not value.run] or times
-    near = min(beside, key=lambda clock: (clock.at > value.at, abs(clock.at - value.at)))
-    return next((clock for clock in beside if clock.gate and clock.gate == value.gate), near)
+    own = [clock for clock in beside if clock.gate and clock.gate == value.gate] or beside
+    return min(own, key=lambda clock: (clock.at > value.at, abs(clock.at - value.at)))
 
 
 def _label_of(value: TimerColumn) -> str:

@@ -6,13 +6,12 @@ straight line between two samples crosses that middle.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from rig.arrays import Array
 
 _HYSTERESIS = 0.2
@@ -47,10 +46,8 @@ def find_threshold(volts: Array) -> tuple[float, float] | None:
         low, high = float(np.median(volts[~above])), float(np.median(volts[above]))
         if before == (low, high):
             break
-    noise = max(
-        float(np.median(np.abs(volts[above] - high))),
-        float(np.median(np.abs(volts[~above] - low))),
-    )
+    levels = (above, high), (~above, low)
+    noise = max(float(np.median(np.abs(volts[side] - level))) for side, level in levels)
     if high - low < _CLEAR_SWING * _SCATTER * noise:
         return None
     return 0.5 * (low + high), 0.5 * _HYSTERESIS * (high - low)

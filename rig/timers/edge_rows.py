@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,6 @@ from rig.timers.table import Row, split_cells
 from rig.timers.vocabulary import LONGEST, is_remark
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
     from rig.timers.problems import ProblemList
 
 HEADER = ("run", "channel", "time_s", "state")
@@ -45,27 +44,30 @@ def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[
         for number, line in lines
         if line.strip() and not is_remark(line)
     )
-    heading = next(plain, Row(1, []))
-    if tuple(map(str.lower, heading.texts)) != HEADER:
-        problems.refuse(heading.line, 1, "wrong_header", header=",".join(HEADER))
+    heading, header = next(plain, Row(1, [])), ",".join(HEADER)
+    if ",".join(heading.texts).lower() != header:
+        problems.refuse(heading.line, 1, "wrong_header", header=header)
     for row in plain:
-        cells = _read_cells(row, problems)
-        if None in cells:
-            continue
-        run, channel, tick, state = cells
-        edges = runs.setdefault(run, [])
-        edge, place = Edge(tick, channel, bool(state)), (*row.place(2), HEADER[2])
-        lasting_s = abs(tick - (edges or [edge])[0].tick) / TICK_HZ
-        before = last.get((run, channel), tick)
-        if lasting_s > _LONGEST_RUN_S:
-            limit = {"lasting_s": lasting_s, "limit_s": _LONGEST_RUN_S}
-            problems.add(*place, "too_long", recording=f"run {run}", **limit)
-        elif tick < before:
-            times = {"last": seconds(before, Fraction(TICK_HZ)), "text": row.texts[2]}
-            problems.add(*place, "before_last", channel=str(channel), run=run, **times)
-        else:
-            last[run, channel] = tick
-            edges.append(edge)
+        if row.raw.count('"') % 2:
+            problems.add(row.line, 1, "", "open_quote")
+        elif len(row.texts) != len(HEADER):
+            values = {"values": len(row.texts), "needed": len(HEADER), "header": header}
+            problems.add(row.line, 1, "", "wrong_width", **values)
+        elif None not in (cells := _read_cells(row, problems)):
+            run, channel, tick, state = cells
+            edges = runs.setdefault(run, [])
+            edge, place = Edge(tick, channel, bool(state)), (*row.place(2), HEADER[2])
+            lasting_s = abs(tick - (edges or [edge])[0].tick) / TICK_HZ
+            before = last.get((run, channel), tick)
+            if lasting_s > _LONGEST_RUN_S:
+                limit = {"lasting_s": lasting_s, "limit_s": _LONGEST_RUN_S}
+                problems.add(*place, "too_long", recording=f"run {run}", **limit)
+            elif tick < before:
+                times = {"last": seconds(before, Fraction(TICK_HZ)), "text": row.texts[2]}
+                problems.add(*place, "before_last", channel=str(channel), run=run, **times)
+            else:
+                last[run, channel] = tick
+                edges.append(edge)
     problems.raise_if_any()
     if not runs:
         problems.refuse(1, 1, "no_edges")
@@ -74,13 +76,6 @@ def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[
 
 def _read_cells(row: Row, problems: ProblemList) -> list[Any]:
     """Return the values of a row, `None` for each that is not accepted."""
-    if row.raw.count('"') % 2:
-        problems.add(row.line, 1, "", "open_quote")
-        return [None]
-    if len(row.texts) != len(HEADER):
-        values = {"values": len(row.texts), "needed": len(HEADER), "header": ",".join(HEADER)}
-        problems.add(row.line, 1, "", "wrong_width", **values)
-        return [None]
     cells = []
     for n, (text, (pattern, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
         cells.append(read(text) if re.fullmatch(pattern, text) else None)
@@ -95,7 +90,7 @@ def make_drop(run: int, edges: list[Edge]) -> Drop:
     start = edges[0].tick // TICK_HZ * TICK_HZ
     first = {edge.channel: edge.blocked for edge in reversed(edges)}
     clear = sum(1 << channel for channel, blocked in first.items() if not blocked)
-    stamps = tuple(edge._replace(tick=edge.tick - start) for edge in edges)
+    stamps = tuple(Edge(edge.tick - start, edge.channel, edge.blocked) for edge in edges)
     return Drop(run, 1, TICK_HZ, stamps, initial_state=clear)
 
 

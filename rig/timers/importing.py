@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.errors import InputError
-from rig.reasons import make_reason
+from rig.reasons import Reason, make_reason
+from rig.records import Drop
 from rig.timers.edge_rows import HEADER, is_own, read_edges
-from rig.timers.events import LONGEST_S, TimerFile
 from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, read_drops
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList, refusal
@@ -26,12 +28,10 @@ from rig.timers.vocabulary import POWERS, form
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from rig.reasons import Reason
-    from rig.records import Drop
+    from rig.timers.events import TimerFile
 
-    Fit = Callable[[Sequence[Drop], bool], "FallMatch"]
+Fit = Callable[[Sequence[Drop], bool], "FallMatch"]
 
 _GOOD = 0.75
 """Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
@@ -39,13 +39,15 @@ _CLOSE = 0.1
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
+_COARSE = 10**8
+"""Picoseconds: times in whole tenths of milliseconds may be those of two falls by chance."""
+_FEWEST_SAME = 3
+"""Edges at the same times: the first may be 0 in every run, and a second by chance."""
 _HEAD = 50
 """Lines above or at which the project's own header stands."""
 _EXCESS = 4
 """Edges for each bar, twice as many as it has, beyond which several gates are on one wire: a beam
 that flickers makes a few more than two."""
-LONGEST_MAP = 100_000
-"""Characters of a saved map; one of 200 inputs has a tenth of it."""
 
 
 class FallMatch(NamedTuple):
@@ -69,8 +71,7 @@ class FallMatch(NamedTuple):
     doubts: Sequence[Reason] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Import:
+class Import(NamedTuple):
     """What is imported.
 
     Attributes
@@ -113,45 +114,40 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     """
     place = options.events
     if is_own(itertools.islice(read_lines(place), _HEAD)):
-        drops = read_edges(enumerate(read_lines(place), 1), ProblemList(place))
+        for name in "map", "map_file", "channel", "dark", "unit":
+            if getattr(options, name) is not None:
+                raise refusal(f"--{name.replace('_', '-')}", "own_format_stated")
+        with closing(read_lines(place)) as rows:
+            drops = read_edges(enumerate(rows, 1), ProblemList(place))
         return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
     readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
     for file in read_ways(place):
         try:
             stated = _read_stated(options, file, gates)
+            readings += [read_drops(file, way) for way in find_layouts(file, gates, bars, stated)]
         except InputError as error:
             faults.append(error)
-            continue
-        readings += [read_drops(file, way) for way in find_layouts(file, gates, bars, stated)]
-    if faults and not readings:
-        raise faults[0]
-    if not readings:
+    if not any(reading.drops for reading in readings):
         pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
-        raise refusal(place, "inputs_unclear", **values, pairs=pairs)
-    # Parts that are a gate each may be of different days.
-    lasting_s = min(reading.lasting_s for reading in readings)
-    if lasting_s > LONGEST_S:
-        limit = {"lasting_s": lasting_s, "limit_s": LONGEST_S}
-        raise refusal(place, "too_long", recording="the recording", **limit)
-    readings = [reading for reading in readings if reading.lasting_s <= LONGEST_S]
+        raise faults[0] if faults else refusal(place, "inputs_unclear", **values, pairs=pairs)
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings
-        reading, match = _choose(readings, place, fit, is_stated="channels" in stated)
+        is_stated = "channels" in stated and (reading.layout.dark != "states" or "dark" in stated)
+        reading, match = _choose(readings, place, fit, is_stated=is_stated)
         _refuse_excess(reading, bars, place, is_stated="groups" in stated)
-    file, layout = reading.file, reading.layout
-    notes = [*file.notes, _account(reading, options)]
-    is_open = len([other for other in readings if other.layout.dark != "inverted"]) > 1
-    if is_open or (match.share < _GOOD and not options.as_read):
-        notes.append(make_reason("reading_chosen", option=str(layout), fit=match.text))
+    notes = [*reading.file.notes, _account(reading, options)]
+    if len(readings) > 1 or (match.share < _GOOD and not options.as_read):
+        notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=match.text))
     notes += [*match.doubts, *_assumptions(reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
-        Path(options.map_file).write_text(f"{layout.text}\n", "utf-8")
-    lines = [file.kind, *(f"  {name}: {meaning}" for name, meaning in file.columns.items())]
-    lines += [f"input {x} is the gate at channel {n}" for x, n in layout.channels.items() if x]
-    lines += [str(layout), *([match.text] if match.text else [])]
-    return Import(reading.drops, layout.channels, lines, notes)
+        Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
+    channels, columns = reading.layout.channels, reading.file.columns.items()
+    lines = [reading.file.kind, *(f"  {name}: {meaning}" for name, meaning in columns)]
+    lines += [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
+    lines += filter(None, [str(reading.layout), match.text])
+    return Import(reading.drops, channels, lines, notes)
 
 
 def _choose(
@@ -160,31 +156,34 @@ def _choose(
     """Return the reading that a fall of the protocol bears out, and how well.
 
     Where the user said which input is which gate, that reading, if there is no other, is taken
-    whatever falls say.
+    whatever falls say. The contrary of what the file says of beams may be proposed, and is never
+    taken.
     """
-    distinct = {repr(reading.drops): reading for reading in reversed(readings) if reading.drops}
+    distinct = [*{tuple(x.drops): x for x in reversed(readings) if x.drops}.values()]
     if is_stated and len(distinct) == 1:
-        (reading,) = distinct.values()
-        return reading, fit(reading.drops, True)
-    usual = reversed(distinct.values())  # the most usual first
-    rough = [(fit(reading.drops, False).share, reading) for reading in usual]
+        return distinct[0], fit(distinct[0].drops, True)
+    rough = [(fit(x.drops, False).share, x) for x in reversed(distinct)]
     rough.sort(key=lambda row: -row[0])
     near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
-    # What the file says comes first: the contrary may be proposed, and is never taken.
-    own = [reading for reading in near if reading.layout.dark != "inverted"]
-    matches = [(fit(reading.drops, True), reading) for reading in own]
+    matches = [(fit(reading.drops, True), reading) for reading in near]
     ranked = [(match, reading) for match, reading in matches if match.share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
-    (match, reading), *rest = ranked or [(FallMatch(0.0), readings[0])]
+    usual_first = [row for row in ranked if not row[1].file.begins_late]
+    if usual_first and ranked[0][0].evidence - usual_first[0][0].evidence < _DECISIVE:
+        ranked = usual_first
+    if not ranked:
+        credible = [x.layout for share, x in rough if share >= _GOOD or x.layout.dark != "states"]
+        for reading in near:
+            contrary = replace(reading.layout, dark="inverted")
+            inverted = read_drops(reading.file, contrary).drops
+            is_said = reading.layout.dark == "states"
+            credible += [contrary] if is_said and fit(inverted, False).share >= _GOOD else []
+        options = "; ".join(map(str, [*credible[:3], "--as-read"]))
+        raise refusal(place, "no_reading_fits", share=100 * rough[0][0], options=options)
+    (match, reading), *rest = ranked
     if rest and match.evidence - rest[0][0].evidence < _DECISIVE:
         options = " or ".join(str(reading.layout) for _, reading in ranked[:2])
         raise refusal(place, "several_readings", options=options)
-    if not ranked:
-        says_dark = any(reading.layout.dark == "states" for reading in readings)
-        good = [reading.layout for share, reading in rough if share >= _GOOD or not says_dark]
-        options = "; ".join(map(str, [*good[:3], "--as-read"]))
-        shares = [share for share, reading in rough if reading.layout.dark != "inverted"]
-        raise refusal(place, "no_reading_fits", share=100 * max(shares, default=0), options=options)
     return reading, match
 
 
@@ -197,20 +196,33 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
     is_wire = layout.groups == "passing" and not file.is_wide and bool(file.labels)
     if is_wire and not is_stated:
         raise refusal(place, "one_wire", option=str(layout))
-    alike: dict[object, int] = {}
+    earlier: dict[object, int] = {}
     for drop in reading.drops:
-        earlier = alike.setdefault(drop.edges, drop.run)
-        if earlier != drop.run:
-            raise refusal(place, "same_twice", run=drop.run, other=earlier)
+        moments = _fine_moments(drop)
+        same = Counter(earlier[moment] for moment in moments & earlier.keys())
+        earlier |= dict.fromkeys(moments, drop.run)
+        run, count = max(same.items(), key=itemgetter(1), default=(0, 0))
+        if count and count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
+            raise refusal(place, "same_twice", run=drop.run, other=run)
         for channel, count in Counter(edge.channel for edge in drop.edges).items():
             if count > _EXCESS * bars:
                 excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
                 raise refusal(place, "more_edges", **excess)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter((event.line, event.tick) for part in file.parts for event in part.events)
-    line = next((line for (line, _), count in changes.items() if count > 1), 0)
-    if line and file.period_s is None:  # regular samples see changes together
-        raise refusal(place, "at_once", line=line)
+    lines = [line for (line, _), count in changes.items() if count > 1]
+    if lines and file.period_s is None:  # regular samples see changes together
+        raise refusal(place, "at_once", lines=_some(lines))
+
+
+def _fine_moments(drop: Drop) -> set[object]:
+    """Return the edges of a drop, at times that no other has by chance, or all as they are.
+
+    Of coarse times only those of a whole drop are a copy's; of fine ones, rows may be missing.
+    """
+    if all(edge.tick % _COARSE == 0 for edge in drop.edges):
+        return {drop.edges}
+    return {(edge.tick, edge.channel, edge.blocked) for edge in drop.edges}
 
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
@@ -223,11 +235,14 @@ def _account(reading: FileReading, options: Namespace) -> Reason:
     counts = {"runs": len(reading.drops), "rows": file.rows, "edges": edges}
     if not unused:
         return make_reason("rows_used", silent=file.rows - len(reading.lines), **counts)
-    listed = ", ".join(map(str, unused[:8])) + (" …" if len(unused) > 8 else "")
-    rest = {"unused": len(unused), "lines": listed}
+    rest = {"unused": len(unused), "lines": _some(unused)}
     if not options.allow_unused:
         raise refusal(options.events, "rows_unused", **counts, **rest)
     return make_reason("rows_left_out", **counts, **rest)
+
+
+def _some(lines: Sequence[int]) -> str:
+    return ", ".join(map(str, lines[:8])) + (" …" if len(lines) > 8 else "")
 
 
 def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
@@ -241,8 +256,7 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
         yield make_reason("samples", period_us=period_us, u_us=period_us / math.sqrt(12.0))
     if absent := [str(n) for n in gates if n not in channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))
-    if layout.dark in {"high", "low"}:
-        opposite = {"high": "low", "low": "high"}[layout.dark]
+    if opposite := {"high": "low", "low": "high"}.get(layout.dark):
         yield make_reason("blocked_level", level=layout.dark, other=opposite)
     idle = [label for label in file.labels if label not in channels]
     if idle and layout.groups != "passing":
@@ -251,15 +265,16 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
 
 def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
     """Return what is decided: by a saved layout, and by options, which come after it."""
-    saved, channel, texts = Path(options.map_file or ""), options.channel, dict[str, str]()
+    saved, texts = Path(options.map_file or ""), dict[str, str]()
     if saved.is_file():
-        with saved.open(encoding="utf-8", errors="replace") as stream:
-            texts[options.map_file] = stream.read(LONGEST_MAP).strip()
-    texts |= {"--dark": f"dark={options.dark}"} if options.dark else {}
-    texts |= {"--unit": f"unit={options.unit}"} if options.unit else {}
-    if channel is not None and len(file.labels) < 2:
-        texts["--channel"] = f"{next(iter(file.labels), 'input')}={channel}"
-    texts |= {"--map": options.map} if options.map is not None else {}
+        texts[options.map_file] = next(read_lines(saved), "")
+    for name in "dark", "unit":
+        if value := getattr(options, name):
+            texts[f"--{name}"] = f"{name}={value}"
+    if options.channel is not None and len(file.labels) < 2:
+        texts["--channel"] = f"{next(iter(file.labels), 'input')}={options.channel}"
+    if options.map is not None:
+        texts["--map"] = options.map
     stated = dict[str, Any]()
     for place, text in texts.items():
         stated |= _read_map(text, place, file, gates, stated.get("groups"))
@@ -274,7 +289,7 @@ def _read_map(
     channels, stated = dict(pairs), dict[str, Any]()
     for name in [name for name in channels if name in SETTINGS and name not in file.labels]:
         stated[name] = channels.pop(name)
-        if not re.fullmatch(SETTINGS[name], stated[name]):
+        if not form(f"setting {name}").fullmatch(stated[name]):
             raise refusal(place, "layout_unclear", text=f"{name}={stated[name]:.40}")
     inputs = {x or "input": x for x in input_names(file, stated.get("groups", groups), gates)}
     for label, channel in channels.items():

@@ -7,14 +7,15 @@ gates, and which gate each input is.
 from __future__ import annotations
 
 import itertools
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.records import Drop, Edge
 from rig.timers.edge_rows import make_drop
-from rig.timers.moments import TICK_HZ
+from rig.timers.moments import LONGEST_S, TICK_HZ
 from rig.timers.vocabulary import POWERS, number_of
 
 if TYPE_CHECKING:
@@ -25,21 +26,8 @@ _LONGEST_S = 60
 _CLEAR_PAUSE = 3.0
 _MOST_MAPS = 200
 
-SETTINGS = {
-    "unit": "|".join(POWERS),
-    "dark": "high|low|states|inverted|turns|turns-clear|each",
-    "groups": "runs|rows|gates|passing",
-    "pause_s": r"[0-9]{1,3}(?:\.[0-9]{0,20})?",
-}
-"""What each setting may be."""
-_DARK = {
-    "blocked": ("states", "inverted"),
-    "clear": ("states", "inverted"),
-    "": ("each", "turns", "turns-clear"),
-    "high": ("high", "low"),
-    "low": ("high", "low"),
-}
-"""What may be dark where a file has such a state."""
+SETTINGS = ("unit", "dark", "groups", "pause_s")
+"""What a layout has beside its inputs; `forms.txt` says what each may be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +43,8 @@ class FileLayout:
         when a beam is blocked, ``inverted`` where it says the contrary; of times alone, whether the
         beam darkens and clears in turns, clears first (``turns-clear``), or darkens at ``each``.
     groups
-        Whether parts of the file, or its ``rows``, are ``runs``, or parts are ``gates``, or in each
-        run all gates stand in the order of the way (``passing``).
+        Whether parts of the file are ``runs``, or its ``rows`` are, or in each run all gates stand
+        in the order of the way (``passing``).
     pause_s
         Beyond which a pause parts two runs; 0 for none.
     channels
@@ -78,10 +66,10 @@ class FileLayout:
     @property
     def text(self) -> str:
         """What ``--map`` accepts."""
-        stated = {name: value for name, value in asdict(self).items() if name in SETTINGS and value}
-        stated |= {label or "input": channel for label, channel in self.channels.items()}
-        usual = {"states", "runs"}
-        return ",".join(f"{name}={value}" for name, value in stated.items() if value not in usual)
+        stated = asdict(self) | {x or "input": channel for x, channel in self.channels.items()}
+        usual = "", 0.0, "states", "runs", self.channels
+        pairs = ((x, y) for x, y in stated.items() if x not in SETTINGS or y not in usual)
+        return ",".join(f"{name}={value}" for name, value in pairs if name != "channels")
 
     def __str__(self) -> str:
         return f"--map '{self.text}'"
@@ -96,11 +84,6 @@ class FileReading(NamedTuple):
     lines: set[int]
 
     @property
-    def lasting_s(self) -> float:
-        """How long the longest run is."""
-        return max((drop.edges[-1].tick for drop in self.drops), default=0) / TICK_HZ
-
-    @property
     def is_whole(self) -> bool:
         """Whether beams are clear at the beginning, and in the end, as a protocol has them.
 
@@ -110,63 +93,58 @@ class FileReading(NamedTuple):
         if self.layout.dark.startswith("turns"):
             return not any(n % 2 for n in counts.values())
         began_dark = sum(drop.initial_state.bit_count() for drop in self.drops)
-        is_level = self.file.is_sampled and self.layout.dark in {"high", "low"}
-        return not is_level or began_dark < len(counts)
+        return self.layout.dark not in {"high", "low"} or began_dark < len(counts)
 
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    inputs, names, power = (
-        list(layout.channels),
-        _part_names(file),
-        10 ** POWERS.get(layout.unit, 0),
-    )
-    has_gates, passes = layout.groups == "gates", layout.groups == "passing"
-    by_row = file.is_wide and layout.groups in {"rows", "passing"}
-    limit = round(layout.pause_s * TICK_HZ) * power
-    groups: dict[tuple[int, int], list[TimerEvent]] = {}
-    cuts, numbers = Counter[int](), dict[int, int | None]()
-    events = [(event, n) for n, part in enumerate(file.parts) for event in part.events]
-    for event, part in sorted(events, key=lambda row: row[0].tick):  # equal ones stay in order
-        group = 0 if has_gates else event.line if by_row else part
-        before = groups.get((group, cuts[group]), [event])[-1]
-        cuts[group] += 0 < limit <= event.tick - before.tick
-        label = event.label or names[part] * has_gates
-        groups.setdefault((group, cuts[group]), []).append(event._replace(label=label))
-        numbers.setdefault(group, 0 if has_gates else number_of(file.parts[part].run))
-    runs, lines = dict[int, list[Edge]](), set[int]()
-    for (group, _), drop in sorted(groups.items()):
-        number = 0 if cuts[group] else numbers[group]
-        run = number if number and number not in runs else max(runs, default=0) + 1
-        counts, share = Counter[str](), max(1, len(drop) // max(1, len(inputs)))
+    inputs, scale = [*layout.channels], 10 ** POWERS.get(layout.unit, 0)
+    runs, lines, last = dict[int, list[Edge]](), set[int](), 0
+    for number, drop in _group_events(file, layout):
+        edges, counts = list[Edge](), Counter[str]()
+        share = max(1, len(drop) // max(1, len(inputs)))
         for k, event in enumerate(drop):
-            # Where gates pass one after the other, there are as many at each.
-            label = inputs[min(k // share, len(inputs) - 1)] if passes else event.label
+            label = event.label
+            if layout.groups == "passing":  # one gate after the other, as many at each
+                label = inputs[min(k // share, len(inputs) - 1)]
             if label in layout.channels:
                 dark = layout.is_dark(event, counts[label])
-                edge = Edge(event.tick // power, layout.channels[label], dark)
-                runs.setdefault(run, []).append(edge)
+                edges.append(Edge(event.tick // scale, layout.channels[label], dark))
                 lines.add(event.line)
                 counts[label] += 1
+        if edges:
+            run = number if number and number not in runs else last + 1
+            runs[run], last = edges, max(last, run)
     drops = [make_drop(run, runs[run]) for run in sorted(runs)]
+    if any(drop.edges[-1].tick > LONGEST_S * TICK_HZ for drop in drops):
+        drops, lines = [], set()
     return FileReading(file, layout, drops, lines)
+
+
+def _group_events(file: TimerFile, layout: FileLayout) -> Iterator[tuple[int, list[TimerEvent]]]:
+    """Yield the events of each drop, with its number in the file; those without one come last."""
+    limit = round(layout.pause_s * TICK_HZ) * 10 ** POWERS.get(layout.unit, 0)
+    by_row = file.is_wide and layout.groups != "runs"
+    groups: dict[tuple[bool, int, int], list[TimerEvent]] = defaultdict(list)
+    for n, part in enumerate(file.parts):
+        number = number_of(part.run) or 0
+        for event in part.events:
+            groups[not number, event.line if by_row else n, number].append(event)
+    for (_, _, number), events in sorted(groups.items()):
+        drops: list[list[TimerEvent]] = [[]]
+        for event in sorted(events, key=attrgetter("tick")):  # equal ones stay in order
+            last = drops[-1][-1] if drops[-1] else event
+            if 0 < limit <= event.tick - last.tick:
+                drops.append([])
+            if last is event or event[:3] != last[:3]:  # nothing does the same twice at once
+                drops[-1].append(event)
+        yield from ((number if len(drops) == 1 else 0, drop) for drop in drops)
 
 
 def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> list[str]:
     """Name the inputs of a file whose parts are grouped so; an empty text where it names none."""
-    if groups == "passing":
-        return [f"gate {n}" for n in range(1, len(gates) + 1)]
-    return _part_names(file) if groups == "gates" else [*file.labels] or [""]
-
-
-def _part_names(file: TimerFile) -> list[str]:
-    """Name the parts of a file that stand one below, or beside, the other."""
-    labels = [{event.label for event in part.events} for part in file.parts]
-    inputs = [min(own) for own in labels if len(own) == 1]
-    for names in inputs, [part.name for part in file.parts]:
-        if len(set(names) - {""}) == len(labels):
-            return names
-    return [f"part {n}" for n in range(1, len(labels) + 1)]
+    passing = [f"gate {n}" for n in range(1, len(gates) + 1)]
+    return passing if groups == "passing" else [*file.labels] or [""]
 
 
 def find_layouts(
@@ -183,11 +161,12 @@ def find_layouts(
     """
     counts = Counter((n, e.label) for n, part in enumerate(file.parts) for e in part.events)
     states = {event.state for part in file.parts for event in part.events}
-    dark = next(ways for state, ways in _DARK.items() if state in states)
+    levels = ["high", "low"] if states & {"high", "low"} else ["states"]
+    # More times than bars: it darkens and clears in turns.
+    times = ["each", "turns", "turns-clear", "each"][max(counts.values()) > bars :][:3]
     choices: dict[str, Sequence[Any]] = {
         "unit": list(POWERS) if file.is_counted else [""],
-        # More times than bars: it darkens and clears in turns.
-        "dark": dark[-2:] + dark[:-2] if max(counts.values()) > bars else dark,
+        "dark": levels if states - {""} else times,
         "groups": _groupings(file, gates, bars),
     }
     said = {"unit"} if file.has_unit else set()
@@ -201,16 +180,14 @@ def find_layouts(
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    groups, parts = ["runs"], len(file.parts)
-    if parts > 1 and set(_part_names(file)) == set(file.labels):
-        groups.insert(0, "gates")
-    elif 1 < parts == len(gates) and not (file.labels or any(part.run for part in file.parts)):
-        groups.append("gates")
-    if file.is_wide:
+    groups = ["runs"]
+    lines = Counter(event.line for part in file.parts for event in part.events)
+    is_wide = file.is_wide and max(lines.values()) > 1  # a row with a single time is no drop
+    if is_wide:
         ticks = [event.tick for event in file.parts[0].events]
         # Times that begin anew with each row are of a drop each.
-        groups.insert(0 if parts > 1 or ticks != sorted(ticks) else 1, "rows")
-    if (file.is_wide or len(file.labels) < 2) and bars == 1 and len(gates) > 1:
+        groups.insert(len(file.parts) == 1 and ticks == sorted(ticks), "rows")
+    if (is_wide or len(file.labels) < 2) and bars == 1 and len(gates) > 1:
         groups.append("passing")
     return groups
 
@@ -218,18 +195,16 @@ def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
 def _pauses(file: TimerFile, power: int, groups: str) -> list[float]:
     """Return the pause, s, at which drops one after the other are parted, if there may be any.
 
-    Between drops nothing passes for far longer than ever within one: the pauses in order, the
-    widest step from one to the next, by a factor of 3 at least, up to half a second or more.
+    Between drops nothing passes for far longer than within one: of the pauses in order, the first
+    of half a second or more that is three times as long as the one before.
     """
-    is_parted = file.is_wide or groups == "gates" or (len(file.parts) > 1 and groups == "runs")
+    is_parted = file.is_wide or (len(file.parts) > 1 and groups == "runs")
     for part in [] if is_parted else file.parts:
         ticks = sorted(event.tick // 10**power for event in part.events)
         pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
-        steps = [(b / max(a, TICK_HZ // 1000), b) for a, b in itertools.pairwise(pauses)]
-        ratio, pause = max((step for step in steps if 2 * step[1] >= TICK_HZ), default=(0.0, 0))
-        if ratio >= _CLEAR_PAUSE:
-            is_long = ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ
-            return [0.0, pause / TICK_HZ][is_long:]
+        for before, pause in itertools.pairwise(pauses):
+            if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
+                return [0.0, pause / TICK_HZ][ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ :]
     return [0.0]
 
 
@@ -239,10 +214,8 @@ def _channels(file: TimerFile, gates: Sequence[int], groups: str) -> list[dict[s
     if groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
-    if by_number and (len(set(by_number.values())) == len(labels) or len(labels) == 1):
+    if len(set(by_number.values())) == len(labels):
         return [by_number]
-    if len(labels) < 2:
-        return [{labels[0]: channel} for channel in gates]
     first = {e.label: e.tick for part in file.parts for e in reversed(part.events)}
     passed = sorted(labels, key=lambda label: first.get(label, 0))
     # In order of their numbers, or as they are passed first; and the reverse.
@@ -252,4 +225,4 @@ def _channels(file: TimerFile, gates: Sequence[int], groups: str) -> list[dict[s
         for chosen in itertools.combinations(beams, len(labels))
         for way in (1, -1)
     ]
-    return ([by_number] if by_number and len(labels) > len(gates) else []) + maps[:_MOST_MAPS]
+    return maps[:_MOST_MAPS] or [by_number] * bool(by_number)

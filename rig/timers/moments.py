@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 TICK_HZ = 10**12
 LONGEST_PS = 10**24
+LONGEST_S = 86400
+"""How long a recording may be: more means a wrong unit."""
 _EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
 
 

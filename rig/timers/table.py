@@ -16,7 +16,16 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rig.timers import vocabulary
-from rig.timers.vocabulary import LONGEST, MEASURED, form, is_number, is_remark, kinds_of, roles_in
+from rig.timers.vocabulary import (
+    LONGEST,
+    MEASURED,
+    find_label,
+    form,
+    is_number,
+    is_remark,
+    kinds_of,
+    roles_in,
+)
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
@@ -34,22 +43,20 @@ class Row(NamedTuple):
     line: int
     texts: list[str]
     raw: str = ""
-    separator: str = ","
 
     def cell(self, at: int) -> str:
         """Return what a column, from 0, has; nothing where the row ends before it."""
         text = self.texts[at] if at < len(self.texts) else ""
-        # Most are numbers.
-        is_missing = not text[:1].isdigit() and text[:5].casefold() in vocabulary.words()["missing"]
-        return "" if is_missing else text
+        if text[:1].isdigit():  # most are numbers
+            return text
+        return "" if text[:5].casefold() in vocabulary.words()["missing"] else text
 
     @property
     def known(self) -> int:
         """How many cells say what a column is."""
         texts = [text for text in self.texts if text and not is_number(text)]
-        units = ({"volts"} if vocabulary.unit_of(text) else set() for text in texts)
-        roles = [_COLUMN_ROLES & (roles_in(text) | u) for text, u in zip(texts, units, strict=True)]
-        return sum(map(bool, roles)) if set().union(*roles) - {"derived"} else 0
+        roles = [{*_COLUMN_ROLES & roles_in(x), vocabulary.unit_of(x)} - {""} for x in texts]
+        return sum(map(bool, roles)) if set().union(*roles) - {"derived", "index"} else 0
 
     @property
     def is_mark(self) -> bool:
@@ -74,11 +81,11 @@ class Row(NamedTuple):
         """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
         if at >= len(self.texts):
             return self.line, 1
-        if not self.separator:
-            return self.line, max(0, self.raw.find(self.texts[at])) + 1
-        before = sum(len(cell) + 1 for cell in self.raw.split(self.separator)[:at])
-        rest = self.raw[before:]
-        return self.line, before + len(rest) - len(rest.lstrip(' "')) + 1
+        begin, end, raw = 0, 0, self.raw.replace(",", ".")
+        for text in self.texts[: at + 1]:
+            begin = max(end, raw.find(text.replace(",", "."), end))
+            end = begin + len(text) + 1
+        return self.line, begin + 1
 
 
 @dataclass(eq=False, slots=True)
@@ -100,21 +107,37 @@ class RowBlock:
     width: int = 0
     remarks: list[Row] = field(default_factory=list)
 
+    def begin(self, width: int) -> None:
+        """Begin its rows: one without a heading as wide as these has that of the block above."""
+        self.width = width
+        if all(len(row.texts) != width for row in self.headings):
+            self.headings += [row for row in self.above if not row.is_mark]
+
+    @property
+    def is_gate(self) -> bool:
+        """Whether a gate stands above it, so that it is of the run of the block before."""
+        return any(row.is_mark and find_label(row.raw, "gate") for row in self.headings)
+
+    @property
+    def key(self) -> object:
+        """What is the same for blocks whose columns are: all above but the run's name."""
+        rows = [row for row in self.headings if not row.is_mark or find_label(row.raw, "gate")]
+        return self.width, *(tuple(row.texts) for row in rows)
+
     def find_heading(self, filled: Collection[int], width: int) -> Row | None:
         """Return the row with most cells that are known; above and below may stand symbols, units.
 
         A row with a measured number, or with more names than there are columns, is a setting. A
         remark may name the columns where nothing else does.
         """
+        remarks = (row for row in self.remarks if not form("assignment").search(row.texts[0]))
         rows = [
             row
-            for row in self.headings or [row for row in self.remarks if len(row.texts) == width]
+            for row in self.headings or [row for row in remarks if len(row.texts) == width]
             if row.known
-            and "unit" not in vocabulary.normal(row.texts[0])
             and (len(row.texts) > 1 or len(filled) == 1)
-            and any(row.cell(n) and not is_number(row.cell(n)) for n in filled)
             and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
-            and (row.has_numbers or not any(MEASURED & kinds_of(t) for t in row.texts[:width]))
+            and not any(MEASURED & kinds_of(text) for text in row.texts[:width])
         ]
         return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
 
@@ -123,29 +146,30 @@ class RowBlock:
         stated: dict[str, float] = {}
         for above, below in itertools.pairwise([*self.remarks, *self.headings, Row(0, [])]):
             for n, text in enumerate(above.texts):
-                name, _, inside = form("assignment").sub("\0", text[:60]).partition("\0")
-                places = inside.strip(), above.cell(n + 1), below.cell(n)
-                quantities = list(filter(None, map(form("quantity").fullmatch, places)))
+                name, *inside = form("assignment").split(text[:60], 1)
+                places = map(str.strip, (*inside, above.cell(n + 1), below.cell(n)))
+                quantity = next(filter(None, map(form("quantity").fullmatch, places)), None)
                 role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
-                if role and quantities:
-                    number, prefix, unit = quantities[0].groups("")
+                if role and quantity:
+                    number, prefix, unit = quantity.groups("")
                     power = vocabulary.POWERS.get(vocabulary.unit_of(unit.lower()), 0)
                     power = _PREFIXES.get(prefix.lower(), 0) - power
                     stated.setdefault(role, float(number.replace(",", ".")) * 10.0**power)
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
         return (stated.get("start", 0.0), step) if step else None
 
-    def find_inputs(self, places: Sequence[int]) -> list[str]:
-        """Return names for columns without a heading.
+    def find_inputs(self, columns: Sequence[int]) -> list[str]:
+        """Return names for columns without a heading: those of a row that lists as many inputs.
 
-        A row lists as many inputs, each equally far to the left of its column.
+        Where it is as wide as the rows, each is as far to the left of its own column.
         """
         for row in [*self.remarks, *self.headings]:
-            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
-            named = [n for n, label in enumerate(labels) if label]
-            distances = {at - n for at, n in zip(places, named, strict=False)}
-            if len(named) == len(places) and len(distances) == 1 and min(distances) >= 0:
-                return [labels[n] for n in named]
+            labels = (find_label(text.rpartition(":")[2], "gate") for text in row.texts)
+            names = {n: label for n, label in enumerate(labels) if label}
+            apart = {at - n for at, n in zip(columns, names, strict=False)}
+            is_left = len(apart) == 1 and min(apart) >= 0
+            if len(names) == len(columns) and (is_left or len(row.texts) < self.width):
+                return [*names.values()]
         return []
 
 
@@ -176,8 +200,7 @@ class Table:
         self._names = _find_names(plain)
         self.separator = "" if self._names else find_separator(plain)
         self._usual: tuple[tuple[bool, bool], ...] = ()
-        shapes = Counter(_shape(self.split(line)) for line in plain)
-        shapes = Counter({shape: n for shape, n in shapes.items() if any(map(all, shape))})
+        shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
@@ -191,14 +214,10 @@ class Table:
         if self._names:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
-        cells = line.split() if self.separator == " " else []
-        if not cells or len(cells) != len(self._usual):
-            cells = split_cells(line, self.separator)
+        cells = split_cells(line, self.separator, len(self._usual))
         if "," in line and (self.separator != "," or '"' in line):
-            return [
-                t.replace(",", ".") if form("decimal comma").fullmatch(t[:LONGEST]) else t
-                for t in cells
-            ]
+            has_comma = form("decimal comma").fullmatch
+            return [t.replace(",", ".") if has_comma(t[:LONGEST]) else t for t in cells]
         return cells
 
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
@@ -208,16 +227,18 @@ class Table:
             if not line or line.isspace():
                 continue
             if block.width and form("plain row").fullmatch(line):
-                yield block, Row(number, self.split(line), line, self.separator)
+                yield block, Row(number, self.split(line), line)
                 continue
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
-            row = Row(number, self.split(text), line, self.separator)
+            row = Row(number, self.split(text), line)
             self.remarks += [row] if mark and number <= _SAMPLE else []
             if row.is_mark if mark else block.width > 0 and self._begins_block(row, block):
-                block = RowBlock([row], block.headings, remarks=self.remarks)
+                above = [*([] if block.width else block.above), *block.headings]
+                block = RowBlock([row], above, remarks=self.remarks)
             elif not mark and self._is_row(row, block):
-                block.width = block.width or len(row.texts)
+                if not block.width:
+                    block.begin(len(row.texts))
                 yield block, row
             elif not mark and any(row.texts):
                 if block.width:
@@ -229,27 +250,32 @@ class Table:
 
     def _begins_block(self, row: Row, block: RowBlock) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
+        if any(map(is_number, row.texts)):  # most are rows
+            return not row.raw[:1].isdigit() and row.is_mark
         is_again = row.texts in [above.texts for above in block.headings]
-        is_heading = is_again or 0 < len(row.texts) <= 2 * row.known
-        has_number = any(map(is_number, row.texts))
-        return (is_heading and not has_number) or (not row.raw[:1].isdigit() and row.is_mark)
+        return is_again or row.is_mark or 0 < len(row.texts) <= 2 * row.known
 
     def _is_row(self, row: Row, block: RowBlock) -> bool:
         texts, shape, usual = row.texts, _shape(row.texts), self._usual
         if usual and not any(is_filled for is_filled, _ in usual[:2]):
             # Samples of an oscilloscope, beside which settings may stand.
             shape = tuple(a if b[0] else b for a, b in zip(shape, usual, strict=False))
-        is_usual = any(texts) and (shape == usual or _is_data(texts))
-        # One of data with a fault: some of it is a number, as in those above.
-        return is_usual or (1 < len(texts) == block.width and any(map(is_number, texts)))
+        if any(texts) and (shape == usual or _is_data(texts)):
+            return True
+        # One of data with a fault: some of it is a number, as in those above, or below their names.
+        if len(texts) < 2 or not any(map(is_number, texts)):
+            return False
+        named = {len(above.texts) for above in block.headings if len(above.texts) == above.known}
+        return len(texts) == block.width or (len(texts) in named and not row.known)
 
 
-def split_cells(line: str, separator: str) -> list[str]:
+def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
     """Split a line into cells, without the blanks and the quotes around them."""
     if separator == " ":
         # A heading has names of several words: two blanks or more part them.
         cells = line.split()
-        return cells if all(map(kinds_of, cells)) else re.split(r" {2,}|\t", line.strip())
+        is_row = len(cells) == usual or all(map(kinds_of, cells))
+        return cells if is_row else re.split(r" {2,}|\t", line.strip())
     if '"' in line:
         (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
         return [text.strip().strip('"').strip() for text in cells]
@@ -279,6 +305,10 @@ def _find_names(lines: Sequence[str]) -> list[str]:
     rows = [tuple(name for name, _ in _named_values(line)) for line in lines[:100]]
     usual, count = next(iter(Counter(filter(None, rows)).most_common(1)), ((), 0))
     is_named = len(set(usual) - {""}) > 1 and 2 * count > sum(map(bool, rows))
+    # Below a heading with as many cells, words beside values are parts of cells: Gate 1, Run 2.
+    marks = [[line.count(mark) for mark in "\t;,"] for line in lines[:100]]
+    heads = [cells for row, cells in zip(rows, marks, strict=True) if not row and any(cells)]
+    is_named &= not any(cells in heads for row, cells in zip(rows, marks, strict=True) if row)
     return list(usual) if is_named else []
 
 

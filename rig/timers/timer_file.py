@@ -9,30 +9,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.reasons import make_reason
 from rig.timers.columns import columns_of
 from rig.timers.events import EventReader, FilePart, TimerFile
-from rig.timers.lines import find_kind, is_cut, read_lines
+from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import TICK_HZ
 from rig.timers.problems import ProblemList
-from rig.timers.table import Table
+from rig.timers.table import Row, RowBlock, Table
 from rig.timers.vcd import BEGINNINGS, vcd_rows
-from rig.timers.vocabulary import LONGEST, recognise_format
-
-if TYPE_CHECKING:
-    from rig.timers.table import Row, RowBlock
 
 _SAMPLE = 200
 """Rows that show what columns are."""
-_HINT = (
-    "accepted are run,channel,time_s,state; tables with a heading such as time (s), gate, state; "
-    "samples of inputs (0 and 1, or volts) with times; and value change dumps; see "
-    "rig import --list-formats"
-)
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks", "|": "bars"}
 
 
@@ -44,18 +35,18 @@ def read_ways(path: str | Path) -> list[TimerFile]:
     InputError
         Every fault of the file at its line and column, or what it is instead.
     """
-    files, faults, way, ways = list[TimerFile](), list[InputError](), 0, 1
-    while way < ways:
-        file = TimerFile(ProblemList(str(path), _HINT), way)
+    files, faults = list[TimerFile](), list[InputError]()
+    for way in itertools.count():
+        file = TimerFile(ProblemList(str(path), make_reason("timer_files").text), way)
         try:
-            _read(file, read_lines(path))
+            with closing(read_lines(path)) as lines:
+                _read(file, lines)
             files.append(file)
         except InputError as error:
             faults.append(error)
-        way, ways = way + 1, max(ways, file.ways)
+        if file.ways <= way + 1:
+            break
     if not files:
-        if faults[0].problems and (kind := find_kind(path)):
-            ProblemList(str(path)).refuse(1, 1, "other_kind", kind=kind)
         raise faults[0]
     for file in files if is_cut(path) else ():
         file.notes.append(make_reason("last_line_cut"))
@@ -68,10 +59,10 @@ def _read(file: TimerFile, lines: Iterator[str]) -> None:
     is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
     table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
     cells = f"separated by {_SEPARATORS[table.separator]}" if table.separator else "between words"
-    name = recognise_format("\n".join(line[:LONGEST] for line in head))
-    file.kind = f"a table, its cells {cells}" + (f"; it looks like {name}" if name else "")
+    file.kind = f"a table, its cells {cells}"
+    readers: dict[object, EventReader] = {}
     for block, rows in table.blocks():
-        _read_block(file, block, rows)
+        _read_block(file, block, rows, readers)
         file.problems.raise_if_any()
     file.rows += len(table.strays)
     file.unread += table.strays
@@ -80,24 +71,28 @@ def _read(file: TimerFile, lines: Iterator[str]) -> None:
         file.problems.refuse(1, 1, "nothing_passes" if file.rows else "no_edges", notes=notes)
 
 
-def _read_block(file: TimerFile, block: RowBlock, rows: Iterator[Row]) -> None:
-    """Add what a block says."""
-    sample = list(itertools.islice(rows, _SAMPLE))
-    columns = columns_of(file, block, sample)
-    file.columns |= {column.name: column.meaning for column in columns}
-    roles = {column.role for column in columns}
-    base = None if "time" in roles else block.find_time_base()
-    title = " ".join(block.headings[0].texts) if block.headings else ""
-    reader, start = EventReader(file, columns, title, base or (0.0, 1.0)), len(file.parts)
-    if reader.is_sampled and base is None and "time" not in roles:
-        file.problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
-    reader.read(itertools.chain(sample, rows))
-    unused = ", ".join(column.name for column in columns if column.role in {"other", "duration"})
-    file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
+def _read_block(
+    file: TimerFile, block: RowBlock, rows: Iterator[Row], readers: dict[object, EventReader]
+) -> None:
+    """Add what a block says; its columns are those of earlier ones with the same heading."""
+    start, key = len(file.parts), block.key
+    if key not in readers:
+        sample = list(itertools.islice(rows, _SAMPLE))
+        columns = columns_of(file, block, sample)
+        file.columns |= {column.name: column.meaning for column in columns}
+        readers[key], rows = EventReader(file, columns), itertools.chain(sample, rows)
+        unused = readers[key].unused
+        file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
+    reader = readers[key]
+    base = (0.0, 1.0) if "time" in reader.roles else block.find_time_base()
+    if reader.is_sampled and base is None:
+        lacks = "a column of times or a rate"
+        file.problems.refuse(next(rows).line, 1, "no_rate", lacks=lacks)
+    reader.read(rows, base or (0.0, 1.0), is_gate=block.is_gate)
     if reader.is_stacked:
         parts = sorted(file.parts[start:], key=lambda part: part.run)
-        if not {"edge", "state", "cleared", "gate"} & roles:
-            _check_moments(parts, unused, file.problems)
+        if not {"edge", "state", "cleared", "gate"} & reader.roles:
+            _check_moments(parts, reader.unused, file.problems)
         for before, part in itertools.pairwise(parts):
             if before.run == part.run and min(len(before.events), len(part.events)) == 1:
                 text = f"{part.events[0].tick / TICK_HZ:.9g}"

@@ -109,7 +109,8 @@ def state_of(text: str) -> str:
         ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, ``unknown``, ``missing``, or
         an empty text.
     """
-    word = re.sub(r"(?<=[01])[.,]0{0,30}$", "", without_accents(text[:80]).casefold())
+    word = without_accents(text[:80]).casefold()
+    word = re.sub(r"(?<=[01])[.,]0{0,30}(?:e[+-]?0{1,3})?$", "", word)
     roles = ("one", "zero", "blocked", "clear", "high", "low", "unknown", "missing")
     return next((role for role in roles if word in words()[role]), "")
 
@@ -143,17 +144,8 @@ def is_remark(line: str) -> bool:
 
 
 def number_of(label: str) -> int | None:
-    """Return the number in an input's name: 3 of D3, of ``Channel 3 (V)`` and of 3."""
+    """Return the number in an input's name: 3 of D3, of ``Channel 3 (V)`` and of 3.0."""
+    if is_number(label) and abs(float(label)) < LONGEST:
+        return int(float(label))
     match = re.search(r"([0-9]{1,9})$", re.sub(r"[\[(].*", "", label).strip())
     return int(match[1]) if match else None
-
-
-def recognise_format(head: str) -> str:
-    """Return the name of the maker's format that the first lines are like; nothing if of none.
-
-    The rows of `formats.txt`: name, what it is recognised by, what differs, its example.
-    """
-    for name, marks, *_ in read_rows("formats.txt", "|"):
-        if marks and all(mark.strip().casefold() in head.casefold() for mark in marks.split("+")):
-            return name
-    return ""

@@ -1,1 +1,1 @@
-"""The lab session in a terminal: a client of the daemon that holds no truth of its own."""
+"""The lab session in a terminal: a client of the daemon without data of its own."""

@@ -1,6 +1,6 @@
-"""Everything an operator can do, from the table ``actions.txt``: keys, palette and help.
+"""All actions of the operator, from the table ``actions.txt``: keys, palette and help.
 
-Nothing else binds a key.
+Keys are bound only here.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ if TYPE_CHECKING:
 
 
 class Action(NamedTuple):
-    """One thing to do.
+    """An action of the operator.
 
     Attributes
     ----------
     name
-        In keys.toml and in the program.
+        Name in keys.toml and in the program.
     keys
-        As Textual names them, separated by commas; what the operator's file may change.
+        Keys in Textual's names, separated by commas; the operator's file may change them.
     label
-        In the line of keys; short.
+        Short text for the line of keys.
     text
-        In palette and help.
+        Text for palette and help.
     command
-        The `rig` command that does the same; empty where only a screen can.
+        The `rig` command that does the same; empty if there is none.
     stages
-        Where it makes sense.
+        Stages in which the action is possible.
     group
-        Its heading in the help.
+        Heading in the help.
     driving
-        Whether it needs control of the rig.
+        Whether the action needs control of the rig.
     """
 
     name: str
@@ -62,7 +62,7 @@ _TABLE = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
 ACTIONS = tuple(_read_row(row) for row in _TABLE if not row.startswith("#"))
 BY_NAME = {action.name: action for action in ACTIONS}
 NEEDS_RIG = {"stop", "control", "wave"}
-"""What makes no sense with a file and no rig, beside all that needs control."""
+"""Actions that need a rig but no control."""
 _KEYS = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
          "left": "←", "right": "→", "up": "↑", "down": "↓", "tab": "Tab"}  # fmt: skip
 _HELP = """\
@@ -73,12 +73,12 @@ To change keys, write ~/.config/chainrig/keys.toml: reject = "r"
 
 
 def possible(action: Action, stage: Stage, *, driving: bool) -> bool:
-    """Say whether an action makes sense now."""
+    """Whether an action is possible in this stage."""
     return stage in action.stages and (driving or not action.driving)
 
 
 def shown_key(keys: str) -> str:
-    """Write the first of an action's keys as it stands on a keyboard."""
+    """Return the first key of an action as labelled on a keyboard."""
     first = keys.partition(",")[0]
     if first.startswith("ctrl+"):
         return "Ctrl-" + first[5:].upper()
@@ -86,7 +86,7 @@ def shown_key(keys: str) -> str:
 
 
 def help_text(keys: Mapping[str, str], *, wide: bool) -> Content:
-    """Write what can be done, one action a line, with the command that does it too."""
+    """Return the help: a line for each action, with the equivalent command."""
     lines: list[str] = []
     for head, actions in groupby(ACTIONS, attrgetter("group")):
         lines += ["", head]

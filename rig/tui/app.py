@@ -1,4 +1,4 @@
-"""The app: one clock, one flow, pages that draw what they are shown."""
+"""The terminal app: clock, flow of the campaign, and pages."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ if TYPE_CHECKING:
     from rig.tui.indicators import Indicators
 
 TICK_S = 0.1
-_LEAST_S = 0.01  # between ticks, when one was late
-_LOOK_S = 2.0  # between two looks at folder and USB
+_LEAST_S = 0.01  # least time between ticks, after a late tick
+_LOOK_S = 2.0  # time between two scans of folder and USB
 _COUNTED_S = 0.3
-"""Most that one tick takes off a countdown: keys may have waited as long as the tick was late."""
+"""Most that a tick takes off a countdown: after a late tick, keys may still be waiting."""
 _TOLD_S = 15.0
-_SHARE = 0.18  # of a core, that this may take for long
-_SAVED_S = 0.1  # of processor time, that a fall may take beyond it
+_SHARE = 0.18  # share of a core that the app may use for long
+_SAVED_S = 0.1  # processor time that a fall may use beyond that
 _PAGE_OF = {
     Stage.PROTOCOL: "protocol",
     Stage.DEVICE: "device",
@@ -58,7 +58,7 @@ _PAGE_OF = {
 
 _MODULES = {"protocol": "home", "device": "device", "run": "drop", "result": "drop",
             "session": "session", "history": "drop"}  # fmt: skip
-"""Where each page is made."""
+"""Module of each page."""
 _WATCHING = "this screen only watches\npress c to take control when it is free"
 _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
@@ -98,18 +98,18 @@ class RigApp(App[None], inherit_bindings=False):
     Parameters
     ----------
     options
-        What the command line says.
+        Options of the command line.
     keys
-        Of every action, by name.
+        Keys of every action, by name.
     client
-        Another line to the rig than the options ask for.
+        Client of the daemon, if not that of the options.
     loaded
-        Called when all that a session needs is in memory.
+        Called when all modules that a session needs are loaded.
     """
 
     TITLE = "chainrig"
     CSS_PATH = "rig.tcss"
-    ENABLE_COMMAND_PALETTE = False  # there is one that knows what can be done now
+    ENABLE_COMMAND_PALETTE = False  # our own palette lists only possible actions
     VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
 
     def __init__(
@@ -127,7 +127,7 @@ class RigApp(App[None], inherit_bindings=False):
         self.client = client
         self._loaded = loaded
         if client is None and not options.offline:
-            self.client = ReconnectingClient(options.port, options.socket, self._reached)
+            self.client = ReconnectingClient(options.port, options.socket, self._resume)
         self.follower = Follower(self.client, self.begin)
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
@@ -147,7 +147,7 @@ class RigApp(App[None], inherit_bindings=False):
         self.theme = THEMES[0].name
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """What goes over every line that is drawn."""
+        """Return the filters applied to every line drawn."""
         if not self.options.ascii:
             return super().get_line_filters()
         from rig.tui.ascii import AsciiFilter  # noqa: PLC0415 - most terminals know more
@@ -176,11 +176,11 @@ class RigApp(App[None], inherit_bindings=False):
             self.client.end_trial()
 
     def begin(self, work: Coroutine[Any, Any, None]) -> None:
-        """Do something beside the screens."""
+        """Run a coroutine in the background."""
         self.run_worker(work, group="beside")
 
     async def _tick(self) -> None:
-        # Ten times a second, and down to five where that takes too much of the machine for long.
+        # Ten times a second, or down to five if that takes too much processor time for long.
         now, spent = monotonic(), process_time()
         passed, self._last = now - self._last, now
         took, self._spent = spent - self._spent, spent
@@ -210,18 +210,18 @@ class RigApp(App[None], inherit_bindings=False):
         self.draw()
 
     def _open(self) -> bool:
-        """Whether there is a screen, and none that is being taken down."""
+        """Whether there is a screen that is not being closed."""
         return self.is_running and bool(self.screen_stack) and self.screen_stack[0].is_attached
 
     def draw(self) -> None:
-        """Draw what changed since the last time."""
+        """Draw all changes since the last drawing."""
         if not self._open():
             return
         model, size, base = self.model, self.size, self.screen_stack[0]
         try:
             base.query_one("#alarm")
         except NoMatches:
-            return  # on its way in, or out
+            return  # the screen is opening or closing
         message = self._told if model.now_s - self._told_s < _TOLD_S else ""
         base.query_one(StatusBar).show(model, self.keys, size.width, message)
         base.query_one(StopBar).show(model, self.keys, size.width, self.possible)
@@ -232,12 +232,12 @@ class RigApp(App[None], inherit_bindings=False):
             face = self._faces[self.page](model, self.desk, self.sheet.tables_width())
             self.sheet.show(face, self.desk, fresh=self.page != self._drawn)
             self._drawn = self.page
-        # What is drawn is seen when it is painted.
+        # The operator sees a drawing only after the refresh.
         self.call_after_refresh(self._stillness.shown, self._face)
 
     @property
     def _face(self) -> Hashable:
-        """What the operator looks at, as far as a key depends on it."""
+        """Return the part of the view on which the meaning of a key depends."""
         flow = self.flow
         return self.page, flow.stage, flow.job, self.driving, id(self.screen)
 
@@ -245,7 +245,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     @property
     def flow(self) -> Flow:
-        """Where the campaign is."""
+        """State of the campaign."""
         return self.driver.flow
 
     @property
@@ -255,7 +255,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     @property
     def view(self) -> SessionView | None:
-        """The session file, as read last."""
+        """Latest view of the session file."""
         return self.follower.view
 
     @property
@@ -265,7 +265,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     @property
     def model(self) -> Model:
-        """What the pages are drawn from, now."""
+        """Return the data of the pages at this moment."""
         client, follower = self.client, self.follower
         return Model(
             state=follower.state,
@@ -289,8 +289,8 @@ class RigApp(App[None], inherit_bindings=False):
 
     # ------------------------------------------------------------------ flow and pages
 
-    async def _reached(self) -> None:
-        """Go on where the daemon, or a new one, is."""
+    async def _resume(self) -> None:
+        """Continue after the daemon, or a new one, was reached."""
         assert self.client is not None
         if self.driver.asked and self.client.driving and not self.client.state.section("session"):
             await self.driver.open_session(*self.driver.asked, self.options.seed)
@@ -308,7 +308,7 @@ class RigApp(App[None], inherit_bindings=False):
             self.turn(page_wanted)
 
     async def _load_pages(self) -> None:
-        """Have ready what was not needed for the first paint."""
+        """Load modules that were not needed for the first paint."""
         for page, module in _MODULES.items():
             loaded = await asyncio.to_thread(import_module, f"rig.tui.pages.{module}")
             self._faces[page] = loaded.face
@@ -319,11 +319,11 @@ class RigApp(App[None], inherit_bindings=False):
 
     @property
     def sheet(self) -> Page:
-        """What the pages are drawn on."""
+        """Widget on which pages are drawn."""
         return self.screen_stack[0].query_one(Page)
 
     def turn(self, page: str) -> None:
-        """Show a page, from its first part on."""
+        """Show a page, beginning with its first part."""
         self.page = page
         self.desk.part = self.desk.chart = 0
         self.draw()
@@ -335,7 +335,7 @@ class RigApp(App[None], inherit_bindings=False):
         self.draw()
 
     async def _look_around(self, client: ReconnectingClient) -> None:
-        """See what there is to begin with."""
+        """Update the list of the home page: sessions, protocols and boards."""
         port, other = client.port if not client.idle else "", client.in_the_way
         rows = await asyncio.to_thread(look_around, self.options, port, other[0] if other else "")
         self.desk.begin_with(rows)
@@ -345,49 +345,49 @@ class RigApp(App[None], inherit_bindings=False):
         self.desk.opens_first = False
 
     def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None:
-        """Ask the operator, and act on the answer; nothing opens while something may fall."""
+        """Open a dialog, and act on the answer; no dialog opens while a chain may fall."""
 
-        def answered(answer: Any) -> None:
+        def act_on_answer(answer: Any) -> None:
             if act is not None and answer is not None:
                 act(answer)
 
         if not self.model.hot:
-            self.push_screen(question, answered)
+            self.push_screen(question, act_on_answer)
             self.draw()
 
     def tell(self, text: str) -> None:
-        """Say something for a while, on any page."""
+        """Show a message for some time, on any page."""
         self._told, self._told_s = text, monotonic()
         self.draw()
 
     def next_theme(self) -> None:
-        """Change the colours."""
+        """Switch to the next colour theme."""
         names = [theme.name for theme in THEMES]
         self.theme = names[(names.index(self.theme) + 1) % len(names)]
 
     # ------------------------------------------------------------------ keys and mouse
 
     async def on_event(self, event: events.Event) -> None:
-        """Take keys before anybody else: STOP must work with focus anywhere."""
-        taken = False
-        if isinstance(event, (events.InputEvent, events.Paste)) and not event.is_forwarded:
-            if not self.screen_stack:  # the terminal has ended
-                return
+        """Handle keys before any widget: STOP must work with focus anywhere."""
+        taken, typed = False, isinstance(event, (events.InputEvent, events.Paste))
+        if typed and not self.screen_stack:  # the terminal has ended
+            return
+        if typed and not event.is_forwarded:
             if isinstance(event, events.Key):
                 taken = self._takes(event.key, event.time)
             elif isinstance(event, events.Paste):
                 taken = self._ends_countdown()
             if isinstance(event, (events.Key, events.Paste, events.MouseDown)):
-                self._stillness.touched(event.time)
+                self._stillness.note_input(event.time)
         if taken:
             event.stop()
         else:
             await super().on_event(event)
 
     def _takes(self, key: str, at_s: float) -> bool:
-        """Do what a key means now, STOP first; say whether it meant anything.
+        """Handle a key, STOP first; return whether it had a meaning.
 
-        All of it at once, in the order of keys: what waits is begun and not waited for.
+        Keys are handled synchronously and in order; slow work starts in the background.
         """
         name, screen = self.action_of.get(key), self.screen
         if name == "stop" or (key == "escape" and not isinstance(self.focused, Input)):
@@ -409,14 +409,14 @@ class RigApp(App[None], inherit_bindings=False):
         return name is not None
 
     def _ends_countdown(self) -> bool:
-        """Stop what is on its way to a release; say whether anything was."""
+        """Stop a countdown to a release; return whether there was any."""
         if self.flow.stage not in BEFORE_RELEASE:
             return False
         self.driver.take(campaign.StopRequest())
         return True
 
     def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
-        """Let a key answer a dialog; say whether it did."""
+        """Let a key answer a dialog; return whether it did."""
         by = {"up": -1, "down": 1}.get(key, 0)
         if by and not isinstance(dialog, Confirm):
             if dialog.is_mounted:
@@ -433,12 +433,12 @@ class RigApp(App[None], inherit_bindings=False):
         return True
 
     def _arm(self, at_s: float) -> None:
-        """Arm the release: the one place from which that is done.
+        """Arm the release; the app arms only here.
 
-        Only for an Enter by itself: the run page stood still, and nothing was typed.
+        Requires an Enter by itself: the run page was still, and no other key was pressed.
         """
         if not self.driving:
-            self.action_do("go_on")  # which says so
+            self.action_do("go_on")  # which shows the reason
         elif self._stillness.meant(self._face, at_s):
             model = self.model
             self.driver.take(campaign.GoOn(model.next_job, model.settle_s))
@@ -446,7 +446,7 @@ class RigApp(App[None], inherit_bindings=False):
             self.driver.take(campaign.Notice(_NOT_MEANT))
 
     def action_do(self, name: str) -> None:
-        """Do one action of the table, if it makes sense now."""
+        """Do an action of the table, if it is possible now."""
         action = BY_NAME[name]
         if self.possible(action):
             commands.do(self, name)
@@ -454,15 +454,15 @@ class RigApp(App[None], inherit_bindings=False):
             self.driver.take(campaign.EffectFailure(self.flow.ticket, _WATCHING))
 
     def possible(self, action: Action) -> bool:
-        """Say whether an action makes sense now."""
+        """Whether an action is possible now."""
         if self.client is None and (action.driving or action.name in NEEDS_RIG):
             return False
-        # Whoever has no rig yet may begin with one.
+        # Without a rig, an operator may start with a new one.
         begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
         return possible(action, self.flow.stage, driving=self.driving or begins)
 
     def action_choose(self, at: int) -> None:
-        """Choose a row of the home page."""
+        """Select a row of the home page."""
         self.desk.row = at
         sections = {row.section for row in self.desk.rows[: at + 1]}
         self.sheet.show_row(at + len(sections))

@@ -1,4 +1,4 @@
-"""For terminals and fonts without Unicode: everything that is drawn, in characters of ASCII."""
+"""Conversion of drawn text to ASCII, for terminals and fonts without Unicode."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _LIKE = str.maketrans(
     '+x/~.v#*o:!>><|><^>=--|+++'
     "+|++++dabgkusnX~--'x23n<>/",
 )  # fmt: skip
-"""Characters of the same width that say the same."""
-_MANY = 5  # dots that fill a character
+"""ASCII characters of the same width and meaning."""
+_MANY = 5  # least number of dots shown as a full character
 
 
 def in_ascii(text: str) -> str:
-    """Write text in as many characters of ASCII."""
+    """Return text in the same number of ASCII characters."""
     if text.isascii():
         return text
     return "".join(map(_character, text.replace(" ± ", "+/-").translate(_LIKE)))
@@ -44,9 +44,9 @@ def _character(letter: str) -> str:
 
 
 class AsciiFilter(LineFilter):
-    """Goes over every line that is drawn."""
+    """Filter that converts every drawn line to ASCII."""
 
     def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
-        """Write the segments of a line in ASCII."""
+        """Return the segments of a line in ASCII."""
         del background
         return [Segment(in_ascii(text), style, control) for text, style, control in segments]

@@ -1,4 +1,4 @@
-"""Drawing in braille: a character is 2 × 4 dots, all of one colour."""
+"""Drawing in braille: a character has 2 × 4 dots of the same colour."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 COLUMNS, ROWS = 2, 4
-"""Dots of one character."""
+"""Dots of a character."""
 BLANK = 0x2800
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
 
 class Span(NamedTuple):
-    """Text in a colour of the theme; empty for the ordinary one."""
+    """Text in a colour of the theme; empty for the default colour."""
 
     text: str
     color: str = ""
@@ -29,14 +29,14 @@ class Span(NamedTuple):
 
 
 class Sheet:
-    """Characters to draw on; where several colours meet in one, the last of `colors` is taken.
+    """Characters to draw on; if colours meet in a character, the last of `colors` is used.
 
     Parameters
     ----------
     width, height
-        In characters.
+        Size in characters.
     colors
-        Of the theme, by name; an ink is a place in it.
+        Colours of the theme, by name; an ink is an index into them.
     """
 
     def __init__(self, width: int, height: int, colors: Sequence[str]) -> None:
@@ -52,10 +52,10 @@ class Sheet:
         Parameters
         ----------
         ends
-            In dots from the top left, x before y; shape ``(lines, 2, 2)``. What is not finite is
-            left out, and what lies outside is cut off.
+            Ends in dots from the top left, x before y; shape ``(lines, 2, 2)``. Lines that are not
+            finite are left out, and lines are clipped at the edges.
         inks
-            One, or one a line.
+            A single ink, or an ink for each line.
         """
         inks = np.broadcast_to(np.asarray(inks), len(ends))
         finite = np.isfinite(ends).all(axis=(1, 2))
@@ -71,9 +71,9 @@ class Sheet:
         Parameters
         ----------
         places
-            In dots from the top left, x before y; shape ``(dots, 2)``.
+            Places in dots from the top left, x before y; shape ``(dots, 2)``.
         inks
-            One, or one a dot.
+            A single ink, or an ink for each dot.
         """
         inks = np.broadcast_to(np.asarray(inks), len(places))
         spots = np.rint(places)
@@ -84,17 +84,17 @@ class Sheet:
         np.maximum.at(self._inks, at, inks[inside])
 
     def write(self, row: int, column: int, span: Span) -> None:
-        """Write over what is drawn there."""
+        """Write text over the drawing."""
         for place, letter in enumerate(span.text, start=column):
             self._letters[row, place] = span._replace(text=letter)
 
     def rows(self) -> list[list[Span]]:
-        """Everything, a list of spans a line of characters."""
+        """Return the drawing, a list of spans for each line of characters."""
         return [self._row(number) for number in range(self.height)]
 
     def _row(self, row: int) -> list[Span]:
         cells = zip(self._bits[row].tolist(), self._inks[row].tolist(), strict=True)
-        # A blank is what every font has.
+        # Every font has a blank.
         letters = [Span(chr(BLANK + bits) if bits else " ", (*self._colors, "")[ink])
                    for bits, ink in cells]  # fmt: skip
         for (line, column), letter in self._letters.items():
@@ -104,7 +104,7 @@ class Sheet:
 
 
 def dots_of(letter: str) -> list[tuple[int, int]]:
-    """List the dots of a character, column before row; none of what is no braille."""
+    """Return the dots of a braille character, column before row; empty for other characters."""
     bits = ord(letter) - BLANK
     if not 0 < bits < 1 << COLUMNS * ROWS:
         return []

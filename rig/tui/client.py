@@ -1,4 +1,4 @@
-"""The line to the daemon: found or started, kept, and taken up again when it is lost."""
+"""Connection to the daemon, which is found or started, and reconnected when lost."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from rig.daemon.aclient import AsyncClient
+from rig.daemon.client import AsyncClient
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
 from rig.reasons import make_error
-from rig.tui.state import DaemonState, typed
+from rig.tui.state import DaemonState, read_state
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Mapping
@@ -24,41 +24,41 @@ if TYPE_CHECKING:
     from rig.daemon.replica import Replica
 
 _AGAIN_S = 0.5
-_BEAT_S = 0.15  # between two signs of life
+_BEAT_S = 0.15  # time between heartbeats
 _LATE_S = 0.02
-_SILENT_S = 0.5  # without an answer to one: all of this within a second
-_START_S = 5.0  # a daemon that was started has this long before another one is
-_IDLE_S = 300.0  # nobody asked for that daemon by name, so it ends when it is left alone
+_SILENT_S = 0.5  # longest time without an answer; a loss is noticed within a second
+_START_S = 5.0  # time for a daemon to start before another is started
+_IDLE_S = 300.0  # a daemon started from here ends after this time without clients
 
 
 class ReconnectingClient:
-    """One client of the daemon for as long as the screen is open.
+    """A client of the daemon for as long as the screen is open.
 
     Parameters
     ----------
     url
-        The port; empty to watch whatever daemon there is.
+        The port; empty to watch any running daemon.
     socket
-        Of the daemon; `None` for the usual one.
+        Socket of the daemon; `None` for the default.
     connected
         Awaited each time the daemon was reached and its state is known.
 
     Attributes
     ----------
     silence
-        Why the daemon is not heard; empty while it is.
+        Why the daemon does not answer; empty while it does.
     daemon
-        The one that was started from here, if any.
+        Process of a daemon started from here, if any.
     disk_s
-        How long the daemon's disk has been at one write; 0 for none.
+        Duration of the daemon's present disk write, s; 0 for none.
     patience_s
-        How long the daemon may take to answer a sign of life.
+        Longest time for an answer to a heartbeat, s.
     lost
-        Why the port was lost last, for who says so when it is back, which may be a moment later.
+        Why the port was last lost, for a message after it is back.
     is_trial
-        Whether that one simulates for this screen alone, and ends with it.
+        Whether the started daemon simulates for this screen alone, and ends with it.
     in_the_way
-        Port and process of a daemon that has another port than the wanted one; empty for none.
+        Port and process of a daemon with another port than the wanted; empty for none.
     """
 
     def __init__(
@@ -85,26 +85,26 @@ class ReconnectingClient:
 
     @property
     def idle(self) -> bool:
-        """Whether no rig was asked for, and none was ever there."""
+        """Whether no rig was requested or ever connected."""
         return not self.url and self._client is None
 
     @property
     def up(self) -> bool:
-        """Whether the daemon is heard."""
+        """Whether the daemon answers."""
         return self._client is not None and not (self._client.lost.is_set() or self._hangs)
 
     @property
     def port(self) -> str:
-        """The port as the daemon names it, or as it was asked for."""
+        """Port as named by the daemon, or as requested."""
         return self._port or self.url
 
     @property
     def state(self) -> DaemonState:
-        """What the daemon said last."""
+        """Latest state of the daemon."""
         if self._client is None:
             return DaemonState()
         replica = self._client.replica
-        return typed(replica.n, replica.state) if replica.state else DaemonState()
+        return read_state(replica.n, replica.state) if replica.state else DaemonState()
 
     @property
     def driving(self) -> bool:
@@ -113,25 +113,26 @@ class ReconnectingClient:
             return False
         control = self._client.replica.state.get("control")
         if control is None:
-            # On a busy machine control may lapse; if nobody takes it, it is ours when we speak.
+            # On a busy machine control may lapse; unless another client takes it, our next call
+            # restores it.
             return self._had_control
         mine: bool = control["client"] == self.name
         return mine
 
     async def call(self, method: str, **params: Any) -> Any:
-        """Ask the daemon for anything in its interface.
+        """Call a method of the daemon.
 
         Raises
         ------
         RigError
-            As the daemon raised it, or it is not there.
+            The daemon raised it, or there is no daemon.
         """
         if self._client is None:
             raise DeviceError(f"no daemon: {self.silence}", "reconnecting")
         return await self._client.call(method, **params)
 
     async def take_control(self) -> None:
-        """Take control, now and whenever the daemon had to be reached again.
+        """Take control, now and after each reconnection.
 
         Raises
         ------
@@ -143,19 +144,19 @@ class ReconnectingClient:
         self._had_control = True
 
     async def release_control(self) -> None:
-        """Give control back, for good."""
+        """Release control permanently."""
         self._wants_control = self._had_control = False
         await self.call("release_control")
 
     async def go_to(self, url: str, *, trial: bool = False) -> None:
-        """Leave the daemon for that of another port.
+        """Switch to the daemon of another port.
 
         Parameters
         ----------
         url
             The port.
         trial
-            Whether it is a simulation for this screen alone, which ends with it.
+            Whether to start a simulation for this screen alone, which ends with it.
         """
         await asyncio.to_thread(self.end_trial)
         usual = self._usual_path
@@ -167,7 +168,7 @@ class ReconnectingClient:
         self._client, self._port, self.changed = None, "", True
 
     def end_trial(self) -> None:
-        """End the simulation that was begun for this screen alone."""
+        """End the simulation that was started for this screen alone."""
         if self.is_trial and self.daemon is not None:
             self.daemon.terminate()
             self.daemon.wait()
@@ -175,7 +176,7 @@ class ReconnectingClient:
             self.daemon, self.is_trial = None, False
 
     async def keep(self) -> None:
-        """Connect, and connect again, until cancelled."""
+        """Connect and reconnect until cancelled."""
         try:
             while True:
                 try:
@@ -189,7 +190,7 @@ class ReconnectingClient:
                 await self._client.close()
 
     async def _once(self) -> None:
-        """Stay connected as long as it goes."""
+        """Connect once, and stay connected as long as possible."""
         try:
             client = await AsyncClient.connect(self.path, self.name)
         except DeviceError as error:
@@ -205,7 +206,7 @@ class ReconnectingClient:
             if self._wants_control and client.replica.state.get("control") is None:
                 with suppress(RigError):
                     await self.take_control()
-            # Beside the signs of life: to open a session may take longer than control lasts.
+            # In parallel with heartbeats: opening a session may take longer than control lasts.
             reached = asyncio.get_running_loop().create_task(self._connected())
             while not client.lost.is_set():
                 await self._beat(client)
@@ -218,13 +219,13 @@ class ReconnectingClient:
             await client.close()
 
     async def _beat(self, client: AsyncClient) -> None:
-        """Give a sign of life, and see that it is answered."""
+        """Send heartbeats, and check that they are answered."""
         begun = monotonic()
         answer = asyncio.ensure_future(client.call("renew"))
         while not answer.done():
             try:
                 await asyncio.wait([answer], timeout=self.patience_s)
-                await asyncio.sleep(_LATE_S)  # what waits here may be the answer
+                await asyncio.sleep(_LATE_S)  # the answer may be waiting here
             except asyncio.CancelledError:
                 answer.cancel()
                 raise
@@ -243,7 +244,7 @@ class ReconnectingClient:
                 await asyncio.wait_for(client.lost.wait(), _BEAT_S)
 
     async def _check(self, client: AsyncClient) -> None:
-        """See that it is the daemon of the port that was asked for."""
+        """Check that the daemon has the requested port."""
         await client.subscribe()
         self._port = str(client.replica.state["port"]["url"])
         if self.url and self._port != self.url:
@@ -251,7 +252,7 @@ class ReconnectingClient:
             raise make_error(DeviceError, "daemon_port", port=self._port, wanted=self.url)
 
     def _start(self, error: DeviceError) -> None:
-        """Start a daemon that outlives this screen, as long as it has something to do."""
+        """Start a daemon that outlives this screen until it is idle."""
         if not self.url:
             raise error
         now = asyncio.get_running_loop().time()
@@ -259,9 +260,9 @@ class ReconnectingClient:
             return
         self._started_at = now
         if self.daemon is not None:
-            self.daemon.poll()  # buries the last one
+            self.daemon.poll()  # reaps the previous process
         prepare_folder(self.path.parent)
-        # What it has to say about its own end would otherwise be lost with the terminal.
+        # Its last messages would otherwise be lost with the terminal.
         with self.path.with_suffix(".log").open("ab") as log:
             command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
             command += ["--idle-timeout", str(_IDLE_S)]

@@ -1,4 +1,4 @@
-"""The operator's commands: what each action of the table does."""
+"""Implementation of the operator's actions."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ REASONS = (
     "caught on something",
     "a trial that should not count",
 )
-"""Frequent reasons to reject a drop that is within its limits; the operator may type another."""
+"""Frequent reasons to reject a drop within its limits; the operator may type another."""
 
 
 def do(app: RigApp, name: str) -> None:
-    """Do one action of the table; whether it makes sense now was asked before.
+    """Do an action of the table, which must be possible now.
 
-    At once: what comes of a key depends on what is there when the key is handled. Only what waits
-    for the daemon or for files goes on beside the screens, and none of that arms.
+    Actions run synchronously, as their effect depends on the state when the key is handled. Only
+    work that waits for the daemon or files runs in the background, and none of that arms.
     """
     if name.startswith("page_"):
         app.turn(name.removeprefix("page_"))
@@ -54,7 +54,7 @@ def do(app: RigApp, name: str) -> None:
 
 
 def _go_on(app: RigApp) -> None:
-    """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp.arm`."""
+    """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp._arm`."""
     stage = app.driver.flow.stage
     if stage is Stage.PREPARE and app.page == "run":
         app.driver.take(Notice("only the Enter key arms the release\n"
@@ -75,7 +75,7 @@ def _go_on(app: RigApp) -> None:
 
 
 def _open(app: RigApp, row: Beginning) -> None:
-    """Open an experiment with the rig that is there, or in simulation where there is none."""
+    """Open an experiment with the connected rig, or in simulation without a rig."""
     client = app.client
     if client is None or row.file is None:
         return
@@ -96,7 +96,7 @@ def _open(app: RigApp, row: Beginning) -> None:
 
 
 def _connect(app: RigApp, row: Beginning) -> None:
-    """Go to a board; what was a trial ends."""
+    """Switch to a board; ends a trial."""
     if app.client is not None and row.value:
         app.driver.asked = None
         app.begin(app.client.go_to(row.value))
@@ -112,7 +112,7 @@ def _flash(app: RigApp, row: Beginning) -> None:
 
 
 def _new(app: RigApp, row: Beginning) -> None:
-    """Have a protocol drafted, under a name that is free."""
+    """Draft a protocol under an unused name."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
     name = next(name for name in names if not Path(name).exists())
     written = f"{name} is written: change what differs in your rig; then Enter opens it"
@@ -120,7 +120,7 @@ def _new(app: RigApp, row: Beginning) -> None:
 
 
 def _end_other(app: RigApp, row: Beginning) -> None:
-    """Ask, then end the daemon that stands in the way."""
+    """Ask, then end the daemon of another port."""
     client = app.client
     if client is None or client.in_the_way is None:
         return
@@ -147,19 +147,19 @@ _BEGIN: dict[str, Callable[[RigApp, Beginning], object]] = {
 
 
 def _control(app: RigApp) -> None:
-    """Take control, or ask whether to give it back; who has it instead is said."""
+    """Take control, or ask whether to give it back."""
     client = app.client
     assert client is not None
     if client.driving:
         question = "Another screen can then take it; this screen keeps watching."
         _confirm(app, "Give control back?", question, "give it back",
-                 lambda: app.begin(_tried(app, client.release_control())))  # fmt: skip
+                 lambda: app.begin(_try_command(app, client.release_control())))  # fmt: skip
     else:
-        app.begin(_tried(app, client.take_control()))
+        app.begin(_try_command(app, client.take_control()))
 
 
-async def _tried(app: RigApp, work: Coroutine[Any, Any, Any]) -> None:
-    """Wait for what the daemon does, and say what is wrong when it fails."""
+async def _try_command(app: RigApp, work: Coroutine[Any, Any, Any]) -> None:
+    """Wait for a call to the daemon, and show its error if it fails."""
     try:
         await work
     except RigError as error:
@@ -173,14 +173,14 @@ def _close(app: RigApp) -> None:
 
     def close() -> None:
         app.driver.asked = None
-        app.begin(_tried(app, client.call("close_session")))
+        app.begin(_try_command(app, client.call("close_session")))
 
     question = "Everything recorded stays in its file. You can continue it later."
     _confirm(app, "Close the session?", question, "close", close)
 
 
 def _quit(app: RigApp) -> None:
-    """Ask, then leave."""
+    """Ask, then quit."""
     question = "The rig keeps running after you quit." if app.client else ""
     if app.client and app.client.is_trial:
         question = "The simulation ends too. What it has recorded stays in its file."
@@ -214,7 +214,7 @@ def _note(app: RigApp) -> None:
 
 
 async def _sessions(app: RigApp) -> None:
-    """Let one session of the folder be chosen, and play it."""
+    """Let the operator choose a session of the folder, and play it."""
     view = app.desk.other or app.model.view
     own = view.path if view else app.options.session
     folder = own.parent if own else Path()
@@ -248,7 +248,7 @@ def _session_line(entry: SessionEntry) -> str:
 
 
 def _move(app: RigApp, by: int) -> None:
-    """Go to the previous or next of what a page lists, or scroll."""
+    """Move in the list of a page, or scroll."""
     desk = app.desk
     if app.page == "history":
         desk.choose(app.model, desk.players["history"].at + by)
@@ -266,7 +266,7 @@ def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], None]
 
 
 def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
-    """Ask, then have a command write files of the session that is looked at, beside it."""
+    """Ask, then run a command that writes files of the shown session beside it."""
     view = (app.desk.view(app.model) if app.page == "history" else None) or app.model.view
     if view is None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
@@ -277,9 +277,9 @@ def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
 
 
 async def _run(app: RigApp, *command: str, done: str = "") -> None:
-    """Run a command, and say what is done, or where its files are, or what went wrong.
+    """Run a command, and show its result, its files, or its error.
 
-    A process of its own: what it computes takes nothing from STOP.
+    It runs in a separate process, so that its computations do not delay STOP.
     """
     app.tell(f"rig {command[0]}: working …")
     process = await asyncio.create_subprocess_exec(
@@ -290,7 +290,7 @@ async def _run(app: RigApp, *command: str, done: str = "") -> None:
     )  # fmt: skip
     try:
         output, _ = await process.communicate()
-    except asyncio.CancelledError:  # the screen is left
+    except asyncio.CancelledError:  # the app quits
         process.kill()
         await process.wait()
         raise
@@ -301,7 +301,7 @@ async def _run(app: RigApp, *command: str, done: str = "") -> None:
 
 
 def _reject(app: RigApp) -> None:
-    """Ask why the drop is rejected; or whether a rejection is taken back."""
+    """Ask for the reason to reject a drop, or whether to undo a rejection."""
     model = app.model
     if model.flow.verdict == "rejected":
         verdict, _ = model.flow.judged
@@ -311,9 +311,9 @@ def _reject(app: RigApp) -> None:
         return
 
     question = "Why is this drop rejected?"
-    if model.replaced is not None:
+    if model.previous is not None:
         question += (
-            f" Only the latest attempt of a run counts: attempt {model.replaced.attempt} was good, "
+            f" Only the latest attempt of a run counts: attempt {model.previous.attempt} was good, "
             "but the run will have no result until you repeat it."
         )
     app.ask(Ask(question, choices=REASONS, yes="reject"), lambda why: app.driver.take(Reject(why)))
@@ -333,7 +333,7 @@ def _repeat(app: RigApp) -> None:
 
 
 def _unblind(app: RigApp) -> None:
-    """Ask, then have it recorded that the numbers may be seen."""
+    """Ask, then unblind the session."""
     client = app.client
     assert client is not None
     if not app.model.blind:
@@ -341,7 +341,7 @@ def _unblind(app: RigApp) -> None:
         return
     question = "This shows all results. It is recorded and cannot be undone."
     _confirm(app, "Unblind the session?", question, "show results",
-             lambda: app.begin(_tried(app, client.call("unblind"))))  # fmt: skip
+             lambda: app.begin(_try_command(app, client.call("unblind"))))  # fmt: skip
 
 
 def _begin_check(app: RigApp) -> None:
@@ -349,7 +349,7 @@ def _begin_check(app: RigApp) -> None:
 
 
 def _palette(app: RigApp) -> None:
-    """Search what can be done now."""
+    """Search the actions that are possible now."""
     actions = [action for action in ACTIONS
                if action.name != "palette" and app.possible(action)]  # fmt: skip
     lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
@@ -377,11 +377,11 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "close": _close,
     "release_test": _try_release,
     "sessions": lambda app: app.begin(_sessions(app)),
-    "play": _change(Player.started),
-    "earlier": _change(lambda player, end_s: player.moved(-1, end_s)),
-    "later": _change(lambda player, end_s: player.moved(1, end_s)),
+    "play": _change(Player.toggle_play),
+    "earlier": _change(lambda player, end_s: player.step_time(-1, end_s)),
+    "later": _change(lambda player, end_s: player.step_time(1, end_s)),
     "report": lambda app: _write(app, "report", "-o", ".html"),
     "export": lambda app: _write(app, "export", "--csv", ".csv"),
-    "slower": _change(lambda player, _: player.turned(0.5)),
-    "faster": _change(lambda player, _: player.turned(2.0)),
+    "slower": _change(lambda player, _: player.change_speed(0.5)),
+    "faster": _change(lambda player, _: player.change_speed(2.0)),
 }

@@ -1,4 +1,4 @@
-"""What the command line says."""
+"""Options of the command line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rig.tui.stillness import STILL_S
 
 
 def ascii_only(environment: Mapping[str, str]) -> bool:
-    """Whether a terminal shows ASCII only, by its type or its locale."""
+    """Whether a terminal is limited to ASCII, by its type or locale."""
     if environment.get("TERM", "") in {"linux", "vt100", "vt220", "ansi", "dumb"}:
         return True
     names = ("LC_ALL", "LC_CTYPE", "LANG")
@@ -21,24 +21,24 @@ def ascii_only(environment: Mapping[str, str]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the command line says.
+    """Options of the command line.
 
     Attributes
     ----------
     files
         Protocols to choose from.
     port
-        Empty to watch a daemon that runs already.
+        Port of the rig; empty to watch a running daemon.
     session
-        The file to be made or continued.
+        Session file to create or continue.
     offline
-        Only look at `session`: no daemon is asked for.
+        Whether to show only `session`, without a daemon.
     still_s
-        How long the screen stands still before Enter can arm.
+        Time that the screen must be still before Enter can arm, s.
     bell
-        Whether it rings at a verdict.
+        Whether to ring the bell at a verdict.
     ascii
-        Whether only ASCII can be shown.
+        Whether to draw only ASCII.
     """
 
     files: tuple[Path, ...] = ()

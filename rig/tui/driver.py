@@ -1,4 +1,4 @@
-"""The asynchronous driver of a campaign: has effects carried out beside the screens."""
+"""Asynchronous driver of a campaign, which carries out effects in the background."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ if TYPE_CHECKING:
 
 
 class Driver:
-    """Takes what happens, one event after the other.
+    """Handles events of a campaign in order.
 
     Parameters
     ----------
     flow
-        Where the campaign is at first.
+        Initial state of the campaign.
     client
-        What carries effects out; `None` where a file is only looked at.
+        Client that carries out effects; `None` without a daemon.
     follower
-        What reads and analyses the session.
+        Reader of the session.
     begin
-        Runs a coroutine beside the screens.
+        Runs a coroutine in the background.
 
     Attributes
     ----------
     flow
-        Where the campaign is.
+        State of the campaign.
     stop
-        What became of the latest STOP; `None` before the first.
+        Answer to the latest STOP; `None` before the first.
     asked
-        Protocol and session that were opened from here; `None` when they were closed.
+        Protocol and session that were opened from here; `None` after they were closed.
     """
 
     def __init__(
@@ -57,23 +57,23 @@ class Driver:
         self._begin = begin
 
     def take(self, event: Event) -> None:
-        """Take an event, and have its effects carried out."""
+        """Handle an event, and carry out its effects."""
         self.flow, effects = step(self.flow, event)
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
             self._follower.judged.add(self.flow.job)
         for effect in effects:
             if isinstance(effect, campaign.Stop) and (self._client is None or self._client.idle):
-                continue  # nothing is there that could fall
+                continue  # without a rig, no chain can fall
             if isinstance(effect, campaign.Stop):
                 self.stop = StopAnswer(monotonic())
             self._begin(self._carry_out(effect, self.flow.ticket))
 
     def refuse(self, error: RigError) -> None:
-        """Say what is wrong and what to do."""
+        """Show an error with its remedy."""
         self.take(effect_failure(self.flow.ticket, error))
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
-        """Have the daemon open a session, now and whenever it had to be started again."""
+        """Open a session in the daemon, now and after each restart."""
         assert self._client is not None
         try:
             await self._client.call("open_session", protocol=protocol, session=session, seed=seed)
@@ -83,14 +83,14 @@ class Driver:
             self.asked = protocol, session
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
-        """Do what is wanted, and take what came of it."""
+        """Carry out an effect, and handle the resulting event."""
         client = self._client
         assert client is not None
         token = None
         try:
             match effect:
                 case campaign.GiveUp():
-                    return  # what is wrong is shown, and the operator goes on from there
+                    return  # the error is shown, and the operator decides
                 case campaign.Stop(reason):
                     await self._switch_off(client, reason)
                     return
@@ -121,9 +121,9 @@ class Driver:
             self.take(campaign.EffectDone(ticket, token))
 
     async def _switch_off(self, client: ReconnectingClient, reason: str) -> None:
-        """Have everything switched off, and ask on until it is known whether it is.
+        """Switch all outputs off, and repeat until the result is known.
 
-        The daemon answers after a second at the latest, also when the board was not heard by then.
+        The daemon answers within a second, even without an answer of the board.
         """
         asked, is_known = self.stop, False
         while not is_known and asked is self.stop:

@@ -1,4 +1,4 @@
-"""A drop in words: which it is, and what it measured, beside the model and free fall."""
+"""A drop in words: its run, and its results with the model and free fall for comparison."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ LOOKS = {
     "planned": ("·", "$foreground 70%"),
 }
 _PAST = 6
-"""Drops in the strip of past runs: as many as fit 80 columns."""
+"""Number of drops in the strip of past runs, to fit 80 columns."""
 
 
-def stated(model: Quantity) -> Measured | float:
-    """Take a prediction as a measured value is written: with U95 where it has any."""
+def as_measured(model: Quantity) -> Measured | float:
+    """Return a prediction as a measured value with U95, or as a number if exact."""
     return Measured(model.value, model.u) if model.u else model.value
 
 
 def headline(run: Run, total: int, attempt: int) -> str:
-    """Say which run it is, and what falls how."""
+    """Return the headline of a run: number, attempt, incline and striking chain."""
     again = f" · attempt {attempt}" if attempt > 1 else ""
     if run.impact is None:
         return f"Run {run.number} of {total}{again}"
@@ -49,10 +49,10 @@ def headline(run: Run, total: int, attempt: int) -> str:
 
 
 def expected_words(protocol: Protocol, run: Run) -> str:
-    """State the model's prediction for a run; empty where it has no answer."""
+    """Return the model's prediction for a run in words; empty without a prediction."""
     expected = predicted_run(protocol, run)
     values = [
-        f"{row.symbol} {plus_minus(stated(expected[row.name]), row.scale)} {row.unit}"
+        f"{row.symbol} {plus_minus(as_measured(expected[row.name]), row.scale)} {row.unit}"
         for row in averaged()
         if row.name in expected
     ]
@@ -60,14 +60,14 @@ def expected_words(protocol: Protocol, run: Run) -> str:
 
 
 def sentence(view: SessionView, job: Job) -> str:
-    """Say the drop's main result beside what the model expects; empty where there is none."""
+    """Return the drop's main result with the model's value in words; empty without a result."""
     result, run = view.results[job], view.plan[job.run]
     row = next((row for row in averaged() if row.name in result.quantities), None)
     if row is None:
         return ""
     measured = result.quantities[row.name]
     expected = predicted_run(view.protocol, run).get(row.name)
-    beside = "" if expected is None else f"; model {plus_minus(stated(expected), row.scale)}"
+    beside = "" if expected is None else f"; model {plus_minus(as_measured(expected), row.scale)}"
     size = plus_minus(Measured(abs(measured.value), measured.u), row.scale)
     if row == SEPARATION and run.impact is not None:
         wins = "wins" if measured.value > 0.0 else "loses"
@@ -76,7 +76,7 @@ def sentence(view: SessionView, job: Job) -> str:
 
 
 def past_runs(view: SessionView, job: Job) -> str:
-    """Write the latest drops up to one in a line: run, verdict and main result of each."""
+    """Return a line of the latest drops up to `job`: run, verdict and main result of each."""
     parts, unit = [], ""
     for drop in view.jobs[: view.jobs.index(job) + 1][-_PAST:]:
         result = view.results[drop]
@@ -88,9 +88,9 @@ def past_runs(view: SessionView, job: Job) -> str:
 
 
 def number_table(view: SessionView, job: Job) -> str:
-    """Write what a drop measured, one number a line, beside what it says with all others.
+    """Return a table of a drop's results, a line each.
 
-    Alone is what the drop says by itself, together what it says in the joint fit of the session.
+    "Alone" is the result of the drop by itself, "together" that of the session's joint fit.
     """
     alone, run = view.results[job], view.plan[job.run]
     joint = (

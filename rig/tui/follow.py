@@ -1,4 +1,4 @@
-"""Following the daemon and the session file: what they say becomes state and events."""
+"""Follower of the daemon and the session file, which turns changes into state and events."""
 
 from __future__ import annotations
 
@@ -31,33 +31,33 @@ _UNSEEN = (
     "daemon or board keeps the drop; it is analysed when the daemon is back"
 )
 _CLOCK_S = 3.0
-"""Clock samples come between drops too, so the file is read again so often."""
+"""Time between readings of the file, as clock samples also arrive between drops, s."""
 
 
 class Follower:
-    """Holds what is known of rig and session.
+    """Holds the latest state of rig and session.
 
     Parameters
     ----------
     client
-        `None` to look at a file only.
+        Client of the daemon; `None` to show only a file.
     begin
-        Runs a coroutine beside the screens.
+        Runs a coroutine in the background.
 
     Attributes
     ----------
     state
-        What the daemon said last.
+        Latest state of the daemon.
     indicators
-        The gates.
+        State of the gates.
     view
-        The session file, as read last.
+        Latest view of the session file.
     voids
-        What its log says of them.
+        Void drops by the session's log.
     judged
-        Drops that this screen gave a verdict.
+        Drops with a verdict from this screen.
     unreadable
-        Why the session file cannot be read; empty while it can.
+        Why the session file cannot be read; empty if it can.
     """
 
     def __init__(
@@ -82,32 +82,32 @@ class Follower:
 
     @property
     def done(self) -> int:
-        """How many drops of the file were analysed so far."""
+        """Number of drops of the file analysed so far."""
         return self._live.done if self._live else 0
 
     def look_at(self, path: Path) -> None:
-        """Look at a file that nobody records."""
+        """Show a file that has no writer."""
         self._forget(path)
         self._begin(self._read_quietly())
 
     def look_with(self, live: LiveAnalysis) -> None:
-        """Look at a file that somebody has read already."""
+        """Show a file with an existing live analysis."""
         self._path, self._live = live.path, live
 
     def _forget(self, path: Path | None = None) -> None:
         self._path, self._live, self.view, self.voids = path, None, None, Voids()
 
     def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
-        """Take what the daemon says now.
+        """Take over the daemon's present state, and return events for its changes.
 
         Parameters
         ----------
         stage
-            Where the operator is.
+            Present stage of the campaign.
         now
-            A clock that only goes on, s.
+            Monotonic time, s.
         reopens
-            Whether a session that is closed will be opened again from here.
+            Whether a closed session will be opened again from here.
         """
         client = self._client
         assert client is not None
@@ -145,9 +145,9 @@ class Follower:
             counted = 0
         if len(state.edges) > counted and drop.get("state") == "fired":
             fresh = tuple(int(edge[1]) for edge in state.edges[counted:])
-            self.indicators = self.indicators.counted(fresh, now)
+            self.indicators = self.indicators.count_edges(fresh, now)
         else:
-            self.indicators = self.indicators.seen(state.blocked, now)
+            self.indicators = self.indicators.seen(state.blocked_mask, now)
         self._counted = job, len(state.edges)
 
     def _look_at_session(
@@ -221,8 +221,8 @@ def open_live(path: Path) -> LiveAnalysis:
 
 
 def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
-    """Say what was wrong with a port that is back: it may have been too short to be seen."""
-    if state.link != "up" or state.section("error"):  # it is back, and being looked through
+    """Yield the event for a port that is back, as its loss may have been too short to be seen."""
+    if state.link != "up" or state.section("error"):  # back, but still being checked
         return
     lost, client.lost = client.lost, {}
     if lost:
@@ -230,7 +230,7 @@ def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
 
 
 def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
-    """Say that what was armed, or would be, is not: nothing here waits for an answer then."""
+    """Yield the event that an armed or arming drop has failed, as no answer will follow."""
     if stage not in BEFORE_RELEASE:
         return
     if state.link == "down":

@@ -1,4 +1,4 @@
-"""The operator's own keys, from a small file: ``reject = "r"`` a line."""
+"""The operator's own keys, from a small file with lines such as ``reject = "r"``."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from rig.files import read_input
 from rig.tui.actions import ACTIONS, BY_NAME
 
 ALWAYS = {"stop": "f9", "go_on": "enter"}
-"""Keys that stay, whatever others an action is given: who knows only one key knows these."""
+"""Keys that an action keeps in addition to the operator's own."""
 _HOW = 'write one line for each action, such as reject = "r"'
 RESERVED = ("escape",)
 """Keys whose meaning is fixed."""
 
 
 def default_file() -> Path:
-    """Where the file is looked for."""
+    """Return the default path of the file."""
     base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
     return Path(base) / "chainrig" / "keys.toml"
 
 
 def read_keys(path: Path | None = None) -> dict[str, str]:
-    """Read the keys of every action, by name.
+    """Return the keys of every action, by name.
 
     Parameters
     ----------
@@ -57,24 +57,24 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
         line, column = re.findall(r"\d+", at) or (len(before) + 1, len(last) + 1)
         raise InputError(f"{place}:{line}:{column}: {reason}", _HOW) from None
     lines = {line.partition("=")[0].strip(): n for n, line in enumerate(text.splitlines(), start=1)}
-    return combined(table, str(place), lines)
+    return merge_keys(table, str(place), lines)
 
 
-def combined(
+def merge_keys(
     table: Mapping[str, object], source: str, lines: Mapping[str, int] | None = None
 ) -> dict[str, str]:
-    """Put given keys over the table's own.
+    """Return the table's keys with the operator's keys in their place.
 
-    A key that is given to one action is taken from the action that had it in the table.
+    A key that the operator gives to an action is removed from the action that had it.
 
     Parameters
     ----------
     table
         Keys by action.
     source
-        For messages.
+        Name of the source, for messages.
     lines
-        Where in the source each action stands.
+        Line of each action in the source.
 
     Raises
     ------
@@ -112,12 +112,12 @@ def combined(
 
 
 def _is_key(key: str) -> bool:
-    """Whether a terminal may send it, by Textual's names."""
+    """Whether a terminal may send a key, by Textual's names."""
     *held, last = key.split("+")
     if not set(held) <= {"ctrl", "shift", "alt"}:
         return False
     if len(last) == 1:
-        return last.isalnum()  # others have names, such as question_mark
+        return last.isalnum()  # other keys have names, such as question_mark
     if last in {name.value for name in Keys}:
         return True
     try:

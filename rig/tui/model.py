@@ -1,4 +1,4 @@
-"""What the screens are drawn from: what daemon, session and campaign say, and what follows."""
+"""Data of the screens: state of daemon, session and campaign, and derived values."""
 
 from __future__ import annotations
 
@@ -23,24 +23,25 @@ if TYPE_CHECKING:
     from rig.vocabulary import Vocabulary
 
 SLOW_DISK_S = 0.5
-"""A commit takes milliseconds; of a board that is armed nothing is heard while one lasts."""
+"""Duration of a disk write that is a problem, s: normal writes take milliseconds, and messages of
+an armed board wait meanwhile."""
 HOT = frozenset({*BEFORE_RELEASE, Stage.LIVE})
 UNDER_WAY = HOT | {Stage.JUDGING}
 _ALONE = "a fired drop is recorded without this screen; in danger, switch the release's supply off"
 _BETWEEN = (Stage.PREPARE, Stage.DEVICE, Stage.TESTING, Stage.DONE)
 WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESULT}
-"""Where a watcher is, by the state of the drop."""
+"""Stage of a watcher, by the state of the drop."""
 
 
 class Alarm(NamedTuple):
-    """What is wrong, and what to do."""
+    """A problem, and its remedy."""
 
     message: str
     hint: str = ""
 
 
 class StopAnswer(NamedTuple):
-    """What became of the latest STOP: sent at a time (monotonic, s), `heard` once that is known."""
+    """State of the latest STOP: time of sending (monotonic, s), and `heard` once known."""
 
     at_s: float
     heard: bool | None = None
@@ -48,34 +49,34 @@ class StopAnswer(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """One moment.
+    """Data of the screens at a moment.
 
     Attributes
     ----------
     voids
-        What the log says of them.
+        Void drops by the session's log.
     connected
-        Whether the daemon is heard.
+        Whether the daemon answers.
     driving
         Whether this screen has control of the rig.
     now_s
-        A clock that only goes on.
+        Monotonic time, s.
     silence
-        Why the daemon is not heard.
+        Why the daemon does not answer.
     offline
-        Whether only a file is looked at.
+        Whether only a file is shown.
     unreadable
         Why the session file cannot be read.
     read
-        How many of its drops were analysed so far.
+        Number of its drops analysed so far.
     stop
-        What became of the latest STOP.
+        State of the latest STOP.
     disk_s
-        How long the disk has been at one write.
+        Duration of the present disk write, s.
     page
         The page that is shown.
     idle
-        Whether no rig was ever asked for or heard: nothing is wrong with that.
+        Whether no rig was ever requested or connected, which is not a fault.
     """
 
     state: DaemonState
@@ -103,7 +104,7 @@ class Model:
 
     @property
     def runs(self) -> tuple[RunLine, ...]:
-        """The plan as it stands, our own latest verdict in it."""
+        """The plan with the states of its runs, including our latest verdict."""
         flow, job = self.flow, self.flow.job
         if flow.stage is not Stage.RESULT or job is None:
             return self.state.runs
@@ -114,14 +115,14 @@ class Model:
 
     @property
     def next_job(self) -> Job | None:
-        """The attempt that comes next; `None` when the plan is done."""
+        """The next attempt; `None` when the plan is complete."""
         if self.flow.stage is Stage.PREPARE and self.flow.job is not None:
             return plan.again(self.runs, self.flow.job.run)
         return plan.next_job(self.runs, self.voids.counts(self.runs))
 
     @property
     def job(self) -> Job | None:
-        """The attempt that the page is about: the one in hand, or that would be next."""
+        """Attempt of the page: the present or else the next attempt."""
         latest = self.view.jobs[-1] if self.view and self.view.jobs else None
         if self.offline:
             return latest
@@ -134,7 +135,7 @@ class Model:
 
     @property
     def settle_s(self) -> float:
-        """How long the chains rest before the next drop."""
+        """Rest of the chains before the next drop, s."""
         if self.view is None:
             return 0.0
         clock = self.view.clock.device
@@ -142,7 +143,7 @@ class Model:
 
     @property
     def loading(self) -> str:
-        """Say that the session is being read, where it is not there yet; empty where it is."""
+        """Message while the session is being read; empty afterwards."""
         waits = self.offline or bool(self.state.section("session"))
         if self.view is not None or self.unreadable or not waits:
             return ""
@@ -150,7 +151,7 @@ class Model:
 
     @property
     def stage(self) -> Stage:
-        """Where the session is: by our own flow, or as seen by a watcher."""
+        """Stage of the session: from our own flow, or for a watcher from the daemon."""
         if self.driving or not self.connected:
             return self.flow.stage
         seen = WATCHED.get(str(self.state.section("drop").get("state")))
@@ -158,12 +159,12 @@ class Model:
 
     @property
     def hot(self) -> bool:
-        """Whether something may fall, or does: nothing may stand over that."""
+        """Whether a chain may fall or is falling, so that no dialog may open."""
         return self.stage in HOT
 
     @property
     def words(self) -> Vocabulary:
-        """The words of the scene."""
+        """Vocabulary of the scene."""
         return ANY_SCENE if self.protocol is None else self.protocol.vocabulary
 
     @property
@@ -175,7 +176,7 @@ class Model:
 
     @property
     def verdict(self) -> tuple[str, tuple[Reason, ...]]:
-        """Verdict and reasons of the attempt in hand; empty before there are any."""
+        """Verdict and reasons of the present attempt; empty before the verdict."""
         if self.flow.stage is Stage.RESULT and self.flow.job == self.job:
             return self.flow.verdict, self.flow.reasons
         line = self.state.line(self.job.run) if self.job else None
@@ -184,8 +185,8 @@ class Model:
         return line.state, line.reasons
 
     @property
-    def replaced(self) -> Job | None:
-        """The latest good attempt before the one in hand, whose place it takes; `None` for none."""
+    def previous(self) -> Job | None:
+        """The latest good attempt that the present attempt replaces; `None` if there is none."""
         if self.view is None or self.job is None:
             return None
         run, attempt = self.job
@@ -198,17 +199,17 @@ class Model:
 
     @property
     def simulated(self) -> bool:
-        """Whether a stamp is needed."""
+        """Whether the data are simulated, and must be marked."""
         return self.state.simulated or bool(self.view and self.view.simulated)
 
     @property
     def blind(self) -> bool:
-        """Whether what this session measured is kept back."""
+        """Whether the session's results are withheld."""
         return bool(self.state.section("session").get("blind") or (self.view and self.view.blind))
 
 
 def alarm(model: Model) -> Alarm | None:
-    """Name what is most wrong now; `None` when all is well."""
+    """Return the most serious present problem; `None` without problems."""
     if not model.connected and not model.idle:
         silence, _, hint = model.silence.partition("\n")
         begun = model.flow.stage is not Stage.PROTOCOL

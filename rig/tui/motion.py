@@ -1,4 +1,4 @@
-"""Where what fell was during a drop, from its edges, beside where the model has it."""
+"""Motion of chains and objects during a drop, from its edges and by the model."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, RodChain, Run, Side
     from rig.records import Drop
 
-_POINTS = 120  # of a curve: two a column of a wide terminal
+_POINTS = 120  # points of a curve: two in each column of a wide terminal
 
 
 @dataclass(frozen=True, slots=True)
 class ChainFall:
-    """One chain's way down, or an object's.
+    """Fall of a chain or an object, measured and by the model.
 
     Attributes
     ----------
     role
         ``impact`` or ``free``.
     rods
-        What falls.
+        Falling chain or object.
     times, heights
-        Of each rod's passage of a beam: seconds since the release fired, and the height of the
-        bottom rod's middle above the contact point that follows, m; in order of time.
+        For each rod's passage of a beam: time since the release fired, s, and height of the bottom
+        rod's middle above the contact point, m; in order of time.
     model
-        `None` outside the model's domain.
+        Trajectory by the model; `None` outside its domain.
     delay_s
-        By how much the model's release is later than the fire stamp, so that it meets the points.
+        Delay of the model's release after the fire stamp that fits the points, s.
     end_s
-        When all of it has struck or passed the last gate, by the model and by the points.
+        Time at which all rods have struck or passed the last gate, by model and points, s.
     """
 
     role: Side
@@ -56,26 +56,26 @@ class ChainFall:
 
     @property
     def length(self) -> float:
-        """From the bottom rod's middle to the top one's, m."""
+        """Distance of the top rod's middle from that of the bottom rod, m."""
         return self.rods.chain.length
 
-    def measured(self, time_s: float) -> float | None:
-        """Height as the gates saw it, at their last word after that; `None` before their first."""
+    def measured_height(self, time_s: float) -> float | None:
+        """Return the measured height, m; constant after the last point, `None` before the first."""
         if not self.times.size or time_s < self.times[0]:
             return None
         return float(np.interp(time_s, self.times, self.heights))
 
-    def expected(self, time_s: float) -> float | None:
-        """Height by the model, which ends with the impact of the top rod."""
+    def model_height(self, time_s: float) -> float | None:
+        """Return the height by the model, m, constant after the impact of the top rod."""
         if self.model is None:
             return None
         last = float(self.model.time[-1]) if self.model.hits is not None else np.inf
         return float(self.model.heights(np.clip([time_s - self.delay_s], 0.0, last))[0][0])
 
     def curve(self, end_s: float) -> tuple[Array, Array]:
-        """Model's heights from the fire stamp to a time; empty without a model.
+        """Return times and heights of the model from the fire stamp on; empty without a model.
 
-        What strikes the surface ends there, with the impact of its top rod.
+        A striking chain ends with the impact of its top rod.
         """
         if self.model is None:
             return np.empty(0), np.empty(0)
@@ -90,15 +90,15 @@ def motions(
     run: Run,
     recorded: tuple[Drop, float | Fraction, DropResult] | None = None,
 ) -> tuple[ChainFall, ...]:
-    """Turn a drop's edges into heights.
+    """Return the falls of a run's chains, measured and by the model.
 
     Parameters
     ----------
     run
-        What hung where.
+        The planned run.
     recorded
-        The drop, calibrated ticks per second, and which edge is of which rod; `None` before it
-        fell, when there are only the model's curves.
+        The drop, calibrated ticks per second, and its result; `None` before the drop, for the
+        model's curves alone.
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     gates = protocol.gates

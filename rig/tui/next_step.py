@@ -1,11 +1,11 @@
-"""What comes next: one answer for the page's coloured line, the footer, and what Enter does."""
+"""The next step: a common source for the page's coloured line, the footer, and Enter."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.campaign.machine import Stage
-from rig.tui.widgets.gates import named
+from rig.tui.widgets.gates import label
 from rig.tui.widgets.text import duration, plain
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class NextStep(NamedTuple):
-    """What Enter does, in the footer; empty where it does nothing. And what to do, on the page."""
+    """Effect of Enter for the footer (empty for none), and instruction for the page."""
 
     enter: str
     text: str
@@ -42,17 +42,17 @@ _ONWARD = {
 
 
 def hand(model: Model) -> str:
-    """Name what is done by hand before a drop, in the scene's verb."""
+    """Return the manual action before a drop, with the scene's verb."""
     return _HANDS.get(model.words.reset.split()[0], "Set up")
 
 
 def at_rest(model: Model) -> str:
-    """Say how what falls waits, in the scene's words."""
+    """Return how chains or objects wait, in the scene's words."""
     return "hang still" if model.words.part == "rod" else "come to rest"
 
 
 def next_step(model: Model) -> NextStep:
-    """Say what comes next where the session is now, on the page that is shown."""
+    """Return the next step for the present stage and page."""
     stage, left = model.stage, model.next_job is not None
     if model.offline:
         return NextStep("", "")
@@ -81,15 +81,15 @@ def next_step(model: Model) -> NextStep:
 
 
 def _prepare(model: Model) -> NextStep:
-    """Say what is missing before the drop; the device refuses to arm until it is there."""
+    """Return the next preparation; the device refuses to arm before all are done."""
     indicators = model.indicators
     if not model.connected or model.state.link != "up":
         return NextStep("arm", "The device is not connected; Enter arms when it is.", "$warning")
     if not indicators.known:
         return NextStep("arm", "Waiting for the gates; Enter arms when they answer.", "$warning")
-    if indicators.blocked:
-        first, *more = indicators.blocked
-        blocked = f"Clear the beam of {named(model, first)}{f' and {len(more)} more' * bool(more)}"
+    if indicators.blocked_channels:
+        first, *more = indicators.blocked_channels
+        blocked = f"Clear the beam of {label(model, first)}{f' and {len(more)} more' * bool(more)}"
         return NextStep("arm", f"{blocked}; Enter arms when it is clear.", "$warning")
     if indicators.restless(model.now_s):
         moving = f"A beam keeps changing. Let everything {at_rest(model)}, then Enter arms."

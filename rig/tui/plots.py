@@ -1,4 +1,4 @@
-"""What the plots show: the report's own figures, and a fall that is to come."""
+"""Plots of the screens: figures of the report, and predictions of the next fall."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def pictures_of(*charts: Chart | None) -> list[Picture]:
-    """Take panels of figures one by one; one of residuals stays below its own."""
+    """Return the panels of figures as single pictures; residuals stay below their panel."""
     pictures: list[Picture] = []
     for panel in (panel for chart in charts if chart is not None for panel in chart.panels):
         if panel.y.label.startswith("residual") and pictures:
@@ -31,7 +31,7 @@ def pictures_of(*charts: Chart | None) -> list[Picture]:
 
 
 def fall_pictures(falls: tuple[ChainFall, ...]) -> list[Picture]:
-    """Draw z(t) by the model, of a drop that is to come or does not count."""
+    """Return z(t) by the model, for a future drop or a drop that does not count."""
     end_s = max((fall.end_s for fall in falls), default=0.0)
     traces = []
     for fall in falls:
@@ -44,13 +44,13 @@ def fall_pictures(falls: tuple[ChainFall, ...]) -> list[Picture]:
 
 
 def drop_pictures(view: SessionView, job: Job) -> list[Picture]:
-    """Draw a drop as the report does; nothing where it does not count."""
+    """Return the report's figures of a drop; empty if it does not count."""
     drop, hz = view.drops[job], view.scales[job].hz
     return pictures_of(*fall_figures(view.protocol, drop, hz, view.results[job]))
 
 
 def session_pictures(view: SessionView) -> Iterator[tuple[Picture, str]]:
-    """Draw results, and what a drift would show in, each with what it is read for."""
+    """Yield figures of results and of runs in order (for drifts), each with its caption."""
     analysis, gravity = view.analysis, view.protocol.gravity.value
     for chart in (result_figure(analysis, view.curves, site_m_s2=gravity),
                   runs_figure(analysis, view.protocol.accept.release_skew)):  # fmt: skip

@@ -1,7 +1,7 @@
-"""One way to plot: panels of the report's figures, in dots of braille.
+"""Plots in the terminal: panels of the report's figures, in dots of braille.
 
-An axis is a number of units a character: its ticks stand in the middle of the characters that name
-them, and what is drawn lies where the tick says, to the dot.
+An axis has a fixed number of units in each character. Its ticks are in the middle of their
+characters, and data are drawn at their exact place, to the dot.
 
 A frame of 440 points, 120 by 34, takes 5 ms; textual-plot 0.10 takes 16 ms, and has no bands.
 """
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     Numbers = Sequence[float] | Array
 
 _COLORS = ("border", "foreground", "accent", "warning", "secondary", "primary", "success", "error")
-"""Of traces, the last above the others."""
+"""Colours of traces; the last is drawn above the others."""
 _COLOR_OF = {MODEL: "accent", SECOND: "secondary", MUTED: "foreground"}
 _ROLES = {"band": "⣿", "line": "⠒", "dash": "⠒", "thick": "⠒", "level": "⠒", "limit": "⠒",
           "shade": "⠒", "points": "+", "cross": "×", "mean": "●", "ring": "○",
           "square": "●"}  # fmt: skip
 """Marks of the roles that are drawn: of a shade its edges; of gaps, maps and words nothing."""
 _TICK_COLUMNS, _TICK_ROWS = 9, 2
-"""Characters from one number at an axis to the next, at least."""
-_ROOM = 0.04  # of an axis, above and below what is drawn
-_STRIP_OF, _STRIP_LEAST, _STRIP_FROM = 4, 4, 12  # lines for one of residuals, and from how many on
-_OUTSIDE = 4  # sheets: what is drawn farther away is drawn there
+"""Least number of characters between numbers on an axis."""
+_ROOM = 0.04  # share of an axis left empty above and below the data
+_STRIP_OF, _STRIP_LEAST, _STRIP_FROM = 4, 4, 12  # lines of residuals; shown from _STRIP_FROM on
+_OUTSIDE = 4  # sheets: points further away are clipped to this distance
 _SHAPES = {
     "●": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)],
     "+": [(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)],
@@ -43,29 +43,29 @@ _SHAPES = {
     "○": [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y],
 }
 """Dots of each marker around its place."""
-_CAP = np.array([[-1.0, 0.0], [1.0, 0.0]])  # of an error bar
+_CAP = np.array([[-1.0, 0.0], [1.0, 0.0]])  # cap of an error bar
 
 
 class Picture(NamedTuple):
-    """A panel, and the one of residuals below it, if there is one."""
+    """A panel, and the panel of residuals below it, if any."""
 
     panel: Panel
     residuals: Panel | None = None
 
 
 class CellAxis(NamedTuple):
-    """Units a character, such that numbers stand in the middle of characters.
+    """Scale of an axis in characters, with numbers in the middle of characters.
 
     Attributes
     ----------
     unit
-        Of one character.
+        Length of a character.
     first
         Number of units in the middle of the first character, from below or from the left.
     cells
-        Characters.
+        Number of characters.
     every
-        Characters from one tick to the next.
+        Characters between ticks.
     """
 
     unit: float
@@ -74,17 +74,17 @@ class CellAxis(NamedTuple):
     every: int
 
     def at(self, values: Numbers, dots: int) -> Array:
-        """Where values are, in dots from the axis' beginning, with so many a character."""
+        """Return places of values in dots from the axis' start, with `dots` for a character."""
         place = np.asarray(values, dtype=np.float64) / self.unit - self.first
         return np.clip(place, -_OUTSIDE * self.cells, _OUTSIDE * self.cells) * dots + _middle(dots)
 
     def value(self, cell: float) -> float:
-        """Value in the middle of a character."""
+        """Return the value in the middle of a character."""
         return self.unit * (self.first + cell)
 
     @property
     def ticks(self) -> dict[int, float]:
-        """The number of each character that has one."""
+        """Return the numbers at ticks, by character."""
         begin = -self.first % self.every
         return {
             cell: float(f"{self.value(cell):.9g}") for cell in range(begin, self.cells, self.every)
@@ -96,16 +96,16 @@ def _middle(dots: int) -> float:
 
 
 def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = False) -> CellAxis:
-    """Find the axis that shows a range as large as there is room.
+    """Return the axis that shows a range as large as possible.
 
     Parameters
     ----------
     low, high
         Ends, low < high.
     cells
-        Characters.
+        Number of characters.
     least
-        Characters from one tick to the next, at least.
+        Least number of characters between ticks.
     whole
         Whether ticks are whole numbers only.
     """
@@ -123,17 +123,17 @@ def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = 
     return min(fitting, key=lambda axis: (len(axis.ticks) < 3, axis.unit), default=bare)
 
 
-def plotted(
+def draw_picture(
     picture: Picture, width: int, height: int, moment: float | None = None
 ) -> list[list[Span]]:
-    """Draw a picture.
+    """Return a drawn picture, a list of spans for each line.
 
     Parameters
     ----------
     width, height
-        In characters.
+        Size in characters.
     moment
-        Where on a horizontal axis of time a line stands; `None` for nowhere.
+        Time of a vertical line, s; `None` for no line.
     """
     panel, residuals = picture
     if residuals is None or height < _STRIP_FROM:
@@ -156,7 +156,7 @@ def plotted(
 
 
 def _spread(panel: Panel) -> tuple[float, float]:
-    """Take the horizontal ends that are given, or those of the data."""
+    """Return the horizontal limits of a panel, or those of its data."""
     x = panel.x
     places = [place for trace in panel.series for place in trace.x] or [0.0]
     low, high = x.limits or (min(places) - 0.5 * panel.whole, max(places) + 0.5 * panel.whole)
@@ -168,7 +168,7 @@ def _one_line(label: str) -> str:
 
 
 def _legend(panel: Panel, width: int) -> list[Span]:
-    """Say what is drawn."""
+    """Return the legend of a panel."""
     spans, used = [Span(_one_line(panel.y.label)[:width], bold=True)], len(panel.y.label)
     for trace in panel.series:
         used += len(trace.label) + 4
@@ -191,7 +191,7 @@ def _number(value: float) -> str:
 def _drawn(
     panel: Panel, x: CellAxis, y: CellAxis, moment: float | None, margin: int
 ) -> Iterator[list[Span]]:
-    """Draw traces on one pair of axes, behind the upright one."""
+    """Yield the lines of traces on a pair of axes, with the vertical axis."""
     sheet = Sheet(x.cells, y.cells, _COLORS)
     if moment is not None and "time" in panel.x.label:
         down = np.arange(0, ROWS * y.cells, 2.0)
@@ -230,7 +230,7 @@ def _draw(sheet: Sheet, trace: Trace, x: CellAxis, y: CellAxis) -> None:
 
 
 def _foot(label: str, axis: CellAxis, margin: int) -> Iterator[list[Span]]:
-    """Write the horizontal axis with its name in it, and its numbers below."""
+    """Yield the horizontal axis with its label, and its numbers below."""
     line, below = ["─"] * axis.cells, [" "] * (margin + 2 + axis.cells)
     for column, value in axis.ticks.items():
         text = _number(value)
@@ -244,7 +244,7 @@ def _foot(label: str, axis: CellAxis, margin: int) -> Iterator[list[Span]]:
 
 
 def _roomy(panel: Panel) -> tuple[float, float]:
-    """Give the upright axis room, and a span where all values are alike."""
+    """Return the vertical limits with margins, and a span if all values are equal."""
     ends = [np.asarray(panel.y.limits or (), dtype=np.float64)]
     for trace in panel.series if not panel.y.limits else ():
         values = np.asarray(trace.y, dtype=np.float64)

@@ -1,6 +1,6 @@
-"""A rig to scale at one moment of a drop, as strokes in metres: what falls, board, posts, Δz.
+"""Drawing of a rig to scale at a moment of a drop: chains or object, board, posts and Δz.
 
-Heights are above the contact point, as those of falls are.
+The drawing consists of strokes in metres. Heights are above the contact point.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from rig.tui.indicators import Indicators
     from rig.tui.motion import ChainFall
 
-_WIDTH_M = 0.1  # of a rod whose length nobody stated
+_WIDTH_M = 0.1  # length of a rod without a stated length
 _MARGIN_M = 0.04
-_BALL = 0.012  # of the height that is shown: a smaller ball would not be seen
-_CORNERS = 17  # of what is round
+_BALL = 0.012  # least radius of a ball as a share of the height shown, to be visible
+_CORNERS = 17  # corners of a circle
 _COLORS = ("border", "foreground", "accent", "primary", "secondary", "success", "warning")
 
 
 class Stroke(NamedTuple):
-    """A straight line from one point to another, m, in a colour of the theme."""
+    """A straight line between two points, m, in a colour of the theme."""
 
     x: float
     z: float
@@ -39,7 +39,7 @@ class Stroke(NamedTuple):
 
 
 class Lamp(NamedTuple):
-    """Channel of a gate, and where its beam begins, m."""
+    """Channel of a gate, and the start of its beam, m."""
 
     channel: int
     x: float
@@ -48,9 +48,9 @@ class Lamp(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """Strokes, and what of the world they show, m.
+    """Strokes, and the range of the scene that they show, m.
 
-    `middles` are those of the sides, `apart_m` is Δz as far as it was measured.
+    `middles` are those of the sides; `apart_m` is Δz if measured so far.
     """
 
     strokes: tuple[Stroke, ...]
@@ -69,16 +69,16 @@ def drawing(
     indicators: Indicators,
     time_s: float,
 ) -> Drawing:
-    """Draw what falls as measured, over where the model has it, between the posts of its gates.
+    """Return the measured chains over those of the model, between the posts of their gates.
 
     Parameters
     ----------
     falls
-        As `rig.tui.motion.motions` gives them.
+        Falls from `rig.tui.motion.motions`.
     indicators
-        Of the gates at that moment: those that are blocked light.
+        State of the gates at that time; blocked gates are highlighted.
     time_s
-        Since the release fired.
+        Time since the release fired, s.
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
     strokes: list[Stroke] = []
@@ -87,7 +87,7 @@ def drawing(
     half, length = 0.5 * pitch, max((fall.length for fall in falls), default=0.0)
     heights = [gate.height for gate in protocol.gates.gates] if protocol.gates else [0.0]
     low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
-    # A free chain that passes the contact point is shown as far down as one that struck it lies.
+    # A free chain below the contact point is shown down to the depth of a fallen chain.
     bottom = -0.35 * length if protocol.surface else low - length
     top = protocol.drop.value + length + _MARGIN_M
     middles = [pitch * (2.0 * column + 1.2) for column in range(len(falls))]
@@ -95,11 +95,11 @@ def drawing(
         left, right = middle - half, middle + half
         strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
         for gate in protocol.gates.on(fall.role) if protocol.gates else ():
-            lit = gate.channel in indicators.blocked
+            lit = gate.channel in indicators.blocked_channels
             lamps.append(Lamp(gate.channel, left, gate.height, lit))
             end, color = (right, "warning") if lit else (left + 0.2 * half, "foreground")
             strokes.append(Stroke(left, gate.height, end, gate.height, color))
-        expected, measured = fall.expected(time_s), fall.measured(time_s)
+        expected, measured = fall.model_height(time_s), fall.measured_height(time_s)
         seen = expected if measured is None and fall.times.size else measured
         own = "primary" if fall.role == "impact" else "secondary"
         for height, color in ((expected, "accent"), (seen, own)):
@@ -109,9 +109,9 @@ def drawing(
             fallen = half * math.tan(math.radians(run.incline_deg))
             strokes.append(Stroke(left, fallen, right, -fallen, "foreground"))
     width = pitch * (2.0 * max(1, len(falls)) + 0.4)
-    # Δz is known as long as both chains are seen.
+    # Δz is known while both chains pass gates.
     until_s = min([time_s, *(float(fall.times[-1]) for fall in falls if fall.times.size)])
-    tops = [z + fall.length for fall in falls if (z := fall.measured(until_s)) is not None]
+    tops = [z + fall.length for fall in falls if (z := fall.measured_height(until_s)) is not None]
     apart_m = None
     if len(tops) > 1:
         at, apart_m = 2.2 * pitch, tops[1] - tops[0]
@@ -120,10 +120,10 @@ def drawing(
     return Drawing(tuple(strokes), width, bottom, top, apart_m, tuple(lamps), tuple(middles))
 
 
-def painted(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
-    """Draw into so many columns and lines of characters, the last line in words.
+def paint(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
+    """Return the drawing in columns and lines of characters, with words in the last line.
 
-    A dot is as high as it is wide.
+    Dots are square.
     """
     strokes, width_m, bottom, top, apart_m, lamps, _ = drawing
     rows, dots = max(1, height - 1), COLUMNS * width - 1
@@ -156,7 +156,7 @@ def _rod_m(rods: RodChain) -> float:
 def _rods(
     protocol: Protocol, fall: ChainFall, x: float, height: float, color: str, shown_m: float
 ) -> Iterator[Stroke]:
-    """Rods on their strings; those that struck lie at the contact point. An object is round."""
+    """Yield rods and strings, with struck rods at the contact point, or a round object."""
     rods = fall.rods
     half = 0.5 * _rod_m(rods)
     if protocol.vocabulary.part == "object":

@@ -1,4 +1,4 @@
-"""The daemon's state as the screens see it: typed, and never changed under them.
+"""The daemon's state for the screens: typed and immutable.
 
 See rig/daemon/API.md for the sections; `rig.daemon.replica` applies the changes.
 """
@@ -22,18 +22,18 @@ EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class DaemonState:
-    """Everything the daemon says.
+    """State of the daemon.
 
     Attributes
     ----------
     n
-        Number of the last change in it; −1 before the first snapshot.
+        Number of the last included change; −1 before the first snapshot.
     sections
-        By name, as they came, but for the two below.
+        Sections by name, as received, without the two below.
     runs
         The plan, in order.
     edges
-        Of the latest drop, as they came: tick, gate, state after it.
+        Edges of the latest drop, as received: tick, gate, state after it.
     """
 
     n: int = -1
@@ -42,13 +42,13 @@ class DaemonState:
     edges: tuple[Sequence[int], ...] = ()
 
     def section(self, name: str) -> Mapping[str, Any]:
-        """Return one section, empty where the daemon says null."""
+        """Return a section; empty if it is null."""
         section = self.sections.get(name)
         return section if isinstance(section, dict) else EMPTY
 
     @property
     def phase(self) -> str:
-        """What the daemon does: ``idle``, ``armed``, ``recording``, ``storing`` or ``trouble``."""
+        """Phase of the daemon: ``idle``, ``armed``, ``recording``, ``storing`` or ``trouble``."""
         return str(self.sections.get("phase", "idle"))
 
     @property
@@ -57,14 +57,14 @@ class DaemonState:
         return str(self.section("link").get("state", "closed"))
 
     @property
-    def blocked(self) -> int | None:
-        """Mask of the gates that are blocked; `None` when nobody knows."""
+    def blocked_mask(self) -> int | None:
+        """Mask of the blocked gates; `None` if unknown."""
         mask = self.section("gates").get("blocked")
         return None if mask is None else int(mask)
 
     @property
     def simulated(self) -> bool:
-        """Whether no real chain falls here."""
+        """Whether port or session is simulated."""
         return bool(
             self.section("port").get("simulated") or self.section("session").get("simulated")
         )
@@ -76,17 +76,17 @@ class DaemonState:
         return None if name is None else str(name)
 
     def line(self, run: int) -> RunLine | None:
-        """Where a run stands; `None` when it is not planned."""
+        """Return the plan's line of a run; `None` if it is not planned."""
         return next((line for line in self.runs if line.run == run), None)
 
 
-def typed(n: int, state: Mapping[str, Any]) -> DaemonState:
-    """Take the daemon's sections as they are now; what they become later changes nothing here.
+def read_state(n: int, state: Mapping[str, Any]) -> DaemonState:
+    """Return the present state of the daemon's sections, unaffected by later changes.
 
     Parameters
     ----------
     n
-        Number of the last change in them.
+        Number of their last change.
     state
         Sections by name. Entries of its lists are replaced by the replica, never changed.
     """
@@ -109,7 +109,7 @@ def _line(run: Mapping[str, Any]) -> RunLine:
 
 
 def state_of(view: SessionView) -> DaemonState:
-    """Say what a daemon would of a file that nobody is writing."""
+    """Return the state that a daemon would have for a file without a writer."""
     last = {entry.run: (entry.attempt, str(entry.state), entry.reasons) for entry in view.states}
     runs = [
         RunLine(run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ()))

@@ -1,4 +1,4 @@
-"""Whether the screen stood still for long enough that a key can be meant for what it shows."""
+"""Check that the screen was still long enough for a key to be meant for its content."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from collections.abc import Hashable
 from time import monotonic
 
 STILL_S = 0.5
-"""Longer than between two letters of somebody who types, or two repeats of a key held down."""
+"""Longer than the interval between typed letters, or between repeats of a held key, s."""
 _HELD_UP_S = 0.35
-"""More than the program ever leaves between two signs of life by itself."""
+"""Longer than any interval between heartbeats of the running program, s."""
 
 
 class Stillness:
-    """Remembers when the screen came to show what it shows, and when a hand last touched it.
+    """Times of the latest change of the screen, and of the latest key or mouse button.
 
-    Times are those of the events themselves (`textual.message.Message.time`, monotonic, s): a key
-    that waited while the program was busy was pressed before it is handled. When all of the program
-    was held up nobody knows when a key was pressed: none is meant until it stood still anew.
+    Times are those of events (`textual.message.Message.time`, monotonic, s), as keys may be handled
+    later than pressed. If the whole program was held up, the time of a key is unknown: then no key
+    counts until the screen was still again.
 
     Parameters
     ----------
     needed_s
-        How long is long enough.
+        Least time that the screen must be still, s.
     """
 
     def __init__(self, needed_s: float = STILL_S) -> None:
@@ -31,25 +31,25 @@ class Stillness:
         self._shown_s = self._touched_s = self._alive_s = float("-inf")
 
     def alive(self, now_s: float) -> None:
-        """Take note of a sign of life of the program; due several times a second."""
+        """Note a heartbeat of the program, due several times a second."""
         if now_s - self._alive_s > self._held_up_s:
-            self.touched(now_s)
+            self.note_input(now_s)
         self._alive_s = now_s
 
     def shown(self, face: Hashable) -> None:
-        """Take note of what the screen shows now."""
+        """Note the present content of the screen."""
         if face != self._face:
             self._face, self._shown_s = face, monotonic()
 
-    def touched(self, at_s: float) -> None:
-        """Take note of a key or a mouse button."""
+    def note_input(self, at_s: float) -> None:
+        """Note a key or mouse button."""
         self._touched_s = max(self._touched_s, at_s)
 
     def read(self, face: Hashable, at_s: float) -> bool:
-        """Whether `face` was there for long enough before a key of that moment."""
+        """Whether `face` was shown long enough before a key at that time."""
         return face == self._face and at_s - self._shown_s >= self._needed_s
 
     def meant(self, face: Hashable, at_s: float) -> bool:
-        """Whether besides nothing was touched meanwhile: not typed, pasted, or held down."""
+        """Whether in addition no other key was pressed meanwhile: typed, pasted or held down."""
         still = at_s - self._touched_s >= self._needed_s
         return self.read(face, at_s) and still and at_s - self._alive_s <= self._held_up_s

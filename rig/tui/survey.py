@@ -1,4 +1,4 @@
-"""What there is to begin with: sessions and experiments of the folder, ready ones, boards."""
+"""Survey for the home page: sessions and protocols of the folder, ready protocols, boards."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 HERE = "Experiments here"
 _MOST = 200
-"""Session files that are listed, the newest."""
+"""Number of session files listed, the newest first."""
 _SCENES = """\
 Try it         | try | falling-ball     |              | a ball: g within seconds
 Try it         | try | inclined-uniform |              | two chains on a board
@@ -31,18 +31,18 @@ New experiment | new | picket-fence     | picket-fence | a picket fence
 New experiment | new | single-chain     | one-chain    | one chain on a board
 New experiment | new | inclined-uniform | two-chains   | two chains, one strikes
 """
-"""Section, what is done, the ready protocol that looks like it, its scene for `rig new`, title."""
+"""Section, action, ready protocol for the picture, scene for `rig new`, and title of each row."""
 
 
 class SessionEntry(NamedTuple):
-    """One session file; `trouble` says why it cannot be read.
+    """A session file; `trouble` is the reason why it cannot be read.
 
     Attributes
     ----------
     drops, over, runs
-        How many were recorded, of how many of the planned runs.
+        Numbers of recorded drops, of completed runs, and of planned runs.
     source
-        Name of its protocol's file.
+        Name of its protocol file.
     """
 
     path: Path
@@ -57,25 +57,25 @@ class SessionEntry(NamedTuple):
 
 
 class ProtocolFile(NamedTuple):
-    """A protocol, and what is wrong with its file; empty where it can be used."""
+    """A protocol, and the fault of its file; empty if it can be used."""
 
     protocol: Protocol | None
     problem: str = ""
 
 
 class Beginning(NamedTuple):
-    """One thing to begin with.
+    """A row of the home page.
 
     Attributes
     ----------
     kind
-        What is done: ``try``, ``open``, ``board``, ``flash``, ``new``, ``results`` or ``end``.
+        Action: ``try``, ``open``, ``board``, ``flash``, ``new``, ``results`` or ``end``.
     file
-        The protocol that is opened, or whose picture stands beside it.
+        The protocol to open, or to show as a picture.
     value
-        Of a board its port, of a scene or a board to be flashed its name.
+        Port of a board, or name of a scene or of a board to flash.
     session
-        The file that is continued.
+        The session file to continue.
     """
 
     section: str
@@ -87,14 +87,14 @@ class Beginning(NamedTuple):
 
 
 def look_around(options: Options, port: str, other: str) -> list[Beginning]:
-    """List what can be begun, from the folder, the ready protocols, and what USB lists.
+    """Return the rows of the home page from the folder, ready protocols and USB devices.
 
     Parameters
     ----------
     port
-        Of the rig that is there; empty for none.
+        Port of the connected rig; empty for none.
     other
-        The port of a daemon that stands in the way of the wanted one; empty for none.
+        Port of a daemon that blocks the wanted one; empty for none.
     """
     from rig.ready import ready_protocols  # noqa: PLC0415 - not needed to paint
 
@@ -140,7 +140,7 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
 
 
 def first_row(rows: list[Beginning], options: Options) -> int:
-    """Choose the row to begin with: what stands in the way, is unfinished, is here, or a trial."""
+    """Return the row to select first: a blocking daemon, unfinished session, file or trial."""
     for at, row in enumerate(rows):
         if row.kind == "end":
             return at
@@ -167,7 +167,7 @@ def _boards() -> Iterator[Beginning]:
 
 
 def read_file(file: Path) -> ProtocolFile:
-    """Read a protocol, and say what is wrong with it at which line."""
+    """Return a protocol, or the fault of its file with the line."""
     protocol = None
     try:
         protocol = reader.read(file)
@@ -180,15 +180,15 @@ def read_file(file: Path) -> ProtocolFile:
 
 
 def session_list(folder: Path) -> list[SessionEntry]:
-    """List the sessions of a folder, the newest first."""
+    """Return the sessions of a folder, the newest first."""
     dated = []
     for path in folder.glob("*.session"):
-        with suppress(OSError):  # gone meanwhile
+        with suppress(OSError):  # removed meanwhile
             dated.append((path.stat().st_mtime_ns, path))
     return [_look(path, file_stamp(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
 
 
-@lru_cache(maxsize=_MOST)  # the home page lists them again and again
+@lru_cache(maxsize=_MOST)  # the home page lists them repeatedly
 def _look(path: Path, _: object) -> SessionEntry:
     from rig.protocol.plan import runs  # noqa: PLC0415 - not needed to paint
     from rig.results import protocol_of  # noqa: PLC0415 - nor is this

@@ -1,4 +1,4 @@
-"""The real terminal: its keys have one reader, whatever the program goes through."""
+"""Terminal driver that keeps a single reader of keys across stops of the program."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from textual.drivers.linux_driver import LinuxDriver
 
 
 class Terminal(LinuxDriver):
-    """A terminal that is set up anew where the program was stopped from outside and goes on.
+    """A terminal that is set up again after the program was stopped from outside.
 
-    Ctrl-Z has Textual leave the terminal first; a SIGSTOP does not, and with the SIGCONT after it
-    Textual 8 would start a second reader of keys beside the first: of an Escape each might get a
-    part. What was typed while the program stood still is dropped.
+    With Ctrl-Z Textual leaves the terminal first, but not with a SIGSTOP. After the SIGCONT
+    Textual 8 would then start a second reader of keys, and each might get a part of an Escape
+    sequence. Keys typed while the program was stopped are dropped.
     """
 
     _left = True
 
     def start_application_mode(self) -> None:
-        """Take the terminal over."""
+        """Set the terminal up."""
         super().start_application_mode()  # type: ignore[no-untyped-call]
         self._left = False
 
     def suspend_application_mode(self) -> None:
-        """Leave it as it was, for some time."""
+        """Restore the terminal temporarily."""
         super().suspend_application_mode()
         self._left = True
 
     def resume_application_mode(self) -> None:
-        """Take it over once more."""
+        """Set the terminal up again."""
         if self._left:
             super().resume_application_mode()
-        else:  # one signal may come while another one is obeyed: one after the other
+        else:  # signals may arrive during the handling of another: handle them in order
             asyncio.get_running_loop().call_soon_threadsafe(self._anew)
 
     def _anew(self) -> None:

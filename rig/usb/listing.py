@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.boards import MEGA, PICO, UNO
 from rig.errors import DeviceError
-from rig.reasons import make_error, make_reason, remedies
+from rig.reasons import make_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -16,8 +15,7 @@ if TYPE_CHECKING:
     from serial.tools.list_ports_common import ListPortInfo
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
+class Known(NamedTuple):
     """A kind of USB device; several kinds may have the same numbers.
 
     Attributes
@@ -26,27 +24,24 @@ class Known:
         What it is.
     numbers
         USB vendor and product in hexadecimal, as often as it has others.
-    board
-        Whether the numbers belong to a board. A chip that is on cheap copies of boards is on
-        other instruments too, so it says only that there may be one.
     product
-        What the text of the product begins with, where other devices have the numbers too.
+        Of a board: what the text of its product begins with, where other devices have the numbers
+        too. `None` for a chip: that is on cheap copies of boards and on other instruments, so it
+        says only that there may be a board.
     """
 
     name: str
     numbers: str
-    board: bool = False
-    product: str = ""
+    product: str | None = None
 
 
-_NO_HUB = "use no hub"  # in the product text that the firmware gives an RP2040 B0 or B1
 # Boards: as in boards.txt of the makers' own Arduino AVR package, 1.8; the Pico's is what its maker
 # gives any serial port on it. Chips: their makers'.
 _MEGAS = "2341:0010 2341:0042 2341:0210 2341:0242 2a03:0010 2a03:0042"
 KNOWN = (
-    Known(PICO.name, "2e8a:000a", board=True, product="chainrig"),
-    Known(MEGA.name, _MEGAS, board=True),
-    Known(UNO.name, "2341:0001 2341:0043 2341:0243 2a03:0043", board=True),
+    Known(PICO.name, "2e8a:000a", "chainrig"),
+    Known(MEGA.name, _MEGAS, ""),
+    Known(UNO.name, "2341:0001 2341:0043 2341:0243 2a03:0043", ""),
     Known("CH341", "1a86:5523"),
     Known("CH340", "1a86:7523"),
     Known("FTDI FT232R", "0403:6001"),
@@ -54,8 +49,7 @@ KNOWN = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class SerialPort:
+class SerialPort(NamedTuple):
     """A serial port.
 
     Attributes
@@ -102,14 +96,14 @@ def serial_ports() -> list[SerialPort]:
 def _describe(info: ListPortInfo) -> SerialPort:
     """Say what a port is and whether it may be a board's."""
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
-    kinds = [kind for kind in KNOWN if numbers in kind.numbers.split()]
-    boards = [kind.product for kind in kinds if kind.board]
+    kinds = [kind for kind in KNOWN if numbers in kind.numbers]
+    boards = tuple(kind.product for kind in kinds if kind.product is not None)
     reasons = {
         "no USB device": None in {info.vid, info.pid},
         "no board's USB numbers: name it with --port if it is one": not kinds,
         "a chip that boards and other instruments have: name it with --port": not boards,
         "a board with another program: name it with --port if it is one of this rig": (
-            not (info.product or "").startswith(tuple(boards))
+            not (info.product or "").startswith(boards)
         ),
     }
     skipped = next((reason for reason, applies in reasons.items() if applies), "")
@@ -134,19 +128,7 @@ def sole_port() -> str:
 
 
 def path_of(serial_number: str, ports: Iterable[SerialPort]) -> str | None:
-    """Find a board again, wherever it is plugged in now.
-
-    Parameters
-    ----------
-    serial_number
-        From `serial_number_at`.
-    ports
-        Where to look.
-
-    Returns
-    -------
-    str or None
-        Its device path, `None` while it is not there.
+    """Find a board again among some ports, wherever it is plugged in; `None` while it is not there.
 
     Raises
     ------
@@ -155,32 +137,13 @@ def path_of(serial_number: str, ports: Iterable[SerialPort]) -> str | None:
     """
     paths = [port.path for port in ports if port.serial_number == serial_number]
     if len(paths) > 1:
-        raise DeviceError(
-            f"{' and '.join(paths)} have the same serial number {serial_number}",
-            "unplug the others, or name the port",
-        )
+        places = " and ".join(paths)
+        raise make_error(DeviceError, "many_serial_numbers", ports=places, number=serial_number)
     return paths[0] if paths else None
 
 
 def serial_number_at(path: str, ports: Iterable[SerialPort] | None = None) -> str | None:
-    """Give the serial number of what is plugged in at a port.
-
-    Parameters
-    ----------
-    path, ports
-        As for `port_at`.
-
-    Returns
-    -------
-    str or None
-        `None` when it has none (CH340 chips have none), and for URLs.
-    """
-    port = port_at(path, ports)
-    return port.serial_number if port else None
-
-
-def port_at(path: str, ports: Iterable[SerialPort] | None = None) -> SerialPort | None:
-    """Return what USB says of a port.
+    """Give the USB serial number of what is plugged in at a port.
 
     Parameters
     ----------
@@ -191,17 +154,9 @@ def port_at(path: str, ports: Iterable[SerialPort] | None = None) -> SerialPort 
 
     Returns
     -------
-    SerialPort or None
-        `None` for URLs, and where nothing is plugged in.
+    str or None
+        `None` for URLs, where nothing is plugged in, and of a chip without one, such as a CH340.
     """
-    place = os.path.realpath(path)
-    listed = serial_ports() if ports is None else ports
-    return next((port for port in listed if os.path.realpath(port.path) == place), None)
-
-
-def note_early_boards(*paths: str | None) -> list[str]:
-    """Return a note for each port with a Pico whose chip may not be found behind a hub."""
-    ports = [port for path in paths if path and (port := port_at(path))]
-    early = [port.path for port in ports if _NO_HUB in (port.product or "")]
-    reasons = [make_reason("early_pico", port=path) for path in early]
-    return [f"note: {reason}; {remedy}" for reason in reasons for remedy in remedies([reason])]
+    place, listed = os.path.realpath(path), serial_ports() if ports is None else ports
+    here = (port.serial_number for port in listed if os.path.realpath(port.path) == place)
+    return next(here, None)

@@ -5,6 +5,7 @@ Without it the same lines run as they stand, to the same bits, a few hundred tim
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -24,7 +25,7 @@ def is_compiled() -> bool:
     return numba is not None and not numba.config.DISABLE_JIT
 
 
-def compiled(function: Function, *, keep: bool = True) -> Function:
+def jit(function: Function, *, keep: bool = True, inline: str = "never") -> Function:
     """Compile a function when it is first called; threads may run it side by side.
 
     Parameters
@@ -34,11 +35,18 @@ def compiled(function: Function, *, keep: bool = True) -> Function:
     keep
         Keep it on the disk. It is compiled anew once its own file changes, but not when another
         one does: what is kept belongs into one file with all that it calls.
+    inline
+        ``always``: put its lines where it is called. A world has some 300 numbers to be passed.
     """
     if numba is None:
         return function
+    compiled = partial(numba.njit, nogil=True, error_model="numpy", inline=inline)
     try:
-        loops: Function = numba.njit(cache=keep, nogil=True, error_model="numpy")(function)
+        loops: Function = compiled(cache=keep)(function)
     except RuntimeError:  # there is no folder that it may keep it in
-        loops = numba.njit(nogil=True, error_model="numpy")(function)
+        loops = compiled()(function)
     return loops
+
+
+inlined = partial(jit, inline="always")
+"""As `jit`, for the parts of a step."""

@@ -51,7 +51,6 @@ def fall(
     record = world.record
     heights = np.concatenate([first, pages.heights])
     after_it = np.where(np.isnan(record.pulled_after), record.pulled, record.pulled_after)
-    falling, steps = record.slack
     return Fall(
         times=(np.arange(len(heights)) * SAMPLE + 0.5) * step,
         heights=heights,
@@ -65,26 +64,15 @@ def fall(
         top_speed=float(record.top[0]),
         pulled=np.where(np.isfinite(record.touched), after_it - record.pulled_before, math.nan),
         board_impulse=record.impulse,
-        lost={name: float(record.lost[place]) for name, place in _LOST.items()},
+        lost=dict(zip(motion.LOSSES, record.lost.tolist(), strict=True)),
         energy=pages.energy,
         momentum=pages.momentum,
-        slack=float(falling / steps) if steps else math.nan,
-        turning=float(record.top[1]),
     )
 
 
 def usual_step(chain: Chain) -> float:
     """`STEP`, or `stable_step` where that is less, s."""
     return min(STEP, stable_step(chain))
-
-
-_LOST = {
-    "board": motion.BOARD,
-    "board friction": motion.BOARD_FRICTION,
-    "rods": motion.RODS,
-    "strings": motion.STRINGS,
-    "air": motion.AIR,
-}
 
 
 def _turn(world: World, clock: Clock) -> Pages:

@@ -11,7 +11,6 @@ from .hanging import gaps, hang
 from .motion import LONGEST, SAMPLE, closest
 
 if TYPE_CHECKING:
-    from .motion import World
     from .scene import Chain
 
 MOST_ROD_STEPS = 1e8
@@ -26,8 +25,9 @@ _NOT_COMPILED_S = 23e-6
 def impossible(chain: Chain) -> str | None:
     """Say why a chain cannot hang or land like this, if so."""
     world = hang(chain)
-    if chain.touching is not None and (number := _overlapping(world)) is not None:
-        return f"rods {number} and {number + 1} are in each other as it hangs"
+    for k in range(world.bodies.mass.size - 1 if chain.touching is not None else 0):
+        if closest(world.bodies, k, k + 1)[0] > 0.0:
+            return f"rods {k + 1} and {k + 2} are in each other as it hangs"
     if chain.board is not None:
         lowest = gaps(world)
         if lowest.min() <= 0.0:
@@ -35,14 +35,6 @@ def impossible(chain: Chain) -> str | None:
     needed = duration(chain)
     if needed > LONGEST:
         return f"its top rod needs {needed:.3g} s to the contact level, more than {LONGEST:g} s"
-    return None
-
-
-def _overlapping(world: World) -> int | None:
-    """Find the first of two neighbours that overlap, counted from 1."""
-    for k in range(world.bodies.mass.size - 1):
-        if closest(world.bodies, k, k + 1)[0] > 0.0:
-            return k + 1
     return None
 
 

@@ -19,13 +19,7 @@ _TOUCH = 10  # steps in the shortest touch: with three, touches give energy
 
 
 def hang(chain: Chain) -> World:
-    """Hang a chain, at the moment of its release.
-
-    Raises
-    ------
-    ValueError
-        A restitution that `damping` refuses.
-    """
+    """Hang a chain, at the moment of its release."""
     bodies = _bodies(chain)
     return World(
         bodies, _strings(chain, bodies), _ground(chain, bodies), _neighbours(chain, bodies),
@@ -137,11 +131,6 @@ def _contact(chain: Chain, board: Board) -> float:
     return rods.length / 2.0 * abs(along) + radius * math.sqrt(1.0 - along**2)
 
 
-def board_height(chain: Chain, board: Board) -> float:
-    """How far above the contact level the board below the chain is, m; negative."""
-    return -_contact(chain, board) / _normal(board)[2]
-
-
 def _neighbours(chain: Chain, bodies: Bodies) -> Neighbours:
     count = bodies.mass.size if chain.touching is not None else 0
     first, second = np.triu_indices(count, 1)
@@ -160,6 +149,5 @@ def _record(chain: Chain) -> Record:
     unknown = np.full(count, math.nan)
     return Record(
         np.full(count, math.inf), unknown, nothing, nothing.copy(), unknown.copy(), nothing.copy(),
-        np.zeros(AIR + 1), np.zeros(3), np.zeros(3), np.zeros(1), np.zeros(2),
-        np.full(2, math.nan),
+        np.zeros(AIR + 1), np.zeros(3), np.zeros(3), np.zeros(1), np.full(1, math.nan),
     )  # fmt: skip

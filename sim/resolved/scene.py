@@ -6,8 +6,7 @@ rods' middles hang on x = y = 0. A rod's tilt is in the x-z plane, an incline in
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -173,10 +172,6 @@ class Fall:
         Of everything, kinetic, potential and elastic, J, at each frame.
     momentum
         Of all rods less what the board gave them, N s, at each frame; shape (F, 3).
-    slack
-        Mean share of strings that are slack while the chain strikes.
-    turning
-        Rate of turning of rods that had touched nothing before, as the top rod strikes, rad/s.
     """
 
     times: Numbers
@@ -194,8 +189,6 @@ class Fall:
     lost: dict[str, float]
     energy: Numbers
     momentum: Numbers
-    slack: float
-    turning: float = field(default=math.nan)
 
     @property
     def strike_s(self) -> float:

@@ -60,6 +60,11 @@ class Case:
     def analyze(self, components: Components = STATED) -> DropResult:
         return DropCase(self.protocol, self.run, self.drop, self.scale, components).read()[0]
 
+    def judge(self) -> DropResult:
+        """The same, but what else would explain a void drop is not sought: that takes longest."""
+        one = DropCase(self.protocol, self.run, self.drop, self.scale)
+        return one.read(explain=False)[0]
+
     def with_edges(self, edges) -> Case:
         """The same drop with other edges; they need not be in order of time."""
         ordered = tuple(sorted(edges, key=lambda edge: edge.tick))

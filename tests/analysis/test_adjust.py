@@ -8,8 +8,7 @@ import pytest
 from mpmath import mp
 
 from rig.analysis.adjust import DONE, adjust, length
-from rig.analysis.equations import Equations, Residuals, scaled
-from tests.analysis.drops import SCENES, case
+from rig.analysis.equations import Equations, Residuals, standardise
 
 HUBER = 4.0
 PRIOR = np.array([0.3, 2.0, 50.0, 0.0, 0.7])  # one is known exactly
@@ -66,7 +65,7 @@ def posterior(model: Linear) -> tuple[np.ndarray, np.ndarray]:
     return mean, covariance
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_linear_problem_has_the_posterior_of_bayes(seed):
     model = Linear(seed)
     mean, covariance = posterior(model)
@@ -111,7 +110,7 @@ def test_an_outlier_pulls_with_bounded_force(outlier):
     assert found.settled
     usual = adjust(model, ALL, np.zeros(5))
     assert usual.settled
-    assert length(scaled(usual.x - found.x, usual.sd), usual.root) < DONE
+    assert length(standardise(usual.x - found.x, usual.sd), usual.root) < DONE
     jacobian, offset = model.stacked()
     residuals = (offset + jacobian @ found.x) / found.scatter
     assert np.abs(residuals).max() > HUBER
@@ -135,13 +134,3 @@ def test_edges_that_scatter_more_count_less(factor):
     rows = jacobian[:, PRIOR > 0.0] / found.scatter
     covariance = np.linalg.inv(rows.T @ rows + np.diag(PRIOR[PRIOR > 0.0] ** -2.0))
     assert found.u(np.eye(5)[1]) == pytest.approx(math.sqrt(covariance[1, 1]), rel=1e-9)
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_a_drop_s_budget_adds_up(scene):
-    result = case(SCENES[scene], seed=2).analyze()
-    assert result.quantities
-    for measured in result.quantities.values():
-        squares = sum(part**2 for part in measured.budget.values())
-        assert squares == pytest.approx(measured.u**2, rel=1e-9)
-        assert min(measured.budget.values()) > 0.0

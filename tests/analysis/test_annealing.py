@@ -86,7 +86,7 @@ def pile(scene: Case, count: int, seed: int) -> Case:
 def test_a_pile_of_edges_looks_like_no_chain(share, seed):
     one = pile(RECORD, round(share * len(RECORD.drop.edges)), seed)
     assert max(one.identify().shares.values()) < LEAST - 0.2
-    result = one.analyze()
+    result = one.judge()
     assert result.verdict == "void"
     assert set(codes(result)) & {"few_edges_fit", "no_fall"}
 

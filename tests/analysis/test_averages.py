@@ -1,13 +1,17 @@
 """Differences of means beside Student's test, and beside the law of errors that cancel."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rig.analysis.averages import difference
-from rig.analysis.quantities import BUDGET, COMMON
+from rig.analysis.averages import combine
 from rig.analysis.result import Measured
+
+
+def difference(runs, reference):
+    return combine([runs, reference], (1.0, -1.0))
 
 
 def runs(values, u, shared=None):
@@ -40,16 +44,9 @@ def test_what_both_share_cancels_and_what_only_one_has_stays():
     assert unlike.u**2 == pytest.approx((36 - 9 + 36 - 25) / 4 + 16)
 
 
-@pytest.mark.parametrize("scatter", [0.0, 1.0, 5.0])
-def test_intervals_hold_the_true_difference(scatter):
-    rng = np.random.default_rng(2)
-    held = 0
-    for _ in range(400):
-        sets = rng.normal(0.0, math.hypot(1.0, scatter), (2, 4))
-        found = difference(runs(sets[0], 1.0), runs(sets[1], 1.0))
-        held += abs(found.value) <= found.expanded
-    assert 0.92 <= held / 400 <= 0.99
-
-
-def test_common_lines_are_added_in_the_order_of_the_table():
-    assert tuple(filter(COMMON.__contains__, BUDGET)) == COMMON
+def test_where_one_run_was_not_fitted_jointly_only_budget_lines_count_and_the_fewest_degrees():
+    joint = Measured(1.0, 5.0, 9.0, {"datum": 3.0, "edges": 4.0}, shared=np.array([5.0]))
+    found = combine([[joint, replace(joint, degrees=4.0, shared=None)]], [1.0])
+    assert found.budget == pytest.approx({"runs": 4.0 / math.sqrt(2.0), "common": 3.0})
+    share = sum(part**4 for part in found.budget.values())
+    assert found.degrees == pytest.approx(4.0 * found.u**4 / share)

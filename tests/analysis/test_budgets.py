@@ -28,7 +28,7 @@ def test_each_line_is_what_its_source_adds(scene):
         jacobian = np.vstack([jacobian, whole])
     covariance = np.linalg.inv(jacobian.T @ jacobian + np.eye(size))
     joint = by_itself(fit)
-    for name, found in Budgets(joint).measured(joint.drops[0]).items():
+    for name, found in Budgets(joint).measure_all(joint.drops[0]).items():
         gradient = measurands(fit.model, fit.x)[name].slopes * at.sd
         influence = covariance @ gradient
         lines = {

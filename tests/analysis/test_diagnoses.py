@@ -27,12 +27,9 @@ HEIGHTS = {gate.channel: gate.height for gate in UNIFORM.gates.gates}
 CHANNELS = [*HEIGHTS]
 # (0, 2) and (4, 5) are one rod and three rods apart, within half a millimetre.
 ALIKE = [(0, 2), (4, 5), (10, 11)]
-# Of all 120, a few in the soaks; of those that are alike, here one of each side.
-OTHERS = list(combinations(CHANNELS, 2))
-PAIRS = [
-    *ALIKE[::2],
-    *(pytest.param(*pair, marks=pytest.mark.slow) for pair in (ALIKE[1], *OTHERS[::30])),
-]
+# Of all 120, a few in the soaks.
+OTHERS = [*ALIKE[1:], *combinations(CHANNELS, 2)][::30]
+PAIRS = [ALIKE[0], *(pytest.param(*pair, marks=pytest.mark.slow) for pair in OTHERS)]
 
 
 def exchanged(one: Case, a: int, b: int) -> Case:
@@ -102,17 +99,17 @@ def with_rods(protocol: Protocol, rods: int) -> Protocol:
     return replace(protocol, chains=chains)
 
 
-@pytest.mark.parametrize(("rods", "seed"), [(24, 1), (26, 2)])
-def test_another_number_of_rods_is_void_and_counted(rods, seed):
-    one = case(with_rods(UNIFORM, rods), MILD, incline=40.0, seed=seed)
-    result = replace(one, protocol=UNIFORM).analyze()
+@pytest.mark.parametrize("rods", [9, 11])
+def test_another_number_of_rods_is_void_and_counted(rods):
+    stated = parse(FEW.protocol())
+    result = replace(case(with_rods(stated, rods), MILD, run=9), protocol=stated).analyze()
     assert result.verdict == "void"
     counts = [reason.values for reason in result.reasons if reason.code == "rod_count"]
-    assert {(count["rods"], count["stated"]) for count in counts} == {(rods, 25)}
+    assert {(count["rods"], count["stated"]) for count in counts} == {(rods, 10)}
     assert len(counts) == 2 or counts[0]["name"] == ""  # each chain
 
 
-@pytest.mark.parametrize("role", ["impact", "free"])
+@pytest.mark.parametrize("role", ["impact", pytest.param("free", marks=pytest.mark.slow)])
 def test_a_chain_upside_down_is_void_and_named(role):
     name = getattr(case(GRADED, MILD).run, role)
     turned = {**GRADED.chains, name: upside_down(GRADED.chains[name])}
@@ -133,7 +130,7 @@ def test_what_looks_the_same_both_ways_is_no_fault():
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_good_rig_has_no_faults(scene):
-    for seed in range(1, 6):
+    for seed in range(1, 4):
         result = case(SCENES[scene], MILD, seed=seed).analyze()
         assert (result.verdict, result.reasons) == ("accepted", ())
 
@@ -290,5 +287,5 @@ def test_a_fall_that_is_not_the_equations_accuses_nothing():
     assert [one["code"] for one in unclear.values["candidates"]] == ["chain_length"]
     accused = (make_reason("gate_silent", words, channel=1, side="free", height_m=0.1),)
     for log_odds in (51.0, 500.0):
-        first = replace(beyond, log_odds=log_odds)
+        first = beyond._replace(log_odds=log_odds)
         assert name_fault([first, named], words, accused) == [*accused]

@@ -25,8 +25,9 @@ def assert_same(one: DropResult, other: DropResult, share: float) -> None:
         assert other.quantities[name].u == pytest.approx(measured.u, rel=share + 1e-15)
 
 
-@pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("seconds", [-0.25, 0.5, 3.0])
+@pytest.mark.parametrize(
+    ("scene", "seconds"), [("uniform", -0.25), ("graded", 0.5), ("single", 3.0), ("fence", -0.25)]
+)
 def test_the_origin_of_time(scene, seconds):
     """An imported file counts from where it likes."""
     one = case(SCENES[scene], MILD)

@@ -59,7 +59,7 @@ def stamped_as_expected(model: DropModel, matches: dict, x: np.ndarray) -> DropM
         shifts = {}
         for role, match in matches.items():
             left = model.residuals(role, x, match)
-            _, edges = model.pairings[role].observed(match)
+            _, edges = model.pairings[role].indices(match)
             shifts[role] = np.zeros(model.pairings[role].times.size)
             shifts[role][edges] = left.values / left.speed
         model = model.shaken(shifts)
@@ -72,7 +72,7 @@ def beyond_strikes(model, role, x, match):
     Near a strike derivatives are means of both legs'; see `test_trajectory`.
     """
     path, record = model.trajectory(role, x), model.records[role]
-    pick, edge = model.pairings[role].observed(match)
+    pick, edge = model.pairings[role].indices(match)
     if record.ratios is None:
         return np.full(pick.size, np.inf)
     heights, _ = path.heights(model.pairings[role].times[edge] * model.rate(x))

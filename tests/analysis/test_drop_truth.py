@@ -114,10 +114,10 @@ def test_a_chain_whose_coefficients_are_given(gamma):
 
 
 def test_default_dials_are_within_the_stated_uncertainty():
-    """Five scenes, ten rigs each: all near, and the share within U95 not below 95 % by chance."""
+    """Six scenes, five rigs each: all near, and the share within U95 not below 95 % by chance."""
     held: dict[str, list[bool]] = {}
     for scene, incline in (("uniform", 10.0), ("uniform", 40.0), ("uniform", 80.0), *PLACES[5:]):
-        for seed in range(1, 11):
+        for seed in range(1, 6):
             # The skew is within the limit, so that no drop is left out after it was seen.
             one = case(SCENES[scene], Dials(skew_sd=1e-3), incline=incline, seed=seed)
             result = one.analyze()
@@ -184,13 +184,12 @@ def test_stated_uncertainties_are_the_real_ones(scene):
 def test_a_wrong_clock_that_is_known_to_be_unsure_covers_the_truth(scene, error):
     """An uncalibrated resonator: ±0.5 %, taken as evenly likely between."""
     incline = 40.0 if scene == "uniform" else None
-    for seed in (1, 2):
-        one = case(SCENES[scene], Dials(skew_sd=1e-3, clock=error), incline=incline, seed=seed)
-        result = replace(one, scale=one.scale._replace(hz=float(HZ), u=5e-3 / 3**0.5)).analyze()
-        assert result.verdict == "accepted"
-        assert not wrong_rods(result, one.truth)
-        for name, measured in result.quantities.items():
-            assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
+    one = case(SCENES[scene], Dials(skew_sd=1e-3, clock=error), incline=incline)
+    result = replace(one, scale=one.scale._replace(hz=float(HZ), u=5e-3 / 3**0.5)).analyze()
+    assert result.verdict == "accepted"
+    assert not wrong_rods(result, one.truth)
+    for name, measured in result.quantities.items():
+        assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
 
 
 @pytest.mark.parametrize("error", [5e-3, -5e-3])
@@ -206,13 +205,10 @@ def test_a_clock_said_to_be_better_than_it_is_does_not_pass_unseen(error):
     assert f"% {'fast' if error > 0.0 else 'slow'}" in reason.text
 
 
-AIRS = (0.004, 0.08)
-
-
-@pytest.mark.parametrize("drag", AIRS)
+@pytest.mark.parametrize("drag", [0.004, 0.08])
 def test_what_the_air_takes_is_told_by_the_free_chain(drag):
     """A light chain loses a tenth of g: 50 mm at the end. Nothing else is told any worse for it."""
-    for seed, incline in ((1, 40.0), (2, 0.0), (3, 70.0)):
+    for seed, incline in ((1, 40.0), (2, 0.0)):
         one = case(UNIFORM, Dials(skew_sd=1e-3, drag=drag), incline=incline, seed=seed)
         result = one.analyze()
         assert result.verdict == "accepted", result.reasons
@@ -229,13 +225,12 @@ def test_stated_air_is_where_an_adjustment_begins(scene):
     """A terminal speed of 18 m/s, κ = 0.030/m: nobody need guess how much it may be."""
     alone = SCENES[scene]
     stated = replace(alone, drag=Drag(terminal_speed=Quantity(18.0, 0.5)))
-    for seed in (1, 2):
-        one = case(stated, Dials(skew_sd=1e-3), seed=seed)
-        result, guessed = one.analyze(), replace(one, protocol=alone).analyze()
-        assert result.verdict == "accepted", result.reasons
-        for name, measured in result.quantities.items():
-            assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
-            assert measured.u < (0.5 if scene == "fence" else 1.1) * guessed.quantities[name].u
+    one = case(stated, Dials(skew_sd=1e-3))
+    result, guessed = one.analyze(), replace(one, protocol=alone).analyze()
+    assert result.verdict == "accepted", result.reasons
+    for name, measured in result.quantities.items():
+        assert abs(measured.value - truth_of(one, name)) < measured.expanded, name
+        assert measured.u < (0.5 if scene == "fence" else 1.1) * guessed.quantities[name].u
 
 
 def test_a_free_fall_has_the_gravity_of_the_place():

@@ -16,15 +16,20 @@ SCENES = {"fence": FENCE, "uniform": UNIFORM}
 QUIET = Dials.quiet()
 
 
+def read(one: Case, scale: TimeScale | None = None, protocol=None):
+    """The result with its gravity, however wrong the drop is."""
+    case_ = DropCase(protocol or one.protocol, one.run, one.drop, scale or one.scale)
+    result, fit = case_.read(explain=False)
+    return replace(result, gravity=result.quantities.get("gravity_m_s2") or free_gravity(fit))
+
+
 def gravity(one: Case, scale: TimeScale | None = None, protocol=None):
-    result, fit = DropCase(protocol or one.protocol, one.run, one.drop, scale or one.scale).read()
-    return result.quantities.get("gravity_m_s2") or free_gravity(fit)
+    return read(one, scale, protocol).gravity
 
 
 def check(one: Case, scale: TimeScale, protocol=None):
-    return check_gravity(
-        protocol or one.protocol, [replace(one.analyze(), gravity=gravity(one, scale, protocol))]
-    )
+    good = replace(read(one, scale, protocol), verdict="accepted")
+    return check_gravity(protocol or one.protocol, [good])
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -36,13 +41,13 @@ def test_without_disturbance_it_is_the_scenes(scene):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_its_interval_holds_the_truth(scene):
-    """30 rigs, each with its own rods and beams off; 24 in all but one of 1000 sets of 95 %."""
+    """12 rigs, each with its own rods and beams off; 9 in all but one of 500 sets of 95 %."""
     protocol = SCENES[scene]
     run = first_run(protocol, 40.0 if scene == "uniform" else None)
-    found = [gravity(case(protocol, Dials(), run=run, seed=seed)) for seed in range(1, 31)]
+    found = [gravity(case(protocol, Dials(), run=run, seed=seed)) for seed in range(1, 13)]
     errors = np.array([one.value - protocol.gravity.value for one in found])
     widths = np.array([one.expanded for one in found])
-    assert (np.abs(errors) <= widths).sum() >= 24
+    assert (np.abs(errors) <= widths).sum() >= 9
     # What is stated of rods, beams and gates is up to twice the dials, and κ is free beside g.
     assert errors.std() > 0.1 * widths.mean(), "and it is not far too wide"
 

@@ -71,7 +71,11 @@ def test_eliminating_drop_by_drop_is_solving_all_at_once():
     np.testing.assert_allclose(whole.inverse[:size, :size], joint.covariance, rtol=2e-2, atol=2e-4)
     budgets = Budgets(joint)
     for drop, place in zip(joint.drops, whole.columns, strict=True):
-        found = budgets.measured(drop)
+        found = budgets.measure_all(drop)
+        for measured in found.values():
+            squares = sum(part**2 for part in measured.budget.values())
+            assert squares == pytest.approx(measured.u**2, rel=1e-9)
+            assert math.hypot(*measured.shared) < measured.u
         for name, result in measurands(drop.model, drop.x).items():
             full = np.zeros(whole.x.size)
             full[place] = result.slopes * drop.model.unknowns.sd
@@ -85,21 +89,11 @@ def test_eliminating_drop_by_drop_is_solving_all_at_once():
                 )
 
 
-def test_a_session_s_budgets_add_up():
-    joint = fit_session(EIGHT)
-    budgets = Budgets(joint)
-    for drop in joint.drops:
-        for measured in budgets.measured(drop).values():
-            squares = sum(part**2 for part in measured.budget.values())
-            assert squares == pytest.approx(measured.u**2, rel=1e-9)
-            assert math.hypot(*measured.shared) < measured.u
-
-
 # χ² of the members, at 1 in 10⁴ each side; what an estimate of a standard deviation may be off.
 CHANCE = {"gates": 2.2, "rods": 1.5, "beam": 2.2, "hang": 2.1, "impulse": 1.3, "jitter": 1.05}
 
 
-@pytest.mark.parametrize("factor", [1.0, 2.0])
+@pytest.mark.parametrize("factor", [pytest.param(1.0, marks=pytest.mark.slow), 2.0])
 def test_how_much_everything_scatters_is_found_whatever_was_stated(factor):
     dials = replace(
         MILD, gate_sd=factor * 0.2e-3, rod_sd=factor * 0.3e-3, beam_sd=factor * 0.5e-3,
@@ -185,13 +179,11 @@ def test_what_the_edges_do_not_tell_is_said():
 
 def test_nothing_stated_is_used_where_the_session_tells():
     """Twice the stated scatter of beams and hanging gives the same results, but for little."""
-    one, other = (analysis(cases(EIGHT, MILD, seed)).runs for seed in (4, 4))
-    assert [r.quantities for r in one] == [r.quantities for r in other]
+    drops = cases(EIGHT, MILD, 4)
+    found = analysis(drops).runs
     doubled = replace(UNIFORM, gates=replace(UNIFORM.gates, height_u=0.6e-3))
-    again = analyze(
-        doubled, [c.drop for c in cases(EIGHT, MILD, 4)], lambda _: cases(EIGHT, MILD, 4)[0].scale
-    ).runs
-    for before, after in zip(one, again, strict=True):
+    again = analyze(doubled, [one.drop for one in drops], lambda _: drops[0].scale).runs
+    for before, after in zip(found, again, strict=True):
         for name, measured in before.quantities.items():
             assert abs(after.quantities[name].value - measured.value) < 0.5 * measured.u
             assert after.quantities[name].u == pytest.approx(measured.u, rel=0.15)
@@ -260,12 +252,12 @@ def test_a_drop_that_does_not_go_with_the_others_stays_by_itself():
         replace(gate, height=gate.height + (-1) ** n * 1.2e-3) for n, gate in enumerate(gates)
     ]
     other = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=tuple(pushed)))
-    *rest, _ = cases(EIGHT)
-    last = replace(case(other, MILD, seed=1, run=8), protocol=UNIFORM)
+    rest = cases(FOUR)
+    last = replace(case(other, MILD, run=5), protocol=UNIFORM)
     alone = last.analyze()
     assert (alone.verdict, alone.reasons) == ("accepted", ())
     found = analysis([*rest, last])
-    assert [result.learned for result in found.runs] == [True] * 7 + [False]
+    assert [result.learned for result in found.runs] == [True] * 4 + [False]
     assert found.runs[-1].quantities == alone.quantities
     assert found.runs[-1].verdict == "accepted"
     assert found.runs[-1].reasons[0].code == "differs_from_session"
@@ -275,12 +267,12 @@ def test_a_drop_that_does_not_go_with_the_others_stays_by_itself():
 
 
 def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
-    drops = cases(EIGHT)
+    drops = cases((*FOUR, 5))
     alone = [one.analyze() for one in drops]
-    bad = drops[5].with_edges(drops[5].drop.edges[::3])
-    found = analysis([*drops[:5], bad, *drops[6:]])
+    bad = drops[3].with_edges(drops[3].drop.edges[::3])
+    found = analysis([*drops[:3], bad, drops[4]])
     for n, (result, single) in enumerate(zip(found.runs, alone, strict=True)):
-        if n == 5:
+        if n == 3:
             assert (result.verdict, result.learned) == ("void", False)
         else:
             assert (result.verdict, result.reasons) == (single.verdict, single.reasons)
@@ -291,11 +283,11 @@ def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
         lambda _: drops[0].scale,
         {(3, 1): ("the door slammed",)},
     )
-    assert [r.learned for r in rejected.runs] == [True] * 2 + [False] + [True] * 5
-    assert len(rejected.joint.drops) == 7
+    assert [r.learned for r in rejected.runs] == [True] * 2 + [False] + [True] * 2
+    assert len(rejected.joint.drops) == 4
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it(seed):
     drops = cases(FOUR, seed=seed)
     runs = analysis(drops).runs
@@ -367,7 +359,7 @@ FEW = {f"{one.kind.name}: {one.heights}": one for one in LAYOUTS}
 def test_where_little_scatters_and_few_gates_tell_of_it_the_joint_fit_settles(layout, dial):
     """What hardly a degree of freedom tells is near what was stated, and does not jump there."""
     protocol = parse(FEW[layout].protocol())
-    numbers = [run.number for run in planned_runs(protocol)][:8]
+    numbers = [run.number for run in planned_runs(protocol)][:6]
     found = analysis([case(protocol, with_dials(**dial), run=number) for number in numbers])
     assert found.joint is not None
     assert [result.learned for result in found.runs] == [True] * len(numbers)

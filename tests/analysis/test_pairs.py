@@ -42,6 +42,15 @@ def test_a_drift_cancels_and_the_difference_stays():
         assert side.expanded == pytest.approx(2.5706 * side.u, rel=1e-4)  # t of 5
 
 
+def test_scatter_that_is_no_drift_counts_within_blocks_too():
+    """1, −3, 3, −1 leave mean, chains and drift as they are: one degree of freedom a block."""
+    off = (1e-3, -3e-3, 3e-3, -1e-3)
+    for one in effects(UNIFORM, made_up(lambda n, _: off[(n - 1) % 4])):
+        within = (3 * 20e-6 / 5 / 3) ** 0.5
+        assert one.chain["speed_m_s"].budget["runs"] == pytest.approx(within, rel=1e-9)
+        assert one.side["release_skew_s"].budget["runs"] == pytest.approx(within / 2, rel=1e-9)
+
+
 def test_blocks_that_lack_a_run_do_not_count():
     good = made_up(lambda n, _: float(n))
     at = [n for n, one in enumerate(good) if one.run.incline_deg == 40.0]
@@ -50,6 +59,10 @@ def test_blocks_that_lack_a_run_do_not_count():
     assert blocks.pop(40.0) == 2
     assert set(blocks.values()) == {3}
     assert effects(UNIFORM, good[at[5] : at[5] + 1]) == ()
+    run = good[at[0]].run
+    good[at[0]] = replace(good[at[0]], run=replace(run, impact=run.free, free=run.impact))
+    blocks = {one.incline_deg: one.blocks for one in effects(UNIFORM, good)}
+    assert blocks[40.0] == 1, "in another order it is no block"
 
 
 @pytest.mark.parametrize("order", ["alternate", "fixed"])
@@ -61,17 +74,18 @@ def test_no_blocks_no_effects(order):
 
 def test_runs_by_themselves_share_nothing_but_their_own_chain():
     """The scatter of each run, ½² of four of them; of what is common, that of two chains."""
+    budget = {"edges": 3e-3, "spacing": 4e-3, "datum": 12e-3}
     runs_ = [
-        replace(one, quantities={n: Measured(1.0, 5e-3, budget={"edges": 3e-3, "spacing": 4e-3})
+        replace(one, quantities={n: Measured(1.0, 13e-3, budget=budget)
                                  for n in NAMES})
         for one in made_up(lambda n, _: 0.0)
     ]  # fmt: skip
     for one in effects(UNIFORM, runs_):
         assert one.chain["speed_m_s"].budget == pytest.approx(
-            {"runs": 3e-3 / 3**0.5, "common": 2**0.5 * 4e-3}
+            {"runs": 1e-3 * 51**0.5, "common": 2**0.5 * 4e-3}
         )
         assert one.side["release_skew_s"].budget == pytest.approx(
-            {"runs": 1.5e-3 / 3**0.5, "common": 0.5**0.5 * 4e-3}
+            {"runs": 0.5e-3 * 51**0.5, "common": 0.5**0.5 * 4e-3}
         )
 
 
@@ -87,19 +101,15 @@ def true_effects(seed: int) -> dict[str, float]:
 
 
 def test_effects_are_the_true_ones_within_their_uncertainty():
-    """Three blocks on each of three rigs: of 9 intervals for 95 %, 6 or more hold the truth.
-
-    Fewer do by chance once in 1500 if they are independent.
-    """
-    held = []
-    for seed in range(21, 24):
-        (found,) = analysis(cases(TWELVE, MILD, seed)).effects
-        true = true_effects(seed)
-        assert found.blocks == 3
-        for name in ("separation_m", "speed_m_s", "release_skew_s"):
-            one = found.chain[name]
-            held.append(abs(one.value - true[name]) <= one.expanded)
-            assert abs(one.value - true[name]) < 3 * one.expanded, name
-        # Rods of the two chains hang up to a millimetre apart, and that is what is found.
-        assert found.chain["separation_m"].u < 0.5e-3
-    assert sum(held) >= 6
+    """Of three intervals for 95 % one may miss it, and none by far."""
+    (found,) = analysis(cases(TWELVE, MILD, 21)).effects
+    true = true_effects(21)
+    assert found.blocks == 3
+    far = [
+        abs(found.chain[name].value - true[name]) / found.chain[name].expanded
+        for name in ("separation_m", "speed_m_s", "release_skew_s")
+    ]
+    assert sorted(far)[1] < 1.0
+    assert max(far) < 1.5
+    # Rods of the two chains hang up to a millimetre apart, and that is what is found.
+    assert found.chain["separation_m"].u < 0.5e-3

@@ -4,37 +4,43 @@ import json
 
 import pytest
 
+from bench.studies.falls import Asked, falls
 from bench.studies.time_scales import time_scale
 from rig.analysis.drop import DropCase
-from rig.bench.falls import Asked, falls
 from rig.protocol.plan import runs as planned
 from tests.analysis.drops import PROTOCOLS, UNIFORM, codes
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
 
+SEEDS = range(3, 9)
+HELD = "separation_m", "separation_strike_m", "speed_m_s", "release_skew_s"
 RUNS = {run.number: run for run in planned(UNIFORM)}
 
 
 @pytest.fixture(scope="module")
 def piled():
-    """Drops of the resolved world, and what is true of them."""
+    """Drops of the resolved world on six rigs, and what is true of them."""
     first = {run.incline_deg: number for number, run in reversed(RUNS.items())}
     url = f"sim://?dynamics=resolved&stated=1&protocol={PROTOCOLS / 'inclined-uniform.yaml'}"
-    drops = falls([Asked(url, [3], [[first[incline] for incline in (0.0, 20.0)]])])
-    return [(DropCase(UNIFORM, RUNS[fall.drop.run], fall.drop, time_scale(3)), fall)
-            for fall in drops]  # fmt: skip
+    drops = falls([Asked(url, SEEDS, [[first[incline] for incline in (0.0, 20.0)]] * len(SEEDS))])
+    return [
+        (DropCase(UNIFORM, RUNS[fall.drop.run], fall.drop, time_scale(fall.seed)), fall)
+        for fall in drops
+    ]
 
 
 def test_drops_on_a_pile_are_read_without_the_beams_in_it(piled):
+    held = dict.fromkeys(HELD, 0)
     for case, fall in piled:
         result, _ = case.read()
         assert result.verdict == "marginal", fall.drop.run
         assert "low_gates_miss_rods" in codes(result)
         assert not {"gate_disagrees", "gate_off", "gate_height"} & set(codes(result))
         assert fall.rods(result.matches)[0] == 0
-        for name in ("separation_m", "separation_strike_m", "speed_m_s", "release_skew_s"):
+        for name in HELD:
             measured = result.quantities[name]
-            assert abs(measured.value - fall.truth[name]) < 1.5 * measured.expanded, name
+            held[name] += abs(measured.value - fall.truth[name]) < measured.expanded
+    assert min(held.values()) >= 0.8 * len(piled), held
 
 
 def test_what_was_found_of_it_is_kept_for_the_next_time(piled):
@@ -44,4 +50,4 @@ def test_what_was_found_of_it_is_kept_for_the_next_time(piled):
     again = case.summary(first)
     assert again.result.quantities == first.result.quantities
     assert json.dumps(again.result.json()) == json.dumps(first.result.json())
-    assert case.adjusted(first).rods == first.result.matches
+    assert case.restore_drop(first).rods == first.result.matches

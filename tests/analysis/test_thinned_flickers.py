@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.analysis.chain_records import LONGEST, QUICK, EdgeArrays, thinned
+from rig.analysis.chain_records import LONGEST, QUICK, EdgeArrays, thin
 from rig.records import Drop, Edge
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
@@ -59,7 +59,7 @@ def test_of_each_long_flicker_both_ends_are_left_and_every_edge_is_counted(gaps)
         total = sum(edge.channel == channel for edge in drop.edges)
         assert edges.count_thinned(channel) == total - len(ends)
     assert edges.burst == pytest.approx([left[n] for n in edges.numbers.tolist()])
-    assert len(thinned(drop, HZ).edges) == edges.numbers.size
+    assert len(thin(drop, HZ).edges) == edges.numbers.size
 
 
 @pytest.mark.parametrize("count", [1_000, 100_000])

@@ -11,6 +11,7 @@ from mpmath import mp, mpf
 from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
 from rig.model.chain import Chain
 from rig.model.fall import kicks
+from tests.model.air_reference import exact_leg, exact_way
 
 MASSES = (3.0, 1.0, 2.0, 0.4, 1.5)
 PLACES = (0.0004, 0.0493, 0.0967, 0.1461, 0.1939)  # above the reference point; rod 0 is off it
@@ -36,10 +37,7 @@ def struck(parameters=PARAMETERS) -> Trajectory:
 
 
 class Exact:
-    """The same fall from the equations of v' = g − κv², in 60 digits.
-
-    Its time is that from rest to one speed less that to another, so no formula is the program's.
-    """
+    """The same fall leg by leg from the equations of v' = g − κv², in 60 digits."""
 
     def __init__(self, parameters) -> None:
         release, start, self.g, self.kappa, *rest = map(mpf, parameters)
@@ -47,34 +45,15 @@ class Exact:
         self.time, self.height, self.speed = [release], [start], [mpf(0)]
         for gain, ratio, place in zip(gains, RATIOS, places, strict=True):
             fallen = self.height[-1] + place
-            square, kappa = self.speed[-1] ** 2, self.kappa
-            if kappa:
-                terminal = self.g / kappa
-                self.arrival = mp.sqrt(terminal + (square - terminal) * mp.exp(-2 * kappa * fallen))
-            else:
-                self.arrival = mp.sqrt(square + 2 * self.g * fallen)
-            self.time.append(
-                self.time[-1] + self._since(self.arrival) - self._since(self.speed[-1])
-            )
+            self.arrival, lasted = exact_leg(fallen, self.speed[-1], self.g, self.kappa)
+            self.time.append(self.time[-1] + lasted)
             self.height.append(-place)
             self.speed.append(self.arrival + gain * ratio * self.arrival)
-
-    def _since(self, speed) -> mpf:
-        """How long it takes from rest to a speed."""
-        if not self.kappa:
-            return speed / self.g
-        rate = mp.sqrt(self.kappa * self.g)
-        return mp.re(mp.atanh(speed * rate / self.g) / rate)
 
     def at(self, when) -> mpf:
         leg = max([k for k, begin in enumerate(self.time) if begin <= when], default=0)
         since = max(when - self.time[leg], mpf(0))
-        speed = self.speed[leg]
-        if not self.kappa:
-            return self.height[leg] - speed * since - self.g * since**2 / 2
-        x = mp.sqrt(self.kappa * self.g) * since
-        grown = mp.cosh(x) + speed * mp.sqrt(self.kappa / self.g) * mp.sinh(x)
-        return self.height[leg] - mp.re(mp.log(grown) / self.kappa)
+        return self.height[leg] - exact_way(since, self.speed[leg], self.g, self.kappa)
 
 
 def derivatives(what, parameters) -> np.ndarray:

@@ -5,12 +5,8 @@ import csv
 import pytest
 
 from bench.__main__ import main
-from bench.studies import resolved as bench_resolved
+from bench.studies import resolved_paper
 from rig import cli
-from rig.bench import resolved_paper
-from rig.report.canvas import figure_file
-from rig.report.film import film_figure
-from tests.report.test_figures import FILM
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
 
@@ -29,25 +25,22 @@ def ensemble(incline: float):
     ]
 
 
-@pytest.mark.parametrize("number", [3, 4])
-def test_figures_with_resolved_falls(number, tmp_path, monkeypatch):
-    some = [ensemble(10.0 * n) for n in range(9)]
-    monkeypatch.setattr(resolved_paper, "uniform", lambda: some)
-    monkeypatch.setattr(resolved_paper, "graded", lambda: some[4])
-    target = tmp_path / "figure.svg"
-    assert cli.main(["predict", "--figure", str(number), "--resolved", "-o", str(target)]) == 0
-    assert "resolved" not in target.with_suffix(".csv").read_text()
-    with (tmp_path / "figure-resolved.csv").open(newline="") as table:
+@pytest.mark.parametrize(("number", "lines"), [(3, 9), (4, 18)])
+def test_figures_with_resolved_falls(number, lines, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        resolved_paper, "_ensembles", lambda *scene: [ensemble(i) for i in scene[-1]]
+    )
+    monkeypatch.setattr(resolved_paper, "INCLINES", tuple(10.0 * n for n in range(9)))
+    assert main(["resolved", "--paper", str(number), "-o", str(tmp_path)]) == 0
+    with (tmp_path / f"figure-{number}-resolved.csv").open(newline="") as table:
         rows = list(csv.DictReader(table))
-    assert len(rows) == (9 if number == 3 else 18)
+    assert len(rows) == lines
+    if number == 3:
+        assert [float(rows[8][name]) for name in ("separation_m", "separation_sd_m")] == [
+            pytest.approx(0.11),
+            pytest.approx(0.02 / 2**0.5),
+        ]
     plain = tmp_path / "plain.svg"
     assert cli.main(["predict", "--figure", str(number), "-o", str(plain)]) == 0
-    assert target.read_text() != plain.read_text()
-
-
-def test_a_fall_is_drawn(tmp_path, monkeypatch):
-    monkeypatch.setattr(bench_resolved, "film", lambda folder, incline: FILM)
-    assert main(["resolved", "--film", "40", "-o", str(tmp_path)]) == 0
-    assert (tmp_path / "resolved-fall.svg").read_text() == figure_file(
-        film_figure(FILM), "svg"
-    ).decode()
+    drawn = tmp_path / f"figure-{number}-resolved.svg"
+    assert drawn.read_text() != plain.read_text()

@@ -14,6 +14,7 @@ from rig.cli import main
 def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, capsys, tmp_path):
     steps = {name: ladder()[name] for name in ("free fall", "whole")}
     monkeypatch.setattr(bench, "ladder", lambda: dict(steps))
+    monkeypatch.setattr(bench, "_PROBES", 2)
     ready, kept = tmp_path / "ready", tmp_path / "kept"
     ready.mkdir()
     (ready / "mine.yaml").write_text(ladder()["inclined"], "utf-8")
@@ -32,6 +33,7 @@ def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, capsys, tmp_pa
 def test_what_a_scene_gains_fails(monkeypatch, capsys, tmp_path):
     parts = {**bench.PARTS, "gates": {"rig.model.chain"}}  # as if falls needed gates
     monkeypatch.setattr(bench, "PARTS", parts)
+    monkeypatch.setattr(bench, "_PROBES", 1)
     monkeypatch.setattr(bench, "ladder", lambda: {"whole": ladder()["level surface"]})
     command = ["bench", "scenes", "--rounds", "1", "--protocols", "nowhere"]
     assert main([*command, "-o", str(tmp_path)]) == 1

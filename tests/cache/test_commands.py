@@ -16,6 +16,7 @@ from rig.cli import main
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS, short
+from tests.report.undrawn import undrawn  # noqa: F401 - a fixture
 
 SCENES = {
     "fence": ("picket-fence.yaml", ""),
@@ -30,13 +31,25 @@ COMMANDS = [
     ("analyze", "SESSION", "--json"),
     ("analyze", "SESSION", "--scatter"),
     ("analyze", "SESSION", "--priors", "--json"),
-    ("analyze", "SESSION", "--session-trials", "2"),
     ("analyze", "SESSION", "--budget", "1", "--trials", "2"),
     ("estimate", "SESSION"),
     ("estimate", "SESSION", "--json", "-o", "OUT/pictures"),
     ("export", "SESSION", "--csv", "OUT/tables"),
     ("report", "SESSION", "-o", "OUT/page.html", "--figures", "OUT/figures"),
 ]
+
+
+def record(folder, scene):
+    """Record a session of a scene."""
+    name, dials = SCENES[scene]
+    protocol, path = folder / "p.yaml", folder / "s.session"
+    text = (PROTOCOLS / name).read_text("utf-8") if name else short("[40 deg]", 4)
+    if scene == "fence":  # enough for a joint fit
+        text = text.replace("repeats: 10", "repeats: 4")
+    protocol.write_text(text, "utf-8")
+    url = f"sim://?seed=3&{dials}"
+    assert main(["run", str(protocol), "--port", url, "--session", str(path), "--yes"]) in {0, 3}
+    return path
 
 
 @pytest.fixture(
@@ -46,16 +59,7 @@ COMMANDS = [
     ],
 )
 def session(request, tmp_path_factory):
-    name, options = SCENES[request.param]
-    folder = tmp_path_factory.mktemp(request.param)
-    protocol, path = folder / "p.yaml", folder / "s.session"
-    text = (PROTOCOLS / name).read_text("utf-8") if name else short("[40 deg]", 4)
-    if request.param == "fence":  # enough for a joint fit
-        text = text.replace("repeats: 10", "repeats: 4")
-    protocol.write_text(text, "utf-8")
-    url = f"sim://?seed=3&{options}"
-    assert main(["run", str(protocol), "--port", url, "--session", str(path), "--yes"]) in {0, 3}
-    return path
+    return record(tmp_path_factory.mktemp(request.param), request.param)
 
 
 def fingerprint(folder: Path) -> dict[str, str]:
@@ -79,6 +83,7 @@ def refuse(*_, **__):
     raise AssertionError("computed again")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_is_kept_is_said_again_to_the_last_byte(session, tmp_path, capsys, monkeypatch):
     """Cold, kept, forced, and kept of a copy, and the session stays as it is."""
     monkeypatch.setattr("rig.report.canvas.KINDS", ("svg",))
@@ -99,14 +104,19 @@ def test_what_is_kept_is_said_again_to_the_last_byte(session, tmp_path, capsys, 
     assert fingerprint(session.parent) == before
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Record a fence; what is kept of it lies beside."""
+    folder = tmp_path_factory.mktemp("recorded")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(folder / "caches"))
+        return record(folder, "fence")
+
+
 @pytest.fixture
-def fence(tmp_path):
-    """Record as many drops as a joint fit takes."""
-    protocol, path = tmp_path / "fence.yaml", tmp_path / "fence.session"
-    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
-    protocol.write_text(text.replace("repeats: 10", "repeats: 4"), "utf-8")
-    assert main(["run", str(protocol), "--port", "sim://?seed=3", "--session", str(path)]) == 0
-    return path
+def fence(recorded, tmp_path):
+    shutil.copytree(recorded.with_name("caches"), os.environ["XDG_CACHE_HOME"])
+    return Path(shutil.copy(recorded, tmp_path / "fence.session"))
 
 
 @pytest.fixture
@@ -178,7 +188,7 @@ def test_doctor_tells_the_size_and_forgets(fence, capsys):
     assert str(CacheFile().folder) in line
     assert " 5 of " in line  # four drops and their session
     main(["doctor", "--clear-cache"])
-    assert "kept results: 0 of " in capsys.readouterr().out
+    assert "kept results: ok: 0 of " in capsys.readouterr().out
 
 
 def test_a_blind_session_keeps_no_numbers(tmp_path, capsys):

@@ -278,3 +278,9 @@ def test_voids_that_others_logged_count_too():
     flow = voids(SKEW, SKEW)
     flow, _ = through(flow, on.GoOn(NEXT), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
     assert flow.stage is Stage.PREPARE
+
+
+def test_a_drop_that_fell_has_no_refusals_left():
+    flow = replace(Flow(stage=Stage.FIRING, attended=False), job=JOB, refusals=LOOKS - 1)
+    flow, effects = through(flow, DONE)
+    assert (flow.refusals, effects) == (0, [on.Collect(JOB)])

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 import pytest
 
 from rig.cli import main
-from tests.cli.lab import PROTOCOLS, rig, short
+from tests.cli.lab import rig, short, short_fence
 from tests.once import (
     analysed_once,  # noqa: F401 - a fixture
     filled_once,
 )
+from tests.report.undrawn import undrawn  # noqa: F401 - a fixture
 
 
 class Done(NamedTuple):
@@ -55,11 +56,13 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 @pytest.fixture(scope="session")
 def fences(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Record ten drops of a fence, which are quickly analysed."""
+    """Record five drops of a fence, which are quickly analysed; its protocol lies beside it."""
 
     def fill(folder: Path) -> None:
-        words = ["run", PROTOCOLS / "picket-fence.yaml", "--port", "sim://?seed=2", "--session"]
-        assert main([*map(str, words), str(folder / "s")]) == 0
+        protocol = folder / "fences.yaml"
+        protocol.write_text(short_fence(5, "5 s"), "utf-8")
+        words = ["run", protocol, "--port", "sim://?seed=2", "--session", folder / "s"]
+        assert main([*map(str, words)]) == 0
 
     return filled_once(tmp_path_factory, "fences", fill) / "s"
 
@@ -101,11 +104,8 @@ def protocol(tmp_path: Path) -> Path:
 @pytest.fixture
 def fence(tmp_path: Path) -> Path:
     """Write a protocol of two drops that are quickly analysed."""
-    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
     path = tmp_path / "fence.yaml"
-    path.write_text(
-        text.replace("{repeats: 10, settle: 5 s}", "{repeats: 2, settle: 1 s}"), "utf-8"
-    )
+    path.write_text(short_fence(), "utf-8")
     return path
 
 

@@ -70,6 +70,12 @@ def short(inclines: str = "[40 deg, 60 deg]", repeats: int = 2, settle: str = "1
     return text.replace("SETTLE", settle)
 
 
+def short_fence(repeats: int = 2, settle: str = "1 s") -> str:
+    """Write a protocol of a few drops of a fence, which are quickly analysed."""
+    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
+    return text.replace("repeats: 10, settle: 5 s", f"repeats: {repeats}, settle: {settle}")
+
+
 def without(key: str, text: str) -> str:
     """Leave one top-level key out of a protocol."""
     kept, leaving = [], False

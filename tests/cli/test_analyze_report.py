@@ -8,7 +8,7 @@ import pytest
 
 from rig.measurands import SEPARATION
 from rig.report.parts import LABELS, Mean
-from rig.results import detailed
+from rig.results import complete_analysis
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS
 
@@ -76,7 +76,7 @@ def test_a_report_can_be_written_of_a_session_without_a_drop(call, tmp_path, pro
         (["estimate", "SESSION", "-o"], "estimate.results", "file/figures"),
         (["export", "SESSION", "--csv"], "export.results", "file/tables"),
         (["design", PROTOCOLS / "picket-fence.yaml", "-o"], "design.better", "none/new.yaml"),
-        (["predict", "--figure", "3", "-o"], "predict._table", "none/figure.svg"),
+        (["predict", "--figure", "3", "-o"], "predict._write_table", "none/figure.svg"),
     ],
 )
 def test_what_cannot_be_written_is_not_begun(
@@ -92,16 +92,9 @@ def test_what_cannot_be_written_is_not_begun(
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
-def test_a_pdf_does_not_take_the_place_of_its_page(call, finished, tmp_path):
-    page = tmp_path / "a.html"
-    done = call("report", finished.session, "-o", page, "--pdf", tmp_path / "x/../a.html")
-    assert (done.code, page.exists()) == (2, False)
-    assert "is the page's own file" in done.err
-
-
 def test_bars_are_as_long_as_the_analysis_says(finished):
     with Session.open(finished.session, readonly=True) as session:
-        drawn = detailed(session)[0].summary[0]
+        drawn = complete_analysis(session).summary[0]
     line = drawn.json()
     sd = line["separation_sd_m"]
     expected = {"U95": line["separation_m"]["U95"], "u": line["separation_m"]["u"],
@@ -110,15 +103,6 @@ def test_bars_are_as_long_as_the_analysis_says(finished):
     for bars, label in LABELS.items():
         assert label == words.get(bars, bars)
         assert Mean(drawn, SEPARATION).bars[bars] == pytest.approx(expected[bars], rel=1e-9), bars
-
-
-def test_the_reader_chooses_what_bars_stand_for(call, finished, tmp_path, monkeypatch):
-    monkeypatch.setattr("rig.report.canvas.KINDS", ("svg",))
-    done = call("report", finished.session, "-o", tmp_path / "r.html",
-                "--figures", tmp_path, "--bars", "half-SD")  # fmt: skip
-    assert done.code == 0, done.err
-    drawn = (tmp_path / "figure-1.svg").read_text("utf-8")
-    assert "SIMULATED" in drawn
 
 
 def test_scatter_is_told_beside_uncertainty(call, finished, analysis):

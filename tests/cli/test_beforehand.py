@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from rig.protocol.describe import describe
+from rig.protocol.reader import read
 from tests.cli.lab import short
 
 GATES = """\
@@ -38,7 +40,7 @@ def test_a_long_fall_is_recorded_to_its_end(call, tmp_path, old, new, top, lasts
     assert done.code == 0, done.err
     runs = json.loads(done.out)["runs"]
     assert [run["verdict"] for run in runs] == ["accepted", "accepted"]
-    assert f"recording: {lasts};" in call("check", path).out
+    assert f"recording: {lasts};" in describe(read(path))
 
 
 @pytest.mark.parametrize(
@@ -58,9 +60,6 @@ def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     (line,) = done.err.splitlines()
     assert f"{path}:{problem} the board (virtual) has" in line
     assert not session.exists()
-    said = call("check", path)
-    assert said.code == 0
+    said = describe(read(path))
     for word in ("mega", "uno"):
-        assert f"note: board {word} is not suitable: {path}:" in said.out
-    path.write_text(changed("", ""), "utf-8")
-    assert call("run", path, "--port", "sim://", "--session", session, "--yes").code == 0
+        assert f"note: board {word} is not suitable: {path}:" in said

@@ -24,11 +24,12 @@ from tests.cli.lab import PROTOCOLS, short
 from tests.once import once
 from tests.session.altering import unguarded
 
+pytestmark = pytest.mark.usefixtures("undrawn")
 FLIPS = int(os.environ.get("RIG_FLIPS", "60"))
 
 
 @pytest.fixture(scope="module")
-def bundle(fences, tmp_path_factory):
+def bundle(fences, undrawn, tmp_path_factory):
     from rig.cli import main
 
     path = tmp_path_factory.mktemp("bundle") / "fences.eln"
@@ -90,7 +91,7 @@ def test_a_bundle_is_as_recorded_whole_or_unpacked(bundle, call, tmp_path):
     done = call("verify", tmp_path / ROOT)
     assert (done.code, f"more.txt is not as {SUMS} has it" in done.out) == (3, True)
     done = call("verify", tmp_path / ROOT / SESSION)
-    assert (done.code, "10 drops: no gap" in done.out) == (0, True)
+    assert (done.code, "5 drops: no gap" in done.out) == (0, True)
 
 
 def test_other_programs_can_read_what_is_in_it(files):
@@ -129,8 +130,9 @@ def test_a_byte_altered_anywhere_is_found_and_named(bundle, tmp_path):
         except InputError as error:  # its directory names no files any more
             assert at >= directory, at
             faults = [str(error)]
-        named = name if at < directory else "rchive"
-        assert any(named in fault for fault in faults), (at, faults)
+        # A file's size in the directory makes another file of it.
+        assert faults, at
+        assert at >= directory or any(name in fault for fault in faults), (at, faults)
     altered.write_bytes(data + b"\0")
     assert read_bundle(altered)[1]
 
@@ -158,7 +160,7 @@ def test_limits_that_changed_after_the_first_run_are_told(files, call, tmp_path)
     session.write_bytes(files[SESSION])
     with unguarded(session) as connection:
         (text,) = connection.execute("SELECT text FROM protocol").fetchone()
-        other = text.replace("repeats: 10", "repeats: 20")
+        other = text.replace("repeats: 5", "repeats: 20")
         connection.execute("UPDATE protocol SET text = ?", (other,))
         digest = hashlib.sha256(other.encode()).hexdigest()
         connection.execute("UPDATE meta SET value = ? WHERE key = 'protocol_sha256'", (digest,))
@@ -227,7 +229,9 @@ def test_what_is_no_bundle_is_refused_in_words(make, said, bundle, call, tmp_pat
 
 @pytest.mark.usefixtures("analysed_once")
 @pytest.mark.parametrize("name", ["two chains", "ball", "blind"])
-def test_every_scene_has_a_bundle(name, call, tmp_path):
+def test_every_scene_has_a_bundle(name, call, tmp_path, request):
+    if name != "two chains":  # their numbers come again as those of chains and fences do
+        request.getfixturevalue("derived_once")
     text = {
         "two chains": short(repeats=1),
         "ball": (PROTOCOLS / "falling-ball.yaml").read_text("utf-8"),

@@ -13,6 +13,7 @@ from rig.link import messages as wire
 from rig.link.frames import Decoder
 from rig.protocol import reader
 from rig.protocol.protocol import PPS_U
+from rig.recorder.published import PublishedState
 from rig.recorder.recorder import Recorder
 from rig.results import calibration
 from rig.session.store import Session
@@ -167,8 +168,10 @@ def test_a_real_host_is_believed_no_further_than_its_quartz(tmp_path, fence):
         with Session.create(
             tmp_path / f"{simulated}", protocol.text, "f", simulated=simulated, origin="x"
         ) as session:
-            with Recorder(session, f"sim://?protocol={fence}") as recorder:
-                recorder.wait(60.0)
+            url, state = f"sim://?protocol={fence}", PublishedState()
+            recorder = Recorder(session, url, state, lambda: False, lambda _: {})
+            recorder.wait(60.0)
+            recorder.let_go()
             scales[simulated] = calibration(session).device
     assert scales[True].u < 2e-6
     assert scales[False].u == pytest.approx(50e-6 / 3**0.5, rel=0.01)

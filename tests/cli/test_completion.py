@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.command_help import COMMANDS
+from rig.command_page import COMMANDS
 from tests.waiting import PATIENCE_S
 
 

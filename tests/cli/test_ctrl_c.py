@@ -17,8 +17,6 @@ from textual.app import App
 from bench.mutants import CSV, make_session
 from rig import cli
 from rig.commands import demo, tui
-from rig.commands.growing import Growing
-from tests.cli.lab import Terminal
 
 STRUCK = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
 LOADING = f"""
@@ -85,7 +83,7 @@ def test_a_signal_while_the_terminal_is_at_work():
 def test_a_demo_that_was_interrupted_says_what_goes_on_with_it(call, tmp_path, monkeypatch):
     asked = []
 
-    def interrupted(protocol, _url, session, _operator, seed, _interrupts):
+    def interrupted(protocol, _url, session, _operator, seed):
         asked.append((protocol, Path(protocol).read_text("utf-8"), session, seed))
         raise KeyboardInterrupt
 
@@ -95,22 +93,6 @@ def test_a_demo_that_was_interrupted_says_what_goes_on_with_it(call, tmp_path, m
     words = re.search(r"rig: interrupted; \S*rig (demo .*) continues it", said.err)
     assert said.code == call(*shlex.split(words[1])).code == 130
     assert asked[0] == asked[1]
-
-
-def test_a_demo_draws_fig_3_as_it_grows_where_somebody_looks(call, tmp_path, monkeypatch):
-    """As `rig run` does, which tests/cli/test_growing.py looks at."""
-    told = []
-
-    def interrupted(_protocol, _url, _session, operator, _seed, _interrupts):
-        told.append(operator.judged)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(demo, "run_protocol", interrupted)
-    call("demo", "-o", tmp_path / "lines")
-    monkeypatch.setattr(sys, "stderr", Terminal())
-    call("demo", "-o", tmp_path / "picture")
-    assert told[0] is None
-    assert isinstance(told[1].__self__, Growing)
 
 
 MOMENTS = 40
@@ -163,8 +145,8 @@ def test_ctrl_c_at_any_moment_of_a_command(command, tmp_path):
             time.sleep(after_s)
             process.send_signal(signal.SIGINT)
         _, told = process.communicate()
-        for one in ("imported", "recovered", "ran", *(path.name for path in tmp_path.glob("new*"))):
-            (tmp_path / one).unlink(missing_ok=True)
+        for made in tmp_path.glob("[inr]*"):  # imported, new, ran, recovered
+            made.unlink()
         shutil.rmtree(tmp_path / "demo", ignore_errors=True)
         return time.monotonic() - began, process.returncode, told
 

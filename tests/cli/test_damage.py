@@ -16,7 +16,7 @@ from rig.results import calibration, protocol_of
 from rig.session.store import Session
 from tests.session.altering import unguarded
 
-pytestmark = pytest.mark.usefixtures("analysed_once")
+pytestmark = pytest.mark.usefixtures("analysed_once", "undrawn")
 RUNS = 3
 HZ = 16_000_000
 PARTS = 200

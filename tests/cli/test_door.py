@@ -72,7 +72,7 @@ def test_edges_are_those_that_export_writes(call, tmp_path):
         np.testing.assert_array_equal(edges.channel, mine[:, 1])
         np.testing.assert_array_equal(edges.blocked, mine[:, 3] == 1)
         np.testing.assert_allclose(edges.time_s, mine[:, 2], rtol=0, atol=2e-12)
-    with pytest.raises(InputError, match="no recorded drop of run 99"):
+    with pytest.raises(InputError, match=r"run 99 has no recorded drop\n.*runs 1–4"):
         session.edges(99)
     assert repr(session) == "<session my.session: 4 runs, simulated>"
 

@@ -1,14 +1,17 @@
 """Bad arguments, bad files, closed pipes: one located line a problem, and never a traceback."""
 
+import io
 import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from rig.commands import output
 from rig.session.store import Session
-from tests.cli.lab import PROTOCOLS, ROOT, command, rig, short
+from tests.cli.lab import PROTOCOLS, ROOT, Terminal, command, rig, short
 from tests.waiting import PATIENCE_S
 
 
@@ -21,84 +24,22 @@ def assert_told(done, code=2):
     assert "Error" not in done.err
 
 
-@pytest.fixture
-def files(tmp_path, finished):
-    """Files that are not what a command wants, by name."""
-    made = {
-        "folder": tmp_path,
-        "absent": tmp_path / "absent",
-        "nowhere": tmp_path / "no" / "such" / "folder" / "file",
-        "empty": tmp_path / "empty",
-        "binary": tmp_path / "binary",
-        "cut": tmp_path / "cut",
-        "text": tmp_path / "text",
-        "null": "/dev/null",
-        "nothing": "",
-        "root": "/",
-    }
-    made["empty"].touch()
-    made["binary"].write_bytes(bytes(range(256)) * 40)
-    made["cut"].write_bytes(finished.session.read_bytes()[:30_000])
-    made["text"].write_text("just words\n", "utf-8")
-    return made
-
-
-NOT_A_PROTOCOL = ("folder", "absent", "empty", "binary", "text", "null", "nothing")
-NOT_A_SESSION = ("folder", "absent", "empty", "binary", "cut", "text", "null", "nothing", "root")
-
-
-@pytest.mark.parametrize("name", NOT_A_PROTOCOL)
-def test_what_is_no_protocol_is_refused(call, files, tmp_path, name):
-    new = tmp_path / "new"
-    for arguments in (
-        ("check",),
-        ("predict", "--json"),
-        ("run", "--port", "sim://", "--session", new),
-        ("import", files["text"], "--session", new, "--protocol"),
-    ):
-        assert_told(call(*arguments, files[name]))
-        assert not new.exists()
-
-
-@pytest.mark.parametrize("name", NOT_A_SESSION)
-def test_what_is_no_session_is_refused_and_left_alone(call, files, tmp_path, name):
-    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    for arguments in (
-        ("analyze",),
-        ("analyze", "--json"),
-        ("replay",),
-        ("report", "-o", tmp_path / "out.html"),
-        ("export", "--csv", tmp_path / "out"),
-    ):
-        assert_told(call(*arguments, files[name]))
-    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-@pytest.mark.parametrize("name", ["folder", "nowhere", "empty", "binary", "cut", "text", "nothing"])
-def test_a_run_does_not_overwrite_another_file(call, files, protocol, name):
-    kept = {path: path.read_bytes() for path in protocol.parent.iterdir()}
+@pytest.mark.parametrize("name", [".", "no/such/folder/file", "text"])
+def test_a_run_does_not_overwrite_another_file(call, tmp_path, protocol, name):
+    """What else is no session is for tests/session."""
+    (tmp_path / "text").write_text("just words\n", "utf-8")
+    kept = {path: path.read_bytes() for path in tmp_path.iterdir()}
     for port in ("sim://", "/dev/nonexistent"):
-        assert_told(call("run", protocol, "--port", port, "--session", files[name]))
-    assert {path: path.read_bytes() for path in protocol.parent.iterdir()} == kept
+        assert_told(call("run", protocol, "--port", port, "--session", tmp_path / name))
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == kept
 
 
 @pytest.mark.parametrize(
     "port",
-    [
-        "sim://?protocol=/no/such/file",
-        "sim://?truth=/no/such/folder/file",
-        "sim://?no_such_dial=1",
-        "sim://?skew_sd=3",
-        "sim://?lose=nan",
-        "sim://?missed=2",
-        "sim://?pace=often",
-        "sim://?seed=x",
-        "sim://?seed=1&seed=2",
-        "sim://?quiet=perhaps",
-        "sim://[half",
-    ],
+    ["sim://?protocol=/no/such/file", "sim://?lose=nan", "sim://?seed=1&seed=2", "sim://[half"],
 )
 def test_a_simulation_that_cannot_be_is_bad_input(call, protocol, tmp_path, port):
+    """What else cannot be is for tests/sim."""
     assert_told(call("run", protocol, "--port", port, "--session", tmp_path / "s"))
 
 
@@ -170,6 +111,7 @@ def test_every_problem_of_a_protocol_has_its_line_and_column(call, tmp_path):
             (len(lines) + 1, "gravity"),
         } <= found
         assert any(key == "plan.repeat" for _, key in found)
+    assert not (tmp_path / "s").exists()
 
 
 def test_a_protocol_without_gates_points_to_predict(call, tmp_path):
@@ -215,11 +157,11 @@ def test_simulated_and_real_data_are_never_mixed(call, finished, protocol, tmp_p
 @pytest.mark.parametrize(
     ("port", "found", "instead"),
     [
-        ("sim://anything", "found 'anything' before the ?", "sim://?seed=3"),
-        ("sim://lab/7?seed=1", "found 'lab/7' before the ?", "sim://?seed=3"),
-        ("emu://pico", "found 'pico' before the ?", "emu://?board=mega"),
-        ("emu://uno?board=mega", "found 'uno' before the ?", "emu://?board=mega"),
-        ("sim://?seed=1#2", "found '#2' at its end", "%23"),
+        ("sim://anything", "unexpected 'anything'", "sim://?seed=3"),
+        ("sim://lab/7?seed=1", "unexpected 'lab/7'", "sim://?seed=3"),
+        ("emu://pico", "unexpected 'pico'", "emu://?board=mega"),
+        ("emu://uno?board=mega", "unexpected 'uno'", "emu://?board=mega"),
+        ("sim://?seed=1#2", "unexpected '#2'", "%23"),
     ],
 )
 def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port, found, instead):
@@ -235,7 +177,6 @@ def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port
         done = call(*arguments)
         assert_told(done)
         assert f"{port}: {found}" in done.err
-        assert "nothing is accepted" in done.err
         assert instead in done.err
     assert list(tmp_path.iterdir()) == [protocol]
 
@@ -255,6 +196,21 @@ def test_a_reader_that_leaves_in_the_middle_is_no_error(finished, tmp_path):
     assert process.returncode == 0
 
 
+@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+def test_sentences_are_broken_on_terminals_only(stream, monkeypatch):
+    lines = ["  a   row that is wider than the terminal   " + "x" * 60, "  run 3: " + "why " * 30]
+    monkeypatch.setattr("sys.stdout", stream())
+    monkeypatch.setenv("COLUMNS", "80")
+    output.show(lines)
+    row, *sentence = sys.stdout.getvalue().splitlines()
+    assert row == lines[0]
+    if stream is io.StringIO:
+        assert sentence == lines[1:]
+    else:
+        assert max(map(len, sentence)) <= 80
+        assert [line.startswith("    why") for line in sentence] == [False, True]
+
+
 def test_a_full_disk_behind_stdout_is_told(finished):
     with open("/dev/full", "w") as full:  # noqa: PTH123
         done = rig("predict", finished.protocol, stdout=full)
@@ -263,10 +219,10 @@ def test_a_full_disk_behind_stdout_is_told(finished):
 
 
 @pytest.mark.parametrize("closed", ["1", "2"])
-def test_streams_may_be_closed(finished, tmp_path, closed):
-    session = finished.copy(tmp_path)
+def test_streams_may_be_closed(call, finished, closed):
+    words = "predict", finished.protocol
     done = subprocess.run(
-        ["sh", "-c", f'exec "$@" {closed}>&-', "sh", *command("analyze", session)],
+        ["sh", "-c", f'exec "$@" {closed}>&-', "sh", *command(*words)],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -275,7 +231,7 @@ def test_streams_may_be_closed(finished, tmp_path, closed):
     )
     assert done.returncode == 0
     assert done.stderr == ""
-    assert done.stdout == ("" if closed == "1" else finished.table.out)
+    assert done.stdout == ("" if closed == "1" else call(*words).out)
 
 
 @pytest.mark.parametrize(
@@ -290,7 +246,6 @@ def test_streams_may_be_closed(finished, tmp_path, closed):
             ("stdout", "stderr"),
             ("daemon", "--port", "sim://", "--socket", "PLACE/d/s", "--idle-timeout", "0.1"),
         ),
-        (0, ("stdout", "stderr"), ("new", "PLACE/new.yaml", "--scene", "object", "--yes")),
     ],
 )
 def test_a_command_that_nobody_listens_to_keeps_its_exit_code(
@@ -311,12 +266,11 @@ def test_names_need_not_be_utf_8(tmp_path, fence):
     session = os.fsdecode(os.fsencode(tmp_path) + b"/\xff.session")
     done = rig("run", fence, "--port", "sim://", "--session", session)
     assert done.returncode == 0, done.stderr
-    assert rig("analyze", session).returncode == 0
 
 
-def test_a_terminal_without_greek_letters_is_served(finished, tmp_path):
+def test_a_terminal_without_greek_letters_is_served(finished):
     environment = os.environ | {"PYTHONIOENCODING": "latin-1"}
-    done = rig("analyze", finished.copy(tmp_path), env=environment, encoding="latin-1")
+    done = rig("predict", finished.protocol, env=environment, encoding="latin-1")
     assert (done.returncode, done.stderr) == (0, "")
     assert "?z ± U (cm)" in done.stdout
 
@@ -324,4 +278,5 @@ def test_a_terminal_without_greek_letters_is_served(finished, tmp_path):
 def test_what_only_the_system_refuses_is_said_without_numbers():
     session = 300 * "x"
     done = rig("run", PROTOCOLS / "picket-fence.yaml", "--port", "sim://", "--session", session)
-    assert (done.returncode, done.stderr) == (2, f"rig: {session}: File name too long\n")
+    said = f"{Path(session).absolute()}: File name too long\n  hint: name another file\n"
+    assert (done.returncode, done.stderr) == (2, said)

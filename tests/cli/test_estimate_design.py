@@ -49,6 +49,7 @@ def test_pictures_of_an_estimate_are_stamped(estimated):
     assert all("SIMULATED" in path.read_text("utf-8") for path in estimated.iterdir())
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_report_may_have_the_impacts_too(call, finished, tmp_path):
     page = tmp_path / "r.html"
     assert call("report", finished.session, "-o", page, "--estimate").code == 0
@@ -82,7 +83,9 @@ def test_a_design_proposes_heights_and_writes_them(call, tmp_path):
     assert done.code == 0, done.err
     (line,) = re.findall(r"^proposed \(mm\): (.*)$", done.out, re.MULTILINE)
     proposed = [float(one) * 1e-3 for one in line.split(", ")]
-    assert "sweep 1" in done.err
+    told = float(re.findall(r"sweep \d: uncertainties × (\S+) in", done.err)[-1])
+    (pair,) = re.findall(r"^g of one run .* (\S+) +(\S+)$", done.out, re.MULTILINE)
+    assert told == pytest.approx(float(pair[1]) / float(pair[0]), rel=0.1)
     assert "±" not in done.out
     written, before = (
         [gate.height for gate in reader.read(path).gates.gates] for path in (new, FENCE)
@@ -108,6 +111,8 @@ def test_a_design_by_the_scatter_that_a_session_taught(call, finished):
         found["current"]["measurands"], stated["current"]["measurands"], strict=True
     ):
         assert one["u_run"] < other["u_run"]
+    unlike = call("design", FENCE, "--learned", finished.session)
+    assert "has another kind of scene" in unlike.err
 
 
 @pytest.mark.parametrize(

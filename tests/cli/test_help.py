@@ -7,7 +7,7 @@ import pytest
 
 from rig.boards import BOARDS, FLASHED
 from rig.cli import BAD_INPUT, INTERRUPTED, _parser
-from rig.command_help import COMMANDS
+from rig.command_page import COMMANDS
 from rig.commands.output import VOID
 from rig.commands.replay import DIFFERENT
 from rig.errors import DeviceError, InputError, RigError
@@ -84,10 +84,31 @@ def test_examples_are_commands(line):
         (["analyse", "x"], "did you mean analyze?"),
         (["analyze", "x", "--josn"], "rig analyze [-h]"),
         (["run", "p", "--port", "sim://", "--session", "s", "--seed", "-1"], "found '-1'"),
-        (["predict", "nothere.yaml", "--figure", "3"], "leave nothere.yaml out"),
+        (
+            ["predict", "nothere.yaml", "--figure", "3"],
+            "--figure: not allowed with argument PROTOCOL",
+        ),
+        (["predict"], "PROTOCOL --figure is required"),
+        (["predict", "--figure", "3"], "--figure needs --output"),
+        (["predict", "--figure", "x", "-o", "x.svg"], "found 'x'; accepted: 3, 4, 6"),
+        (["check", "x", "--keys"], "--keys: not allowed with argument PROTOCOL"),
+        (["check", "--keys", "--board", "uno"], "--board needs PROTOCOL"),
+        (["export", "x", "--csv", "x", "--sign", "x"], "--sign needs --bundle"),
+        (["design", "x", "--no-search", "-o", "x"], "--output is of no use beside --no-search"),
+        (["design", "x", "-o", PROTOCOLS / "glider.yaml"], "glider.yaml already exists"),
+        (["analyze", "x", "--unfinished"], "--unfinished needs further SESSION"),
+        (["analyze", "x", "y", "--scatter"], "--scatter is of no use beside further SESSION"),
+        (["analyze", "x", "--budget", "1", "--priors"], "--priors is of no use beside --budget"),
+        (["import", "x", "--protocol", "x", "--channel", "a"], "found 'a'; accepted: a whole"),
+        (["report", "x", "-o", "x.session"], "accepted endings: .html"),
+        (["report", "x", "-o", "x.html", "--pdf", "x.html"], "accepted endings: .pdf"),
+        (["sweep", "x", "--vary", "friction=0..1:3", "-o", "s.txt"], "endings: .csv, .npz, .svg"),
+        (["export", "x", "--bundle", "x.yaml"], "accepted endings: .eln"),
+        (["analyze", "x", "--trials", "5"], "--trials needs --budget"),
+        (["new", "x.yaml", "--scene", "object", "--length", "1 m"], "--length: not in the scene"),
         (
             ["predict", "--figure", "3", "-o", "x.doc"],
-            "x.doc: unknown figure format; accepted: .svg, .png",
+            "found 'x.doc'; accepted endings: .svg, .png, .pdf",
         ),
         (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
         (["selftest", "--port", "/dev"], "/dev: it is a folder"),

@@ -11,7 +11,7 @@ from rig.analysis.quantities import COMPUTED
 from rig.measurands import MEASURANDS, Measurand
 from rig.results.live import LiveAnalysis
 from rig.tui.drop_words import number_table
-from tests.tui.lab import KEYS
+from tests.tui.lab import KEYS, unseen
 from tests.tui.screen import text_of
 
 SIZE = [(120, 36)]
@@ -58,8 +58,9 @@ def test_keys_of_any_name_and_unit(stem, unit):
     assert (row.stem, row.key("sd")) == (stem, f"{stem}_sd{unit}")
 
 
-@pytest.mark.usefixtures("added", "analysed_once")
-def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path):
+@pytest.mark.usefixtures("added", "analysed_once", "undrawn")
+def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path, monkeypatch):
+    unseen(monkeypatch)
     session = finished.copy(tmp_path)
     found = json.loads(call("analyze", session, "--json").out)
     for run in found["runs"]:

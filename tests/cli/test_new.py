@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from rig.errors import InputError
+from rig.files import write_atomic
 from rig.protocol.draft import SCENES, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.protocol.reader import parse, read
@@ -62,6 +64,18 @@ def test_a_protocol_with_drawings_and_four_drops(call, tmp_path, monkeypatch):
         assert (again.code, f"{here} already exists" in again.err) == (2, True)
         Path(here).unlink()
     assert not any(tmp_path.iterdir()), "none was drawn anew while another was there"
+
+
+def test_a_disk_that_is_full_half_way_is_left_as_it_was(call, tmp_path, monkeypatch):
+    def full(path, content):
+        if "wiring" in path.name:
+            raise InputError(f"cannot write {path}: No space left on device")
+        write_atomic(path, content)
+
+    monkeypatch.setattr("rig.commands.new.write_atomic", full)
+    done = call("new", tmp_path / "x.yaml", "--scene", "object", "--yes")
+    assert (done.code, "No space left" in done.err) == (2, True)
+    assert not any(tmp_path.iterdir())
 
 
 def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):

@@ -13,6 +13,7 @@ import pytest
 
 from rig.bundle.archive import list_hashes, pack
 from rig.cli import _parser
+from rig.errors import InputError
 from rig.files import write_atomic
 from tests.cli.lab import ROOT, command
 from tests.waiting import PATIENCE_S
@@ -161,3 +162,8 @@ def test_output_goes_into_any_pipe():
     code = f"from {write_atomic.__module__} import write_atomic; write_atomic('/dev/stdout', 'x')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
     assert done.stdout == b"x"
+
+
+def test_nothing_takes_the_place_of_a_session(finished):
+    with pytest.raises(InputError, match="a session is there"):
+        write_atomic(finished.session, "a page")

@@ -7,6 +7,7 @@ import pytest
 from tests.cli.lab import PROTOCOLS
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("name", ["falling-ball", "glider"])
 def test_each_gate_says_speed_and_time(name, call, tmp_path):
     text = (PROTOCOLS / f"{name}.yaml").read_text("utf-8")

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from rig.design.trials import Trials
 from tests.cli.lab import PROTOCOLS, short, without
 
 FIELDS = {
@@ -93,9 +94,16 @@ def test_a_given_alpha_needs_no_surface_numbers(call):
     assert line["separation_u_m"] > 0.0
 
 
-@pytest.mark.usefixtures("analysed_once")
+@pytest.fixture
+def untried(monkeypatch):
+    """Let no trial drops fall, which take long: `test_check_counts_runs_and_trial_drops` does."""
+    monkeypatch.setattr("rig.design.trials.trials", lambda _: Trials(20, 20))
+
+
+@pytest.mark.usefixtures("untried")
 @pytest.mark.parametrize("protocol", sorted(PROTOCOLS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
+    """And README, which boards can do it."""
     done = call("check", protocol)
     assert (done.code, done.err) == (0, "")
     title, blank, scene, *rest = done.out.splitlines()
@@ -107,8 +115,14 @@ def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
         assert "  no gates: prediction only, nothing is measured" in rest
     if "\nsurface:" not in text:
         assert any(line.startswith("  no surface:") for line in rest)
+    assert f"`{protocol.stem}`" in (PROTOCOLS.parent / "README.md").read_text("utf-8")
+    small = protocol.with_name(f"{protocol.stem}-uno.yaml").exists()  # what an Uno needs instead
+    boards = "pico, mega" if small else "pico, mega, uno"
+    able = [line.partition(": ")[2] for line in rest if line.startswith("  suitable boards")]
+    assert able == ([boards] if "\ngates:" in text else [])
 
 
+@pytest.mark.usefixtures("untried")
 def test_check_for_one_board_is_its_refusal(call):
     graded = "protocols/graded-chain.yaml"
     code, _, _ = call("check", graded, "--board", "mega")
@@ -119,18 +133,7 @@ def test_check_for_one_board_is_its_refusal(call):
     assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in err
 
 
-@pytest.mark.usefixtures("analysed_once")
-def test_the_readme_says_which_boards_can_do_a_ready_protocol(call):
-    readme = (PROTOCOLS.parent / "README.md").read_text("utf-8")
-    for path in PROTOCOLS.glob("*.yaml"):
-        assert f"`{path.stem}`" in readme
-        small = path.with_name(f"{path.stem}-uno.yaml").exists()  # what an Uno needs instead
-        boards = "pico, mega" if small else "pico, mega, uno"
-        lines = call("check", path).out.splitlines()
-        able = [line.partition(": ")[2] for line in lines if line.startswith("  suitable boards")]
-        assert able == ([boards] if "\ngates:" in path.read_text("utf-8") else [])
-
-
+@pytest.mark.usefixtures("untried")
 def test_check_says_what_predict_notes(call, tmp_path):
     path = tmp_path / "p.yaml"
     path.write_text(SINGULAR, "utf-8")
@@ -150,9 +153,10 @@ def test_check_says_what_predict_notes(call, tmp_path):
     assert noted == {note.partition("°: ")[2]}
 
 
-def test_check_counts_the_runs(call, finished):
+def test_check_counts_runs_and_trial_drops(call, finished):
     done = call("check", finished.protocol)
     assert "  4 runs: 2 at each incline (40, 60 deg)" in done.out.splitlines()
+    assert "20 simulated trial drops were identified" in done.out
 
 
 def test_a_table_has_no_columns_of_what_is_not_there(call):

@@ -24,6 +24,7 @@ if sys.argv[2] == "die":
 print("ready", flush=True)
 sys.stdin.read()
 """
+pytestmark = pytest.mark.usefixtures("undrawn")
 COMMANDS = [
     ("analyze", "SESSION"),
     ("analyze", "SESSION", "--json"),

@@ -27,14 +27,13 @@ def tamper(session, sql, *values):
 
 
 def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, monkeypatch):
-    connect = Recorder.connect
+    connect = Recorder.__init__
 
-    def wired(recorder, port):
-        identity = connect(recorder, port)
+    def wired(recorder, *what):
+        connect(recorder, *what)
         recorder._port.board.sense(0.0125)
-        return identity
 
-    monkeypatch.setattr(Recorder, "connect", wired)
+    monkeypatch.setattr(Recorder, "__init__", wired)
     assert call("run", fence, "--port", "sim://", "--session", tmp_path / "s").code == 0
     with Session.open(tmp_path / "s", readonly=True) as session:
         senses = [drop.certificate.release_sense for drop in session.drops()]

@@ -1,20 +1,23 @@
 """A campaign that is stopped, killed or cut off goes on where it was, and loses nothing."""
 
+import os
 import random
 import signal
 import subprocess
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
 
 import pytest
 
+from rig.daemon.worker import Worker
 from rig.errors import DeviceError
+from rig.link.client import Device
 from rig.link.port import open_port
-from rig.ports import completed
+from rig.ports import fill_url
 from rig.protocol import reader
 from rig.recorder.interrupts import Interrupts
-from rig.recorder.recorder import Recorder
 from rig.replay import replay
 from rig.results import calibration, results
 from rig.session.schema import RunState
@@ -27,6 +30,7 @@ from tests.cli.lab import (
     log_of,
     rig,
     short,
+    short_fence,
     truth_of,
 )
 from tests.waiting import PATIENCE_S, until
@@ -36,9 +40,6 @@ from tests.waiting import PATIENCE_S, until
 def protocol(fence):
     """What falls is all the same to a recording: bars, whose edges are identified at once."""
     return fence
-
-
-NAMES = {signal.SIGINT: "SIGINT", signal.SIGTERM: "SIGTERM", signal.SIGKILL: "SIGKILL"}
 
 
 def stopped(arguments, session, number, wait_s):
@@ -71,11 +72,11 @@ def _holds(lock, pid):
         return False
 
 
-def campaign(folder, numbers, longest_s, seed, pace):
+def campaign(folder, numbers, longest_s, seed, pace, text):
     """Stop a campaign by one signal after the other, then let it end; return the session."""
-    session = folder / f"{'-'.join(NAMES[number] for number in numbers)}-{seed}"
+    session = folder / f"{'-'.join(number.name for number in numbers)}-{seed}"
     protocol = session.with_suffix(".yaml")
-    protocol.write_text(short("40 deg", 3, "0.2 s"), "utf-8")
+    protocol.write_text(text, "utf-8")
     arguments = (
         *("run", protocol, "--port", f"sim://?pace={pace}", "--session", session),
         *("--seed", seed),
@@ -105,10 +106,11 @@ def campaign(folder, numbers, longest_s, seed, pace):
 def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path):
     int_, term, kill = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
     cases = [(int_, term), (kill, kill), (term, kill, int_)]
+    text = short("40 deg", 3, "0.2 s")
     with ThreadPoolExecutor(len(cases)) as pool:
         made = list(
             pool.map(
-                lambda case: campaign(tmp_path, case[1], 3.0, case[0], pace=1), enumerate(cases)
+                lambda case: campaign(tmp_path, case[1], 3.0, case[0], 1, text), enumerate(cases)
             )
         )
     for (_, ends), numbers in zip(made, cases, strict=True):
@@ -128,10 +130,10 @@ def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path)
 
 def test_signals_at_random_moments_of_a_fast_campaign_cost_no_run(tmp_path):
     """In virtual time nearly every moment is one of work, not of waiting."""
-    cases = [(signal.SIGTERM,), (signal.SIGKILL,)]
+    cases, text = [(signal.SIGTERM,), (signal.SIGKILL,)], short_fence(3)
     with ThreadPoolExecutor(2) as pool:
         made = pool.map(
-            lambda case: campaign(tmp_path, case[1], 0.25, case[0], pace=0), enumerate(cases)
+            lambda case: campaign(tmp_path, case[1], 0.25, case[0], 0, text), enumerate(cases)
         )
         assert any(code in {130, -signal.SIGKILL} for _, ends in made for code in ends)
 
@@ -175,13 +177,17 @@ def test_a_signal_between_a_byte_and_what_it_means_waits(run, tmp_path, monkeypa
 def test_whoever_stops_before_the_release_sees_nothing_fall(
     run, tmp_path, monkeypatch, state, number
 ):
-    add_state = Session.add_state
+    add_state, asked = Session.add_state, threading.Event()
 
     def add(session, run, attempt, new, *more):
         add_state(session, run, attempt, new, *more)
         if new == state:
-            signal.raise_signal(number)
+            os.kill(os.getpid(), number)  # the main thread has it, and waits for this one
+            assert asked.wait(PATIENCE_S)
 
+    for name in ("stop", "end"):
+        ask = getattr(Worker, name)
+        monkeypatch.setattr(Worker, name, lambda *a, ask=ask, **k: (ask(*a, **k), asked.set())[0])
     monkeypatch.setattr(Session, "add_state", add)
     assert run().code == 130
     assert truth_of(tmp_path / "s") == []
@@ -215,26 +221,26 @@ def test_a_drop_that_is_recorded_when_the_signal_comes_is_not_made_again(
 # ------------------------------------------------- what keeps the signals waiting
 
 
-def test_a_held_signal_comes_at_the_end_of_the_outermost_block():
+def test_a_signal_comes_where_it_is_let_through_or_at_the_end():
     interrupts, reached = Interrupts(), []
 
     def work():
-        with interrupts.held():
-            with interrupts.held():
-                signal.raise_signal(signal.SIGTERM)
-                reached.append("inner")
-            reached.append("outer")
-        reached.append("behind")
+        signal.raise_signal(signal.SIGTERM)
+        reached.append("inside")
+        with interrupts.let_through():
+            reached.append("behind")
 
     with interrupts.caught(), pytest.raises(KeyboardInterrupt):
         work()
-    assert reached == ["inner", "outer"]
+    assert reached == ["inside"]
     interrupts.check()
+    with pytest.raises(KeyboardInterrupt), interrupts.caught():
+        signal.raise_signal(signal.SIGTERM)
 
 
-def test_without_a_block_a_signal_comes_at_once():
+def test_where_it_is_let_through_a_signal_comes_at_once():
     interrupts = Interrupts()
-    with interrupts.caught(), pytest.raises(KeyboardInterrupt):
+    with interrupts.caught(), pytest.raises(KeyboardInterrupt), interrupts.let_through():
         signal.raise_signal(signal.SIGINT)
 
 
@@ -242,10 +248,9 @@ def test_the_third_signal_is_obeyed_at_once():
     interrupts, reached = Interrupts(), []
 
     def work():
-        with interrupts.held():
-            for number in (1, 2, 3, 4):
-                reached.append(number)
-                signal.raise_signal(signal.SIGINT)
+        for number in (1, 2, 3, 4):
+            reached.append(number)
+            signal.raise_signal(signal.SIGINT)
 
     with interrupts.caught(), pytest.raises(KeyboardInterrupt):
         work()
@@ -256,9 +261,8 @@ def test_an_error_inside_a_block_goes_first():
     interrupts = Interrupts()
 
     def work():
-        with interrupts.held():
-            signal.raise_signal(signal.SIGINT)
-            raise DeviceError("the board restarted")
+        signal.raise_signal(signal.SIGINT)
+        raise DeviceError("the board restarted")
 
     with interrupts.caught():
         with pytest.raises(DeviceError):
@@ -289,7 +293,7 @@ def new(tmp_path, protocol):
 
     def make(name="s"):
         path = tmp_path / name
-        url = completed("sim://", protocol, path, 1)
+        url = fill_url("sim://", protocol, path, 1)
         session = Session.create(path, scene.text, protocol.name, simulated=True, origin=url)
         return session, url, scene
 
@@ -318,13 +322,13 @@ def one_board(request, monkeypatch):
 
 def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
     """Lose the connection just before the drop is read, or just before it is acknowledged."""
-    fail = {RunState.FIRED: "collect", RunState.RECORDED: "_acknowledge"}[state]
+    fail = {RunState.FIRED: "collect", RunState.RECORDED: "acknowledge"}[state]
 
-    def broken(station, *_):
+    def broken(device, *_):
         raise DeviceError("connection lost: somebody stumbled")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Recorder, fail, broken)
+        patch.setattr(Device, fail, broken)
         done = run()
     assert done.code == 4
     return done

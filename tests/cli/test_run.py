@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import subprocess
+from html import unescape
 from itertools import count
 
 import pytest
@@ -18,7 +19,6 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from sim.serial_port import SimulatedSerial
 from tests.cli.lab import (
-    PROTOCOLS,
     ROOT,
     assert_whole,
     command,
@@ -26,6 +26,7 @@ from tests.cli.lab import (
     log_of,
     rig,
     short,
+    short_fence,
     truth_of,
 )
 from tests.waiting import PATIENCE_S
@@ -86,7 +87,7 @@ def test_what_is_measured_is_what_happened(finished, analysis):
             assert abs(run[name]["value"] - truth[name]) < 2.0 * run[name]["U95"], name
 
 
-def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, tmp_path):
+def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, call, tmp_path):
     done = run("s", "--json", port="sim://?skew_sd=1s")
     assert done.code == 3
     found = json.loads(done.out)
@@ -106,28 +107,31 @@ def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, tmp_path):
     assert log_of(tmp_path / "s")[1][: len(log[1])] == log[1]
     assert drops_of(tmp_path / "s")[:4] == [(1, 1), (1, 2), (1, 3), (1, 4)]
     assert "No accepted runs" in again.out
+    assert call("report", tmp_path / "s", "-o", tmp_path / "r.html").code == 0
+    what = again.out.splitlines()[again.out.splitlines().index("what to do:") + 1].strip()
+    assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
 def test_what_is_put_right_is_gone_on_with_by_the_same_command(call, tmp_path):
-    (tmp_path / "p.yaml").write_text(short("[40 deg, 60 deg]", 3), "utf-8")
-    args = ("run", tmp_path / "p.yaml", "--port", "sim://?skew_sd=6ms&seed=1", "--session")
+    (tmp_path / "p.yaml").write_text(short("40 deg", 2), "utf-8")
+    args = ("run", tmp_path / "p.yaml", "--port", "sim://?skew_sd=6ms&seed=31", "--session")
     first = call(*args, tmp_path / "s")
     assert first.code == 3
     assert "void for the same reason: release skew" in first.err
-    assert [attempt for number, attempt in drops_of(tmp_path / "s") if number == 5] == [1, 2, 3]
+    assert drops_of(tmp_path / "s") == [(1, 1), (1, 2), (1, 3)]
     assert call(*args, tmp_path / "s").code == 0
-    assert_whole(tmp_path / "s", 6)
+    assert_whole(tmp_path / "s", 2)
 
 
-def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_path, protocol):
+def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_path, fence):
     path, reasons = tmp_path / "s", ("edges_lost", "edges_missed", "crc_mismatch")
-    Session.create(path, protocol.read_text("utf-8"), protocol.name, simulated=True,
+    Session.create(path, fence.read_text("utf-8"), fence.name, simulated=True,
                    origin="sim://?seed=1").close()  # fmt: skip
     with Session.open(path) as session:
         for attempt, reason in enumerate(reasons, start=1):
             session.add_state(1, attempt, RunState.VOID, 0, (Reason(reason),))
         session.commit()
-    assert run("s").code == 0
+    assert run("s", protocol=fence).code == 0
     assert [(run, len(entries)) for run, entries in log_of(path).items()] == [(1, 3), (2, 4)]
 
 
@@ -189,13 +193,13 @@ def test_other_chains_are_not_mixed_into_a_simulated_session(run, tmp_path, fenc
     assert run("s", protocol=fence).code == run("s", "--seed", 3, protocol=fence).code == 0
 
 
-def test_a_session_that_was_moved_can_be_continued(call, tmp_path, protocol):
+def test_a_session_that_was_moved_can_be_continued(call, tmp_path, fence):
     def run(folder):
         return call("run", folder / "short.yaml", "--port", "sim://", "--session", folder / "s")
 
     old, new = tmp_path / "old", tmp_path / "new"
     old.mkdir()
-    (old / "short.yaml").write_bytes(protocol.read_bytes())
+    (old / "short.yaml").write_bytes(fence.read_bytes())
     assert run(old).code == 0
     old.rename(new)
     assert run(new).code == 0
@@ -206,10 +210,7 @@ def test_a_session_that_was_moved_can_be_continued(call, tmp_path, protocol):
 def reads(tmp_path_factory):
     """How often the port is read in a campaign of two runs that nothing disturbs."""
     folder, read, number = tmp_path_factory.mktemp("reads"), SimulatedSerial.read, count(1)
-    text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
-    (folder / "short.yaml").write_text(
-        text.replace("{repeats: 10, settle: 5 s}", "{repeats: 2, settle: 1 s}"), "utf-8"
-    )
+    (folder / "short.yaml").write_text(short_fence(), "utf-8")
 
     def counted(port, size=1):
         next(number)
@@ -257,35 +258,31 @@ def test_blocked_beams_that_nobody_clears_are_device_trouble(run, tmp_path):
         assert len(session.pings()) > 5, "somebody might have cleared them"
 
 
-def test_whoever_is_there_is_asked_before_each_drop(tmp_path):
-    protocol = tmp_path / "short.yaml"
-    protocol.write_text(short(repeats=1), "utf-8")
-    args = ("run", protocol, "--port", "sim://", "--session", tmp_path / "s")
+def test_whoever_is_there_is_asked_before_each_drop(tmp_path, fence):
+    session = tmp_path / "s"
+    args = ("run", fence, "--port", "sim://", "--session", session)
     ours, terminal = os.openpty()
     try:
-        os.write(ours, b"\n\n")
+        os.write(ours, b"\n\x04")  # Ctrl-D instead of a second answer
         done = rig(*args, stdin=terminal)
-        assert done.returncode == 0
-        assert "run 1 of 2: incline 40° · impact side: A · free side: B" in done.stderr
-        assert "run 2 of 2: incline 60° · impact side: A · free side: B" in done.stderr
-        assert done.stdout.startswith("SIMULATED DATA\n")
-
-        os.write(ours, b"\n\x04")  # Ctrl-D instead of an answer
-        done = rig(*args[:-1], tmp_path / "t", stdin=terminal)
         assert done.returncode == 130
-        assert drops_of(tmp_path / "t") == [(1, 1)]
-        assert rig(*args[:-1], tmp_path / "t", "--yes", stdin=terminal).returncode == 0
-        assert_whole(tmp_path / "t", 2)
+        assert all(f"run {number} of 2: put fence" in done.stderr for number in (1, 2))
+        assert drops_of(session) == [(1, 1)]
+        done = rig(*args, "--yes", stdin=terminal)
+        assert done.returncode == 0
+        assert "run 2 of 2: put fence" not in done.stderr
+        assert done.stdout.startswith("SIMULATED DATA\n")
+        assert_whole(session, 2)
     finally:
         os.close(ours)
         os.close(terminal)
 
 
-def test_a_second_writer_is_refused_and_a_reader_is_not(tmp_path):
+def test_a_second_writer_is_refused_and_a_reader_is_not(call, tmp_path, fence):
     """While a run is going on, at the speed of a real one."""
-    protocol, session = tmp_path / "two.yaml", tmp_path / "s"
-    protocol.write_text(short("40 deg", 500, "0.2 s"), "utf-8")  # more than there is time for
-    run = ("run", protocol, "--session", session, "--port")
+    session = tmp_path / "s"
+    fence.write_text(short_fence(500), "utf-8")  # more than there is time for
+    run = ("run", fence, "--session", session, "--port")
     writer = subprocess.Popen(
         command(*run, "sim://?pace=1"), cwd=ROOT, stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -293,13 +290,13 @@ def test_a_second_writer_is_refused_and_a_reader_is_not(tmp_path):
     try:
         assert writer.stderr is not None
         assert writer.stderr.readline().split()[1] == "1/500"
-        reader = rig("analyze", session, "--json")
-        second = rig(*run, "sim://")
+        reader = call("analyze", session, "--json")
+        second = call(*run, "sim://")
         assert writer.poll() is None, "all this happened while it was being written"
-        assert reader.returncode == 0, reader.stderr
-        assert json.loads(reader.stdout)["runs"][0]["run"] == 1
-        assert second.returncode == 2
-        assert f"is being written by process {writer.pid}" in second.stderr
+        assert reader.code == 0, reader.err
+        assert json.loads(reader.out)["runs"][0]["run"] == 1
+        assert second.code == 2
+        assert f"is being written by process {writer.pid}" in second.err
         writer.send_signal(signal.SIGINT)
         _, err = writer.communicate(timeout=PATIENCE_S)
     finally:

@@ -122,8 +122,10 @@ def test_whoever_is_there_is_asked_to_close_the_stop(monkeypatch, tmp_path, fenc
         asked.append(what)
         recorders[0]._port.board.stop(len(asked) == 1)
 
-    recorders, connect = [], Recorder.connect
-    monkeypatch.setattr(Recorder, "connect", lambda s, p: (connect(s, p), recorders.append(s))[0])
+    recorders, connect = [], Recorder.__init__
+    monkeypatch.setattr(
+        Recorder, "__init__", lambda s, *a: (connect(s, *a), recorders.append(s))[0]
+    )
     operator = Operator(say=lambda _: None, ask=ask)
     run_protocol(str(fence), "sim://", str(tmp_path / "s"), operator, 1)
     assert asked[1].startswith("not armed: the emergency stop is open; ")

@@ -11,7 +11,7 @@ from rig.records import ClockSample
 from tests.clock.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled, tick_rate
 from tests.examples import examples
 
-TRIALS = 300
+TRIALS = 120
 
 
 def errors(delay, trials=TRIALS, span=60.0, **clock):

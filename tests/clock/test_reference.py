@@ -1,7 +1,10 @@
 """The 1 Hz reference: seconds from pulses, whatever becomes of single ones."""
 
+from unittest.mock import Mock
+
 import pytest
 
+from rig.clock.calibration import Calibrator
 from rig.clock.epochs import epochs
 from rig.clock.rate import ping_rate, pulse_rate
 from rig.link import messages as wire
@@ -109,3 +112,13 @@ def test_pulses_come_out_of_the_bytes_and_repeats_do_not():
     ping, pong = wire.Ping(), wire.Pong(77)
     both = talk(("tx", ping, True), ("rx", pong, True), ("tx", ask, True), ("rx", answer, True))
     assert both == [ClockSample(0, 1000, 77), Pulse(2000, 3000, 12, 6_500_000)]
+
+
+def test_without_samples_the_rate_is_the_one_that_the_board_states():
+    log = Mock(simulated=False, **{"identities.return_value": [(0, {"tick_hz": HZ})]})
+    for name in ("pings", "pulses", "host_breaks"):
+        getattr(log, name).return_value = []
+    clock = Calibrator().look(log, 1e-7)
+    assert (clock.sources, clock.device.hz) == ((), HZ)
+    assert (clock.said["source"], clock.details["samples"]) == ("stated", 0)
+    assert not {"pings", "pulses", "clock_u_ppm"} & clock.said.keys()

@@ -46,10 +46,10 @@ def driver(processes, client):
 def door(tmp_path):
     """Run a test inside the daemon's own loop: a daemon whose simulated port is still closed."""
 
-    def within(test, *, tcp=False):
+    def within(test):
         async def run():
             path = tmp_path / "door" / "rig.sock"
-            server, ready = Server("sim://", path, tcp=tcp), asyncio.Event()
+            server, ready = Server("sim://", path), asyncio.Event()
             server.serving = asyncio.create_task(server.run(ready.set))
             await asyncio.wait_for(ready.wait(), PATIENCE_S)
             try:
@@ -59,7 +59,7 @@ def door(tmp_path):
                 server.end()
                 await asyncio.gather(server.serving, return_exceptions=True)
             assert failed or server.serving.exception() is None
-            assert not path.exists()
+            assert not any(path.parent.iterdir()), "nothing stays of it"
 
         asyncio.run(run())
 

@@ -196,7 +196,7 @@ class Box:
         """End the daemon as ``kill -9`` does; what the kernel has of it goes its way."""
         self.clock.sleep(0.02)
         self.board.advance(self.clock.now_ns())
-        session = self.worker.controller._session
+        session = self.worker.controller.opened
         if session is not None:
             session._connection.close()
             session._lock.release()
@@ -220,7 +220,7 @@ class Box:
         with suppress(RigError):
             self.lease.take("A", "A")
         names = str(self.protocol), str(self.session)
-        return self.asked(lambda c: None if c.recording else c.open_session(*names))
+        return self.asked(lambda c: None if c.opened else c.open_session(*names))
 
     def coming(self):
         """Run and attempt that come next by the file; `None` when all are done."""
@@ -323,7 +323,7 @@ class Box:
         if worker is not None:
             recorder, controller = worker.controller.recorder, worker.controller
             rig = (
-                controller.recording, recorder is not None, recorder and recorder.armed,
+                controller.opened is not None, recorder is not None, recorder and recorder.armed,
                 controller.due, type(worker._trouble).__name__, self.lease.holder,
                 worker._holder, self.line is not None,
             )  # fmt: skip
@@ -346,7 +346,7 @@ class Box:
             case "accept":
                 return any(self.on_disk("state", one)[-1:] == ["recorded"] for one in self.fell)
             case "resume":
-                return self.worker is None or not self.worker.controller.recording
+                return self.worker is None or self.worker.controller.opened is None
             case "reset":
                 return True
         return self.worker is not None

@@ -15,7 +15,7 @@ from tests.daemon.far_port import FarPort
     ("scheme", "lost", "said"),
     [
         ("rfc2217", FarPort.hang_up, "connection lost"),
-        ("socket", FarPort.fall_silent, "did not answer"),
+        pytest.param("socket", FarPort.fall_silent, "did not answer", marks=pytest.mark.slow),
     ],
 )
 def test_a_session_survives_a_connection_that_is_lost_while_chains_fall(scheme, lost, said):

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from rig.daemon import admission, rpc
+from rig.daemon import connection, rpc
 from rig.daemon.lease import LEASE_S
 from rig.daemon.service import METHODS
 from rig.recorder.published import PublishedState
@@ -36,11 +36,9 @@ def test_the_page_has_the_numbers():
     text = " ".join(PAGE.split())
     assert f"Version {rpc.API}." in text
     assert f"not heard for {LEASE_S:g} s" in text
-    assert f"within {admission.HELLO_S:g} s, or" in text
-    assert f"at most {admission.STRANGERS} are kept" in text
-    assert f"| {admission.CLIENTS}; {admission.RESERVE} more" in text
-    assert f"batch of up to {rpc.BATCH_LIMIT} requests" in text
-    assert f"| {rpc.BATCH_LIMIT}; more get" in text
+    assert f"within {connection.HELLO_S:g} s, or" in text
+    assert f"| {connection.CLIENTS}; any further" in text
+    assert f"| {rpc.WAITING_LIMIT}; more get" in text
     assert f"read | {rpc.UNREAD_LIMIT >> 20} MiB" in text
     assert rpc.REQUEST_LIMIT == 64 << 10
     assert rpc.MESSAGE_LIMIT == 16 << 20

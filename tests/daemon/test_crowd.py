@@ -8,13 +8,11 @@ import socket
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from unittest.mock import Mock
 
 import pytest
 
-from rig.daemon import admission, rpc, socket_path
-from rig.daemon.aclient import AsyncClient
-from rig.daemon.client import Client
+from rig.daemon import connection, rpc, service
+from rig.daemon.client import AsyncClient, Client, Line
 from tests.waiting import PATIENCE_S
 
 HELLO = rpc.request("hello", {"api": rpc.API, "client": "t"}, 1)
@@ -49,7 +47,7 @@ def test_a_silent_crowd_keeps_nobody_out(daemon):
             with contextlib.suppress(BlockingIOError):
                 line.connect(str(path))
                 line.send(b"{" * (number % 2))  # some begin a line
-        client = Client(path, "the one that means it")
+        client = Client(Line(path, "the one that means it"))
         client.stop("enough")
         client.close()
 
@@ -60,43 +58,40 @@ def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
 
         def come(number):
             try:
-                crowd.callback(Client(path, f"client {number}").close)
+                crowd.callback(Client(Line(path, f"client {number}")).close)
             except rpc.BusyError:
                 return 0
             return 1
 
         with ThreadPoolExecutor(160) as pool:
             let_in = sum(pool.map(come, range(160)))
-        assert let_in <= admission.CLIENTS + admission.RESERVE
-        assert let_in + sum(map(come, range(let_in, admission.CLIENTS))) >= admission.CLIENTS
+        assert let_in + sum(map(come, range(let_in, connection.CLIENTS))) >= connection.CLIENTS
     assert started.poll() is None
 
 
 def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, monkeypatch):
-    monkeypatch.setattr(socket_path, "_REACH_S", 0.2)
+    monkeypatch.setattr("rig.daemon.client._REACH_S", 1)
+    tmp_path.chmod(0o700)
     path = tmp_path / "rig.sock"
     with contextlib.ExitStack() as stack:
-        deaf = stack.enter_context(socket.socket(socket.AF_UNIX))
+        deaf, waiting = (stack.enter_context(socket.socket(socket.AF_UNIX)) for _ in range(2))
         deaf.bind(str(path))
         deaf.listen(0)
-        stack.enter_context(socket_path.reach(path)[0])  # the kernel keeps one waiting
+        waiting.connect(str(path))  # the kernel keeps one waiting
         with pytest.raises(rpc.BusyError, match="it took no new client"):
-            socket_path.reach(path)
+            Client(Line(path, "one more"))
 
 
 def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch):
-    monkeypatch.setattr(admission, "CLIENTS", 2)
-    monkeypatch.setattr(admission, "RESERVE", 1)
+    monkeypatch.setattr(service, "CLIENTS", 2)
 
     async def test(server, path):
         clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
         with pytest.raises(rpc.BusyError, match="any further client may only stop"):
             await clients[2].call("subscribe")
         assert await clients[2].call("stop") == {}
-        with pytest.raises(rpc.BusyError, match="2 clients are connected"):
-            await AsyncClient.connect(path, "one more")
         await clients[0].close()
-        while len(server.publisher.connections) > 2:
+        while server.published.get("clients") > 1:
             await asyncio.sleep(0)
         await (await AsyncClient.connect(path, "in its place")).close()
         for client in clients:
@@ -151,7 +146,7 @@ def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog)
         def broken():
             raise ArithmeticError("of a kind that nobody foresaw")
 
-        monkeypatch.setattr(server.publisher, "spread", broken)
+        monkeypatch.setattr(server.service.publisher, "spread", broken)
         server.published.set(error={"message": "anything"})
         with pytest.raises(ArithmeticError, match="nobody foresaw"):
             await server.serving
@@ -173,51 +168,6 @@ def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
     door(test)
 
 
-def spoken(path, *lines):
-    """Send lines behind a hello and give the answers to them, until one to `end` comes."""
-    with socket.socket(socket.AF_UNIX) as line:
-        line.connect(str(path))
-        end = rpc.request("unsubscribe", {}, 999)
-        line.sendall(HELLO + b"".join(lines) + end)
-        with line.makefile("rb") as answers:
-            assert json.loads(answers.readline())["id"] == 1
-            found = []
-            while (one := json.loads(answers.readline())) != json.loads(rpc.answer(999, {})):
-                found.append(one)
-            return found
-
-
-def test_batches_and_ids_are_as_json_rpc_has_them(door):
-    async def test(server, path):
-        batch = [
-            {"jsonrpc": "2.0", "id": "a", "method": "renew"},
-            {"jsonrpc": "2.0", "method": "renew"},
-            {"jsonrpc": "2.0", "id": 1.5, "method": "dance"},
-            7,
-            {"jsonrpc": "2.0", "id": None, "method": "unsubscribe"},
-            {"jsonrpc": "2.0", "id": 3, "method": "unsubscribe", "params": {"from": 1}},
-        ]
-        silent = [{"jsonrpc": "2.0", "method": "dance"}, {"jsonrpc": "2.0", "method": "renew"}]
-        lines = [
-            json.dumps(batch).encode() + b"\n",
-            json.dumps(silent).encode() + b"\n",
-            b'{"jsonrpc":"2.0","method":"dance","params":[1]}\n',
-            b'{"jsonrpc":"2.0","id":null,"method":"renew"}\n',
-        ]
-        told = await asyncio.to_thread(spoken, path, *lines)
-        answers, last = sorted(
-            told, key=lambda one: isinstance(one, dict)
-        )  # signs of life overtake
-        codes = {one["id"]: one["error"]["code"] for one in answers if "error" in one}
-        assert codes == {1.5: rpc.NO_METHOD, None: rpc.INVALID, 3: rpc.BAD_PARAMS}
-        assert [one["id"] for one in answers if "result" in one] in (["a", None], [None, "a"])
-        assert last == {"jsonrpc": "2.0", "id": None, "result": {"disk_s": 0.0}}
-        told = {one["id"]: one["error"]["message"] for one in answers if "error" in one}
-        assert told[3] == "unsubscribe: Object contains unknown field `from`"
-
-    door(test)
-
-
 def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
     async def test(server, path):
         reader, writer = await asyncio.open_unix_connection(path)
@@ -225,7 +175,7 @@ def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
         waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
         writer.write(HELLO)
         await reader.readline()
-        (client,) = server.publisher.connections
+        (client,) = server.service.connections
         do = client._do
 
         async def held(one, request):
@@ -251,10 +201,10 @@ def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch)
         lines = [await asyncio.open_unix_connection(path) for _ in range(21)]
         for _, writer in lines:
             writer.write(HELLO)
-        while len(server.publisher.connections) < len(lines):
+        while server.published.get("clients") < len(lines):
             await asyncio.sleep(0)
         (_, stopping), *many = lines
-        done, do = [], server._service.do
+        done, do = [], server.service.do
 
         def noted(client, request):
             if not done:
@@ -262,7 +212,7 @@ def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch)
             done.append(request.method)
             return do(client, request)
 
-        for one in server.publisher.connections:
+        for one in server.service.connections:
             monkeypatch.setattr(one, "_do", noted)
         for _, writer in many:
             writer.write(b"".join(rpc.request("subscribe", {}, number) for number in range(20)))
@@ -273,18 +223,6 @@ def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch)
             writer.close()
 
     door(test)
-
-
-def test_the_oldest_that_says_nothing_makes_room():
-    turned_away = []
-    door = admission.Admission()
-    for number in range(admission.STRANGERS + 3):
-        said = number == 1
-        door.register(Mock(spoke=said, turn_away=lambda _why, n=number: turned_away.append(n)))
-    assert turned_away == [0, 2, 3]  # 1 waits for an answer
-    while door.make_room():
-        pass
-    assert turned_away == [0, *range(2, admission.STRANGERS + 3)]
 
 
 def test_of_a_client_that_goes_nothing_stays(door):

@@ -3,6 +3,8 @@
 import os
 import shutil
 import socket
+import time
+from itertools import product
 
 import pytest
 
@@ -10,7 +12,7 @@ from bench.process_fixture import ProcessFixture
 from rig.errors import RigError
 from rig.session.store import Session
 from tests.daemon.at_work import working
-from tests.waiting import PATIENCE_S
+from tests.waiting import PATIENCE_S, until
 
 
 @pytest.fixture
@@ -65,11 +67,11 @@ def replace(place):
 
 
 @pytest.mark.parametrize(
-    ("lose", "option"), [(delete, ()), (move, ("--idle-timeout", "300")), (replace, ("--tcp",))]
+    ("lose", "option"), [(delete, ()), (move, ("--idle-timeout", "300")), (replace, ())]
 )
 def test_without_its_socket_it_ends(processes, state, lose, option):
     processes.start_daemon(*option)
-    place = processes.socket.with_suffix(".tcp" if option == ("--tcp",) else ".sock")
+    place = processes.socket
     lose(place)
     assert "was deleted, moved or replaced" in ended(processes, 2)
     assert "was deleted, moved or replaced" in (state / "daemon.log").read_text("utf-8")
@@ -79,7 +81,9 @@ def test_without_its_socket_it_ends(processes, state, lose, option):
 def test_it_stays_for_the_clients_that_it_has(processes):
     processes.start_daemon()
     client = processes.client()
+    until(lambda: client.call("subscribe")["state"]["link"]["state"] == "up")
     delete(processes.socket)
+    time.sleep(1.0)  # it looks ten times a second
     lease = client.call("subscribe")["state"]["daemon"]
     assert client.call("renew") == {"disk_s": 0.0}
     assert lease["pid"] == processes.daemon.pid
@@ -104,14 +108,13 @@ def test_where_all_was_deleted_under_it_it_saves_what_it_has_and_ends(processes,
         assert session.drop(1, attempt) is not None
 
 
-@pytest.mark.parametrize("length", [250, 300])
-@pytest.mark.parametrize("which", ["session", "protocol"])
-def test_a_name_that_no_disk_takes_is_refused_with_its_place(processes, caplog, length, which):
+def test_a_name_that_no_disk_takes_is_refused_with_its_place(processes, caplog):
     with working(processes) as (_, ask):
-        names = {"protocol": str(processes.protocol), "session": str(processes.session)}
-        names[which] = str(processes.folder / (length * "x"))
-        with pytest.raises(RigError) as caught:
-            ask(lambda controller: controller.open_session(**names))
-    assert caught.value.exit_code == 2
-    assert names[which][:50] in str(caught.value)
+        for which, length in product(("session", "protocol"), (250, 300)):
+            names = {"protocol": str(processes.protocol), "session": str(processes.session)}
+            names[which] = str(processes.folder / (length * "x"))
+            with pytest.raises(RigError) as caught:
+                ask(lambda controller, names=names: controller.open_session(**names))
+            assert caught.value.exit_code == 2
+            assert names[which][:50] in str(caught.value)
     assert not [record for record in caplog.records if record.exc_info]

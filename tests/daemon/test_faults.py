@@ -15,8 +15,8 @@ from rig.session.store import Session
 @pytest.mark.parametrize(
     ("kinds", "contention"),
     [
-        (("daemon", "brownout"), ()),
-        pytest.param(("runner", "cable", "disk"), CONTENTION, marks=pytest.mark.slow),
+        (("daemon",), ()),
+        pytest.param(("runner", "cable", "brownout", "disk"), CONTENTION, marks=pytest.mark.slow),
     ],
 )
 def test_nothing_is_lost_whatever_dies(kinds, contention):

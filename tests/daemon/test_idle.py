@@ -20,7 +20,7 @@ ALONE = f"no client for {IDLE_S:g} s"
 @pytest.fixture
 def processes():
     """Have a board and a daemon that ends when it is left alone."""
-    with ProcessFixture(runs=2, seed=3, small_disk=True) as made:
+    with ProcessFixture(runs=2, seed=3) as made:
         made.start_daemon("--idle-timeout", str(IDLE_S))
         yield made
 
@@ -106,12 +106,12 @@ def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):
 
 
 def test_it_stays_until_the_disk_has_taken_everything(processes, driver):
-    processes.disk.fill(processes.daemon)
+    processes.fill_disk()
     until(lambda: driver.call("subscribe")["state"]["phase"] == "trouble")  # until then all is kept
     driver.close()
     time.sleep(4 * IDLE_S)
     assert processes.daemon.poll() is None
-    processes.disk.free(processes.daemon)
+    processes.free_disk()
     assert any(line.startswith("trouble: ") for line in ended(processes))
     with Session.open(processes.session, readonly=True) as session:
         assert list(session.pings())

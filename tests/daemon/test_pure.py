@@ -2,6 +2,9 @@
 
 import json
 import random
+import socket
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
 from unittest.mock import Mock
 
 import pytest
@@ -10,12 +13,11 @@ from hypothesis import strategies as st
 
 from bench.process_fixture import FENCE
 from rig.daemon import rpc
-from rig.daemon.admission import CLIENTS, Admission
-from rig.daemon.client import MessageReader
+from rig.daemon.client import Client, Line
 from rig.daemon.lease import LEASE_S, ControlError, Lease
 from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
-from rig.daemon.stopper import Stopper
+from rig.daemon.worker import Worker
 from rig.errors import (
     DeviceError,
     DeviceTimeoutError,
@@ -24,13 +26,13 @@ from rig.errors import (
     RigError,
     SessionError,
 )
-from rig.files import identity_of
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
 from rig.recorder.controller import Controller
-from rig.recorder.interrupts import StoppedError
+from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.recorder.published import EDGES_LIMIT, PublishedState
+from tests.waiting import PATIENCE_S
 
 ERRORS = [
     RigError("something"),
@@ -42,11 +44,8 @@ ERRORS = [
     DeviceRefusedError(RefusalReason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
     ControlError("taken"),
     make_error(StoppedError, "stopped", text="stopped by Ada"),
-    make_error(ControlError, "control_lost", silence_s=3.25, holder="Ada"),
     rpc.VersionError("old"),
 ]
-
-MESSAGES = st.lists(st.dictionaries(st.text(max_size=4), st.text(max_size=9), max_size=3))
 
 
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
@@ -80,8 +79,7 @@ def test_an_error_of_a_kind_only_the_daemon_knows_is_an_error_all_the_same():
 @given(st.binary(max_size=200))
 def test_any_line_is_a_request_or_is_refused_with_a_code(line):
     read = rpc.read_line(line)
-    for one in read if isinstance(read, list) else [read]:
-        assert one.code if isinstance(one, rpc.RpcError) else one.method is not None
+    assert read.code if isinstance(read, rpc.RpcError) else read.method is not None
 
 
 @pytest.mark.parametrize(
@@ -93,7 +91,7 @@ def test_any_line_is_a_request_or_is_refused_with_a_code(line):
         (b'{"jsonrpc":"1.0","id":1,"method":"a"}', rpc.INVALID),
         (b'{"jsonrpc":"2.0","id":true,"method":"a"}', rpc.INVALID),
         (b'{"jsonrpc":"2.0","id":1,"method":2}', rpc.INVALID),
-        (b'{"jsonrpc":"2.0","id":1,"method":"a","params":[1]}', rpc.BAD_PARAMS),
+        (b'{"jsonrpc":"2.0","id":[1],"method":"a"}', rpc.INVALID),
     ],
 )
 def test_what_is_no_request_gets_its_code(line, code):
@@ -102,35 +100,33 @@ def test_what_is_no_request_gets_its_code(line, code):
 
 def test_a_request_is_read_as_it_was_written():
     job = {"run": 1, "attempt": 2}
-    assert rpc.read_line(rpc.request("arm", job, 5)) == rpc.Request("arm", job, 5)
-    assert rpc.read_line(rpc.request("renew", {}, None)).silent
+    assert rpc.read_line(rpc.request("arm", job, 5)) == rpc.Request(
+        jsonrpc="2.0", method="arm", params=job, id=5
+    )
 
 
-@given(MESSAGES, st.data())
-def test_any_cut_gives_the_same_messages(messages, data):
-    stream = b"".join(json.dumps(one).encode() + b"\n" for one in messages)
-    cuts = data.draw(st.lists(st.integers(1, max(1, len(stream))), max_size=9, unique=True))
-    ends = sorted({*cuts, len(stream)} - {0})
-    dialogue, found = MessageReader(), []
-    for begin, end in zip([0, *ends], ends, strict=False):
-        if part := stream[begin:end]:
-            found += dialogue.feed(part)
-    assert found == messages
-    with pytest.raises(DeviceError, match="hung up"):
-        list(dialogue.feed(b""))
-
-
-@pytest.mark.parametrize("line", [b"HTTP/1.1 400 Bad Request\n", b"\xff\xfe\n", b"[1]\n", b"\n"])
-def test_who_is_no_daemon_is_told_so(line):
-    with pytest.raises(DeviceError, match="not a daemon of this rig"):
-        list(MessageReader().feed(line))
-
-
-def test_a_line_without_an_end_is_no_daemons():
-    dialogue = MessageReader()
-    assert list(dialogue.feed(b"x" * rpc.MESSAGE_LIMIT)) == []
-    with pytest.raises(DeviceError, match="not a daemon of this rig"):
-        list(dialogue.feed(b"x"))
+@pytest.mark.parametrize(
+    ("told", "why"),
+    [
+        (b"HTTP/1.1 400 Bad Request\n", "not a daemon of this rig"),
+        (b"\xff\xfe\n", "not a daemon of this rig"),
+        (b"[1]\n", "not a daemon of this rig"),
+        (b'{"half": ', "hung up"),
+        (b"", "hung up"),
+    ],
+)
+def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
+    tmp_path.chmod(0o700)
+    with socket.socket(socket.AF_UNIX) as other, ThreadPoolExecutor(1) as pool:
+        other.bind(str(tmp_path / "rig.sock"))
+        other.listen()
+        client = pool.submit(Line, tmp_path / "rig.sock", "t")
+        line, _ = other.accept()
+        with line:
+            line.recv(1 << 10)
+            line.sendall(told)
+        with pytest.raises(DeviceError, match=why):
+            client.result()
 
 
 class Time:
@@ -169,47 +165,19 @@ def test_one_client_has_control_until_it_is_not_heard():
     assert lease.holder is None
 
 
-def test_who_was_silent_too_long_is_told_so_until_it_gives_control_up_or_has_it_again():
-    time = Time()
-    lease = Lease(time)
-    lease.take("one", "rig run 1")
-    time.now = 5.0
-    lease.take("two", "a tui")
-    time.now = 7.5
-    lease.heard("one")
-    lost = r"control was lost: nothing was heard .* for 7\.5 s, and a tui has it"
-    with pytest.raises(ControlError, match=lost):
-        lease.require("one")
-    assert not lease.release("one")
-    with pytest.raises(ControlError, match="take control first"):
-        lease.require("one")
-    lease.release("two")
-    lease.take("one", "rig run 1")
-    lease.require("one")
-
-
 def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch):
     """The next daemon's file may have the number that this one's had."""
     place = tmp_path / "rig.sock"
-    place.touch()
+    tmp_path.chmod(0o700)
     door = Door(place)
-    same = identity_of(place)
+    same = door._ours
     place.unlink()
     assert not door.there()
     place.touch()
-    monkeypatch.setattr("rig.daemon.listener.identity_of", lambda _: same)
+    monkeypatch.setattr("rig.daemon.listener._identity", lambda _: same)
     assert not door.there()
-    door.remove()
+    door.close()
     assert place.exists()
-
-
-def test_a_client_in_the_reserve_has_no_more_time_than_a_stranger():
-    admission, *clients = Admission(), *(Mock() for _ in range(CLIENTS + 1))
-    for client in clients:
-        admission.register(client)
-        assert admission.late(client)
-        admission.welcome(client)
-    assert [client for client in clients if admission.late(client)] == clients[-1:]
 
 
 def test_a_replica_shows_what_is_published_whenever_it_is_looked_at():
@@ -276,29 +244,32 @@ def test_a_replica_does_not_swallow_a_gap():
 
 @pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])
 def test_stop_is_sent_five_times_unless_the_worker_takes_over(monkeypatch, worker_comes, times):
-    sent, paused = [], []
-
-    def send():
-        sent.append(1)
-        stopper._ending = True  # behind what is asked for now
-        stopper._asked.set()
-        return True
-
-    stopper = Stopper(send)  # never started: this thread is its thread
+    worker = Worker("a port", PublishedState(), Lease())  # never started: nobody attends to it
+    sent, paused, over = [], [], threading.Event()
+    monkeypatch.setattr(worker, "_abort_past", lambda: sent.append(1) or True)
     pause = lambda seconds: paused.append(seconds) or worker_comes  # noqa: E731
-    monkeypatch.setattr(stopper._taken_over, "wait", pause)
-    stopper.ask()
-    stopper._run()
+    monkeypatch.setattr(worker._attended, "wait", pause)
+    send = worker._send_aborts
+    monkeypatch.setattr(worker, "_send_aborts", lambda: (send(), over.set()))
+    worker._attended.set()  # of the time before
+    worker.stop("enough")
+    assert over.wait(PATIENCE_S)
+    assert not worker._attended.is_set()
     assert len(sent) == times
     # The board switches itself off by then, and a later one could end what somebody armed anew.
     assert 0.0 < sum(paused) < HOST_SILENCE_MS * 1e-3
 
 
-def test_who_asks_for_stop_again_waits_until_that_one_has_left_too():
-    stopper = Stopper(lambda: True)  # never started: nothing leaves
-    stopper._left.set()  # of the time before
-    stopper.ask()
-    assert not stopper._left.is_set()
+def test_a_signal_waits_only_while_something_falls():
+    """The daemon records what fell; to stop it then would cut the recording short."""
+    answer, interrupts, client = Future(), Interrupts(), Client.__new__(Client)
+    answer.set_result({})
+    client._interrupts, client.line = interrupts, Mock(ask=lambda *_, **__: answer)
+    for method in ("wait", "fire"):  # until the release is on, nothing shall fall
+        interrupts._note()
+        assert client.call("collect") == {}
+        with pytest.raises(KeyboardInterrupt):
+            client.call(method)
 
 
 def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
@@ -306,14 +277,14 @@ def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
     before, _, after = FENCE.partition("gates:")
     protocol.write_text(before + after[after.index("release:") :].replace("RUNS", "1"), "utf-8")
     with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
-        Controller("sim://").open_session(str(protocol), str(session))
+        Controller("sim://", PublishedState()).open_session(str(protocol), str(session))
     assert not session.exists()
 
 
 def test_a_session_that_is_closed_is_shown_to_nobody_any_more(tmp_path):
     protocol = tmp_path / "fence.yaml"
     protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
-    rig = Controller("sim://")
+    rig = Controller("sim://", PublishedState())
     rig.open_session(str(protocol), str(tmp_path / "session"))
     assert rig.published.get("session")["path"] == str(tmp_path / "session")
     rig.close()

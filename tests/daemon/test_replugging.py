@@ -9,6 +9,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from bench.process_fixture import ProcessFixture
 from rig.errors import DeviceError
 from rig.recorder.controller import Controller
+from rig.recorder.published import PublishedState
 from rig.session.store import Session
 from tests.daemon.at_work import let_fall, working
 from tests.waiting import until
@@ -74,16 +75,16 @@ def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):
     with ProcessFixture(1) as processes:
         elsewhere = processes.folder / "elsewhere"
         usb |= {processes.port: "85430", elsewhere: "85430"}
-        with closing(Controller(str(processes.port))) as controller:
+        with closing(Controller(str(processes.port), PublishedState())) as controller:
             controller.open_session(str(processes.protocol), str(processes.session))
         processes.hand(f"pull 0 {elsewhere}")
         until(elsewhere.exists)
-        with closing(Controller(str(processes.port))) as controller:
+        with closing(Controller(str(processes.port), PublishedState())) as controller:
             controller.open_session(str(processes.protocol), str(processes.session))
             assert controller.published.get("port")["path"] == os.path.realpath(elsewhere)
         usb[elsewhere] = "999"
         with (
-            closing(Controller(str(processes.port))) as controller,
+            closing(Controller(str(processes.port), PublishedState())) as controller,
             pytest.raises(DeviceError, match="no such"),
         ):
             controller.open_session(str(processes.protocol), str(processes.session))

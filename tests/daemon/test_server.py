@@ -6,16 +6,13 @@ import json
 import os
 import socket
 import stat
-import subprocess
-import sys
 
 import pytest
 
 from bench.process_fixture import ProcessFixture
 from rig.daemon import rpc
-from rig.daemon.aclient import AsyncClient
-from rig.daemon.client import Client
-from rig.daemon.listener import listen, notify_systemd
+from rig.daemon.client import AsyncClient, Client, Line
+from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, InputError, RigError
 
@@ -54,7 +51,7 @@ def test_a_folder_that_is_open_to_others_is_refused(tmp_path):
     with pytest.raises(InputError, match="open to other users"):
         prepare_folder(tmp_path)
     with pytest.raises(InputError, match="open to other users"):
-        Client(tmp_path / "rig.sock", "t")
+        Client(Line(tmp_path / "rig.sock", "t"))
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
@@ -106,7 +103,8 @@ def test_a_client_of_another_version_is_told_so_and_sent_away(door):
         (rpc.request("open_session", {"protocol": "/p\0", "session": "/s"}, 2), rpc.BAD_PARAMS),
         (rpc.request("open_session", {"protocol": "/\ud800", "session": "/s"}, 2), rpc.BAD_PARAMS),
         (b"[]\n", rpc.INVALID),
-        (b"[" + 65 * b"1," + b"1]\n", rpc.INVALID),
+        (b'{"jsonrpc":"2.0","method":"renew"}\n', rpc.INVALID),
+        (b'[{"jsonrpc":"2.0","id":1,"method":"renew"}]\n', rpc.INVALID),
         (rpc.request("subscribe", {"to": "all"}, 2), rpc.BAD_PARAMS),
         (rpc.request("log_state", {"run": 1, "attempt": 1, "state": "fine", "reasons": []}, 2),
          rpc.BAD_PARAMS),
@@ -162,14 +160,14 @@ def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_do
         slow.connect(str(path))
         slow.sendall(HELLO + rpc.request("subscribe", {}, 2))
         slow.setblocking(False)
-        while not any(one.subscribed for one in server.publisher.connections):
+        while not any(one.subscribed for one in server.service.connections):
             await asyncio.sleep(0)
-        (stuck,) = server.publisher.connections
+        (stuck,) = server.service.connections
         quick = await AsyncClient.connect(path, "quick")
         await quick.subscribe()
         for number in range(400):
             server.published.set(error={"message": f"{number} " + "x" * 2000})
-            server.publisher.spread()
+            server.service.publisher.spread()
             assert stuck.waiting() < 100_000
             while not str((quick.replica.state["error"] or {}).get("message")).startswith(
                 f"{number} "
@@ -190,26 +188,6 @@ def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_do
     door(test)
 
 
-def test_over_tcp_the_token_is_asked_for(door):
-    async def test(server, path):
-        file = path.with_suffix(".tcp")
-        assert stat.S_IMODE(file.stat().st_mode) == 0o600
-        port = json.loads(file.read_text())["port"]
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        writer.write(HELLO)
-        assert json.loads(await reader.readline())["error"]["message"] == "wrong token"
-        assert await reader.read() == b""
-        writer.close()
-        client = await AsyncClient.connect(path, "tui")
-        await client.subscribe()
-        await client.close()
-        blocking = await asyncio.to_thread(Client, path, "script")
-        assert await asyncio.to_thread(blocking.call, "renew") == {"disk_s": 0.0}
-        blocking.close()
-
-    door(test, tcp=True)
-
-
 def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
     with ProcessFixture(runs=1) as processes:
         processes.start_daemon()
@@ -223,24 +201,20 @@ def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
         processes.client().close()
 
 
-def test_a_daemon_to_which_so_many_want_that_nobody_else_gets_through_is_one(tmp_path):
-    path = tmp_path / "door" / "rig.sock"
-    with listen(path, "") as other, contextlib.ExitStack() as waiting:
-        other.listen(0)  # nobody is let in, and the kernel keeps one or two
-        full = 0
-        while not full:
-            one = waiting.enter_context(socket.socket(socket.AF_UNIX))
-            one.setblocking(False)
-            full = one.connect_ex(str(path))
-        with pytest.raises(InputError, match="another daemon answers"):
-            listen(path, "")
-        assert path.exists()
+def test_a_place_that_cannot_be_a_socket_is_refused_and_left_as_it_is(tmp_path):
+    tmp_path.chmod(0o700)
+    (tmp_path / "my.yaml").write_text("chains")
+    for name, why in (("my.yaml", "in use"), (110 * "x", "too long")):
+        with pytest.raises(InputError, match=rf"cannot use .*{why}") as caught:
+            Door(tmp_path / name)
+        assert "--socket" in caught.value.hint
+    assert (tmp_path / "my.yaml").read_text() == "chains"
 
 
 def test_no_daemon_is_said_so(tmp_path):
     tmp_path.chmod(0o700)
     with pytest.raises(RigError, match=r"no daemon at .*/rig\.sock: No such file or directory"):
-        Client(tmp_path / "rig.sock", "t")
+        Client(Line(tmp_path / "rig.sock", "t"))
     with pytest.raises(RigError, match="no daemon at"):
         asyncio.run(AsyncClient.connect(tmp_path / "rig.sock", "t"))
 
@@ -251,25 +225,3 @@ def test_the_usual_place(monkeypatch, tmp_path):
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert default_socket() == tmp_path / ".cache/chainrig/rig.sock"
-
-
-def test_systemd_is_told_when_it_asks(monkeypatch, tmp_path):
-    notify_systemd()
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as there:
-        there.bind(str(tmp_path / "notify"))
-        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
-        notify_systemd()
-        assert there.recv(99) == b"READY=1"
-
-
-def test_a_run_without_a_daemon_loads_neither_asyncio_nor_msgspec(tmp_path):
-    program = (
-        "import sys; from rig.daemon.connecting import connect; "
-        "from rig.recorder.interrupts import Interrupts; "
-        "connect('sim://', print, Interrupts()); print({'asyncio', 'msgspec'} & {*sys.modules})"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True,
-        env=os.environ | {"XDG_RUNTIME_DIR": str(tmp_path)},
-    )  # fmt: skip
-    assert done.stdout == "set()\n"

@@ -11,8 +11,11 @@ from contextlib import contextmanager
 
 import pytest
 
+from rig.errors import SessionError
 from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
 from rig.recorder.controller import Controller
+from rig.recorder.interrupts import StoppedError
+from rig.recorder.published import PublishedState
 from tests.daemon.rig_in_a_box import Box, Trouble
 
 ACTIONS = [
@@ -107,7 +110,7 @@ def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(tmp_path, monkeypatch):
 def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeypatch):
     box = Box(tmp_path, monkeypatch)
     box.arm()
-    assert box.worker.controller.has_unsaved()
+    assert box.worker.published.get("phase") == "armed"
     box.worker.controller.close()
     assert box.phase is Phase.IDLE
     box.kill()
@@ -117,15 +120,13 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeyp
     box.fire_latest()
     box.clock.sleep(2.0)
     assert box.phase is Phase.HOLDING
-    another = Controller("a port")
+    another = Controller("a port", PublishedState())
     another.connect()
-    assert another.has_unsaved()
+    another.recorder.look()
+    assert another.published.get("phase") == "storing"
     another.close()
     assert box.phase is Phase.HOLDING
     box.ends_well()
-    recorder = box.worker.controller.recorder
-    monkeypatch.setattr(recorder, "held", lambda: box.fell[-1])  # acknowledged in vain
-    assert not box.worker.controller.has_unsaved()
     box.kill()
 
 
@@ -137,11 +138,53 @@ def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(tmp_path
     device.fire(device.arm(Arm(label, **order)))
     box.clock.sleep(1.0)
     assert box.phase is Phase.HOLDING
-    assert not box.worker.controller.has_unsaved()
     box.kill()
     box.resume()
     assert box.phase is Phase.IDLE
     assert isinstance(box.arm(), int)
+    box.kill()
+
+
+def test_a_drop_that_a_restart_of_the_board_cut_is_shown_as_interrupted(tmp_path, monkeypatch):
+    box = Box(tmp_path, monkeypatch)
+    box.arm()
+
+    def falls(label):
+        box.line = None  # the cable is pulled
+        return box.falls(label)
+
+    box.board.lab.drop = falls
+    box.fire_latest()
+    box.reset()
+    box.board.lab.drop = box.falls
+    box.passed(6.0)
+    drop = box.worker.published.get("drop")
+    assert box.on_disk("state", (1, 1))[-1:] == [drop["state"]] == ["interrupted"]
+    box.ends_well()
+
+
+def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(tmp_path, monkeypatch):
+    box, seen = Box(tmp_path, monkeypatch), []
+    names = str(box.protocol), str(box.session)
+    box.worker._weigh(SessionError("the disk is full", "make room"))
+    outcome = box.worker.submit(lambda c: c.open_session(*names), "A", writes=False)
+    outcome.add_done_callback(lambda _: seen.append(box.worker._trouble))
+    box.turned()
+    assert seen == [None], "before it is answered"
+    box.kill()
+
+
+def test_stop_ends_the_search_for_a_board_that_does_not_answer(tmp_path, monkeypatch):
+    box = Box(tmp_path, monkeypatch)
+    box.worker.controller.disconnect()
+    box.trouble = Trouble("stopped", "write", 2)
+    box.deaf_until_ns = box.clock.now_ns() + 60 * 10**9
+    begun_s, ended_s = box.now(), []
+    outcome = box.worker.submit(lambda c: c.connect(), "A")
+    outcome.add_done_callback(lambda _: ended_s.append(box.now()))
+    box.turned()
+    assert isinstance(outcome.exception(), StoppedError)
+    assert ended_s[0] - begun_s < 3.0
     box.kill()
 
 

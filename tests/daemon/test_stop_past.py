@@ -68,10 +68,11 @@ def test_a_stop_between_the_look_and_the_answer_is_kept(monkeypatch):
     worker._attend()
     assert stopped == ["a second client"]
     assert late[0].done()
+    assert worker._attended.is_set(), "no ABORT follows that could end what is armed anew"
 
 
 def test_a_board_that_disarms_itself_as_soon_as_it_is_armed_is_heard(tmp_path, monkeypatch):
-    controller = Controller("sim://")
+    controller = Controller("sim://", PublishedState())
     ball = Path(__file__).parents[2] / "protocols/falling-ball.yaml"
     controller.open_session(str(ball), str(tmp_path / "a.session"), 1)
     device, (code, payload) = controller.recorder.device, pack(Disarmed(1, DisarmReason.STOPPED))

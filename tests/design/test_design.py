@@ -48,8 +48,8 @@ def foretold(protocol: Protocol, components: Components, *names: str) -> Forecas
 
 @cache
 def dropped(protocol_heights: tuple[float, ...]) -> tuple[tuple[Case, ...], Analysis]:
-    """Sixteen drops of one chain before beams at these heights."""
-    protocol = placed(SINGLE, list(protocol_heights), repeats=16)
+    """Ten drops of one chain before beams at these heights."""
+    protocol = placed(SINGLE, list(protocol_heights), repeats=10)
     drops = [case(protocol, Dials(), seed=5, run=run.number) for run in runs(protocol)]
     return tuple(drops), analyzed(drops)
 
@@ -80,7 +80,7 @@ def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected)
     found = best(UNIFORM, coefficient_problem(UNIFORM, merge_like(forms(INCLINES))))
     assert set(expected.coefficients) == {"restitution", "friction"}
     for name, u in expected.coefficients.items():
-        assert u == pytest.approx(found[name][1], rel=0.2), name
+        assert u == pytest.approx(found[name].u, rel=0.2), name
 
 
 def test_more_runs_tell_more_but_not_of_what_is_common():
@@ -103,7 +103,7 @@ def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
     found = foretold(protocol, analysis((40.0,), 4).joint.components)
     problem = coefficient_problem(protocol, merge_like(forms((40.0,), 4)))
     assert found.held == set(problem.held) == {"friction"}
-    u = pytest.approx(best(protocol, problem)["restitution"][1], rel=0.2)
+    u = pytest.approx(best(protocol, problem)["restitution"].u, rel=0.2)
     assert found.coefficients.keys() - found.held == {"restitution"}
     assert found.coefficients["restitution"] == u
 
@@ -114,7 +114,7 @@ BEFORE = (0.06, 0.07, 0.1, 0.13, 0.16, 0.204, 0.35, 0.69)
 
 def speed_errors(layout: tuple[float, ...]) -> np.ndarray:
     drops, found = dropped(layout)
-    assert sum(result.learned for result in found.runs) >= 14
+    assert sum(result.learned for result in found.runs) >= 9
     return np.array(
         [
             result.quantities["speed_m_s"].value - one.truth.speed_m_s
@@ -125,15 +125,15 @@ def speed_errors(layout: tuple[float, ...]) -> np.ndarray:
 
 
 def predicted_speed_u(layout: tuple[float, ...]) -> float:
-    protocol = placed(SINGLE, list(layout), repeats=16)
+    protocol = placed(SINGLE, list(layout), repeats=10)
     protocol = replace(protocol, priors=replace(protocol.priors, strings=0.0))  # as TRUE has it
     found = foretold(protocol, TRUE, "speed_m_s")
     return found.typical("speed_m_s")
 
 
 def test_a_proposed_layout_is_better_as_predicted_and_in_fact():
-    """Root mean square over sixteen drops: χ² of 16 stays within a factor 1.6 of its mean."""
-    protocol = placed(SINGLE, list(BEFORE), repeats=16)
+    """Root mean square over ten drops: the root of χ² of 10 over 10 stays within 0.6 and 1.6."""
+    protocol = placed(SINGLE, list(BEFORE), repeats=10)
     found = better(protocol, TRUE, Room(0.02, 0.8, 0.01))
     proposed = tuple(gate.height for gate in found.gates.gates)
     assert min(proposed) < 0.048

@@ -8,7 +8,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 import pytest
 
-from rig.analysis.components import stated
+from rig.analysis.components import priors
 from rig.design.cases import BEAM, cases
 from rig.design.forecast import GateLayout, forecast
 from rig.estimate.hypotheses import model_alpha
@@ -96,7 +96,7 @@ def variances(slopes: np.ndarray, gradients: np.ndarray) -> list[Decimal]:
 def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
     protocol, floor = RIGS[name]
     beams, surface = protocol.gates.gates, protocol.surface
-    kinds = cases(protocol, replace(stated(protocol), floor=floor))
+    kinds = cases(protocol, replace(priors(protocol), floor=floor))
     found = forecast(protocol, GateLayout.of(kinds))
     # All unknowns of the session: each drop's own and its α, what is common, beams.
     common = sum(case.own + case.struck for case in kinds)

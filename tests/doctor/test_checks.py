@@ -3,120 +3,123 @@
 import random
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 
-from rig.doctor.board import BOARD_CHECKS, BoardFacts, mains_ripple
-from rig.doctor.session import check_restarts, check_whole, describe_supply
-from rig.link.gatewatch import GateStates
+from rig.doctor.board import BOARD_CHECKS, mains_ripple
+from rig.doctor.session import check_restarts, describe_supply
+from rig.link import messages as wire
+from rig.link.messages import RefusalReason
 from rig.link.transcript import Restart
-from rig.reasons import make_reason
-from rig.records import Certificate, ClockSample, Drop, Edge
-from rig.selftest.findings import make_check
-from sim.board import VirtualBoard
-from tests.link.bench import ScriptedLab
+from rig.records import Certificate, Drop
+from rig.selftest.board import BoardUnderTest, SelftestOptions
+from rig.selftest.findings import Verdict, make_check
+from rig.selftest.run import run_checks
+from tests.selftest.benches import LoopedBoard, Wire, hold_drop, port_of
+from tests.selftest.broken import claims, odd
 
 HZ = 16_000_000
-FLICKER = GateStates(0, 4)
-HELD = make_reason("drop_held", run=7, attempt=2)
-BLOCKED = make_reason("gates_blocked", gates_listed="gate 1")
 
 
-def pings(ppm=0.0, trip_ns=1_000_000, count=30):
-    tick_ns = 1e9 / (HZ * (1 + ppm * 1e-6))
-    starts = [50_000_000 * n + 7_000_000 * (n % 5) for n in range(count)]
-    return tuple(
-        ClockSample(at, at + trip_ns, round((at + trip_ns / 2) / tick_ns)) for at in starts
-    )
+def findings(board=None, port=None):
+    """What the doctor finds on a board, or at a port."""
+    port = port or port_of(board)
+    checked = run_checks(BOARD_CHECKS, BoardUnderTest(port, port.clock, SelftestOptions()))
+    return {finding.name: finding for finding in checked}
 
 
-BOARD = BoardFacts(
-    identity=VirtualBoard(ScriptedLab()).identity,
-    shipped="sim",
-    pings=pings(),
-    states=GateStates(0, 0),
-    edges=(),
-)
+def calm(*changes, **settings):
+    """Build a board at which nothing moves, but what the lab is told."""
+    (lab := Wire()).changes = list(changes)
+    return LoopedBoard(lab, **settings)
 
 
-def edges(times_s):
-    ticks = [round(time * HZ) for time in times_s]
-    return tuple(Edge(tick + 999 * n, 5, n == 0) for tick in ticks for n in (0, 1))
+def test_a_good_board_is_well_and_nothing_is_driven():
+    board = calm()
+    found = findings(board)
+    assert [str(finding) for finding in found.values() if finding.advice] == []
+    assert found["firmware"].what == "sim; none for a virtual comes with rig"
+    assert (board.driven, board.outputs()) == (0, 0)
+
+
+def flicker(gate, times_s, dark_s=0.004):
+    return [(time + dark_s * (not on), gate, on) for time in times_s for on in (True, False)]
+
+
+def stopped():
+    board = calm()
+    board.stop(True)
+    return board
+
+
+def other_firmware():
+    board = calm()
+    board.identity = replace(board.identity, board="Arduino Uno", firmware="chainrig 9")
+    return board
+
+
+LIGHT = "stop and flickering gates"
 
 
 @pytest.mark.parametrize(
-    ("check", "facts"),
+    ("make", "check", "says", "advises"),
     [
-        *((name, {}) for name in BOARD_CHECKS),
-        ("firmware", {"shipped": ""}),
-        ("clock", {"pings": pings(ppm=4000)}),
-        ("flickering gates", {"edges": BLOCKED}),
-    ],
-)
-def test_what_is_well_needs_no_advice(check, facts):
-    finding = make_check(check, BOARD_CHECKS[check], replace(BOARD, **facts))
-    assert finding.advice == ""
-    assert finding.json()["reason_codes"] == []
-
-
-@pytest.mark.parametrize(
-    ("check", "facts", "says", "advises"),
-    [
-        ("firmware", {"shipped": "chainrig 9"}, "but chainrig 9", "rig flash"),
+        (other_firmware, "firmware", "chainrig 9, but chainrig", "rig flash"),
+        (lambda: calm(ppm=5650), "round trips", "clock is off by +56", "resonator"),
+        (stopped, LIGHT, "open", "close it"),
+        (lambda: calm((0.1, 5, True)), LIGHT, "gate 5 1 times within 1 s", "clear the"),
         (
-            "held drop",
-            {"edges": HELD},
-            "run 7, attempt 2",
-            "rig run",
-        ),
-        ("clock", {"pings": ()}, "from 0 pings", "cable"),
-        ("clock", {"pings": pings(5700, 1000)}, "+5700", "resonator"),
-        ("round trip", {"pings": ()}, "no ping", "cable"),
-        ("round trip", {"pings": pings(trip_ns=130_000_000)}, "130.0 ms", "busy"),
-        ("emergency stop", {"edges": make_reason("refused_stopped")}, "open", "close it"),
-        ("blocked gates", {"states": GateStates(0x102, 0)}, "gates 1, 8", "leave it"),
-        ("flickering gates", {"states": FLICKER}, "gate 2", "clear the beam"),
-        ("flickering gates", {"states": FLICKER, "edges": BLOCKED}, "gate 2", "clear the beam"),
-        (
-            "flickering gates",
-            {"edges": edges([0.1, 0.3])},
-            "gate 5 2 times within 1 s",
-            "clear the beam",
-        ),
-        (
-            "flickering gates",
-            {"edges": edges([n / 100 for n in range(90)])},
+            lambda: calm(*flicker(5, [0.0005 + n / 100 for n in range(90)])),
+            LIGHT,
             "gate 5 90 times, in step with 100 Hz",
             "lamps",
         ),
+        (
+            lambda: calm(*sorted(flicker(5, [0.1], 0.4) + flicker(6, [0.2, 0.3]))),
+            LIGHT,
+            "gate 5 1 times; gate 6 2 times within 1 s",
+            "clear the",
+        ),
     ],
 )
-def test_what_is_wrong_is_said_with_what_to_do(check, facts, says, advises):
-    finding = make_check(check, BOARD_CHECKS[check], replace(BOARD, **facts))
+def test_what_is_wrong_is_said_with_what_to_do(make, check, says, advises):
+    finding = findings(make())[check]
     assert says in finding.what
     assert advises in finding.advice
+    assert finding.verdict is Verdict.FAILED
     assert "\n  do: " in str(finding)
     assert finding.json()["reason_codes"] == [finding.reason.json()]
     assert not re.search(r"[{}]", str(finding))
 
 
-@pytest.mark.parametrize(
-    ("foreign", "troubles", "writer", "says", "advises"),
-    [
-        ("", [], "", "whole", ""),
-        ("", [], "process 7", "whole, being written by process 7", ""),
-        ("it is empty", [], "", "empty", "name a"),
-        ("", ["9 pages", "more"], "", "damaged: 9 pages", "rig recover s -o"),
-    ],
-)
-def test_a_session_file(foreign, troubles, writer, says, advises):
-    snapshot = SimpleNamespace(writer=writer)
-    examined = SimpleNamespace(foreign=foreign, troubles=troubles, snapshot=snapshot)
-    finding = make_check("session s", check_whole, examined, "s")
-    assert says in finding.what
-    assert advises in finding.advice
-    assert bool(advises) is bool(finding.advice)
+@pytest.mark.parametrize("reason", [RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY])
+@pytest.mark.parametrize("times", [3, 100])
+def test_a_gate_that_forbids_firing_now_and_then_is_tried_again(reason, times, monkeypatch):
+    refusals = iter([wire.Refused(reason, 4)] * times)
+    restless = odd(_fire=lambda _, usual, request: next(refusals, None) or usual(request))
+    monkeypatch.setattr("sim.board.Microcontroller", restless)
+    finding = findings(calm())[LIGHT]
+    assert (finding.verdict is Verdict.OK) is (times == 3)
+    assert times == 3 or finding.reason.code == "gates_flicker"
+
+
+def test_an_input_without_a_gate_is_a_note(monkeypatch):
+    monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | 1 << 6))
+    board = LoopedBoard(Wire(None, blocked=1 << 6))
+    found = findings(board)
+    assert found["gates"].verdict is Verdict.NOT_POSSIBLE
+    assert found["gates"].what.endswith("gate 6 blocked all the time")
+    assert found[LIGHT].what == "none within 1 s"
+
+
+def test_a_drop_of_a_session_is_not_touched():
+    port = port_of(calm())
+    device, order, drop = hold_drop(port, 3)
+    found = findings(port=port)
+    assert found["held drop"].reason.values == {"run": 3, "attempt": 2}
+    assert "rig run" in found["held drop"].advice
+    assert found[LIGHT].verdict is Verdict.NOT_POSSIBLE
+    assert device.fetch(order["label"]) == drop
 
 
 @pytest.mark.parametrize("hz", [50, 60, 100, 120])
@@ -128,15 +131,12 @@ def test_the_mains_rhythm_is_found(hz, jitter_s):
     assert mains_ripple(noise.sample(times, hz // 2)) == hz  # half of them missed
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_chance_is_no_rhythm(seed):
-    noise = random.Random(seed)
-    assert mains_ripple([noise.random() for _ in range(noise.randrange(1, 200))]) is None
-
-
-@pytest.mark.parametrize("hz", [37, 55, 80, 173])
-def test_another_rhythm_is_not_the_mains(hz):
-    assert mains_ripple([n / hz for n in range(hz)]) is None
+def test_chance_and_other_rhythms_are_not_the_mains():
+    for seed in range(20):
+        noise = random.Random(seed)
+        assert mains_ripple([noise.random() for _ in range(noise.randrange(1, 200))]) is None
+    for hz in (37, 55, 80, 173):
+        assert mains_ripple([n / hz for n in range(hz)]) is None
 
 
 def test_restarts_that_only_certificates_tell_of_and_a_supply_that_sinks():

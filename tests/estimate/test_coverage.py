@@ -20,7 +20,7 @@ def test_restitution_and_friction_from_one_nine_incline_session():
         every = merge_like(forms(inclines, UNIFORM.plan.repeats, seed))
         outcome = best(UNIFORM, coefficient_problem(UNIFORM, every))
         for name, truth, wanted in (("restitution", BETA, 0.01), ("friction", MU, 0.02)):
-            value, u = outcome[name]
+            value, u = outcome[name].value, outcome[name].u
             assert abs(value - truth) < wanted
             assert 1.96 * u < wanted
             ratios.append((value - truth) / u)

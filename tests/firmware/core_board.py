@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rig.link import messages as wire
 from rig.link.frames import Decoder
-from sim.lab_interface import Lab
+from sim.interfaces import Lab
 from tests.firmware.toolchain import FIRMWARE, make
 
 HZ = 16_000_000
@@ -58,7 +58,7 @@ class Line:
         next_tick = self._board.core.host_next_byte()
         return to_ns(next_tick) if next_tick else None
 
-    def arrived(self, now_ns: int) -> bytes:
+    def read(self, now_ns: int) -> bytes:
         self._board.collect()
         data = bytes(self.waiting)
         self.waiting.clear()

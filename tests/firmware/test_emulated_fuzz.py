@@ -21,7 +21,7 @@ def judge_pulses(wiring, steps: int, least: int) -> None:
 @pytest.mark.parametrize("name", BOARDS)
 def test_every_pulse_was_armed_and_fired(name):
     make("all")
-    judge_pulses(BOARDS[name], steps=250, least=5)
+    judge_pulses(BOARDS[name], steps=150, least=3)
 
 
 @pytest.mark.parametrize(

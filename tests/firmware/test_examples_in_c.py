@@ -88,7 +88,7 @@ class SteppedDevice:
     def next_arrival_ns(self) -> int | None:
         return self.now_us * 1000 if self.waiting else None
 
-    def arrived(self, now_ns: int) -> bytes:
+    def read(self, now_ns: int) -> bytes:
         data, self.waiting = self.waiting, b""
         return data
 

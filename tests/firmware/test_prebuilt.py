@@ -50,12 +50,12 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @EACH
 def test_the_shipped_image_is_what_the_sources_make_in_any_folder(target, images):
     stale = "the sources have changed since: make -C firmware prebuilt"
-    assert (images / target.image).read_bytes() == target.shipped.read_bytes(), stale
+    assert (images / target.image).read_bytes() == target.image_path.read_bytes(), stale
 
 
 @EACH
 def test_the_shipped_image_is_whole_and_for_its_board(target):
     version = re.search(r"^VERSION = (.+)$", (FIRMWARE / "Makefile").read_text(), re.MULTILINE)
-    image = read_image(target.shipped, target)
+    image = read_image(target.image_path, target)
     assert image.firmware == f"chainrig {version[1]}"
     assert 4096 < image.size < target.flash_limit

@@ -51,4 +51,4 @@ class PtyBoard:
             now = time.monotonic_ns() - begun
             self._board.receive(now, self._terminal.read())
             self._board.advance(now)
-            self._terminal.write(self._board.line.arrived(now))
+            self._terminal.write(self._board.line.read(now))

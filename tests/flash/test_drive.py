@@ -4,6 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import count
 from pathlib import Path
+from threading import Timer
 from unittest.mock import Mock
 
 import pytest
@@ -17,7 +18,6 @@ from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.image import read_image, shipped_firmware
 from rig.link import messages as wire
 from rig.link.messages import RefusalReason
-from rig.link.port import open_port
 from rig.reasons import make_error
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
@@ -28,20 +28,19 @@ NAMES = {"board": DRIVE.board.name, "firmware": VERSION}
 
 def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
     """Mount drives of boards that wait for firmware, among other file systems."""
-    made = []
-    for name in names:
-        (drive := folder / name).mkdir()
-        (drive / "INFO_UF2.TXT").write_text("UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\n"
-                                            "Board-ID: RPI-RP2\n")  # fmt: skip
-        made.append(drive)
+    waiting = [folder / name for name in names]
+    for drive in waiting:
+        drive.mkdir()
+        about = "UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: RPI-RP2\n"
+        (drive / "INFO_UF2.TXT").write_text(about)
     (folder / "stick").mkdir()
-    lines = ["proc /proc proc rw 0 0", f"/dev/sdb1 {folder}/stick vfat rw 0 0"]
-    lines += [f"/dev/sdc1 {str(one).replace(' ', chr(92) + '040')} vfat rw 0 0" for one in made]
-    (mounts := folder / "mounts").write_text("\n".join(lines) + "\n")
-    monkeypatch.setattr(drives, "_MOUNTS", mounts)
-    (folder / "usb").mkdir()
-    monkeypatch.setattr(drives, "_USB", folder / "usb")
-    return made
+    places = [folder / "stick", *waiting]
+    escaped = (str(place).replace(" ", chr(92) + "040") for place in places)
+    lines = ["proc /proc proc rw 0 0", *(f"/dev/sdb1 {place} vfat rw 0 0" for place in escaped)]
+    (folder / "mounts").write_text("\n".join(lines) + "\n")
+    monkeypatch.setattr(drives, "_MOUNTS", folder / "mounts")
+    monkeypatch.setattr(drives, "_LABEL", folder / "label")
+    return waiting
 
 
 def plug_in(monkeypatch, path: str, is_in: Callable[[], bool] = lambda: True) -> None:
@@ -69,9 +68,10 @@ def test_a_pico_is_flashed_and_asked(flash, tmp_path, monkeypatch):
         plugged(monkeypatch, there.path, after=3)
         code, out, err = flash()
     assert code == 0, err
+    assert f"copying {VERSION} (" in err
     assert out.startswith(f"Raspberry Pi Pico, {VERSION}, 16 gates, id ")
     assert out.endswith(": flashed and verified\n")
-    assert (drive / "chainrig.uf2").read_bytes() == DRIVE.shipped.read_bytes()
+    assert (drive / "chainrig.uf2").read_bytes() == DRIVE.image_path.read_bytes()
 
 
 def running(monkeypatch, mounts: Path, answer: wire.DeviceMessage) -> None:
@@ -83,7 +83,8 @@ def running(monkeypatch, mounts: Path, answer: wire.DeviceMessage) -> None:
         def answer(self, frame, now_ns):
             if frame.type != wire.CODES[wire.Flash]:
                 return super().answer(frame, now_ns)
-            mounts.write_text(mounted if answer == wire.Done() else "")
+            if answer == wire.Done():
+                Timer(0.05, mounts.write_text, [mounted]).start()
             return answer
 
     monkeypatch.setattr("sim.board.Microcontroller", Asked)
@@ -97,8 +98,9 @@ def test_a_running_pico_is_asked_to_take_firmware(flash, tmp_path, monkeypatch):
         plug_in(monkeypatch, there.path, lambda: not mounts.read_text() or copy.exists())
         code, out, err = flash()
     assert code == 0, err
+    assert f"the Raspberry Pi Pico at {there.path} waits for firmware" in err
     assert out.endswith(": flashed and verified\n")
-    assert copy.read_bytes() == DRIVE.shipped.read_bytes()
+    assert copy.read_bytes() == DRIVE.image_path.read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -119,50 +121,55 @@ def test_a_running_pico_that_refuses_is_left_alone(flash, tmp_path, monkeypatch,
     assert message in err
 
 
-def test_no_drive_says_how_to_make_it_appear(flash, tmp_path, monkeypatch):
-    picos(tmp_path, monkeypatch)
+@pytest.mark.parametrize(
+    ("names", "prepare", "messages"),
+    [
+        (["A", "B"], lambda _: None, ("2 Picos wait for firmware: ", "--drive FOLDER")),
+        (["A"], lambda d: (d / "A/chainrig.uf2").mkdir(), ("A failed: Is a directory",)),
+        (["A"], lambda _: None, ("the firmware was copied, but no port of a Pico appears",)),
+        ([], lambda _: None, ("no Pico waits for firmware", "hold its BOOTSEL button")),
+        ([], lambda d: (d / "label").touch(), ("RPI-RP2 is not mounted", "/dev/disk/by-label/RP")),
+    ],
+)
+def test_what_keeps_a_pico_from_being_flashed_is_said(
+    names, prepare, messages, flash, tmp_path, monkeypatch
+):
+    waiting = picos(tmp_path, monkeypatch, *names)
+    prepare(tmp_path)
+    monkeypatch.setattr(drives, "_RESTART_S", 0.0)
+    plug_in(monkeypatch, "", lambda: False)
     code, out, err = flash()
     assert (code, out) == (4, "")
-    assert "no Pico waits for firmware" in err
-    assert "hold its BOOTSEL button" in err
+    assert [message for message in messages if message not in err] == []
+    assert len(names) < 2 or not any((drive / "chainrig.uf2").exists() for drive in waiting)
 
 
-def test_a_pico_in_boot_mode_that_nothing_has_mounted_is_said(flash, tmp_path, monkeypatch, capsys):
+def test_the_ports_name_a_pico_that_nothing_has_mounted(tmp_path, monkeypatch, capsys):
     picos(tmp_path, monkeypatch)
-    for name, product in (("1-1", "0042"), ("1-2", "0003")):
-        (device := tmp_path / "usb" / name).mkdir()
-        (device / "idVendor").write_text("2e8a\n")
-        (device / "idProduct").write_text(f"{product}\n")
-    code, out, err = flash()
-    assert (code, out) == (4, "")
-    assert "a Pico waits for firmware, but its drive RPI-RP2 is not mounted" in err
-    assert "/dev/disk/by-label/RPI-RP2" in err
+    (tmp_path / "label").touch()
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
     assert main(["ports"]) == 0
     assert "drive RPI-RP2 is not mounted: " in capsys.readouterr().err
 
 
-def test_a_port_that_udev_permits_a_little_later_is_waited_for(flash, tmp_path, monkeypatch):
+@pytest.mark.parametrize("port", [[], ["--port"]])
+def test_a_port_that_udev_permits_a_little_later_is_waited_for(flash, tmp_path, monkeypatch, port):
     picos(tmp_path, monkeypatch, "RPI-RP2")
-    refusals = iter([make_error(DeviceError, "port_denied", port="x", text="")] * 3)
-
-    def open_later(port):
-        for refusal in refusals:
-            raise refusal
-        return open_port(port)
-
-    monkeypatch.setattr(steps, "open_port", open_later)
+    refusals = iter([False] * 3)
+    monkeypatch.setattr("os.access", lambda *_: next(refusals, True))
     with PtyBoard(**NAMES) as there:
         plugged(monkeypatch, there.path)
-        code, _, err = flash()
+        code, _, err = flash(*port, *([there.path] if port else []))
     assert code == 0, err
+    assert next(refusals, None) is None
 
 
 def test_a_port_that_stays_forbidden_is_said(flash, tmp_path, monkeypatch):
     picos(tmp_path, monkeypatch, "RPI-RP2")
     refusal = make_error(DeviceError, "port_denied", port="/dev/ttyACM0", text="")
     monkeypatch.setattr(steps, "open_port", Mock(side_effect=refusal))
-    monkeypatch.setattr(steps, "_UDEV_S", 0.2)
+    monkeypatch.setattr("os.access", lambda *_: False)
+    monkeypatch.setattr(drives, "_RESTART_S", 0.2)
     plugged(monkeypatch, "/dev/ttyACM0")
     code, _, err = flash()
     assert code == 4
@@ -198,21 +205,21 @@ def _with(at: int, value: bytes, size: int = 4):
     [
         (_with(0, b"", 1), "no whole UF2 file"),
         (lambda _: b"", "no whole UF2 file"),
-        (_with(512, b"", 512), "not whole: block 0"),
-        (_with(512 + 12, bytes(4)), "not whole: block 1"),
+        (_with(512, b"", 512), "damaged, or not for an RP2040: block 0"),
+        (_with(512 + 12, bytes(4)), "RP2040: block 1"),
         (_with(28, bytes(4)), "not for an RP2040"),
-        (_with(0, b"X", 1), "no UF2 file, or damaged: block 0"),
+        (_with(0, b"X", 1), "damaged, or not for an RP2040: block 0"),
         (lambda data: data.replace(b"Raspberry Pi Pico\0", b"Raspberry Pi Pika\0"), "no firmware"),
     ],
 )
 def test_a_file_that_must_not_be_flashed(tmp_path, change, message):
-    (file := tmp_path / "it.uf2").write_bytes(change(DRIVE.shipped.read_bytes()))
+    (file := tmp_path / "it.uf2").write_bytes(change(DRIVE.image_path.read_bytes()))
     with pytest.raises(InputError, match=message):
         read_image(file, DRIVE)
 
 
 def test_an_image_of_another_kind(tmp_path):
     with pytest.raises(InputError):
-        read_image(TARGETS["mega"].shipped, DRIVE)
-    with pytest.raises(InputError, match="no record of an Intel HEX file"):
-        read_image(DRIVE.shipped, TARGETS["mega"])
+        read_image(TARGETS["mega"].image_path, DRIVE)
+    with pytest.raises(InputError, match="no whole record of an Intel HEX file"):
+        read_image(DRIVE.image_path, TARGETS["mega"])

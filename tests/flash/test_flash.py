@@ -3,7 +3,6 @@
 import os
 import pty
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 import serial
@@ -12,7 +11,7 @@ from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
 from tests.flash.pty_board import PtyBoard
 
-VERSION = read_image(TARGETS["mega"].shipped, TARGETS["mega"]).firmware
+VERSION = read_image(TARGETS["mega"].image_path, TARGETS["mega"]).firmware
 NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
 PTY = "where nobody answers"
 OTHER = "is for an Arduino Uno, not for an Arduino Mega 2560"
@@ -42,6 +41,7 @@ def test_a_board_is_flashed_and_asked(board, avrdude, flash):
     assert out.startswith(f"{target.board.name}, {VERSION}, 16 gates, id ")
     assert out.endswith(": flashed and verified\n")
     assert out.count("\n") == 1
+    assert f"writing {VERSION} (" in err
     assert "Writing | ######## | 100%" in err
     argv = list(avrdude.argv)
     argv.remove("-D")
@@ -50,13 +50,13 @@ def test_a_board_is_flashed_and_asked(board, avrdude, flash):
         "-c": "wiring" if board == "mega" else "arduino",
         "-b": "57600" if board == "nano-old" else "115200",
         "-P": there.path,
-        "-U": f"flash:w:{target.shipped}:i",
+        "-U": f"flash:w:{target.image_path}:i",
     }
 
 
 def test_another_image_and_another_avrdude(avrdude, flash, tmp_path, monkeypatch):
     hex_file = tmp_path / "my own.hex"
-    hex_file.write_bytes(TARGETS["mega"].shipped.read_bytes())
+    hex_file.write_bytes(TARGETS["mega"].image_path.read_bytes())
     monkeypatch.setenv("PATH", str(tmp_path / "empty"))
     with PtyBoard(**NAMES) as there:
         code, _, err = flash("--port", there.path, "--hex", hex_file, "--avrdude", avrdude.path)
@@ -81,7 +81,6 @@ def test_another_image_and_another_avrdude(avrdude, flash, tmp_path, monkeypatch
         ("avrdude error: verification mismatch\n", "what was read back"),
         ("avrdude: stk500_getsync() attempt 1 of 10: not in sync: resp=0x00\n", "boot loader"),
         ("avrdude: stk500v2_ReceiveMessage(): timeout\n", "boot loader does not answer"),
-        ("avrdude OS error: cannot open port X: Device or resource busy\n", "another program"),
         ("something else\n", "avrdude ended with 1"),
     ],
 )
@@ -104,9 +103,9 @@ def broken_program(folder):
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (lambda _: ["--port", "/dev/null", "--avrdude", "/none"], 2, "is no program that can be"),
+        (lambda _: ["--port", PTY, "--avrdude", "/none"], 2, "cannot run /none: No such file"),
         (lambda d: ["--port", PTY, "--avrdude", broken_program(d)], 2, "cannot run"),
-        (lambda _: ["--port", "/dev/null", "--hex", TARGETS["uno"].shipped], 2, OTHER),
+        (lambda _: ["--port", "/dev/null", "--hex", TARGETS["uno"].image_path], 2, OTHER),
         (lambda d: ["--port", d / "ttyACM0"], 4, "there is no such port"),
         *(
             (lambda _, url=url: ["--port", url], 2, f"{url} is no board that can be flashed")
@@ -127,7 +126,8 @@ def test_nothing_is_flashed_where_something_is_wrong(
 
 def test_avrdude_is_missing(flash, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    code, _, err = flash("--port", "/dev/null")
+    with silent_port() as path:
+        code, _, err = flash("--port", path)
     assert code == 2
     assert "apt-get install avrdude" in err
 
@@ -137,16 +137,6 @@ def test_a_port_somebody_uses(avrdude, flash):
         code, _, err = flash("--port", path)
     assert code == 4
     assert "another program uses it" in err
-    assert avrdude.argv is None
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may open everything")
-def test_a_port_that_is_forbidden(avrdude, flash):
-    with silent_port() as path:
-        Path(path).chmod(0)
-        code, _, err = flash("--port", path)
-    assert code == 4
-    assert "dialout" in err
     assert avrdude.argv is None
 
 
@@ -166,4 +156,5 @@ def test_the_board_says_nothing(avrdude, flash, monkeypatch):
     with silent_port() as path:
         code, out, err = flash("--port", path)
     assert (code, out) == (4, "")
-    assert f"{path} was flashed, but the firmware does not answer" in err
+    assert "written; asking the board who it is" in err
+    assert "the device did not answer Identify" in err

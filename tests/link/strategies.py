@@ -3,7 +3,7 @@
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
-from rig.link.messages import Chars, Raw, Tail, UnsignedInt
+from rig.link.messages import Chars, Raw, UnsignedInt
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 
@@ -14,11 +14,11 @@ def values(field) -> st.SearchStrategy:
             return st.sampled_from(list(field.python))
         case UnsignedInt(size=size):
             return st.integers(0, 2 ** (8 * size) - 1)
-        case Raw(size=size):
+        case Raw(size=size, tail=False):
             return st.binary(min_size=size, max_size=size)
         case Chars(limit=limit):
             return st.text(max_size=limit // 4)
-        case Tail():
+        case Raw():
             events = st.lists(st.tuples(LONG, WORD), max_size=wire.EVENTS_PER_FRAME)
             return events.map(wire.pack_events)
     raise AssertionError(field)

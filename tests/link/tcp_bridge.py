@@ -52,7 +52,7 @@ class TcpBridge:
                     client.close()
                     client = None
             self._board.advance(now)
-            arrived = self._board.line.arrived(now)
+            arrived = self._board.line.read(now)
             if client is not None and arrived:
                 client.sendall(arrived)
         if client is not None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rig.link import frames
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
-from rig.link.messages import Chars, Raw, Tail, UnsignedInt, pack_events
+from rig.link.messages import Chars, Raw, UnsignedInt, pack_events
 from rig.link.port import BAUDRATE
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
@@ -59,11 +59,11 @@ def expected_rows(kind: type) -> list[list[str]]:
         match field.wire:
             case UnsignedInt(size=size):
                 name = f"u{8 * size}"
-            case Raw(size=size):
+            case Raw(size=size, tail=False):
                 name = f"{size} bytes"
             case Chars(limit=limit):
                 name = f"text ≤ {limit}"
-            case Tail(size=record):
+            case Raw(size=record):
                 name = f"{record} bytes each"
         found.append(["" if at is None else str(at), field.name, name])
         at = None if at is None or size is None else at + size
@@ -143,9 +143,7 @@ def spoken(told: str) -> wire.Message:
         else:
             value = ast.literal_eval(keyword.value)
             if isinstance(field.wire, Raw):
-                value = bytes.fromhex(value)
-            elif isinstance(field.wire, Tail):
-                value = pack_events(value)
+                value = pack_events(value) if field.wire.tail else bytes.fromhex(value)
         values[keyword.arg] = value
     return kind(**values)
 

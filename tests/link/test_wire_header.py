@@ -7,7 +7,7 @@ from hypothesis import given
 
 from rig.link import frames
 from rig.link import messages as wire
-from rig.link.messages import Chars, Raw, Tail, UnsignedInt
+from rig.link.messages import Chars, Raw, UnsignedInt
 from tests.link.strategies import MESSAGES
 
 HEADER = Path(__file__).parents[2] / "firmware/core/wire.h"
@@ -70,7 +70,7 @@ def test_fields_are_where_the_header_says(message):
         match field.wire:
             case UnsignedInt(size=size) if fixed:
                 assert int.from_bytes(payload[at : at + size], "little") == value
-            case Raw(size=size) if fixed:
+            case Raw(size=size, tail=False) if fixed:
                 assert payload[at : at + size] == value
             case Chars(limit=limit):
                 assert C[f"{key}_LIMIT"] == limit
@@ -78,7 +78,7 @@ def test_fields_are_where_the_header_says(message):
                 if fixed:
                     assert payload[at : at + 1 + len(text)] == bytes([len(text)]) + text
                 fixed, varying = False, varying + 1 + len(text)
-            case Tail():
+            case Raw(tail=True):
                 assert payload[at:] == value
                 assert len(value) % C[f"{name}_RECORD"] == 0
                 fixed, varying = False, varying + len(value)

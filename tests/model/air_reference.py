@@ -1,41 +1,80 @@
-"""The fall in air with many digits, written from its equation of motion alone.
+"""The fall with many digits, in air and without, from its equation of motion alone.
 
-Between impacts dv/dt = g − κv², so that v² and the way follow in closed form; the free chain falls
-all its way with the first κ. Nothing of `rig.model` is used.
+Between impacts dv/dt = g − κv², so that v² and the way follow in closed form, below κ = 0 too; the
+free chain falls all its way with the first κ. Nothing of `rig.model` is used.
 """
 
+from typing import NamedTuple
+
+import mpmath
 from mpmath import mp
 
-from tests.model.reference import End
-
 DIGITS = 60
+
+
+class End(NamedTuple):
+    separation: mpmath.mpf
+    speed: mpmath.mpf
+    time: mpmath.mpf
 
 
 def reference_air_fall(masses, heights, alpha, gamma, drags, drop, gravity, initial_speed=0) -> End:
     """Drop both chains; `drags` are the rods' c in c v²."""
     with mp.workdps(DIGITS):
-        masses, heights, drags = ([mp.mpf(x) for x in each] for each in (masses, heights, drags))
-        alpha, gamma, g, start, drop = map(mp.mpf, (alpha, gamma, gravity, initial_speed, drop))
-        clock, speed, before = mp.mpf(0), start, -drop
-        for k, height in enumerate(heights):
-            kappa = mp.fsum(drags[k:]) / mp.fsum(masses[k:])
-            terminal, rate = mp.sqrt(g / kappa), mp.sqrt(g * kappa)
-            decay = kappa * (height - before)
-            share = 1 - (speed / terminal) ** 2
-            final = terminal * mp.sqrt(1 - share * mp.exp(-2 * decay))
-            # artanh v₁/u − artanh v₀/u, with the zeros at v = u cancelled
-            clock += (decay + mp.log((final + terminal) / (speed + terminal))) / rate
-            speed, before = final, height
-            rest = mp.fsum(masses[k + 1 :])
-            if rest > 0:
-                speed += alpha * masses[k] * speed / (1 + gamma * masses[k] / rest) / rest
-        twin = drop + heights[-1] - reference_way(drags, masses, g, start, clock)
-        return End(+twin, +final, +clock)
+        masses, drags = ([mp.mpf(x) for x in each] for each in (masses, drags))
+        kappas = [mp.fsum(drags[k:]) / mp.fsum(masses[k:]) for k in range(len(masses))]
+        gains = exact_gains(masses, alpha, gamma)
+        return End(*(+x for x in exact_fall(heights, gains, kappas, drop, gravity, initial_speed)))
 
 
 def reference_way(drags, masses, gravity, initial_speed, time):
     """How far a chain that strikes nothing falls."""
     with mp.workdps(DIGITS):
         kappa = mp.fsum(map(mp.mpf, drags)) / mp.fsum(map(mp.mpf, masses))
-        terminal, x = mp.sqrt(gravity / kappa), mp.sqrt(gravity * kappa) * time
-        return mp.log(mp.cosh(x) + initial_speed / terminal * mp.sinh(x)) / kappa
+        return exact_way(time, initial_speed, gravity, kappa)
+
+
+def exact_gains(masses, alpha, gamma) -> list[mpmath.mpf]:
+    """ΔV/V of each impact: J = α m V / (1 + γ m/M), ΔV = J/M (Eq. 9); none of the last."""
+    masses = [mp.mpf(mass) for mass in masses]
+    alpha, gamma, gains = mp.mpf(alpha), mp.mpf(gamma), []
+    for k, mass in enumerate(masses[:-1]):
+        rest = mp.fsum(masses[k + 1 :])
+        gains.append(alpha * mass / (1 + gamma * mass / rest) / rest)
+    return [*gains, mp.mpf(0)]
+
+
+def exact_leg(distance, speed, gravity, kappa):
+    """Speed and time at the end, as d(v²)/dz = 2(g − κv²) and dt = dv/(g − κv²) integrate."""
+    d, v, g, k = map(mp.mpf, (distance, speed, gravity, kappa))
+    if not k:
+        arrival = mp.sqrt(v * v + 2 * g * d)
+        return arrival, (arrival - v) / g
+    left, u = mp.exp(-2 * k * d), mp.sqrt(g / k)
+    arrival = mp.sqrt(g / k - (g / k - v * v) * left)
+    # artanh v₁/u − artanh v₀/u, with the zeros at v = u cancelled
+    return arrival, mp.re((k * d + mp.log((arrival + u) / (v + u))) * u / g)
+
+
+def exact_way(time, speed, gravity, kappa):
+    """How far something falls in a time."""
+    t, v, g, k = map(mp.mpf, (time, speed, gravity, kappa))
+    if not k:
+        return v * t + g * t * t / 2
+    x = mp.sqrt(k * g) * t
+    return mp.re(mp.log(mp.cosh(x) + v * mp.sqrt(k / g) * mp.sinh(x)) / k)
+
+
+def exact_fall(heights, gains, kappas, drop, gravity, speed) -> End:
+    """Δz as a difference of two heights, V and t, with the digits that are set."""
+    now = mp.mpf(speed)
+    time, before = mp.mpf(0), -mp.mpf(drop)
+    for height, gain, kappa in zip(map(mp.mpf, heights), gains, kappas, strict=True):
+        arrival = now
+        if height != before:
+            arrival, leg = exact_leg(height - before, now, gravity, kappa)
+            time += leg
+        now, before = arrival * (1 + mp.mpf(gain)), height
+    separation = mp.mpf(drop) + before - exact_way(time, speed, gravity, kappas[0])
+    # Two chains that end at one height differ by rounding: no digits are left to be taken for a Δz.
+    return End(mp.chop(separation, tol=1e10 * mp.eps), arrival, time)

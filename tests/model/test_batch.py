@@ -23,8 +23,7 @@ ONE_OR_MANY = st.lists(st.tuples(ALPHAS, GAMMAS, DROPS, GRAVITIES, SPEEDS), min_
 
 def ends(found):
     """Rows of Δz, V and t."""
-    rows = (found.separation_m, found.speed_m_s, found.time_s)
-    return list(zip(*(row.ravel().tolist() for row in rows), strict=True))
+    return list(zip(*(row.ravel().tolist() for row in found), strict=True))
 
 
 def end(chain, alpha, gamma, drop, gravity, speed=0.0):
@@ -48,7 +47,7 @@ def test_arguments_broadcast():
     chain = even_chain(5)
     alpha, drop, gravity = [[0.1], [0.2], [0.3]], [0.0, 0.1], [[[9.81]], [[1.62]]]
     found = falls(chain.masses, chain.heights, given_impacts(alpha, 1.5), drop, gravity, 0.5)
-    assert found.separation_m.shape == found.speed_m_s.shape == (2, 3, 2)
+    assert found.shape == (3, 2, 3, 2)
     wanted = [
         end(chain, a, 1.5, h, g, 0.5) for g in (9.81, 1.62) for a in (0.1, 0.2, 0.3) for h in drop
     ]

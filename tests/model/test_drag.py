@@ -10,50 +10,16 @@ from mpmath import mp
 
 from rig.errors import DomainError
 from rig.model.chain import Chain
-from rig.model.drag import (
-    drag_fall,
-    drag_hits,
-    drag_leg,
-    fallen,
-    falling_speed,
-    leg_drags,
-)
+from rig.model.drag import air_legs, drag_fall, drag_leg, fallen, falling_speed, leg_drags
 from rig.model.fall import fall, hits, kicks
 from tests.examples import examples
+from tests.model.air_reference import exact_fall, exact_leg, exact_way
 from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, decades
 
 TIGHT = 1e-13
 DISTANCES = decades(-4, 2)
 KAPPAS = decades(-15, 2)  # 1/m
 AIR = decades(-6, 1)  # of κ for whole falls
-
-
-def exact_leg(distance, speed, gravity, kappa):
-    """Speed and time at the end, as d(v²)/dz = 2(g − κv²) and dt = dv/(g − κv²) integrate."""
-    d, v, g, k = map(mp.mpf, (distance, speed, gravity, kappa))
-    left, u, rate = mp.exp(-2 * k * d), mp.sqrt(g / k), mp.sqrt(k * g)
-    arrival = mp.sqrt(g / k - (g / k - v * v) * left)
-    return arrival, (k * d + mp.log((arrival + u) / (v + u))) / rate
-
-
-def exact_way(time, speed, gravity, kappa):
-    t, v, g, k = map(mp.mpf, (time, speed, gravity, kappa))
-    x = mp.sqrt(k * g) * t
-    return mp.log(mp.cosh(x) + v * mp.sqrt(k / g) * mp.sinh(x)) / k
-
-
-def exact_fall(chain, gains, kappas, drop, gravity, speed):
-    """Δz as a difference of two heights, V and t."""
-    now = mp.mpf(speed)
-    time, before = mp.mpf(0), -mp.mpf(drop)
-    for height, gain, kappa in zip(chain.heights, gains, kappas, strict=True):
-        arrival = now
-        if height != before:
-            arrival, leg = exact_leg(mp.mpf(height) - before, now, gravity, kappa)
-            time += leg
-        now, before = arrival * (1 + mp.mpf(gain)), mp.mpf(height)
-    separation = mp.mpf(drop) + mp.mpf(chain.length) - exact_way(time, speed, gravity, kappas[0])
-    return separation, arrival, time
 
 
 # In e^(−κd) the rounding of κd counts κd times.
@@ -109,7 +75,7 @@ def test_without_drag_it_is_the_plain_fall_to_the_last_bit(
     assert drag_fall(chain, gains, still, drop, gravity, speed) == fall(
         chain, alpha, gamma, drop, gravity, speed
     )
-    assert drag_hits(chain, gains, still, drop, gravity, speed) == hits(
+    assert hits(chain, gains, drop, gravity, speed, air_legs(still)) == hits(
         chain, gains, drop, gravity, speed
     )
 
@@ -126,7 +92,7 @@ def test_like_drag_keeps_every_digit_of_the_separation(
     many = TIGHT * (1.0 + kappa * length)
     end = drag_fall(chain, gains, kappas, drop, gravity, speed)
     with mp.workdps(max(200, 60 + round(2 * kappa * length))):
-        wanted = exact_fall(chain, gains, kappas, drop, gravity, speed)
+        wanted = exact_fall(chain.heights, gains, kappas, drop, gravity, speed)
         if chain.rods > 2 or drop or speed:
             assert close(end.separation_m, wanted[0], many)
         else:  # one rod is struck, and at rest
@@ -145,7 +111,7 @@ def test_unlike_drag_loses_no_more_than_the_difference_of_drags(
     chain = Chain((1.0, 1.0), (0.0, gap))
     end = drag_fall(chain, [0.0, 0.0], kappas, drop, gravity, speed)
     with mp.workdps(200):
-        wanted = exact_fall(chain, [0.0, 0.0], kappas, drop, gravity, speed)
+        wanted = exact_fall(chain.heights, [0.0, 0.0], kappas, drop, gravity, speed)
         condition = max(kappas) / abs(kappas[1] - kappas[0])
         way = 1.0 + max(kappas) * (drop + gap)
         assert close(end.separation_m, wanted[0], 1e-14 * way * way * condition)

@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 import pytest
 
-from rig.analysis.components import stated
+from rig.analysis.components import priors
 from rig.errors import InputError
 from rig.protocol.describe import describe
 from rig.protocol.keys import SECTIONS
@@ -63,7 +63,7 @@ def test_an_adjustment_takes_what_the_protocol_states():
         "{hang: 3 mm, side: 5 mm, beam_offset: 10 mm, drag: 0.5, impulses: 50 %, departure: 2 mm}"
     )
     one = case(UNIFORM, incline=40.0)
-    components = stated(wide)
+    components = priors(wide)
     assert (components.hang, components.beam, components.impulse) == (3e-3, 10e-3, 0.5)
     narrow, loose = (
         case(protocol, run=one.run.number).analyze(None).quantities["separation_m"]

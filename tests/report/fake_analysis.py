@@ -1,6 +1,5 @@
 """A made-up but realistic analysis: the numbers of the reference table with scatter."""
 
-import math
 import random
 from dataclasses import replace
 from typing import Any
@@ -8,9 +7,10 @@ from typing import Any
 from rig.analysis.comparison import Difference
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
-from rig.analysis.summary import Incline
+from rig.analysis.summary import Incline, summarize
 from rig.protocol.protocol import Run
 from rig.units import Quantity
+from tests.sim.falls import UNIFORM
 
 MODEL = {
     0.0: (0.0801755, 6.2857635),
@@ -33,12 +33,10 @@ EMPTY = analysis([], [])
 def two_chains(seed: int = 1, repeats: int = 12) -> Analysis:
     rng = random.Random(seed)
     runs: list[DropResult] = []
-    summary: list[Incline] = []
     inclines = list(MODEL)
     rng.shuffle(inclines)
     for incline in inclines:
         separation, speed = MODEL[incline]
-        values = []
         for repeat in range(repeats):
             number = len(runs) + 1
             skew = rng.gauss(0.0008, 0.002)
@@ -60,26 +58,7 @@ def two_chains(seed: int = 1, repeats: int = 12) -> Analysis:
                     },
                 )
             )
-            if not void:
-                values.append(dz)
-        mean = sum(values) / len(values)
-        sd = math.sqrt(sum((value - mean) ** 2 for value in values) / (len(values) - 1))
-        summary.append(
-            compared(
-                Incline(
-                    incline,
-                    len(values),
-                    {
-                        "separation_m": Measured(mean, sd / math.sqrt(len(values))),
-                        "speed_m_s": Measured(speed + rng.gauss(0, 0.03), 0.03),
-                    },
-                    {"separation_m": sd},
-                    {"separation_m": Quantity(separation), "speed_m_s": Quantity(speed)},
-                )
-            )
-        )
-    summary.sort(key=lambda line: line.incline_deg)
-    return analysis(runs, summary)
+    return analysis(runs, summarize(UNIFORM, runs))
 
 
 def compared(line: Incline) -> Incline:
@@ -117,30 +96,6 @@ def without(found: Analysis, *names: str) -> Analysis:
             for line in found.summary
         ],
     )
-
-
-def curves() -> dict[str, Any]:
-    def alpha(theta: float) -> float:
-        t = math.radians(theta)
-        tilt = (1 - 0.2 / math.tan(t)) / (1 + 0.2 * math.tan(t))
-        g = math.cos(t) ** 2 + math.sin(t) ** 2 * 4 / 3 * tilt
-        return 0.25 * math.cos(t) ** 2 / g
-
-    inclines = [0.0, 30.0, *map(float, range(30, 86))]
-    segments = ["pile"] * 2 + ["surface"] * 56
-    points = [(0.0801755, 6.2857635)] * 2
-    points += [
-        (0.73 * alpha(t) + 0.001, 5.1366 + 11.5 * alpha(t)) for t in map(float, range(30, 86))
-    ]
-    return {
-        "incline_deg": inclines,
-        "separation_m": [point[0] for point in points],
-        "speed_m_s": [point[1] for point in points],
-        "segments": segments,
-        "separation_U95_m": [0.004] * len(points),
-        "speed_U95_m_s": [0.08] * len(points),
-        "free_fall_speed_m_s": 5.1366,
-    }
 
 
 def single_chain() -> Analysis:

@@ -11,31 +11,26 @@ from xml.etree import ElementTree
 
 import pytest
 
+from rig.analysis.curves import model_curves
 from rig.analysis.result import Audit, DropResult, Measured
-from rig.films import Film
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
 from rig.report.canvas import KINDS, drawing_file, figure_file, style, write_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
 from rig.report.figures import (
-    _stacked,
+    _stack_bar,
     budget_figure,
     result_figure,
     runs_figure,
     variance_shares,
 )
-from rig.report.film import film_figure
-from rig.report.looks import COLORS, PARTS, SECOND
+from rig.report.looks import COLORS, PARTS
 from rig.report.plot import page_svg, plot
 from tests.report import fake_analysis
+from tests.sim.falls import UNIFORM
 
 TWO = fake_analysis.two_chains()
-CURVES = fake_analysis.curves()
-FILM = Film(
-    40.0, -0.02, [0.006] * 2, [[0.05], [0.1]], [0.19, None], [0.19, 0.2],
-    [[[-0.05, 0.0, 0.1], [-0.05, 0.0, 0.15]]] * 2, [[[0.05, 0.0, 0.08], [0.05, 0.0, 0.17]]] * 2,
-)  # fmt: skip
-"""Two rods that do not move; the right string is shorter than at rest."""
+CURVES = model_curves(UNIFORM)
 
 
 def figures() -> list[Chart]:
@@ -48,7 +43,6 @@ def figures() -> list[Chart]:
         result_figure(fake_analysis.gravity(), {}, site_m_s2=9.82),
         runs_figure(TWO, 0.005),
         budget_figure([line]),
-        film_figure(FILM),
     ]
 
 
@@ -148,11 +142,6 @@ def test_shares_of_a_variance_add_up_to_the_whole():
     assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})
 
 
-def test_slack_strings_are_drawn_apart():
-    slack = [series for series in film_figure(FILM).panels[0].series if series.color == SECOND]
-    assert any(series.x for series in slack)
-
-
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monkeypatch) -> None:
     """From matplotlib's C++ an exception would end the process, without a word."""
@@ -161,7 +150,7 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
     def drawn() -> None:
         with style():
             signal.raise_signal(signal.SIGINT)
-            drawings.append(plot(film_figure(FILM)))
+            drawings.append(plot(runs_figure(TWO, 0.005)))
 
     with pytest.raises(KeyboardInterrupt):
         drawn()
@@ -182,7 +171,7 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
 def test_sources_beyond_the_colours_are_among_the_others():
     colors: dict[str, int] = {}
     for names in ("abcdefgh", "abc", "hgfedcba"):
-        bars = [*_stacked(dict.fromkeys(names, 100.0 / len(names)), colors)]
+        bars = [*_stack_bar(dict.fromkeys(names, 100.0 / len(names)), colors)]
         shares = [end - begin for bar in bars for end, _, begin in bar["points"]]
         assert sum(shares) == pytest.approx(100.0)
         assert len({bar["color"] for bar in bars}) == len(bars)

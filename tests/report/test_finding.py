@@ -41,6 +41,7 @@ def test_what_disagrees_is_named_with_its_size():
     summary = fake_analysis.two_chains().summary
     lines = [vague(line, separation_m=0.05, speed_m_s=1.0) for line in summary]
     assert verdict(lines) == ("Δz and V agree with the model at all 7 inclines, within U.", True)
+    assert " in both means," in verdict([lines[0], lines[0]]).sentence  # of unlike chains
     wrong = {**lines[0].predicted, "speed_m_s": Quantity(99.0)}
     lines[0] = fake_analysis.compared(replace(lines[0], predicted=wrong))
     sentence, agrees = verdict(lines)

@@ -8,13 +8,16 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from rig.cli import main
 from rig.protocol.reader import parse, read
 from rig.report.canvas import figure_file
 from rig.report.mounting import beam_ends, mounting_figure
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
-READY = [path for path in sorted(PROTOCOLS.glob("*.yaml")) if "\ngates:" in path.read_text("utf-8")]
+READY = [
+    path
+    for path in sorted(PROTOCOLS.glob("*.yaml"))
+    if "\ngates:" in path.read_text("utf-8") and "uno" not in path.stem  # as its like, with fewer
+]
 
 
 def drawn(protocol):
@@ -63,10 +66,3 @@ def test_a_track_is_drawn_as_it_lies():
     slope = math.degrees(math.atan2(height, low - far))
     assert slope == pytest.approx(protocol.track.incline_deg.value)
     assert math.hypot(height, low - far) == pytest.approx(1e3 * protocol.drop.value)
-
-
-def test_without_gates_there_is_nothing_to_draw(tmp_path, capsys):
-    bead = str(PROTOCOLS / "bead-chain.yaml")
-    assert main(["check", bead, "-o", str(tmp_path / "m.svg")]) == 2
-    assert "has no gates, so nothing can be measured" in capsys.readouterr().err
-    assert not (tmp_path / "m.svg").exists()

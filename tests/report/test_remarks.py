@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from html import unescape
 from types import SimpleNamespace
 
 import pytest
@@ -64,19 +63,6 @@ def rig(capsys):
         return code, capsys.readouterr().out
 
     return call
-
-
-def test_a_session_without_a_good_run_says_why(rig, tmp_path):
-    protocol, session = tmp_path / "p.yaml", tmp_path / "s"
-    protocol.write_text(short("40 deg", 1), "utf-8")
-    done = rig("run", protocol, "--port", "sim://?skew_sd=1s", "--session", session, "--yes")
-    assert done[0] == 3
-    _, told = rig("analyze", session)
-    assert "No accepted runs" in told
-    assert "run 1 (attempts 1–3): " in told
-    assert rig("report", session, "-o", tmp_path / "r.html")[0] == 0
-    what = told.splitlines()[told.splitlines().index("what to do:") + 1].strip()
-    assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
 def test_air_that_may_be_none_is_not_mentioned():

@@ -42,11 +42,11 @@ def single(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(single):
     from rig.estimate.session import estimate
-    from rig.results import detailed, protocol_of
+    from rig.results import complete_analysis, protocol_of
     from rig.session.store import Session
 
     with Session.open(single, readonly=True) as session:
-        return estimate(protocol_of(session), detailed(session)[0])
+        return estimate(protocol_of(session), complete_analysis(session))
 
 
 def test_a_single_chain_s_estimate_speaks_of_no_other(found):
@@ -65,7 +65,7 @@ def changed(found, **gain):
     return replace(
         found,
         impulses=tuple(
-            replace(one, gains=tuple(replace(each, **gain) for each in one.gains))
+            one._replace(gains=tuple(each._replace(**gain) for each in one.gains))
             for one in found.impulses
         ),
     )
@@ -90,10 +90,10 @@ def test_a_posterior_without_spread_has_no_picture(found, what):
     nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
     names = ("restitution", "friction")
     told = Measured(0.5, 0.1)
-    narrow = replace(
-        found.coefficients,
+    narrow = found.coefficients._replace(
         parameters=tuple(
-            Coefficient(name, True, told, 0.5, 0.1, 0.3, 0.7, Quantity(0.5)) for name in names
+            Coefficient(name, True, told, Quantity(0.5), {"u": 0.1, "low": 0.3, "high": 0.7})
+            for name in names
         ),
         posterior=Posterior(
             names,

@@ -13,7 +13,7 @@ from rig.cli import main
 from rig.clock.calibration import TimeScale
 from rig.reasons import plain_reason
 from rig.records import Job
-from rig.results import detailed, results
+from rig.results import calibration, complete_analysis, results
 from rig.results.known_drops import KnownDrops
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
@@ -46,10 +46,10 @@ def reject(path, *runs):
 
 def whole(path):
     with Session.open(path, readonly=True) as session:
-        return detailed(session)[0]
+        return complete_analysis(session)
 
 
-@pytest.mark.parametrize("rejected", [(), (6,), (2, 3, 4)])
+@pytest.mark.parametrize("rejected", [(6,), (2, 3, 4)])
 def test_all_drops_together_say_what_rig_analyze_says(session, rejected):
     """Of one good drop alone nothing is fitted jointly; that is summed up likewise."""
     reject(session, *rejected)
@@ -63,7 +63,7 @@ def test_all_drops_together_say_what_rig_analyze_says(session, rejected):
         assert (view.fitted, view.lagging) == (6 - len(rejected), False)
         assert view.analysis.summary != alone
     assert view.analysis.json() == whole(session).json()
-    assert bool(view.analysis.with_rejected) == bool(rejected)
+    assert view.analysis.with_rejected
 
 
 def test_the_first_reading_of_a_session_whose_results_are_kept_has_them_all(session, monkeypatch):
@@ -77,9 +77,20 @@ def test_the_first_reading_of_a_session_whose_results_are_kept_has_them_all(sess
     assert (view.fitted, view.lagging) == (6, False)
     assert view.analysis.json() == said
     assert view.results == cold.results
+    assert not view.analysis.with_rejected
     for job in view.jobs:
         pairs = [compare(one.protocol, [[one.results[job]]]) for one in (view, cold)]
         assert pairs[0] == pairs[1]
+
+
+def test_results_that_are_kept_have_the_whole_calibration(session):
+    """Also how a clock's rate changed in time, by which edges are exported."""
+    with Session.open(session, readonly=True) as opened:
+        cold, kept = results(opened, fresh=True), results(opened)
+        assert (cold.complete is None, kept.complete is None) == (False, True)
+        for drop in opened.drops():
+            scales = {found.clock.scale(drop) for found in (cold, kept)}
+            assert scales == {calibration(opened).scale(drop)}
 
 
 def test_a_rejected_drop_keeps_the_verdict_of_its_limits(session):

@@ -13,24 +13,31 @@ GATE = 3
 
 
 class Wire:
-    """The lab of a board at which only a wire changes anything."""
+    """The lab of a board at which only a wire changes anything, and some gates are blocked."""
 
-    def __init__(self, gate: int | None = GATE, late_s: float = 0.0) -> None:
+    def __init__(self, gate: int | None = GATE, late_s: float = 0.0, blocked: int = 0) -> None:
         self.changes = [] if gate is None else [(late_s, gate, True)]
+        self.blocked = blocked
 
     def rest(self, label: int) -> int:
-        return 0
+        return self.blocked
 
     def drop(self, label: int) -> list[tuple[float, int, bool]]:
         return self.changes
 
 
 class LoopedBoard(VirtualBoard):
-    """Its wire falls back when the recording ends."""
+    """Its wire falls back when the recording ends. It knows whether a release was ever on."""
+
+    driven = 0
 
     def _close(self):
         super()._close()
         self.touch(0)
+
+    def advance(self, until_ns):
+        super().advance(until_ns)
+        self.driven |= self.outputs()
 
 
 def outcomes(port, loopback=GATE, drops=5, release=True, gates=None):

@@ -1,354 +1,273 @@
 """Boards that are broken on purpose, each in one way, and the check that must notice."""
 
-from __future__ import annotations
-
+from contextlib import suppress
 from dataclasses import replace
+from itertools import count
 
 from rig.link import messages as wire
 from rig.link.messages import DisarmReason, Phase, RefusalReason
+from rig.selftest.board import LABEL, OTHER_LABEL
 from sim.controller import Microcontroller
 from sim.recording import Recording
 from tests.selftest.benches import GATE, LoopedBoard, Wire
 
-BROKEN = {}
-"""A controller or a board, the name of the check and its code, by what is wrong."""
+COUNT = count(1)
 
 
-def caught_by(check, code="wrong_answer"):
-    def remember(kind):
-        BROKEN[kind.__name__] = kind, check, code
-        return kind
+def odd(base=Microcontroller, **methods):
+    """Make a kind of controller or board; each method is given itself and the usual method."""
+    kind = type("Odd", (base,), {})
 
-    return remember
+    def bind(name, method):
+        return lambda self, *args: method(self, getattr(super(kind, self), name), *args)
 
-
-def also(answer, when):
-    """Make a controller that answers some requests in its own way."""
-
-    class Odd(Microcontroller):
-        def answer(self, frame, now_ns):
-            usual = super().answer(frame, now_ns)
-            request = wire.TABLE.get(frame.type)
-            return answer if when(request, usual) else usual
-
-    return Odd
+    for name, method in methods.items():
+        setattr(kind, name, bind(name, method))
+    return kind
 
 
-# -- greeting
+def wrong(phase, request, when=lambda self, asked: True):
+    """Say DONE to some requests in one phase."""
+
+    def reply(self, usual, frame, now_ns):
+        asked = None
+        if self.phase is phase and wire.TABLE.get(frame.type) is request:
+            with suppress(wire.MessageError):
+                asked = wire.unpack(frame.type, frame.payload)
+        return wire.Done() if asked and when(self, asked) else usual(frame, now_ns)
+
+    return odd(answer=reply)
 
 
-@caught_by("handshake", "no_answer")
-class Silent(LoopedBoard):
-    def _listen(self):
-        self._inbox.popleft()
+def claims(name, change):
+    """Answer STATUS with one field changed."""
+
+    def status(_, usual):
+        state = usual()
+        return replace(state, **{name: change(getattr(state, name))})
+
+    return odd(_status=status)
 
 
-@caught_by("handshake")
-class Nameless(LoopedBoard):
-    def __init__(self, *args, **kwargs):
-        super().__init__(*args, **kwargs)
-        self.identity = replace(self.identity, channels="A B C")
+def keeping(method, *names):
+    """Execute a request, but for what becomes of some attributes."""
 
-
-@caught_by("VERSION")
-class AnyVersion(Microcontroller):
-    def _identify(self, request):
-        return self._identity
-
-
-@caught_by("every message")
-class NoReference(also(wire.Done(), lambda asked, _: asked is wire.Reference)):
-    pass
-
-
-@caught_by("UNKNOWN_MESSAGE")
-class Agreeable(also(wire.Done(), lambda asked, _: asked is None)):
-    pass
-
-
-@caught_by("BAD_PARAMETER by length")
-class AnyLength(Microcontroller):
-    def answer(self, frame, now_ns):
-        if frame.type == wire.CODES[wire.Ping]:
-            frame = frame._replace(payload=b"")
-        return super().answer(frame, now_ns)
-
-
-# -- time
-
-
-@caught_by("round trips", "slow_answers")
-class Slow(LoopedBoard):
-    def receive(self, start_ns, data):
-        super().receive(start_ns + 150_000_000, data)
-
-
-@caught_by("round trips", "clock_off")
-class FastClock(LoopedBoard):
-    def __init__(self, *args, **kwargs):
-        super().__init__(*args, ppm=20_000, **kwargs)
-
-
-class Lapses(Microcontroller):
-    deadline_ms = silence_ms = 0
-
-    @property
-    def lapses_ns(self):
-        return min(
-            self._deadline_ns + self.deadline_ms * 10**6, self._heard_ns + self._silence_ns()
-        )
-
-    def _silence_ns(self):
-        return (250 + self.silence_ms) * 10**6
-
-
-@caught_by("arming times out")
-class NamesTheWrongReason(Microcontroller):
-    def lapse(self, now_ns):
-        return self._disarm(DisarmReason.HOST_SILENT)
-
-
-@caught_by("a silent host disarms")
-class SaysSoAndStaysArmed(Microcontroller):
-    def lapse(self, now_ns):
-        order = self.order
-        said = super().lapse(now_ns)
-        if said.reason is DisarmReason.HOST_SILENT:
-            self.order, self._heard_ns = order, now_ns + 10**9
-        return said
-
-
-# -- arming
-
-
-@caught_by("NOT_ARMED")
-class FiresAnyTime(Microcontroller):
-    def _fire(self, request):
-        if self.order is None and self.drop is None:
-            return wire.Fired(1)
-        return super()._fire(request)
-
-
-@caught_by("WRONG_TOKEN")
-class AnyToken(Microcontroller):
-    def _fire(self, request):
-        return super()._fire(wire.Fire(self._token))
-
-
-@caught_by("WRONG_TOKEN")
-class OneToken(Microcontroller):
-    def _arm(self, order):
-        answer = super()._arm(order)
-        self._token = 77
-        return wire.Armed(77) if isinstance(answer, wire.Armed) else answer
-
-
-@caught_by("ARM and ABORT")
-class StaysArmed(Microcontroller):
-    def _abort(self):
-        order = self.order
-        done = super()._abort()
-        self.order = order
-        self._heard_ns = self._now_ns
-        return done
-
-
-@caught_by("ARM and ABORT")
-class ForgetsItsLabel(Microcontroller):
-    def _status(self):
-        return replace(super()._status(), label=0)
-
-
-@caught_by("BAD_PARAMETER")
-class ARefusalDisarms(Microcontroller):
-    def _arm(self, order):
-        answer = super()._arm(order)
-        if answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0):
-            self.order = None
+    def execute(self, usual, *args):
+        before = {name: getattr(self, name) for name in names}
+        answer = usual(*args)
+        vars(self).update(before)
         return answer
 
-
-@caught_by("NO_SUCH_DROP")
-class AlwaysReads(Microcontroller):
-    def _not_held(self, label):
-        return None if self.drop else wire.Refused(RefusalReason.NOT_KEPT, 0)
+    return odd(**{method: execute})
 
 
-# -- gates
+def patient(reason=None, deadline_ms=0, silence_ms=0):
+    """Disarm at another time; for a reason the board says so, and stays armed."""
+
+    class Patient(Microcontroller):
+        @property
+        def lapses_ns(self):
+            deadline_ns = self._deadline_ns + deadline_ms * 10**6
+            return min(deadline_ns, self._heard_ns + (250 + silence_ms) * 10**6)
+
+        def lapse(self, now_ns):
+            order, disarmed = self.order, super().lapse(now_ns)
+            if disarmed.reason is reason:
+                self.order, self._heard_ns = order, now_ns + 10**9
+                self._deadline_ns = now_ns + 10**10
+            return disarmed
+
+    return Patient
 
 
-@caught_by("gates", "gates_blocked")
-class StuckGate(Microcontroller):
-    def _status(self):
-        self.gates |= 1 << 6
-        return super()._status()
+def disobeys(request):
+    """Execute repeats of one kind of request."""
 
-
-@caught_by("gates", "gates_flicker")
-class FlickeringGate(Microcontroller):
-    def _status(self):
-        self.gates ^= 1 << 6
-        return super()._status()
-
-
-@caught_by("GATE_BLOCKED")
-class ArmsBlocked(StuckGate):
-    def _arm(self, order):
-        return super()._arm(replace(order, gates=order.gates & ~(1 << 6) or 1))
-
-
-# -- the line
-
-
-class Forgetful(LoopedBoard):
-    """Executes repeats of one kind of request."""
-
-    forgets = wire.Arm
-
-    def _listen(self):
-        if self._last is not None and self._last[0] == wire.CODES[self.forgets]:
+    def listen(self, usual):
+        if self._last is not None and self._last[0] == wire.CODES[request]:
             self._last = None
-        super()._listen()
+        usual()
+
+    return odd(LoopedBoard, _listen=listen)
 
 
-@caught_by("frames without seq")
-class AnswersSeqZero(LoopedBoard):
-    def _listen(self):
-        _, data = self._inbox[0]
-        if (frames := self._decoder.feed(data)) and frames[0].seq == 0:
-            self._send(wire.State(Phase.IDLE, 0, 0, 0))
-        super()._listen()
+def identified(**fields):
+    """Build a board with another identity."""
+
+    def build():
+        board = LoopedBoard(Wire())
+        board.identity = replace(board.identity, **fields)
+        return board
+
+    return build
 
 
-@caught_by("junk on the line", "no_answer")
-class Sensitive(LoopedBoard):
-    def _listen(self):
-        if self._decoder.bad:
-            self._inbox.popleft()
-        else:
-            super()._listen()
+def bouncing():
+    board = LoopedBoard(Wire())
+    board.lab.changes = [(0.0, GATE, True), (0.001, GATE, False), (0.002, GATE, True)]
+    return board
 
 
-# -- drops
+def refusal_disarms(self, usual, order):
+    answer = usual(order)
+    if answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0):
+        self.order = None
+    return answer
 
 
-@caught_by("certificate")
-class WrongSum(Microcontroller):
-    def _fire(self, request):
-        answer = super()._fire(request)
-        if isinstance(self.drop, Recording):
-            honest = self.drop.certificate
-            self.drop.certificate = lambda: replace(honest(), crc32=honest().crc32 ^ 1)
+def never_cools(self, usual, order):
+    self.release._off_ns = 0
+    return usual(order)
+
+
+def rests(change):
+    """Say another time that a release has to rest."""
+
+    def arm(_, usual, order):
+        answer = usual(order)
+        is_cooling = isinstance(answer, wire.Refused) and answer.reason is RefusalReason.COOLING
+        return replace(answer, detail=change(answer.detail)) if is_cooling else answer
+
+    return odd(_arm=arm)
+
+
+def one_token(self, usual, order):
+    answer, self._token = usual(order), 77
+    return wire.Armed(77) if isinstance(answer, wire.Armed) else answer
+
+
+def keeps_tokens(self, usual, order):
+    answer = usual(order)
+    self.tokens = [*getattr(self, "tokens", []), self._token]
+    return answer
+
+
+def any_of_its_tokens(self, usual, request):
+    is_its = request.token in getattr(self, "tokens", [])
+    return usual(wire.Fire(self._token) if is_its else request)
+
+
+def agrees(_, usual, frame, now_ns):
+    return usual(frame, now_ns) if frame.type in wire.TABLE else wire.Done()
+
+
+def any_length(_, usual, frame, now_ns):
+    is_ping = frame.type == wire.CODES[wire.Ping]
+    return usual(frame._replace(payload=b"") if is_ping else frame, now_ns)
+
+
+def has_wrong_sum(self, asked):
+    return asked.crc32 != self.drop.certificate().crc32
+
+
+def certifies_anew(_, usual, request):
+    answer = usual(request)
+    return replace(answer, glitches=9) if isinstance(answer, wire.DropCertificate) else answer
+
+
+def wrong_certificate(name, change):
+    """Certify drops with one field changed."""
+
+    def fire(self, usual, request):
+        before, answer = self.drop, usual(request)
+        if isinstance(self.drop, Recording) and self.drop is not before:
+            right = self.drop.certificate
+            self.drop.certificate = lambda: replace(
+                right(), **{name: change(getattr(right(), name))}
+            )
         return answer
 
-
-@caught_by("BUSY")
-class NeverBusy(
-    also(
-        wire.Refused(RefusalReason.HOLDING_A_DROP, 0),
-        lambda _, a: a == wire.Refused(RefusalReason.BUSY, 0),
-    )
-):
-    pass
+    return odd(_fire=fire)
 
 
-@caught_by("ABORT of a recording", "no_certificate")
-class RecordsOn(Microcontroller):
-    def _abort(self):
-        end_ns = self.end_ns
-        done = super()._abort()
-        if end_ns is not None and end_ns - self._now_ns > 10**10:
-            self.end_ns = end_ns
-        return done
+def answers_seq_zero(self, usual):
+    _, data = self._inbox[0]
+    if (frames := self._decoder.feed(data)) and frames[0].seq == 0:
+        self._send(wire.State(Phase.IDLE, 0, 0, 0))
+    usual()
 
 
-@caught_by("HOLDING_A_DROP")
-class DropsTheDrop(Microcontroller):
-    def _arm(self, order):
-        if self.end_ns is None:
-            self.drop = None
-        return super()._arm(order)
+def listens_when_clean(self, usual):
+    return self._inbox.popleft() if self._decoder.bad else usual()
 
 
-@caught_by("reading again")
-class ReadsAnything(Microcontroller):
-    def _read(self, request):
-        if request.count and self.drop is not None and request.first >= len(self.drop):
-            return self.drop.part(0, 0)
-        return super()._read(request)
+def takes_ids(_, usual, request):
+    answer = usual(request)
+    fresh = next(COUNT).to_bytes(8, "big")
+    return replace(answer, unique_id=fresh) if isinstance(answer, wire.Identity) else answer
 
 
-@caught_by("reading again")
-class CertifiesAnew(Microcontroller):
-    def _read(self, request):
-        answer = super()._read(request)
-        if isinstance(answer, wire.DropCertificate):
-            return replace(answer, glitches=answer.glitches + 1)
-        return answer
+def late_answers(_, usual, at_ns, data):
+    usual(at_ns + 150_000_000, data)
 
 
-@caught_by("ACKNOWLEDGE and WRONG_CRC")
-class AnySum(Microcontroller):
-    def _acknowledge(self, request):
-        held = self.drop.certificate().crc32 if self.drop else 0
-        return super()._acknowledge(replace(request, crc32=held))
-
-
-@caught_by("ACKNOWLEDGE and WRONG_CRC")
-class KeepsTheDrop(Microcontroller):
-    offended = False
-
-    def _acknowledge(self, request):
-        drop = self.drop
-        answer = super()._acknowledge(request)
-        if answer == wire.Refused(RefusalReason.WRONG_CRC, 0):
-            self.offended = True
-        elif self.offended:
-            self.drop = drop
-        return answer
-
-
-@caught_by("COOLING")
-class NeverCools(Microcontroller):
-    def _arm(self, order):
-        self.release._off_ns = 0
-        return super()._arm(order)
-
-
-# -- the wire
-
-
-@caught_by("sync output to gate", "sync_late")
-class LateStamps(LoopedBoard):
-    def __init__(self, lab, *args, **kwargs):
-        super().__init__(Wire(late_s=20e-6), *args, **kwargs)
-
-
-@caught_by("sync output to gate", "sync_edges")
-class BouncingOutput(LoopedBoard):
-    def __init__(self, lab, *args, **kwargs):
-        super().__init__(lab, *args, **kwargs)
-        self.lab.changes = [(0.0, GATE, True), (0.001, GATE, False), (0.002, GATE, True)]
-
-
-@caught_by("sync output to gate", "sync_blocked")
-class WireToSupply(Microcontroller):
-    def _status(self):
-        self.gates |= 1 << GATE
-        return super()._status()
-
-
-# -- boards that differ in a number
-
-
-for name, kind, check, changes in (
-    ("TimesOutLate", Lapses, "arming times out", {"deadline_ms": 100}),
-    ("TimesOutEarly", Lapses, "arming times out", {"deadline_ms": -10}),
-    ("PatientForTooLong", Lapses, "a silent host disarms", {"silence_ms": 60}),
-    ("WaitsForEver", Lapses, "a silent host disarms", {"silence_ms": 10_000}),
-    ("Impatient", Lapses, "a silent host disarms", {"silence_ms": -20}),
-    ("ArmsTwice", Forgetful, "repeated frames", {"forgets": wire.Arm}),
-    ("FiresTwice", Forgetful, "repeated frames", {"forgets": wire.Fire}),
-    ("AcknowledgesTwice", Forgetful, "repeated frames", {"forgets": wire.Acknowledge}),
-):
-    caught_by(check)(type(name, (kind,), changes))
+ODD, STUCK = "wrong_answer", 1 << 6
+BROKEN = [
+    ("handshake", "device_silent", odd(LoopedBoard, _listen=lambda self, _: self._inbox.popleft())),
+    ("handshake", ODD, identified(channels="A B C")),
+    ("handshake", ODD, identified(unique_id=bytes(8))),
+    ("handshake", ODD, identified(tick_hz=999_999)),
+    ("handshake", ODD, odd(_identify=takes_ids)),
+    ("bad requests", ODD, odd(_identify=lambda self, *_: self._identity)),
+    ("bad requests", ODD, odd(answer=agrees)),
+    ("bad requests", ODD, odd(answer=any_length)),
+    ("round trips", "slow_answers", odd(LoopedBoard, receive=late_answers)),
+    ("round trips", "clock_off", lambda: LoopedBoard(Wire(), ppm=20_000)),
+    ("gates", "gates_blocked", claims("gates", lambda gates: gates | STUCK)),
+    ("gates", "gates_flicker", claims("gates", lambda gates: gates | STUCK * (next(COUNT) % 2))),
+    ("GATE_BLOCKED", ODD, claims("gates", lambda gates: gates | STUCK)),
+    *(
+        ("IDLE", ODD, wrong(Phase.IDLE, kind))
+        for kind in (wire.Reference, wire.Fire, wire.Read, wire.Acknowledge)
+    ),
+    ("ARMED", ODD, wrong(Phase.ARMED, wire.Fire, lambda me, asked: asked.token == me._token ^ 1)),
+    ("ARMED", ODD, keeping("_abort", "order")),
+    ("ARMED", ODD, odd(_fire=lambda self, usual, _: usual(wire.Fire(self._token)))),
+    ("ARMED", ODD, odd(_arm=keeps_tokens, _fire=any_of_its_tokens)),
+    ("ARMED", ODD, odd(_arm=one_token)),
+    ("ARMED", ODD, odd(_arm=refusal_disarms)),
+    ("ARMED", ODD, claims("label", lambda _: 0)),
+    ("arming times out", ODD, odd(lapse=lambda self, *_: self._disarm(DisarmReason.HOST_SILENT))),
+    ("arming times out", ODD, patient(DisarmReason.TIMEOUT)),
+    ("arming times out", ODD, patient(deadline_ms=100)),
+    ("arming times out", ODD, patient(deadline_ms=-10)),
+    ("arming times out", ODD, patient(deadline_ms=-200)),
+    ("a silent host disarms", ODD, patient(DisarmReason.HOST_SILENT)),
+    ("a silent host disarms", ODD, patient(silence_ms=60)),
+    ("a silent host disarms", ODD, patient(silence_ms=10_000)),
+    ("a silent host disarms", ODD, patient(silence_ms=-20)),
+    ("repeated frames", ODD, disobeys(wire.Arm)),
+    ("repeated frames", ODD, disobeys(wire.Fire)),
+    ("repeated frames", ODD, disobeys(wire.Acknowledge)),
+    ("repeated frames", ODD, keeping("_acknowledge", "drop")),
+    ("junk on the line", ODD, odd(LoopedBoard, _listen=answers_seq_zero)),
+    ("junk on the line", "device_silent", odd(LoopedBoard, _listen=listens_when_clean)),
+    *(
+        ("RECORDING", ODD, wrong(Phase.RECORDING, kind))
+        for kind in (wire.Status, wire.Arm, wire.Read, wire.Acknowledge, wire.Fire)
+    ),
+    ("RECORDING", ODD, keeping("_abort", "end_ns")),
+    ("HOLDING", ODD, wrong_certificate("crc32", lambda crc32: crc32 ^ 1)),
+    ("HOLDING", ODD, wrong_certificate("gates", lambda gates: gates ^ 1)),
+    *(
+        ("HOLDING", ODD, wrong(Phase.HOLDING, kind, lambda _, asked: asked.label == OTHER_LABEL))
+        for kind in (wire.Arm, wire.Read, wire.Acknowledge)
+    ),
+    ("HOLDING", ODD, wrong(Phase.HOLDING, wire.Arm, lambda me, _: not me.drop.aborted)),
+    (
+        "HOLDING",
+        ODD,
+        wrong(Phase.HOLDING, wire.Arm, lambda me, asked: asked.label == LABEL and me.drop.aborted),
+    ),
+    ("HOLDING", ODD, wrong(Phase.HOLDING, wire.Read, lambda _, asked: asked.count)),
+    ("HOLDING", ODD, odd(_read=certifies_anew)),
+    ("HOLDING", ODD, wrong(Phase.HOLDING, wire.Status)),
+    ("HOLDING", ODD, wrong(Phase.HOLDING, wire.Acknowledge, has_wrong_sum)),
+    ("COOLING", ODD, odd(_arm=never_cools)),
+    ("COOLING", ODD, rests(lambda _: 10_000)),
+    ("COOLING", ODD, rests(lambda rest_ms: rest_ms // 2)),
+    ("sync output to gate", "sync_late", lambda: LoopedBoard(Wire(late_s=20e-6))),
+    ("sync output to gate", "sync_edges", bouncing),
+    ("sync output to gate", "sync_blocked", claims("gates", lambda gates: gates | 1 << GATE)),
+]
+"""The check, its code, and a kind of controller or what builds a board."""

@@ -6,6 +6,7 @@ from itertools import islice
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
+from rig.link.client import Device
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import CHECKS, selftest
@@ -50,7 +51,7 @@ class Pair:
 def pair():
     """Two boards that have started, which takes long; what a test changes, it changes back."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rig.selftest.requests.BOOT_WAIT_S", 0.0)  # opening restarts none of them
+        patch.setattr(Device.connect, "__defaults__", (0.0,))  # opening restarts none of them
         patch.setattr("rig.selftest.run.CHECKS", dict(islice(CHECKS.items(), 1)))
         yield Pair()
 

@@ -33,12 +33,9 @@ def mutants(sound, tmp_path):
     return Mutants(sound, tmp_path)
 
 
-MANY = pytest.mark.parametrize(
+@pytest.mark.parametrize(
     "seeds", [range(400), pytest.param(range(400, 2000), marks=pytest.mark.slow)], ids=str
 )
-
-
-@MANY
 def test_any_session_is_read_or_refused(seeds, mutants, tmp_path):
     path, done = tmp_path / "mutant", {}
 
@@ -65,14 +62,15 @@ def test_recover_tells_of_any_session_and_calls_none_whole_that_cannot_be_read(m
     assert failures(each, range(150)) == []
 
 
-@MANY
-def test_any_protocol_is_read_or_refused(seeds, tmp_path):
+@pytest.mark.slow
+def test_any_protocol_is_read_or_refused(tmp_path):
+    """As `tests/protocol/test_protocol_reader.py` sees of fewer."""
     path, text = tmp_path / "mutant.yaml", FENCE.replace("RUNS", "2")
 
     def each(seed):
         read_text_with(reader.read, altered_text(text, seed), path)
 
-    assert failures(each, seeds) == []
+    assert failures(each, range(2000)) == []
 
 
 VIEW = """

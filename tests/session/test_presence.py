@@ -9,14 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from bench.failing_disk import FailingDisk
 from bench.mutants import make_session
 from bench.process_fixture import FENCE
 from rig.errors import DeviceError, InputError, SessionError
 from rig.recorder.controller import Controller
+from rig.recorder.published import PublishedState
 from rig.recover.examine import examine
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.session.failing_disk import FailingDisk
 
 DROPS = ((1, 1), (2, 1))
 
@@ -51,7 +52,7 @@ def rig(tmp_path):
     """Have a simulated rig that has recorded one of two drops."""
     protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
     protocol.write_text(FENCE.replace("RUNS", "2"), "utf-8")
-    made = Controller("sim://")
+    made = Controller("sim://", PublishedState())
     made.open_session(str(protocol), str(session), 3)
     made.fire(made.arm(1, 1))
     made.collect(1, 1)
@@ -83,7 +84,7 @@ def test_nothing_is_armed_and_all_is_saved_beside_it(rig, lose):
             assert found.states() == before
     left = {path.name for path in session.parent.iterdir()}
     assert not left & {"session-wal", "session-shm", "session.lock"}
-    again = Controller("sim://")
+    again = Controller("sim://", PublishedState())
     again.open_session(str(protocol), str(saved))
     again.fire(again.arm(2, 1))
     assert again.collect(2, 1).faults == ()
@@ -167,7 +168,7 @@ def test_a_disk_that_can_only_be_read_any_more_leaves_the_drop_on_the_board(tmp_
             pytest.skip("no /sys/fs/ext4 here: a disk cannot be made to fail")
         protocol, session = disk.folder / "fence.yaml", disk.folder / "session"
         protocol.write_text(FENCE.replace("RUNS", "3"), "utf-8")
-        made = Controller("sim://")
+        made = Controller("sim://", PublishedState())
         made.open_session(str(protocol), str(session), 3)
         made.fire(made.arm(1, 1))
         made.collect(1, 1)
@@ -208,10 +209,10 @@ def test_a_session_that_another_writes_costs_no_descriptor(tmp_path):
 def test_a_port_that_is_not_there_leaves_no_session_in_the_way(tmp_path):
     protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
     protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
-    real = Controller(str(tmp_path / "ttyACM0"))
+    real = Controller(str(tmp_path / "ttyACM0"), PublishedState())
     with pytest.raises(DeviceError, match="no such port"):
         real.open_session(str(protocol), str(session))
     assert [one.name for one in tmp_path.iterdir()] == [protocol.name]
-    simulated = Controller("sim://")
+    simulated = Controller("sim://", PublishedState())
     simulated.open_session(str(protocol), str(session))
     simulated.close()

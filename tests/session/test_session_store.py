@@ -401,34 +401,22 @@ def cut(path):
     path.write_bytes(path.read_bytes()[:5000])
 
 
+NO_SESSIONS = {
+    "missing": (lambda path: None, "no session at"),
+    "folder": (lambda path: path.mkdir(), "folder"),
+    "empty": (lambda path: path.write_bytes(b""), "empty"),
+    "text": (lambda path: path.write_text("run,channel,time_s,state\n" * 400), "not a session"),
+    "byte": (lambda path: path.write_bytes(b"x"), "not a session"),
+    "foreign": (database, "another program's"),
+    "newer": (altered(f"PRAGMA user_version = {SCHEMA_VERSION + 1}"), "newer rig"),
+    "undated": (altered("UPDATE meta SET value = 'x' WHERE key = 'created'"), "when it was made"),
+    "hollow": (hollow, "not a session|cannot be used|damaged"),
+    "cut": (cut, "damaged"),
+}
+
+
 @pytest.mark.parametrize("readonly", [False, True])
-@pytest.mark.parametrize(
-    ("prepare", "words"),
-    [
-        (lambda path: None, "no session at"),
-        (lambda path: path.mkdir(), "folder"),
-        (lambda path: path.write_bytes(b""), "empty"),
-        (lambda path: path.write_text("run,channel,time_s,state\n" * 400), "not a session"),
-        (lambda path: path.write_bytes(b"x"), "not a session"),
-        (database, "another program's"),
-        (altered(f"PRAGMA user_version = {SCHEMA_VERSION + 1}"), "newer rig"),
-        (altered("UPDATE meta SET value = 'once' WHERE key = 'created'"), "when it was made"),
-        (hollow, "not a session|cannot be used|damaged"),
-        (cut, "damaged"),
-    ],
-    ids=[
-        "missing",
-        "folder",
-        "empty",
-        "text",
-        "byte",
-        "foreign",
-        "newer",
-        "undated",
-        "hollow",
-        "cut",
-    ],
-)
+@pytest.mark.parametrize(("prepare", "words"), NO_SESSIONS.values(), ids=NO_SESSIONS)
 def test_what_is_no_session(path, prepare, words: str, readonly: bool):
     prepare(path)
     before = path.read_bytes() if path.is_file() else None

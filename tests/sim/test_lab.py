@@ -2,7 +2,6 @@
 
 import math
 import random
-from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -80,7 +79,6 @@ def test_a_single_chain_has_a_speed_and_no_separation():
     assert truth.speed_m_s == pytest.approx(REFERENCE[40][1], rel=1e-12)
     assert truth.impact_chain == "A"
     assert truth.separation_m is truth.separation_raw_m is truth.release_skew_s is None
-    assert truth.camera_separation_m is truth.camera_speed_m_s is None
 
 
 def test_a_picket_fence_falls_freely():
@@ -132,33 +130,3 @@ def test_a_run_the_plan_does_not_have_is_bad_input():
     for ask in (lab.drop, lab.rest):
         with pytest.raises(InputError, match="no run 109"):
             ask(pack_label(109, 1))
-
-
-@examples(25)
-@given(
-    st.builds(
-        Dials,
-        skew_sd=st.floats(0, 0.02),
-        hang_sd=st.floats(0, 0.003),
-        rod_sd=st.floats(0, 0.004),
-        width_sd=st.floats(0, 0.001),
-        gate_sd=st.floats(0, 0.005),
-        beam_sd=st.floats(0, 0.2),
-        impulse_sd=st.floats(0, 0.5),
-        jitter_sd=st.floats(0, 1e-3),
-        missed=st.floats(0, 1),
-        chatter=st.floats(0, 1),
-        string=st.floats(0, 1),
-        bounce=st.floats(0, 1),
-    ),
-    st.integers(0, 10**6),
-    st.integers(1, 108),
-)
-def test_for_any_dials_levels_alternate_and_time_runs_forward(dials, seed, run):
-    edges, truth = drop(UNIFORM, dials, seed, run)
-    assert all(a[0] <= b[0] for a, b in pairwise(edges))
-    for gate in UNIFORM.gates.gates:
-        levels = [blocked for _, blocked in on(edges, gate.channel)]
-        assert levels == [i % 2 == 0 for i in range(len(levels))]
-        assert len(levels) % 2 == 0
-    assert [(t, c, b) for t, c, b, _ in truth.edges] == edges

@@ -85,13 +85,6 @@ def test_the_top_rod_strikes_what_lies_there():
     assert_normal(above, 5e-3)
 
 
-def test_jitter_scatters_single_edges():
-    quiet = attempts(with_dials(), 1)[0]
-    truth = attempts(with_dials(jitter_sd=2e-6), 1)[0]
-    then = {(c, b, r): t for t, c, b, r in quiet.edges}
-    assert_normal([t - then[c, b, r] for t, c, b, r in truth.edges], 2e-6)
-
-
 def test_single_impulses_scatter_independently_by_the_dial():
     sd, wiggle = 0.02, 1e-6
     a = alpha(40)

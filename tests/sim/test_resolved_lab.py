@@ -9,19 +9,16 @@ import numpy as np
 import pytest
 
 from rig.errors import InputError
-from rig.films import Film, read_films
 from rig.link.messages import pack_label
 from rig.ports import truth_file
 from rig.protocol import reader
 from rig.runner import Operator, run_protocol
-from sim import fall_cache, resolved_lab
-from sim.dials import Dials, read_dials
-from sim.film import film
+from sim import resolved_lab
+from sim.dials import ResolvedDials
 from sim.resolved import foresight
 from sim.resolved.fall import fall
-from sim.resolved_dials import ResolvedDials, read_resolved_dials
 from sim.resolved_lab import ResolvedLab, at_level
-from sim.scene import choose_world, set_scene
+from sim.scene import set_scene
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
 
@@ -43,14 +40,6 @@ accept: {release_skew: 20 ms}
 """
 
 
-@pytest.fixture(scope="module", autouse=True)
-def cache(tmp_path_factory):
-    """Falls made here are kept here."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory) -> str:
     path = tmp_path_factory.mktemp("scene") / "four.yaml"
@@ -62,10 +51,8 @@ def scene(tmp_path_factory) -> str:
 def dropped(scene) -> tuple[ResolvedLab, list, list]:
     """Both drops of a session on a perfect rig: lab, truths, edges."""
     truths: list = []
-    lab = ResolvedLab(
-        reader.read(scene), replace(Dials.quiet(), skew_sd=2e-3), 3, truths.append,
-        world=read_resolved_dials({"quiet": "1", "yaw_sd": "1 deg"}),
-    )  # fmt: skip
+    dials = replace(ResolvedDials.quiet(), skew_sd=2e-3, yaw_sd=1.0)
+    lab = ResolvedLab(reader.read(scene), dials, 3, truths.append)
     edges = [lab.drop(pack_label(run, 1)) for run in (1, 2)]
     return lab, truths, edges
 
@@ -74,7 +61,7 @@ def test_free_chain_darkens_beams_as_free_fall_does(dropped):
     lab, truths, _ = dropped
     half = 12.7e-3 / 2 / math.cos(math.radians(12))
     for truth in truths:
-        let_go = Dials().delay + truth.release_skew_s
+        let_go = lab.dials.delay + truth.release_skew_s
         seen = {(ch, dark, rod): t for t, ch, dark, rod in truth.edges if ch >= 8}
         for gate in lab.protocol.gates.on("free"):
             for rod in range(4):
@@ -99,52 +86,20 @@ def test_truth_at_level_and_at_strike(dropped):
         assert truth.separation_strike_m == pytest.approx(strike, abs=1e-7)
         assert truth.speed_m_s > math.sqrt(2 * GRAVITY * 0.74) > 0
         assert truth.separation_m > 1e-3  # struck rods pulled it down
-        assert all(impulse > 0.0 for impulse in truth.impulses[:-1])
-        assert truth.lost["board"] > 0.0
-        assert 0.0 <= truth.slack <= 1.0
+        # Noise of reading is 0.5 mm; the last frame comes up to 1/480 s early.
+        assert truth.camera_separation_m == pytest.approx(truth.separation_m, abs=15e-3)
+        assert truth.camera_speed_m_s == pytest.approx(truth.speed_m_s, abs=0.5)
 
 
-def test_a_drop_comes_out_the_same_alone_again_and_from_the_disk(dropped, monkeypatch, tmp_path):
+def test_a_drop_comes_out_the_same_again_alone_and_made_ahead(dropped):
     lab, truths, edges = dropped
     assert lab.drop(pack_label(2, 1)) == edges[1]
     truths.pop()
-
-    def again() -> list:
-        twin = ResolvedLab(lab.protocol, lab.dials, 3, world=lab.world)
-        return twin.drop(pack_label(2, 1))
-
-    assert again() == edges[1]  # from the disk
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert again() == edges[1]
-
-
-def test_arming_a_drop_has_the_next_ones_made(dropped, monkeypatch, tmp_path):
-    lab, _, edges = dropped
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    made: list[int] = []
-
-    def make(self, label):
-        made.append(label)
-        return self._hidden(label)
-
-    monkeypatch.setattr(ResolvedLab, "_hidden", ResolvedLab._make, raising=False)
-    monkeypatch.setattr(ResolvedLab, "_make", make)
-    twin = ResolvedLab(lab.protocol, lab.dials, 3, world=lab.world)
-    labels = [pack_label(run, 1) for run in (1, 2)]
-    twin.rest(labels[0])
-    twin.rest(labels[0])  # armed once more
-    assert [twin.drop(label) for label in labels] == edges
-    assert sorted(made) == labels
-
-
-@pytest.mark.parametrize("hurt", [lambda t: t[:-1], lambda t: t.replace("1", "2"), lambda _: "[]"])
-def test_a_fall_that_was_damaged_on_the_disk_is_made_anew(hurt, monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    fall_cache.save("x", {"a": 1})
-    assert fall_cache.load("x") == {"a": 1}
-    (path,) = fall_cache.folder().iterdir()
-    path.write_text(hurt(path.read_text()))
-    assert fall_cache.load("x") is None
+    twin = ResolvedLab(lab.protocol, lab.dials, 3)
+    labels = [pack_label(run, 1) for run in (2, 1)]
+    twin.make_ahead(labels)
+    twin.let_fall = None  # whatever falls now
+    assert [twin.drop(label) for label in labels] == edges[::-1]
 
 
 def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
@@ -155,39 +110,7 @@ def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
     url = "sim://?dynamics=resolved&quiet=1&yaw_sd=1 deg"
     run_protocol(str(one), url, str(path), Operator(lambda _: None), 3)
     (truth,) = [json.loads(line) for line in truth_file(path).read_text().splitlines()]
-    with truth_file(path).open("a") as cut:
-        cut.write('{"run": 2, "attempt"')
-    ((label, shown),) = read_films(path).items()
-    assert label == (truth["run"], truth["attempt"]) == (1, 1)
-    assert shown.touched_s == pytest.approx(truth["touched_s"], abs=1e-5)
-    assert shown.times_s[-1] > truth["strike_time_s"]
-
-
-@pytest.mark.parametrize(
-    ("setting", "text", "says"),
-    [
-        ("dynamics", "real", "model or resolved"),
-        ("string_restitution", "0.05", "0.1 to 1"),
-        ("board_time", "2 mm", "a time"),
-        ("rods_touch", "0.5", "neither 0 nor 1"),
-        ("spin_sd", "3", "rad/s"),
-        ("swing_sd", "1e9 m/s", "0 to 10 m/s"),
-        ("tilt_sd", "30 deg", "in each other as it hangs"),
-        ("drag", "1000", "more than 5 s"),
-        ("hang_sd", "9 m", "as it hangs"),
-        ("restitution", "-0.37", "restitution"),
-    ],
-)
-def test_bad_settings_are_refused(scene, setting, text, says):
-    with pytest.raises(InputError) as caught:
-        set_scene("sim", {"protocol": scene, "dynamics": "resolved"} | {setting: text})
-    assert says in f"{caught.value} {caught.value.hint}"
-
-
-def test_dials_of_the_resolved_world_are_unknown_to_the_model():
-    with pytest.raises(InputError, match="string_restitution") as caught:
-        read_dials(choose_world({"string_restitution": "0.5"})[1])
-    assert caught.value.hint == "add dynamics=resolved"
+    assert (truth["run"], truth["attempt"]) == (1, 1)
 
 
 def test_a_fall_that_would_take_minutes_is_refused_and_a_long_one_told_of(
@@ -220,62 +143,26 @@ def test_a_top_rod_that_never_lands_is_said(dropped):
         at_level(struck, GRAVITY)
 
 
-def test_air_takes_from_a_chain_what_the_dial_says(scene):
-    lab = ResolvedLab(
-        reader.read(scene), replace(Dials.quiet(), drag=0.05), 3, world=ResolvedDials()
-    )
-    chain = lab.chains(pack_label(1, 1))["impact"]
-    mean = (chain.drag * chain.rods.masses).sum() / chain.rods.masses.sum()
-    assert np.isclose(mean, 0.05, rtol=1e-12)
-
-
-def test_air_takes_less_from_a_chain_of_thicker_rods(scene):
+def test_air_takes_from_a_chain_what_the_dial_says_and_less_from_thicker_rods(scene):
     protocol = reader.read(scene)
     thin = next(iter(protocol.chains.values()))
     thick = replace(thin, name="B", diameters=tuple(2.0 * d for d in thin.diameters))
     both = replace(protocol, chains={thin.name: thin, thick.name: thick})
-    lab = ResolvedLab(both, replace(Dials.quiet(), drag=0.05), 3, world=ResolvedDials())
-    chains = lab.chains(pack_label(1, 1)).values()
-    assert sorted({round(float(chain.drag[0]), 12) for chain in chains}) == [0.025, 0.05]
-
-
-def test_a_film_shows_rods_whole_and_above_the_board(dropped):
-    lab, _, _ = dropped
-    chain = lab.chains(pack_label(1, 1))["impact"]
-    found = fall(chain)
-    shown = Film(**film(chain, found))
-    left, right = np.array(shown.left), np.array(shown.right)
-    assert left.shape == right.shape == (len(shown.times_s), 4, 3)
-    assert np.linalg.norm(right - left, axis=-1) == pytest.approx(0.102, abs=2e-4)
-    places = np.array([shown.middles(n) for n in range(len(left))])
-    board = shown.board_m - places[..., 1] * math.tan(math.radians(shown.incline_deg))
-    assert (places[..., 2] > board).all()
-    # 18.8 mm: L/2 sin 12° and r/cos 40°, nearly
-    assert shown.board_m == pytest.approx(-0.0188, abs=0.2e-3)
-    # What falls by formula and what falls by steps make one fall, from the release on.
-    for rod in range(4):
-        heights = np.interp(shown.times_s, found.times, found.heights[:, rod])
-        assert places[:, rod, 2] == pytest.approx(heights, abs=0.1e-3)
-    assert shown.times_s[0] < 1e-3
-    assert shown.touched_s == pytest.approx(found.touched_s, abs=1e-5)
-    before, after = (shown.nearest(found.touched_s[0] + late) for late in (-0.01, 0.01))
-    left, right = (np.array([ends[before], ends[after]]) for ends in (shown.left, shown.right))
-    rods = right - left
-    tilts_deg = np.degrees(np.arcsin(rods[:, :, 2] / np.linalg.norm(rods, axis=2)))
-    assert tilts_deg[0, :2] == pytest.approx([12.0, -12.0], abs=0.2)
-    assert abs(tilts_deg[1, 0] - 12.0) > 5.0  # its end was thrown up
-    assert shown.slack(before) == ([False] * 3, [False] * 3)
-    assert any(shown.slack(after)[0] + shown.slack(after)[1])
+    chains = ResolvedLab(both, ResolvedDials(drag=0.05), 3).chains(pack_label(1, 1)).values()
+    means = {
+        round(float((chain.drag * chain.rods.masses).sum() / chain.rods.masses.sum()), 12)
+        for chain in chains
+    }
+    assert means == {0.05, 0.025}
 
 
 def test_a_free_chain_swings_too(scene):
     still, swinging = (
-        ResolvedLab(
-            reader.read(scene), Dials.quiet(), 3,
-            world=read_resolved_dials({"quiet": "1", "swing_sd": f"{speed} m/s"}),
-        ).chains(pack_label(1, 1))
+        ResolvedLab(reader.read(scene), replace(ResolvedDials.quiet(), swing_sd=speed), 3).chains(
+            pack_label(1, 1)
+        )
         for speed in (0.0, 0.1)
-    )  # fmt: skip
+    )
     for side in ("impact", "free"):
         assert not still[side].swing.any()
         speeds = np.abs(swinging[side].swing)

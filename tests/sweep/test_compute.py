@@ -24,10 +24,10 @@ def points(protocol, vary, length=7):
     layout = lay_out(protocol, vary)
     with ThreadPoolExecutor(1) as pool:
         swept = compute(layout, pool, 1, length)
-    assert swept.notes.shape == layout.grid.shape
-    names = [axis.name for axis in layout.grid.axes]
+    assert swept.notes.shape == layout.shape
+    names = list(layout.axes)
     rows = zip(
-        itertools.product(*(axis.values for axis in layout.grid.axes)),
+        itertools.product(*layout.axes.values()),
         swept.separation_m.ravel().tolist(),
         swept.speed_m_s.ravel().tolist(),
         swept.in_domain.ravel().tolist(),
@@ -35,7 +35,7 @@ def points(protocol, vary, length=7):
         strict=True,
     )
     for values, *found in rows:
-        yield {**layout.fixed, **dict(zip(names, values, strict=True))}, *found
+        yield {**layout.fixed_values, **dict(zip(names, values, strict=True))}, *found
 
 
 def test_points_are_single_falls_with_the_notes_of_single_impacts():
@@ -84,16 +84,14 @@ def test_a_stated_alpha_gives_the_single_falls_to_the_bit():
 def test_a_value_holds_a_parameter_and_the_inclines_are_layers():
     protocol = reader.parse(SCENE)
     layout = lay_out(protocol, ["friction=0..1:3", "drop=90mm"])
-    assert [(axis.name, len(axis.values)) for axis in layout.grid.axes] == [
-        ("incline", 3),
-        ("friction", 3),
-    ]
+    assert list(layout.axes) == ["incline", "friction"]
+    assert layout.shape == (3, 3)
     assert layout.layered
-    assert layout.fixed["drop"] == 0.09
+    assert layout.fixed_values["drop"] == 0.09
     layout = lay_out(protocol, ["friction=0..1:3", "incline=40deg"])
     assert not layout.layered
-    assert layout.grid.shape == (3,)
-    assert layout.fixed["incline"] == 40.0
+    assert layout.shape == (3,)
+    assert layout.fixed_values["incline"] == 40.0
 
 
 @pytest.mark.parametrize(("scene", "vary", "said"), [

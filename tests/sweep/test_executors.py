@@ -26,7 +26,7 @@ def layout():
 
 @pytest.fixture(scope="module")
 def wanted(layout):
-    return computed(layout, layout.grid.size)
+    return computed(layout, layout.size)
 
 
 def computed(layout, length, threads=1, show=lambda _: None):
@@ -94,7 +94,7 @@ def test_an_address_where_no_cluster_is(sweep, tmp_path, address, monkeypatch):
 
 
 def test_ctrl_c_ends_a_sweep_and_writes_nothing(tmp_path):
-    vary = ("--vary", "drop=0m..1m:4000", "--vary", "friction=0..1:4000", "--vary", "incline=40deg")
+    vary = ("--vary", "drop=0m..1m:2500", "--vary", "friction=0..1:2500", "--vary", "incline=40deg")
     arguments = ("sweep", PROTOCOLS / "single-chain.yaml", *vary, "--jobs", 2)
     with subprocess.Popen(
         command(*arguments, "-o", tmp_path / "x.csv"),

@@ -74,7 +74,6 @@ def test_a_picture_has_maps_or_curves_and_its_provenance(sweep, tmp_path, vary, 
 
 
 @pytest.mark.parametrize(("output", "vary", "said"), [
-    ("s.txt", ("friction=0..1:3",), "end the name in one of .csv, .npz, .svg"),
     ("no/s.csv", ("friction=0..1:3",), "No such file or directory"),
     ("s.svg", ("friction=0..1:3",), "the plan has 0, 10, 40 degrees"),
     ("s.svg", ("friction=0..1:3", "drop=0m..1m:3", "inertia=0.05..1/4:3", ONE_INCLINE), "not 3"),

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import InputError
-from rig.sweep.layout import MOST_VALUES, read_vary, spaced
+from rig.sweep.layout import MOST_VALUES, linspace, read_vary
 from rig.sweep.variables import VARIABLES
 
 NAMES = tuple(VARIABLES)
@@ -20,7 +20,7 @@ def test_a_range_is_read_as_written(one, other, count, spaces):
     parts = ["restitution", "=", repr(low), "..", repr(high), ":", str(count)]
     for place, space in enumerate(spaces[:4]):
         parts[2 * place] = f"{space}{parts[2 * place]}{spaces[-1]}"
-    assert read_vary(["".join(parts)], NAMES) == {"restitution": spaced(low, high, count)}
+    assert read_vary(["".join(parts)], NAMES) == {"restitution": linspace(low, high, count)}
 
 
 @given(st.text(alphabet="restiuon=.:0123456789-e mdg±", max_size=30))

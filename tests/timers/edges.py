@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 from rig.timers.edge_rows import read_edges as read_rows
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
 
 
 def read_edges(path):
-    return read_rows(enumerate(read_lines(path), 1), ProblemList(str(path)))
+    with closing(read_lines(path)) as lines:
+        return read_rows(enumerate(lines, 1), ProblemList(str(path)))

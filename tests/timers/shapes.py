@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -273,7 +274,44 @@ def shapes() -> dict[str, Shape]:
     found["sigrok, inputs with names"] = Shape(
         found["sigrok"].content.replace(b"D0, D1, D2, D3", b"top, upper, lower, bottom"),
         RUNS[:1], sampled=STEP, bare=True)  # fmt: skip
+    head, initial, *changes = found["Saleae"].content.decode().splitlines(keepends=True)
+    inverted = [re.sub(",([01])", lambda x: f",{1 - int(x[1])}", line) for line in changes]
+    for name, rows, truth in (
+        ("from its first change", changes, RUNS[0]),
+        ("from its first change, pulled up", inverted, RUNS[0]),
+        ("from within a beam", [initial.replace(",0", ",1", 1), *changes[1:]], RUNS[0][1:]),
+        ("with a cell left empty", [initial.replace(",0", ",", 1), *changes], RUNS[0]),
+    ):
+        found[f"Saleae {name}"] = Shape((head + "".join(rows)).encode(), [truth])
+    start = 2**32 - 500_000
+    found["A counter that overflows within a run"] = text("run,gate,micros,state\n" + table(
+        [n, c, (round((t + 8 * n) * 1e6) + start - 16_000_000) % 2**32, int(d)]
+        for n, edges in enumerate(RUNS, 1) for t, c, d in edges), 3)  # fmt: skip
+    found["Vernier, latest run in between"] = Shape(
+        ("Run 1: Time (s),Latest: Time (s),Run 2: Time (s)\n"
+         + table([f"{edges[k][0]:.6f}" for edges in (RUNS[0], RUNS[2], RUNS[1])]
+                 for k in range(8))).encode(), RUNS)  # fmt: skip
+    one = ("--channel", "0")
+    on, off = (time for time, _, _ in by_gate(RUNS[0])[0])
+    found["phyphox, start and stop"] = Shape(
+        b'"Start (s)"\t"Stop (s)"\t"Difference (s)"\n'
+        + f"{on:.9E}\t{off:.9E}\t{off - on:.9E}\n".encode(),
+        [RUNS[0][:2]], options=one)  # fmt: skip
+    found["Tektronix MDO, a channel"] = scope(
+        "Model,MDO3024\nPoint Format,Y,\nSample Interval,2e-04,\nLabel,gate\nTIME,CH1\n",
+        lambda k, t, v: f"{t - 0.1:.7e},{v[0]:.3f}\n", gates=[0], options=one)  # fmt: skip
+    found["Hantek, volts alone"] = scope(
+        "#CHANNEL:CH1\n#CLOCK=0.000200000S\n#SIZE=4000\n#UNITS:V\n\n",
+        lambda k, t, v: f"{v[0]:.6f}\n", gates=[0], options=one, bare=True)  # fmt: skip
+    found["sigrok, no heading"] = Shape(
+        found["sigrok"].content.replace(b"logic,logic,logic,logic\n", b""),
+        RUNS[:1], sampled=STEP, bare=True)  # fmt: skip
     found["VCD"] = text(vcd(RUNS[0]))
+    zeros = "#0\n" + "".join(f"0{mark}\n" for mark in "!#$%")
+    found["VCD from its first change"] = text(vcd(RUNS[0]).replace(zeros, ""))
+    found["Levels without a heading"] = text(
+        table([f"{t:.6f}", *levels(RUNS[0], t)] for t in (0, *(t for t, _, _ in RUNS[0])))
+    )
     found["Time at each gate"] = Shape(
         (
             ",".join(f"Time at gate {g} (s)" for g in HEIGHTS)

@@ -98,6 +98,7 @@ def strangers() -> dict[str, Shape]:
         ("Clear or not", GTS.replace("state", "clear") + write("{c},{s},{no}\n")),
         ("A word for states that is unknown", "tijd (ms);sensor;toestand\n"
          + write("{MS};{c};{d}\n")),
+        ("A row twice", GTS + each[0] + each[0].splitlines()[-1]),
         ("The last row cut", GTS + each[0][:-3]),
     ):  # fmt: skip
         put(name, content)
@@ -122,6 +123,10 @@ def strangers() -> dict[str, Shape]:
         ("Axes by numbers", "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", ",", "{:+.5E}"),
         ("Names repeated", "Time,Ampl,Ampl,Ampl,Ampl\n", ",", "{:.4e}"),
         ("Units in words", "Time,CH1,CH2,CH3,CH4\nin s,in V,in V,in V,in V\n", ",", "{:.4e}"),
+        ("LabVIEW, inputs without names", "time\tY[0]\tY[1]\tY[2]\tY[3]\n", "\t", "{:.6f}"),
+        ("LabVIEW, X", "X,Y[0],Y[1],Y[2],Y[3]\n", ",", "{:.6f}"),
+        ("LabVIEW, untitled", "X_Value,Untitled,Untitled 1,Untitled 2,Untitled 3\n", ",", "{:.6f}"),
+        ("LabJack", "Time\tAIN0\tAIN1\tAIN2\tAIN3\n", "\t", "{:.6f}"),
         ("Light", "t (s);Light 0 (lx);Light 1 (lx);Light 2 (lx);Light 3 (lx)\n", ";", "{:.5f}"),
         ("Counts of a converter", "t(s) A0 A1 A2 A3\n", " ", "{:.4f}"),
         ("Decimal commas", "Zeit [s]\tU0 [V]\tU1 [V]\tU2 [V]\tU3 [V]\n", "\t", "{:,.5f}"),
@@ -139,14 +144,17 @@ NOT_READ = {
     "Runs by a word alone", "Written by hand",
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A word below",
-    "Rows out of order", "Newest first", "A clock that overflows", "Samples with an index",
+    "Rows out of order", "Newest first", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
     "Thousands by points", "Microseconds as if they were seconds",
-    "The last row cut",
+    "The last row cut", "A row twice",
 }  # fmt: skip
 """Refused with what to do: the file leaves open, or contradicts, what is in it."""
 
-REFUSED = {"empty": b"", "blank": b" \n\n", "binary": bytes(range(256)) * 40,
+REFUSED = {"a fault in the first row": b"gate,time (s),state\n0,0.4O0305,1\n0,0.420600,0\n"
+           b"1,0.553153,1\n1,0.561398,0\n2,0.641801,1\n2,0.647889,0\n",
+           "counts of years": b"gate,time,state\n0,1,1\n0,9999999999,0\n1,999999999900,1\n",
+           "empty": b"", "blank": b" \n\n", "binary": bytes(range(256)) * 40,
            "zip": b"PK\x03\x04" * 9,
            "picture": b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 9, "numbers": b"1\n2\n3\n",
            "zeros": b"\0" * 5000, "a heading": b"gate,time (s),state\n",

@@ -99,6 +99,23 @@ def test_no_mutant_is_read_as_another_truth(tmp_path, name):
     assert read_mutants(tmp_path / "file", name, range(4))["wrong"] == []
 
 
+def test_a_row_with_a_single_time_is_no_drop(tmp_path):
+    shape = STRANGERS["Times of gates with NaN"]
+    lines = shape.content.splitlines()
+    del lines[7], lines[5]
+    runs, _ = try_reading(tmp_path / "file", b"\n".join(lines), shape)
+    assert runs is None or len(runs) == 1
+
+
+@pytest.mark.parametrize("gone", range(1, 9))
+def test_a_copy_that_lacks_a_row_is_a_copy(tmp_path, gone):
+    lines = STRANGERS["Twice the same"].content.splitlines(keepends=True)
+    runs, advice = try_reading(tmp_path / "file", b"".join(lines[:gone] + lines[gone + 1 :]),
+                               STRANGERS["Twice the same"])  # fmt: skip
+    assert runs is None
+    assert "copy" in advice
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_none_of_many_mutants_is_read_as_another_truth(tmp_path, name):

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import pytest
 
 from bench.process_fixture import ProcessFixture
-from tests.tui.lab import Lab, short_folder
+from tests.cli.conftest import finished  # noqa: F401 - a fixture
+from tests.tui.lab import Lab, short_folder, unseen
 
 _FENCE = """\
 protocol: 1
@@ -21,6 +22,11 @@ gates:
 plan: {repeats: 3, settle: 1 s}
 accept: {missed_edges: 15 %}
 """
+
+
+@pytest.fixture(autouse=True)
+def _unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    unseen(monkeypatch)
 
 
 @pytest.fixture

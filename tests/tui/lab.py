@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from textual._compositor import Compositor
 from textual.pilot import Pilot
 
 from rig.campaign.machine import Stage
@@ -54,7 +55,7 @@ class Operator:
         end = time.monotonic() + PATIENCE_S
         while not (await found if isawaitable(found := true()) else found):
             assert time.monotonic() < end, f"{self.app.flow}\n{text_of(self.app)}"
-            await self.pilot.pause(0.02)
+            await self.pilot.pause(0.05)
 
     async def at(self, stage: Stage) -> None:
         await self.until(lambda: self.app.flow.stage is stage)
@@ -173,6 +174,22 @@ class Lab:
             await operator.press("enter")
             await operator.at(Stage.PREPARE)
             yield operator
+
+
+def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a screen drawn only when a test looks: the terminal of an app under test shows nothing.
+
+    `tests/tui/test_terminal.py` has one that is drawn whenever something changes.
+    """
+    draw = Compositor.render_update
+
+    def drawn(compositor: Compositor, full: bool = False, **more: Any) -> object:
+        if full:
+            return draw(compositor, full, **more)
+        compositor._dirty_regions.clear()
+        return None
+
+    monkeypatch.setattr(Compositor, "render_update", drawn)
 
 
 def draw_without_pause(monkeypatch: pytest.MonkeyPatch) -> None:

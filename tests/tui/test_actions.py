@@ -7,7 +7,7 @@ import pytest
 from rig.campaign.machine import Stage
 from rig.errors import InputError
 from rig.tui.actions import ACTIONS, BY_NAME, help_text, possible, shown_key
-from rig.tui.keys import combined, read_keys
+from rig.tui.keys import merge_keys, read_keys
 from rig.tui.widgets.text import LONGEST, duration, plain
 
 
@@ -46,10 +46,10 @@ def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
 
 
 def test_f9_always_stops_and_enter_goes_on():
-    given = combined({"stop": "f12", "go_on": "space"}, "k")
+    given = merge_keys({"stop": "f12", "go_on": "space"}, "k")
     assert (given["stop"], given["go_on"]) == ("f12,f9", "space,enter")
     with pytest.raises(InputError, match="f9 already belongs to stop"):
-        combined({"note": "f9"}, "k")
+        merge_keys({"note": "f9"}, "k")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from rig.cli import main
 from rig.reasons import plain_reason
 from rig.records import Job
 from rig.results.live import LiveAnalysis
@@ -21,15 +20,10 @@ from tests.cli.lab import short
 from tests.tui.lab import KEYS, Operator, run
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory) -> Path:
-    """Record four drops of two chains."""
-    folder = tmp_path_factory.mktemp("learned")
-    protocol, session = folder / "abba.yaml", folder / "abba.session"
-    protocol.write_text(short("[40 deg]", 4), "utf-8")
-    words = ["run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes"]
-    assert main([*map(str, words)]) == 0
-    return session
+@pytest.fixture
+def recorded(finished, tmp_path) -> Path:
+    """Four drops of two chains, at two inclines."""
+    return finished.copy(tmp_path).rename(tmp_path / "abba.session")
 
 
 def test_results_and_what_drifts_are_drawn(recorded):

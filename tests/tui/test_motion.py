@@ -58,9 +58,9 @@ def test_points_lie_on_the_models_curve(scene):
         assert one.times.size > 100
         there = one.model.heights(one.times - one.delay_s)[0]
         assert np.abs(there - one.heights).max() < 3e-3
-        assert one.measured(0.0) is None
+        assert one.measured_height(0.0) is None
         last = float(one.times[-1])
-        assert one.measured(last) == pytest.approx(one.expected(last), abs=3e-3)
+        assert one.measured_height(last) == pytest.approx(one.model_height(last), abs=3e-3)
 
 
 def test_a_curve_ends_when_the_top_rod_strikes(scene):
@@ -99,17 +99,17 @@ def test_the_tape_goes_at_any_speed():
     drop = Drop(1, 1, 1000, (Edge(100, 3, True), Edge(200, 3, False)), initial_state=1 << 5)
     end = end_of(drop, 1000)
     assert end == pytest.approx(0.25)
-    player = Player(speed=0.5, playing=True).ticked(0.3, end)
+    player = Player(speed=0.5, playing=True).advance(0.3, end)
     assert (player.time_s, player.playing) == (0.15, True)
-    assert player.ticked(9.0, end) == Player(0, end, 0.5, playing=False)
-    assert player.moved(-1, end).time_s == pytest.approx(0.14)
-    assert Player().moved(-1, end).time_s == 0.0
-    assert player.moved(99, end).time_s == end
-    assert Player(time_s=end).started(end) == Player(playing=True)
-    assert Player().turned(1e9).speed == FASTEST
-    assert Player().turned(1e-9).speed == SLOWEST
+    assert player.advance(9.0, end) == Player(0, end, 0.5, playing=False)
+    assert player.step_time(-1, end).time_s == pytest.approx(0.14)
+    assert Player().step_time(-1, end).time_s == 0.0
+    assert player.step_time(99, end).time_s == end
+    assert Player(time_s=end).toggle_play(end) == Player(playing=True)
+    assert Player().change_speed(1e9).speed == FASTEST
+    assert Player().change_speed(1e-9).speed == SLOWEST
     assert Player(at=2).other(1, 3) == Player(at=0)
     seen = until(drop.edges, 1000, 0.15)
-    assert indicators_at((3, 5), drop, seen).blocked == (3, 5)
-    assert indicators_at((3, 5), drop, drop.edges).blocked == (5,)
+    assert indicators_at((3, 5), drop, seen).blocked_channels == (3, 5)
+    assert indicators_at((3, 5), drop, drop.edges).blocked_channels == (5,)
     assert [one.edges for one in indicators_at((3, 5), drop, drop.edges).gates] == [2, 0]

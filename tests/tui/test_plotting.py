@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rig.report.figure import Panel, PlotAxis, Trace
 from rig.report.looks import MODEL
 from rig.tui.braille import dots_of
-from rig.tui.plotting import Picture, axis_over, plotted
+from rig.tui.plotting import Picture, axis_over, draw_picture
 
 _LINE = Trace("model", [0.0, 4.0, 10.0], [0.0, 1.0, 3.0], "line", MODEL)
 WIDTH, HEIGHT = 44, 20
@@ -18,7 +18,7 @@ WIDTH, HEIGHT = 44, 20
 def drawn(*traces, moment=None, residuals=None, limits=None):
     panel = Panel(PlotAxis("time (s)", limits=limits), PlotAxis("z\n(cm)"), traces)
     below = residuals and Panel(PlotAxis("time (s)"), PlotAxis("residual\n/ U"), residuals)
-    return plotted(Picture(panel, below), WIDTH, HEIGHT, moment)
+    return draw_picture(Picture(panel, below), WIDTH, HEIGHT, moment)
 
 
 def texts(plot):

@@ -8,7 +8,7 @@ from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.tui.indicators import Indicators
 from rig.tui.motion import motions
-from rig.tui.scale import Drawing, Lamp, Stroke, drawing, painted
+from rig.tui.scale import Drawing, Lamp, Stroke, drawing, paint
 from rig.units import Quantity
 from tests.cli.lab import short
 from tests.tui.test_motion import edges_of, recorded
@@ -23,7 +23,7 @@ def test_both_chains_stand_where_they_were_measured_and_the_bracket_is_their_dif
     lit = Indicators.of((0, 8)).seen(1 << 8, 0.0)
     found = drawing(scene, run, falls, lit, time_s)
     last = min(float(fall.times[-1]) for fall in falls)
-    low, high = (fall.measured(last) + fall.length for fall in falls)
+    low, high = (fall.measured_height(last) + fall.length for fall in falls)
     assert found.apart_m == pytest.approx(high - low, abs=1e-9)
     assert found.apart_m == pytest.approx(0.1155, abs=0.02)
     by_color = {one.color: [] for one in found.strokes}
@@ -68,7 +68,7 @@ def test_a_lit_lamp_names_its_channels():
     box = Stroke(0, 0, 1, 1, "primary")
     lamps = (Lamp(3, 0.9, 0.5, lit=True), Lamp(12, 0.9, 0.5, lit=False))
     text = ["".join(span.text for span in row)
-            for row in painted(Drawing((box,), 1.0, 0.0, 1.0, None, lamps), 12, 5)]  # fmt: skip
+            for row in paint(Drawing((box,), 1.0, 0.0, 1.0, None, lamps), 12, 5)]  # fmt: skip
     assert any("3,12●" in row for row in text)
     assert {len(row) for row in text[:-1]} == {12}
 
@@ -78,7 +78,7 @@ def test_a_dot_is_as_high_as_it_is_wide_and_all_dots_are_used():
            Stroke(0, 1, 1, 1, "primary"), Stroke(0, 0, 0, 1, "primary")]  # fmt: skip
     *lines, words = [
         "".join(span.text for span in row)
-        for row in painted(Drawing(tuple(box), 1.0, 0.0, 1.0, 0.123), 6, 4)
+        for row in paint(Drawing(tuple(box), 1.0, 0.0, 1.0, 0.123), 6, 4)
     ]
     assert lines == ["⡏⠉⠉⠉⠉⢹", "⡇    ⢸", "⣇⣀⣀⣀⣀⣸"]
     assert "Δz 12.3 cm" in words

@@ -12,7 +12,7 @@ from rig.tui.client import ReconnectingClient
 from rig.tui.follow import _back
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model, alarm
-from rig.tui.state import DaemonState, typed
+from rig.tui.state import DaemonState, read_state
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
        "reasons": [], "reason_codes": []}  # fmt: skip
@@ -43,15 +43,15 @@ def test_a_state_once_taken_never_changes(steps):
     replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
     taken = []
     for n, change in enumerate(steps, start=8):
-        state = typed(replica.n, replica.state)
+        state = read_state(replica.n, replica.state)
         taken.append((state, copy.deepcopy(state)))
         replica.follow("change", {"n": n} | change)
     assert all(state == as_it_was for state, as_it_was in taken)
 
 
 def test_what_the_daemon_does_not_know_is_not_known():
-    state = typed(0, STATE | {"gates": None, "runs": None, "edges": None})
-    assert state.blocked is None
+    state = read_state(0, STATE | {"gates": None, "runs": None, "edges": None})
+    assert state.blocked_mask is None
     assert (state.runs, state.edges, state.holder) == ((), (), None)
     assert DaemonState().n < 0 <= state.n
 
@@ -59,24 +59,24 @@ def test_what_the_daemon_does_not_know_is_not_known():
 def test_indicators_count_name_and_judge_steadiness():
     indicators = Indicators.of((0, 3)).seen(0b0000, 0.0).seen(0b1000, 1.0)
     assert indicators.alone == 3
-    assert indicators.blocked == (3,)
+    assert indicators.blocked_channels == (3,)
     indicators = indicators.seen(0, 1.2)
     assert indicators.checked == {3}
     assert indicators.restless(1.3) == (3,)
-    assert (indicators.blocked, indicators.restless(2.3)) == ((), ())
+    assert (indicators.blocked_channels, indicators.restless(2.3)) == ((), ())
     assert [one.edges for one in indicators.gates] == [0, 2]
-    assert indicators.counted((0, 0, 0, 0), 5.0).gates[0].flickers(5.0)
+    assert indicators.count_edges((0, 0, 0, 0), 5.0).gates[0].flickers(5.0)
     assert not indicators.seen(None, 3.0).known
     assert indicators.reset().checked == frozenset()
 
 
 def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
     indicators = Indicators.of((2,)).seen(0b100, 0.0)
-    assert (indicators.gates[0].edges, indicators.blocked) == (0, (2,))
+    assert (indicators.gates[0].edges, indicators.blocked_channels) == (0, (2,))
 
 
 def _model(state=None, **more):
-    return Model(typed(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
+    return Model(read_state(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
 
 
 def test_what_is_wrong_is_said_with_what_to_do():
@@ -108,10 +108,10 @@ def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
     line._note(replica)
     replica.follow("change", {"n": 2, "set": {"link": {"state": "up"}}})
     line._note(replica)
-    assert not [*_back(line, typed(replica.n, replica.state))]  # not all is well yet
+    assert not [*_back(line, read_state(replica.n, replica.state))]  # not all is well yet
     replica.follow("change", {"n": 3, "set": {"error": None}})
     line._note(replica)
-    back = typed(replica.n, replica.state)
+    back = read_state(replica.n, replica.state)
     (said,) = _back(line, back)
     assert said.trouble == "the port was lost and is back: the board restarted\ncheck its supply"
     assert not [*_back(line, back)]

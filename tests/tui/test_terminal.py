@@ -160,10 +160,10 @@ def test_keys_have_one_reader_after_the_program_was_stopped(monkeypatch):
 
 
 def _daemon_of(folder: Path) -> int:
-    from rig.daemon.client import Client
+    from rig.daemon.client import Client, Line
 
-    client = Client(folder / "rig.sock", "a test")
+    client = Client(Line(folder / "rig.sock", "a test"))
     try:
-        return int(client.daemon["pid"])
+        return int(client.line.daemon["pid"])
     finally:
         client.close()

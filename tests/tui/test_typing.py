@@ -58,6 +58,9 @@ PRESSES = [("wait", 6 * STILL_S), ("keys", ["enter"])]
 ARMS = [("prepare", "", [*PRESSES, ("told", "collect")])]
 ENDS = [("prepare", "", [*PRESSES, ("type", "x"), ("told", "stop")])]
 PASTES = [("prepare", "", [*PRESSES, ("paste", "x"), ("told", "stop")])]
+TOO_SOON = [("keys", ["enter"]), ("wait", 4 * STILL_S)]
+"""Before anybody can have read what Enter would do; and after a letter, on a page at rest."""
+TYPED_ON = [("wait", 6 * STILL_S), ("type", "x"), *TOO_SOON]
 
 
 class Rig(FakeClient):
@@ -142,6 +145,9 @@ def session(tmp_path_factory):
 @example(ARMS)
 @example(ENDS)
 @example(PASTES)
+@example([("prepare", "", TOO_SOON), ("prepare", "", TYPED_ON)])
+@example([("prepare", "l", TOO_SOON)])
+@example([("prepare", "l", TYPED_ON)])
 @example([("result", "", [("type", "board moved"), ("hold", "enter"), ("wait", 0.6)])])
 def test_nothing_is_armed_but_by_the_deliberate_step(session, lived):
     told, keys = run(_typed(session, lived))
@@ -184,6 +190,18 @@ async def _typed(session, lived):
                     break
                 await hands.do(kind, what)
         return app.client.told, hands.keys
+
+
+def test_a_key_that_comes_back_from_its_field_after_the_end_is_dropped(session):
+    async def work():
+        async with _screen(session) as (app, _):
+            key = events.Key("x", "x")
+            key._set_forwarded()
+        with app._context():
+            await app.on_event(key)
+        assert not app.screen_stack
+
+    run(work())
 
 
 def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):

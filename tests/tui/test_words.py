@@ -10,7 +10,7 @@ from rig.records import Job
 from rig.tui.indicators import Indicators
 from rig.tui.model import Model
 from rig.tui.pages.drop import verdict_words
-from rig.tui.state import typed
+from rig.tui.state import read_state
 from rig.tui.widgets.bars import headline, hints
 from tests.tui.lab import KEYS
 
@@ -21,7 +21,7 @@ def model(text):
     state = {"port": {"url": text, "simulated": True}, "session": {"title": text, "path": text},
              "control": {"client": text}, "link": {"state": "up"}}  # fmt: skip
     flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(plain_reason(text),))
-    return Model(typed(0, state), flow, Indicators(), connected=True, port=text)
+    return Model(read_state(0, state), flow, Indicators(), connected=True, port=text)
 
 
 @pytest.mark.parametrize("text", NASTY, ids=range(len(NASTY)))

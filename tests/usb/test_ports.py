@@ -2,8 +2,8 @@
 
 import json
 import re
+import runpy
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
@@ -12,8 +12,6 @@ from rig.boards import PICO
 from rig.cli import main
 from rig.errors import DeviceError
 from rig.flash.drive import pico_ports
-from rig.recorder.board_locator import BoardLocator
-from rig.usb import udev
 from rig.usb.listing import KNOWN, Known, path_of, serial_number_at, serial_ports
 from tests.flash.pty_board import PtyBoard
 
@@ -111,15 +109,6 @@ def test_who_is_there_is_said_and_that_boards_share_an_id(plugged, capsys):
     assert re.search("several boards have the id [0-9a-f]{16}: erase", err)
 
 
-def test_a_board_with_another_s_name_is_told(plugged, caplog):
-    locator = BoardLocator("/dev/ttyACM3")
-    for number in ("85430", "85430", "777"):
-        plugged(info("/dev/ttyACM3", 0x2341, 0x42, number))
-        locator.meet(SimpleNamespace(unique_id=bytes(8)))
-        assert bool(caplog.messages) == (number == "777")
-    assert "two boards have the id 0000000000000000" in caplog.text
-
-
 def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):
     (link := tmp_path / "by-id").symlink_to("/dev/ttyACM3")
     places = "/dev/ttyACM3", str(link), "/dev/ttyUSB0", "sim://"
@@ -146,53 +135,34 @@ def test_a_pico_with_another_program_is_not_opened(plugged):
     assert pico_ports() == {"/dev/ttyACM2"}
 
 
-@pytest.mark.parametrize("command", ["doctor", "selftest"])
-@pytest.mark.parametrize("revision", [" B1 (use no hub)", ""])
-def test_an_early_pico_is_named_and_fails_nothing(plugged, capsys, command, revision):
-    port, product = "sim://?protocol=protocols/picket-fence.yaml", f"chainrig on a Pico{revision}"
-    plugged(info(port, 0x2E8A, 0x000A, "e66", product))
-    assert main([command, "--port", port, "--json"]) == 0
-    note = (
-        f"note: {port} is an early Pico (RP2040 B0 or B1): behind a hub the computer may not find "
-        "it (erratum E5); plug it straight into the computer, not into a hub\n"
-        if revision
-        else ""
-    )
-    assert capsys.readouterr().err.removesuffix("nothing to do\n") == note
-
-
 def test_copies_that_share_a_number_are_not_confused(plugged):
     plugged(info("/dev/ttyUSB0", serial_number="0001"), info("/dev/ttyUSB1", serial_number="0001"))
     with pytest.raises(DeviceError, match="/dev/ttyUSB0 and /dev/ttyUSB1 have the same"):
         path_of("0001", serial_ports())
 
 
-def test_this_computer_can_be_looked_at():
-    assert all(port.path for port in serial_ports())
-
-
 @pytest.mark.parametrize("first", KNOWN, ids=lambda kind: kind.name)
 def test_a_second_board_may_have_the_same_chip(plugged, monkeypatch, first):
-    """Once either may be there, the port is a board's, and no rule is written twice."""
-    other = Known("Teensy 9", first.numbers[:9], board=True)
+    """Once either may be there, the port is a board's."""
+    other = Known("Teensy 9", first.numbers[:9], "")
     monkeypatch.setattr("rig.usb.listing.KNOWN", (*KNOWN, other))
-    monkeypatch.setattr("rig.usb.udev.KNOWN", (*KNOWN, other))
     plugged(info("/dev/ttyACM0", *(int(part, 16) for part in first.numbers[:9].split(":"))))
     (port,) = serial_ports()
     assert (port.kind, port.candidate) == (f"{first.name} or Teensy 9", True)
     assert pico_ports() == ({port.path} if first.name == PICO.name else set())
-    lines = [line for line in udev.rule().splitlines() if line.startswith(("SUBSYSTEM", "ATTRS"))]
-    assert len(set(lines)) == len(lines)
 
 
-def test_the_udev_rule_is_up_to_date():
-    assert (PACKAGING / "60-chainrig.rules").read_text("ascii") == udev.rule()
-
-
-@pytest.mark.parametrize("kind", KNOWN, ids=lambda kind: kind.name)
-def test_the_udev_rule_opens_every_kind_and_hides_boards_from_modem_manager(kind):
-    for vid, pid in (pair.split(":") for pair in kind.numbers.split()):
-        match = f'ATTRS{{idVendor}}=="{vid}", ATTRS{{idProduct}}=="{pid}", '
-        lines = [line for line in udev.rule().splitlines() if match in line]
-        assert sum(line.startswith('SUBSYSTEM=="tty"') and "uaccess" in line for line in lines) == 1
-        assert sum(line.endswith('ENV{ID_MM_DEVICE_IGNORE}="1"') for line in lines) == kind.board
+def test_the_udev_rule_opens_every_kind_and_hides_boards_from_modem_manager(capsys):
+    runpy.run_module("rig.usb.udev", run_name="__main__")
+    rule = capsys.readouterr().out
+    assert rule == (PACKAGING / "60-chainrig.rules").read_text("ascii")
+    expected = []
+    for kind in KNOWN:
+        for vid, pid in (pair.split(":") for pair in kind.numbers.split()):
+            match = f'ATTRS{{idVendor}}=="{vid}", ATTRS{{idProduct}}=="{pid}", '
+            access = 'GROUP="dialout", MODE="0660", TAG+="uaccess"'
+            expected.append(f'SUBSYSTEM=="tty", {match}{access}')
+            if kind.product is not None:
+                expected.append(f'{match}ENV{{ID_MM_DEVICE_IGNORE}}="1"')
+    lines = [line for line in rule.splitlines() if "ATTRS" in line]
+    assert lines == expected

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rig.link.frames import Frame
     from rig_emulator.image import Image
     from rig_emulator.wiring import Wiring
-    from sim.lab_interface import Lab
+    from sim.interfaces import Lab
 
 _ARM = wire.CODES[wire.Arm]
 _ARMED = wire.CODES[wire.Armed]

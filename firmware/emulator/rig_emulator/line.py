@@ -32,7 +32,7 @@ class LineToHost:
         """Say when the host gets the next byte, as far as is known."""
         return self._coming[0][0] if self._coming else None
 
-    def arrived(self, now_ns: int) -> bytes:
+    def read(self, now_ns: int) -> bytes:
         """Take what has reached the host by now."""
         got = bytearray()
         while self._coming and self._coming[0][0] <= now_ns:

@@ -24,7 +24,7 @@ from sim.serial_port import SimulatedSerial
 if TYPE_CHECKING:
     from rig_emulator.image import Image
     from rig_emulator.wiring import Wiring
-    from sim.board_interface import Board
+    from sim.interfaces import Board
     from sim.scene import Scene
 
 Made = TypeVar("Made", bound=EmulatedBoard)
@@ -76,7 +76,7 @@ class Serial(EmulatedSerial):
             self.reset_on_open = False
         scene = set_scene("emu", settings)
         self.clock = VirtualClock(scene.pace)
-        scene.disturb(self)
+        self.disturb(scene.seed, scene.dials)
         return board_before(
             scene, wiring, Path(program) if program else firmware_for(wiring), self.baudrate
         )

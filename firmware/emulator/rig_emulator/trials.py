@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rig_emulator.stand import Recording, Stamp, Stand
     from rig_emulator.wiring import Wiring
-    from sim.lab_interface import Lab
+    from sim.interfaces import Lab
 
 HZ = 16_000_000
 HALF = 1 << 15

@@ -1,4 +1,4 @@
-"""Pages, texts and sentences, each a template here; a page draws the figures it names."""
+"""Templates of pages, texts and sentences; a page draws the figures that it names."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 _CODE = re.compile("`([^`]*)`")
 _WIDTHS = {"slim": COLUMN_PT, "wide": WIDE_PT}
-"""A figure is drawn for a telephone and for a page; whichever has room is shown."""
+"""Widths of a figure for telephone and page, points; the page shows the one that fits."""
 
 
 @cache
 def environment() -> Environment:
-    """Return the templates; they escape all text."""
+    """Return the template environment, which escapes all text."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # noqa: PLC0415 - pages only
 
     loader = FileSystemLoader(Path(__file__).parent)
@@ -44,45 +44,45 @@ def environment() -> Environment:
 
 
 def render(name: str, **values: object) -> str:
-    """Fill a template.
+    """Return a template filled with values.
 
     Returns
     -------
     Markup
-        Which other templates need not escape.
+        Text that other templates do not escape again.
     """
     return Markup(environment().get_template(name).render(values))  # noqa: S704 - just escaped
 
 
 def sentence(name: str, *values: object) -> str:
-    """Write a sentence of ``words.txt``."""
+    """Return a sentence of ``words.txt``."""
     write = getattr(environment().get_template("words.txt").module, name)
     return Markup(write(*values)).unescape()  # noqa: S704 - for a terminal too
 
 
 def lines(name: str, *values: object) -> list[str]:
-    """Write sentences of ``words.txt``, a line each; none where there is nothing to say."""
+    """Return sentences of ``words.txt``, a line each, without empty ones."""
     return [line for line in sentence(name, *values).split("\n") if line]
 
 
 def parts_html(parts: Sequence[Part]) -> str:
-    """Write parts alone, for a notebook."""
+    """Return parts as HTML without a page, for a notebook."""
     write: Any = environment().get_template("parts.html").module
     return "".join(map(write.part, parts))
 
 
 def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
-    """Write a page; all text is escaped.
+    """Return a page as HTML; all text is escaped.
 
     Parameters
     ----------
     page
-        Its `template`, its `title`, whether it is `simulated`, and what its template asks for.
+        Its `template`, its `title`, whether it is `simulated`, and the template's data.
 
     Returns
     -------
     html, figures
-        The page, and all its figures as they are numbered.
+        The page, and all its figures in the order of their numbers.
     """
     figures: list[Chart] = []
 
@@ -91,11 +91,11 @@ def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
         return len(figures)
 
     def draw(kind: str) -> str:
-        """Draw the latest figure."""
+        """Return the latest figure as SVG."""
         from rig.report.plot import page_svg  # noqa: PLC0415 - matplotlib, only for figures
 
         svg = page_svg(figures[-1], _WIDTHS[kind], kind, f"{kind[0]}{len(figures)}")
-        return Markup(svg)  # noqa: S704 - no text of a file is in it but escaped
+        return Markup(svg)  # noqa: S704 - all text of files in it is escaped
 
     script = render("page.js")
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
@@ -104,5 +104,5 @@ def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
 
 
 def _prose(sentence: str) -> str:
-    """Escape a sentence, and set its keys and commands in code type."""
+    """Return a sentence escaped, with keys and commands in code type."""
     return Markup(_CODE.sub(r"<code>\1</code>", str(escape(sentence))))  # noqa: S704 - just escaped

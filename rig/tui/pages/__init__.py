@@ -1,1 +1,1 @@
-"""The pages: each makes of what is known, and of what is looked at, what there is to see."""
+"""The pages: each returns its content from the model and the operator's view."""

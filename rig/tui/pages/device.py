@@ -12,8 +12,8 @@ from rig.report.finding import clock_lines
 from rig.tui.desk import Face
 from rig.tui.pages.drop import hanging
 from rig.tui.widgets.bars import LINKS
-from rig.tui.widgets.gates import board, named
-from rig.tui.widgets.text import checked, plain
+from rig.tui.widgets.gates import board, label
+from rig.tui.widgets.text import check_line, plain
 
 if TYPE_CHECKING:
     from rig.tui.desk import Desk
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
-    """Show what is connected, and what its gates see."""
+    """Return the device page: connection, and state of the gates."""
     rig = hanging(model, desk)[1]
     gates = board(model.protocol, model.indicators, model.now_s, width)
     words = [*gates, Content(""), _gate_check(model), _release(model)]
@@ -54,7 +54,7 @@ def _facts(model: Model) -> Content:
 
 
 def _release(model: Model) -> Content:
-    """Say what the test of the release saw."""
+    """Return the result of the release test in words."""
     if model.flow.stage is Stage.TESTING:
         return Content.styled("Testing the release; any key stops.", "bold $warning")
     seen = model.state.section("release_test")
@@ -64,10 +64,10 @@ def _release(model: Model) -> Content:
     sensed = "no release sense" if sense is None else f"release sense after {sense * 1e3:.1f} ms"
     pulse = f"Release driven for {seen['pulse_s'] * 1e3:g} ms, {sensed}"
     if not seen["edges"]:
-        return checked(True, f"{pulse}; no gate saw an edge.")
-    where = ", ".join(named(model, channel) for channel in seen["gates"][:2])
+        return check_line(True, f"{pulse}; no gate saw an edge.")
+    where = ", ".join(label(model, channel) for channel in seen["gates"][:2])
     why = "Something fell, or the release disturbs the gates."
-    return checked(False, f"{pulse}; {seen['edges']} edges at {where}. {why}")
+    return check_line(False, f"{pulse}; {seen['edges']} edges at {where}. {why}")
 
 
 def _gate_check(model: Model) -> Content:
@@ -76,12 +76,12 @@ def _gate_check(model: Model) -> Content:
     if not indicators.known:
         return Content("Waiting for the gates.")
     if indicators.alone is not None:
-        return Content.styled(f"☞ blocked: {named(model, indicators.alone)}", "bold $warning")
-    if indicators.blocked:
-        many = f"● {len(indicators.blocked)} beams are blocked. Clear or align them."
+        return Content.styled(f"☞ blocked: {label(model, indicators.alone)}", "bold $warning")
+    if indicators.blocked_channels:
+        many = f"● {len(indicators.blocked_channels)} beams are blocked. Clear or align them."
         return Content.styled(many, "bold $warning")
     left = [gate.channel for gate in gates if gate.channel not in indicators.checked]
     if not left:
-        return checked(True, "every gate works")
+        return check_line(True, "every gate works")
     tested = f"{len(gates) - len(left)} of {len(gates)} gates tested"
     return Content(f"Wave a hand through each beam: {tested}.")

@@ -1,4 +1,4 @@
-"""A drop, from the first look at its gates to its result and any later look: steps, rig, plot."""
+"""Page of a drop, from the check of its gates to its result and replay: steps, rig, plot."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ if TYPE_CHECKING:
 
 _DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
          Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}  # fmt: skip
-"""Steps that are behind, by stage."""
+"""Number of completed steps, by stage."""
 _REMEDIES = 2
-"""Things to do that are shown: what else is wrong shows when these are mended."""
+"""Most instructions shown at once; others follow when these are done."""
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
-    """Show the run in hand: before the drop, during it, or what it said."""
+    """Return the page of the present run: before, during or after the drop."""
     if model.page in {"result", "history"} or model.stage in {Stage.RESULT, Stage.HALTED}:
         return _result(model, desk, width)
     protocol, run = model.protocol, model.run
@@ -61,21 +61,21 @@ def face(model: Model, desk: Desk, width: int) -> Face:
 
 
 def hanging(model: Model, desk: Desk) -> tuple[tuple[ChainFall, ...], Drawing | None]:
-    """Draw what is to fall, and its gates as they are now; with its motion by the model."""
+    """Return the predicted falls of the next run, and the rig with its gates as they are now."""
     protocol, run = model.protocol, model.run
     if protocol is None or run is None:
         return (), None
     falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
-    seen = protocol, run, model.indicators.blocked
+    seen = protocol, run, model.indicators.blocked_channels
     rig = desk.latest("rig", seen, lambda: drawing(protocol, run, falls, model.indicators, 0.0))
     return falls, rig
 
 
 def steps(model: Model) -> Content:
-    """Write the steps of a run: behind, on, and to come."""
+    """Return the steps of a run: done, present and to come."""
     indicators = model.indicators
     behind = _DONE.get(model.stage, 0)
-    clear = indicators.known and not indicators.blocked
+    clear = indicators.known and not indicators.blocked_channels
     still = clear and not indicators.restless(model.now_s)
     good = [behind > 0, behind > 1 or clear, behind > 2 or still, behind > 3, behind > 4]
     names = hand(model), "Clear", "Still", "Drop", "Result"
@@ -97,7 +97,7 @@ def _action(model: Model) -> Content:
 
 
 def verdict_words(model: Model) -> Content:
-    """Write the verdict and its reasons."""
+    """Return the verdict and its reasons in words."""
     verdict, reasons = model.verdict
     if model.job is None or not verdict:
         return Content(model.loading or "No verdict yet.")
@@ -106,7 +106,7 @@ def verdict_words(model: Model) -> Content:
     lines += [Content(f"  {plain(reason, 200)}") for reason in reasons[:4]]
     if len(reasons) > 4:
         lines.append(Content("  and more reasons, in the session file"))
-    replaced = model.replaced
+    replaced = model.previous
     if verdict not in GOOD and replaced is not None:
         lines += [
             Content(f"  Only the latest attempt counts: attempt {replaced.attempt} was good, "
@@ -121,7 +121,7 @@ def verdict_words(model: Model) -> Content:
 
 
 def _result(model: Model, desk: Desk, width: int) -> Face:
-    """Show what a drop said: the latest, in slow motion first, or any on the history page."""
+    """Return the result of the latest drop, first in slow motion, or of a drop of the history."""
     view, job = desk.drop(model)
     own = model.page != "history"
     parts = [verdict_words(model)] if own else []
@@ -161,7 +161,7 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
 
 
 def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason]) -> list[Content]:
-    """Name the drop that is played, and say how."""
+    """Return the name of the replayed drop, and the state of the replay."""
     verdict, run = view.results[job].verdict, view.plan[job.run]
     what = f"{run.incline_deg:g}° impact {run.impact}" if run.impact else run.free
     state = "▶ playing" if player.playing else "‖ paused"

@@ -15,7 +15,7 @@ from rig.tui.desk import Face
 from rig.tui.indicators import Indicators
 from rig.tui.motion import motions
 from rig.tui.scale import drawing
-from rig.tui.widgets.text import plain, pressed
+from rig.tui.widgets.text import link_action, plain
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rig.tui.scale import Drawing
     from rig.tui.survey import Beginning
 
-_FALLEN = 0.7  # of the way down, in the small pictures
+_FALLEN = 0.7  # share of the fall shown in small pictures
 _DOES = {
     "try": "Enter simulates it, with no board.\n",
     "board": "Plug the board in by USB; then choose it here with Enter. Then choose an\n"
@@ -39,7 +39,7 @@ _DOES = {
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
-    """Show what can be begun, or the protocol of the session that is open."""
+    """Return the home page: possible beginnings, or the protocol of the open session."""
     del width
     if model.flow.stage is not Stage.PROTOCOL and model.protocol is not None:
         return Face(Content(""), _picture(desk, model.protocol),
@@ -59,7 +59,7 @@ def face(model: Model, desk: Desk, width: int) -> Face:
 
 
 def _into(model: Model, desk: Desk, row: Beginning) -> str:
-    """Say where the experiment is carried out, and which file it makes."""
+    """Return the rig and session file of an experiment in words."""
     session = plain(row.session or desk.options.session or "")
     rig = model.port or "a simulation: no board is connected"
     return f"→ Enter opens it with {rig}\n→ session file: {session or 'a new one'}\n"
@@ -75,12 +75,12 @@ def _menu(desk: Desk) -> Content:
                 (f"{'▸' if chosen else ' '} {plain(row.title, 30)}",
                  "bold $primary" if chosen else ""),
             )  # fmt: skip
-            lines.append(pressed(text, f"app.choose({at})"))
+            lines.append(link_action(text, f"app.choose({at})"))
     return Content("\n").join(lines)
 
 
 def _picture(desk: Desk, protocol: Protocol) -> Drawing | None:
-    """Draw the model's own fall, on its way."""
+    """Return a drawing of the predicted fall, part of the way down."""
 
     def draw() -> Drawing | None:
         run = runs(protocol)[0]
@@ -92,10 +92,10 @@ def _picture(desk: Desk, protocol: Protocol) -> Drawing | None:
 
 
 def _description(desk: Desk, protocol: Protocol) -> Content:
-    return desk.latest("description", protocol, lambda: _described(protocol))
+    return desk.latest("description", protocol, lambda: _describe_protocol(protocol))
 
 
-def _described(protocol: Protocol) -> Content:
+def _describe_protocol(protocol: Protocol) -> Content:
     title, *lines = describe(protocol, notes(protocol)).splitlines()
     parts = [Content.styled(plain(title, 200), "bold")]
     for line in lines:

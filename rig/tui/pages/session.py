@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
-    """Show the plan, results against incline, and control charts."""
+    """Return the session page: plan, results against incline, and control charts."""
     del width
     view = model.view
     if view is None:
@@ -68,7 +68,7 @@ def _table(parts: Iterable[Part]) -> str:
 
 
 def _fit_words(model: Model) -> tuple[str, str]:
-    """Say whether the means come from a joint fit."""
+    """Return in words whether the means come from a joint fit."""
     view = model.view
     if view is None or not view.analysis.summary:
         return "", ""
@@ -78,7 +78,7 @@ def _fit_words(model: Model) -> tuple[str, str]:
 
 
 def _marks(model: Model) -> Iterator[tuple[str, str]]:
-    """A symbol a run, in order; the one that is on turns its colours round."""
+    """Yield a symbol for each run in order; the present run in reverse colours."""
     for line in model.state.runs:
         is_now = model.job is not None and line.run == model.job.run
         symbol, colour = LOOKS.get(line.state, ("?", "$foreground"))

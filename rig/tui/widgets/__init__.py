@@ -1,1 +1,1 @@
-"""What the pages are made of."""
+"""Widgets of the pages."""

@@ -1,4 +1,4 @@
-"""Top and bottom of every screen: what this is, what is wrong, what can be done now, and STOP."""
+"""Top and bottom bars of every screen: title, problems, possible keys, and STOP."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from textual.content import Content
 from rig.tui.actions import BY_NAME, shown_key
 from rig.tui.model import UNDER_WAY, alarm
 from rig.tui.next_step import next_step
-from rig.tui.widgets.text import Words, plain, pressed
+from rig.tui.widgets.text import Words, link_action, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
 PAGES = {"protocol": "home", "device": "device", "run": "run", "result": "result",
          "session": "session", "history": "history"}  # fmt: skip
-"""Pages by name, and what stands on their tabs."""
+"""Pages by name, with the text of their tabs."""
 KEYS_SHOWN = 4
 _OF_PAGE = {
     "protocol": ("go_on", "next", "previous"),
@@ -38,7 +38,7 @@ _UNANSWERED_S = 0.5
 
 
 class StatusBar(Vertical):
-    """Headline and pages, and below them what is wrong with what to do."""
+    """Headline and tabs of pages, with problems and remedies below."""
 
     def compose(self) -> ComposeResult:
         yield Words(id="headline")
@@ -46,7 +46,7 @@ class StatusBar(Vertical):
         yield Words(id="alarm")
 
     def show(self, model: Model, keys: Mapping[str, str], width: int, message: str) -> None:
-        """Draw what holds now; what was `message` only while nothing is wrong."""
+        """Draw the present state; `message` only without problems."""
         self.query_one("#headline", Words).say(headline(model, width - 2))
         self.query_one("#tabs", Words).say(_tabs(model.page, keys))
         wrong = alarm(model)
@@ -61,17 +61,17 @@ class StatusBar(Vertical):
 
 
 def _tabs(page: str, keys: Mapping[str, str]) -> Content:
-    """Name every page with its key; each can be clicked."""
+    """Return all pages with their keys; each can be clicked."""
     parts: list[Content] = []
     for name, title in PAGES.items():
         text = f" {shown_key(keys[f'page_{name}'])} {title} "
         look = "bold $background on $primary" if name == page else "$foreground 80%"
-        parts += [pressed(Content.styled(text, look), f"app.do('page_{name}')"), Content(" ")]
+        parts += [link_action(Content.styled(text, look), f"app.do('page_{name}')"), Content(" ")]
     return Content.assemble(*parts)
 
 
 def headline(model: Model, width: int) -> Content:
-    """One line of exactly `width`: page and title left, stamp and link right."""
+    """Return a line of exactly `width`: page and title left, SIMULATED mark and link right."""
     link = LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
     if model.offline or model.idle:
         link = "file only" if model.offline else "no rig yet"
@@ -90,17 +90,17 @@ def headline(model: Model, width: int) -> Content:
 
 
 class StopLine(Words):
-    """The bar that stops everything, also by mouse, and what there is to be stopped."""
+    """The STOP bar, also for the mouse, with the present activity."""
 
     def show(self, model: Model, keys: Mapping[str, str]) -> None:
-        """Draw what holds now."""
+        """Draw the present state."""
         self.set_class(model.hot, "-hot")
         stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
-        self.say(pressed(stop, "app.do('stop')"), f"  {_doing(model)}")
+        self.say(link_action(stop, "app.do('stop')"), f"  {_doing(model)}")
 
 
 class StopBar(Vertical):
-    """Keys of this page, and the bar that stops everything, also by mouse."""
+    """Keys of the page, and the STOP bar."""
 
     def compose(self) -> ComposeResult:
         yield Words(id="hints")
@@ -109,14 +109,14 @@ class StopBar(Vertical):
     def show(
         self, model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
     ) -> None:
-        """Draw what holds now."""
+        """Draw the present state."""
         self.query_one("#hints", Words).say(hints(model, keys, width - 2, possible))
 
 
 def hints(
     model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
 ) -> Content:
-    """Write the keys that are wanted most now; all others are in the palette."""
+    """Return the most important keys now; all others are in the palette."""
     page = _OF_PAGE.get(model.page, ())
     parts: list[Content] = []
     used = 0
@@ -129,7 +129,7 @@ def hints(
         used += len(hint) + 2
         if used > width:
             break
-        parts += [pressed(hint, f"app.do('{name}')"), Content("  ")]
+        parts += [link_action(hint, f"app.do('{name}')"), Content("  ")]
     return Content.assemble(*parts)
 
 
@@ -146,7 +146,7 @@ def _label(name: str, model: Model) -> str:
 
 
 def _answer(model: Model) -> str:
-    """Say what became of a STOP that was pressed just now."""
+    """Return the result of a recent STOP in words."""
     if model.stop is None:
         return ""
     waited = model.now_s - model.stop.at_s

@@ -1,4 +1,4 @@
-"""What is asked over a page. Below every dialog STOP goes on to be seen, and to work."""
+"""Dialogs over a page. STOP remains visible below every dialog, and works."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 
 
 class Dialog(ModalScreen[Any]):
-    """Something to be answered, or to be read, before the page goes on.
+    """A dialog that must be answered or read before the page continues.
 
     Parameters
     ----------
     parts
-        What stands in it.
+        Content of the dialog.
     keys
-        What its keys do.
+        Description of its keys.
     """
 
     LEAVE = ""
-    """The key that cancels; empty: any that means nothing else."""
+    """Key that cancels; if empty, any key without another meaning."""
 
     def __init__(self, *parts: Widget, keys: str = "", large: bool = False) -> None:
         super().__init__()
@@ -51,21 +51,21 @@ class Dialog(ModalScreen[Any]):
         self.query("Input").focus()
 
     def move(self, by: int) -> None:
-        """Go to the previous or next of the list, or scroll."""
+        """Move in the list, or scroll."""
         for options in self.query(OptionList):
             (options.action_cursor_down if by > 0 else options.action_cursor_up)()
         for text in self.query(VerticalScroll):
             text.scroll_relative(y=3 * by, animate=False)
 
     def dismiss(self, result: Any = None) -> AwaitComplete:
-        """Give an answer, once: keys that follow each other quickly may ask for it again."""
+        """Close with an answer, once: keys in quick succession may repeat it."""
         return super().dismiss(result) if self.is_active else AwaitComplete()
 
 
 class Confirm(Dialog):
     """Ask for confirmation: Enter confirms, any other key cancels.
 
-    A click never confirms: it is the second step of something, and the first may have been one.
+    A click never confirms, as it may be the second half of a double click on the page.
     """
 
     def __init__(self, title: str, question: str, yes: str) -> None:
@@ -74,14 +74,14 @@ class Confirm(Dialog):
 
 
 class TextDialog(Dialog):
-    """Something long to be read; any key but the arrows closes it."""
+    """A long text; any key but the arrows closes it."""
 
     def __init__(self, text: Content) -> None:
         super().__init__(VerticalScroll(Words(text, id="table"), can_focus=False), large=True)
 
 
 class _Choices(OptionList):
-    """A list that changes as one types: what is clicked may be gone by the time it is heard of."""
+    """A list that changes while typing: a clicked item may be gone when the click is handled."""
 
     can_focus = False
 
@@ -92,19 +92,19 @@ class _Choices(OptionList):
 
 
 class Ask(Dialog):
-    """Ask for a line; Enter gives it, Escape leaves it.
+    """Ask for a line of text; Enter accepts, Escape cancels.
 
     Parameters
     ----------
     text
-        What stands there already.
+        Initial text.
     choices
-        What may be chosen instead of typing.
+        Choices instead of typing.
     free
-        Whether something else may be typed, but not nothing; otherwise what is typed searches the
-        choices, and the answer is the number of one.
+        Whether other (not empty) text may be typed. Otherwise the text searches the choices, and
+        the answer is the number of a choice.
     chosen
-        The choice that is highlighted at first; `None` for none.
+        The choice that is highlighted first; `None` for none.
     """
 
     LEAVE = "escape"
@@ -134,7 +134,7 @@ class Ask(Dialog):
             self._list.highlighted = self._first
 
     def _fill(self, query: str) -> None:
-        """List the choices that fit."""
+        """List the matching choices."""
         matcher = Matcher(query)
         self._list.clear_options()
         self._list.add_options(
@@ -144,13 +144,13 @@ class Ask(Dialog):
         )
 
     @on(Input.Changed)
-    def _typed(self, event: Input.Changed) -> None:
+    def _filter_choices(self, event: Input.Changed) -> None:
         if not self._free and self._list.is_mounted:
             self._fill(event.value)
             self._list.action_first()
 
     def move(self, by: int) -> None:
-        """Take the previous or next of the list."""
+        """Select the previous or next choice."""
         if self._choices:
             super().move(by)
             option = self._list.highlighted_option
@@ -158,7 +158,7 @@ class Ask(Dialog):
                 self.query_one(Input).value = self._choices[int(option.id)]
 
     @on(OptionList.OptionSelected)
-    def _clicked(self, event: OptionList.OptionSelected) -> None:
+    def _take_choice(self, event: OptionList.OptionSelected) -> None:
         if self._free:
             self.query_one(Input).value = self._choices[event.option_index]
         else:
@@ -166,7 +166,7 @@ class Ask(Dialog):
 
     @on(Input.Submitted)
     def action_say(self) -> None:
-        """Give the line, or the number of the choice."""
+        """Answer with the text, or the number of the choice."""
         typed, option = self.query_one(Input).value, self._list.highlighted_option
         if not self._free:
             self.dismiss(int(option.id) if option is not None and option.id else None)

@@ -18,7 +18,7 @@ _WIDE = 39
 def board(
     protocol: Protocol | None, indicators: Indicators, now_s: float, width: int
 ) -> list[Content]:
-    """Write what the gates do now, the highest first; side beside side where there is room."""
+    """Return a line for each gate, the highest first; both sides side by side if they fit."""
     if protocol is None or protocol.gates is None:
         return [Content("no gates in this scene")]
     sides = [sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
@@ -36,7 +36,7 @@ def board(
 
 
 def _line(gate: Gate, indicators: Indicators, now_s: float) -> Content:
-    """Write one gate."""
+    """Return the line of a gate."""
     lamp = next((lamp for lamp in indicators.gates if lamp.channel == gate.channel), None)
     symbol, color, word, quiet = "?", "", "unknown", ""
     if lamp is not None and indicators.known:
@@ -50,8 +50,8 @@ def _line(gate: Gate, indicators: Indicators, now_s: float) -> Content:
     return Content.assemble((symbol, f"bold {color}"), text[: _WIDE - 2].ljust(_WIDE - 1))
 
 
-def named(model: Model, channel: int) -> str:
-    """Name the gate of a channel."""
+def label(model: Model, channel: int) -> str:
+    """Return the name of a channel's gate."""
     for gate in model.protocol.gates.gates if model.protocol and model.protocol.gates else ():
         if gate.channel == channel:
             side = f"{gate.side} side, " if model.words.two_sides else ""

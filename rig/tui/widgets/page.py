@@ -1,4 +1,4 @@
-"""The page: whatever face it is given, as many parts of it as the screen has room for."""
+"""The page widget: shows as many parts of a page's content as fit the screen."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
 from textual.widgets import Digits
 
-from rig.tui.scale import painted
+from rig.tui.scale import paint
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.spans import SpanView
 from rig.tui.widgets.text import Words
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 _FIGURES = 4
 _WIDE, _NORMAL = 160, 100
-"""Columns for three parts beside each other, and for two; on fewer there is room for one."""
+"""Least columns for three parts side by side, and for two; with fewer, a single part is shown."""
 
 
 class Page(Vertical):
-    """Head, then drawing, plots and tables beside each other, then foot."""
+    """Head, then drawing, plots and tables side by side, then foot."""
 
     def compose(self) -> ComposeResult:
         with VerticalScroll(id="top", can_focus=False):
@@ -41,11 +41,11 @@ class Page(Vertical):
         yield Digits("3", id="count")
 
     def tables_width(self) -> int:
-        """Columns of the tables, as they were laid out last."""
+        """Columns of the tables in the latest layout."""
         return max(20, (self.query_one("#tables").size.width or self.app.size.width) - 3)
 
     def show(self, face: Face, desk: Desk, *, fresh: bool) -> None:
-        """Draw a face; `fresh` where another page was shown before."""
+        """Draw a page's content; `fresh` if another page was shown before."""
         for name, content in (("head", face.head), ("list", face.menu), ("words", face.words),
                               ("foot", face.foot)):  # fmt: skip
             words = self.query_one(f"#{name}", Words)
@@ -61,7 +61,7 @@ class Page(Vertical):
                 self.query_one(f"#{name}", VerticalScroll).scroll_home(animate=False)
 
     def _parts(self, face: Face, desk: Desk) -> None:
-        """Show as many parts as there is room for, beginning with the one that was turned to."""
+        """Show as many parts as fit, beginning with the selected part."""
         columns, lines = self.app.size
         room = 3 if columns >= _WIDE else 2 if columns >= _NORMAL else 1
         room = max(1, room + 1 - face.beside)
@@ -76,7 +76,7 @@ class Page(Vertical):
         if face.drawing is not None and "drawing" in shown:
             view = self.query_one("#drawing", SpanView)
             seen = face.drawing, view.size.width or 38, view.size.height or 16
-            view.take(desk.latest("painted", seen, lambda: painted(*seen)))
+            view.take(desk.latest("painted", seen, lambda: paint(*seen)))
         pairs = 2 if columns >= _WIDE and lines >= 40 else 1
         most = face.beside * pairs if columns >= _NORMAL else 1
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
@@ -86,12 +86,12 @@ class Page(Vertical):
             figure.show(picture, face.moment)
 
     def scroll_tables(self, by: int) -> None:
-        """Scroll what is longer than its place."""
+        """Scroll the parts that do not fit, except the menu."""
         for part in self.query(VerticalScroll):
             if part.id != "menu":
                 part.scroll_relative(y=by, animate=False)
 
     def show_row(self, line: int) -> None:
-        """Scroll the list so that a line of it is seen."""
+        """Scroll the list so that a line is visible."""
         menu = self.query_one("#menu", VerticalScroll)
         menu.scroll_to(y=line - menu.size.height // 2, animate=False)

@@ -1,4 +1,4 @@
-"""Lines of a few coloured parts each, without the wrapping and styling of other text."""
+"""Widget for lines of coloured spans, without the wrapping and styling of other text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class SpanView(Widget):
-    """Shows spans, as many lines as there are; for what changes many times a second."""
+    """Widget that shows lines of spans, for content that changes many times a second."""
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
         super().__init__(id=id)
@@ -27,24 +27,24 @@ class SpanView(Widget):
         self._plain = Style()
 
     def take(self, rows: Sequence[Sequence[Span]]) -> None:
-        """Show these instead."""
+        """Show other lines."""
         if rows != self._rows:
             self._rows = rows
             self.refresh()
 
     def render_lines(self, crop: Region) -> list[Strip]:
-        """Render lines, in the widget's own style, which is sought once for all of them."""
+        """Render lines in the widget's style, which is computed once for all of them."""
         self._plain = self.rich_style
         return super().render_lines(crop)
 
     def render_line(self, y: int) -> Strip:
-        """One line."""
+        """Render a line."""
         plain, colors = self._plain, self.app.theme_variables
         row = self._rows[y] if y < len(self._rows) else ()
-        line = [Segment(text, _styled(plain, colors.get(color), bold)) for text, color, bold in row]
+        line = [Segment(text, _style(plain, colors.get(color), bold)) for text, color, bold in row]
         return Strip(line).adjust_cell_length(self.size.width, plain)
 
 
 @lru_cache(maxsize=256)
-def _styled(plain: Style, color: str | None, bold: bool) -> Style:
+def _style(plain: Style, color: str | None, bold: bool) -> Style:
     return plain + Style(color=color, bold=bold or None)

@@ -1,4 +1,4 @@
-"""Text from outside made safe for a terminal, and static text that is never parsed as markup."""
+"""Sanitizing of foreign text for a terminal, and static text that is never parsed as markup."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from rig.printable import one_line
 
 _BREAKS = re.compile(r"[\n\r\t]")
 LONGEST = 400
-"""Characters of one text from outside that are shown; nobody reads more on a screen."""
+"""Most characters shown of a foreign text."""
 
 
 def plain(text: object, limit: int = LONGEST) -> str:
-    """Make text harmless: one line, no control or direction characters, not endless.
+    """Return harmless text: a line of limited length without control or direction characters.
 
     Parameters
     ----------
     text
-        Anything; what it prints as is taken.
+        Any object; converted by `str`.
     limit
         Longest result; longer texts end in ``…``.
     """
     raw = str(text)
-    # Cut first: a megabyte of note costs no more than what is shown of it.
+    # Cut first, so that a megabyte of note costs no more than the part shown.
     shown = one_line(_BREAKS.sub(" ", raw[: limit + 1]), limit + 1)
     return shown if len(raw) <= limit else shown[: limit - 1] + "…"
 
 
 def duration(seconds: float) -> str:
-    """Write how long something takes, as people say it."""
+    """Return a duration in words."""
     minutes, rest = divmod(round(seconds), 60)
     if not minutes:
         return f"{rest} s"
@@ -41,13 +41,13 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"
 
 
-def pressed(content: Content, action: str) -> Content:
-    """Have a click on content do an action."""
+def link_action(content: Content, action: str) -> Content:
+    """Return content that does an action when clicked."""
     return content.stylize(Style.from_meta({"@click": action}))
 
 
-def checked(good: bool, text: str) -> Content:
-    """Write text behind a sign for good or bad."""
+def check_line(good: bool, text: str) -> Content:
+    """Return text after a sign for good or bad."""
     sign = ("✓ ", "bold $success") if good else ("✗ ", "bold $error")
     return Content.assemble(sign, text)
 
@@ -61,24 +61,24 @@ class Words(Static):
 
     def __init__(self, *parts: Styled | Content, id: str | None = None) -> None:  # noqa: A002
         super().__init__(markup=False, id=id)
-        self.auto_links = False  # what can be clicked keeps the colours that it was given
+        self.auto_links = False  # clickable text keeps its colours
         self._said: Content | None = None
         if parts:
             self.say(*parts)
 
     def say(self, *parts: Styled | Content) -> None:
-        """Show these parts, unless they are there already; places all anew only if it must."""
+        """Show these parts if they have changed, with a new layout only if necessary."""
         content = Content.assemble(*parts)
         if self._said is None or not self._said.is_same(content):
             same = self._said is not None and self._fits(self._said) and self._fits(content)
             same = same and _lines(self._said) == _lines(content)
             self._said = content
             if not same:
-                self._layout_updates += 1  # or a height is kept that was found since the last wish
+                self._layout_updates += 1  # otherwise an outdated height is kept
             self.update(content, layout=not same)
 
     def _fits(self, content: Content) -> bool:
-        """Whether no line is broken."""
+        """Whether all lines fit the width."""
         return max(map(len, content.plain.split("\n"))) < self.size.width
 
 

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from rig.errors import RigError
-from rig.ports import simulation_package
 from rig.records import Drop, Edge
 
 HZ = 16_000_000
@@ -50,13 +49,13 @@ STRAY = -1
 """The truth's rod number of what was no rod."""
 
 
-def falls(asked: Sequence[Asked], module: str = "") -> Iterator[SimulatedDrop]:
+def falls(asked: Sequence[Asked], module: str = "sim.edges") -> Iterator[SimulatedDrop]:
     """Let the simulation, run as a module, make the drops of one rig after another.
 
     Parameters
     ----------
     module
-        That makes them; by default the simulation's own.
+        That makes them.
 
     Raises
     ------
@@ -68,7 +67,7 @@ def falls(asked: Sequence[Asked], module: str = "") -> Iterator[SimulatedDrop]:
         for url, seeds, runs in asked
         for text in (url, json.dumps([*seeds]), json.dumps([*runs]))
     ]
-    command = [sys.executable, "-m", module or f"{simulation_package()}.edges", *requests]
+    command = [sys.executable, "-m", module, *requests]
     with Popen(command, stdout=PIPE, text=True) as simulation:
         assert simulation.stdout is not None
         for line in simulation.stdout:

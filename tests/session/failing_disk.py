@@ -1,10 +1,9 @@
-"""A disk that can be frozen and can fail: a small ext4 in a file, where it may be mounted."""
+"""A disk that can fail: a small ext4 in a file, where it may be mounted."""
 
 from __future__ import annotations
 
 import os
 import subprocess
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -53,17 +52,7 @@ class FailingDisk:
     def __exit__(
         self, _kind: type[BaseException] | None, _error: object, _trace: TracebackType | None
     ) -> None:
-        self.thaw()
         _call("umount", "--lazy", self.folder)
-
-    def freeze(self) -> None:
-        """Let no write come back until `thaw`."""
-        _call("fsfreeze", "--freeze", self.folder)
-
-    def thaw(self) -> None:
-        """Let writes go on; nothing where it is not frozen."""
-        with suppress(subprocess.CalledProcessError):
-            _call("fsfreeze", "--unfreeze", self.folder)
 
     def fail(self) -> None:
         """Have the kernel find an error on it: it can only be read from then on."""

@@ -1,8 +1,11 @@
-"""What a simulated port needs of whatever board is at its other end."""
+"""What stands before and behind a board in virtual time: the lab, and a simulated port."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 class Line(Protocol):
@@ -17,7 +20,7 @@ class Line(Protocol):
         """Say when the host gets the next byte, as far as is known."""
         ...
 
-    def arrived(self, now_ns: int) -> bytes:
+    def read(self, now_ns: int) -> bytes:
         """Take what has reached the host by now."""
         ...
 
@@ -44,4 +47,38 @@ class Board(Protocol):
 
     def next_ns(self) -> int | None:
         """Say when something will happen next, or `None` when nothing will."""
+        ...
+
+
+class Lab(Protocol):
+    """The chains and beams in front of the gates."""
+
+    def rest(self, label: int) -> int:
+        """Say which beams are blocked while the chains hang.
+
+        Parameters
+        ----------
+        label
+            Of the drop that is being prepared.
+
+        Returns
+        -------
+        int
+            Gate mask, 1 = blocked.
+        """
+        ...
+
+    def drop(self, label: int) -> Sequence[tuple[float, int, bool]]:
+        """Let go.
+
+        Parameters
+        ----------
+        label
+            Of the drop.
+
+        Returns
+        -------
+        sequence of (seconds after the release fired, channel, blocked)
+            Every change of every beam, in order of time.
+        """
         ...

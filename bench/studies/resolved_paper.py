@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.bench.falls import Asked, falls, simulation
-from rig.measurands import SEPARATION, SPEED
+from bench.studies.falls import Asked, falls, simulation
+from rig.measurands import MEASURANDS, SEPARATION, SPEED
 from rig.model import paper
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     Columns = dict[str, list[float]]
     Ensemble = Sequence[Mapping[str, Any]]
@@ -42,21 +42,13 @@ _HANGING = {
     "aside_sd": "0.5 mm", "swing_sd": "0.01 m/s",
 }  # fmt: skip
 """Chains hang as they would, let go together and seen by a perfect rig."""
-_SEPARATION, _SPEED = "separation_strike_m", "speed_strike_m_s"
-"""Of the truth of a fall: Δz and V at the strike. An ensemble is truths of falls that differ only
-in how their chains hang."""
-
-
-def uniform() -> list[Ensemble]:
-    """Let the chains of Fig. 3 fall at each of `INCLINES`."""
-    return _ensembles(f"rods: {paper.RODS}, diameter: 12.7 mm", 12.0, INCLINES)
-
-
-def graded() -> Ensemble:
-    """Let the chain of Fig. 4 fall."""
-    groups = [f"{{count: 4, diameter: {1e3 * d:g} mm}}" for d in paper.GRADED_DIAMETERS[::4]]
-    rods = f"rods: [{', '.join(groups)}], spacing: equal-gaps"
-    return _ensembles(rods, 21.0, (paper.MIDDLE_INCLINE,))[0]
+_SEPARATION = "separation_strike_m"
+_MEASURED = {
+    "incline_deg": "incline_deg", SEPARATION.name: _SEPARATION, SPEED.name: "speed_strike_m_s",
+    "contact_height_m": "contact_height_m",
+}  # fmt: skip
+"""Columns of Fig. 3, and where they stand in the truth of a fall: Δz and V are those at the strike.
+An ensemble is truths of falls that differ only in how their chains hang."""
 
 
 def _ensembles(rods: str, tilt: float, inclines: Sequence[float]) -> list[Ensemble]:
@@ -79,25 +71,27 @@ def _ensembles(rods: str, tilt: float, inclines: Sequence[float]) -> list[Ensemb
         return [[drop.truth for drop in islice(drops, DROPS)] for _ in inclines]
 
 
-def figure_3(ensembles: Sequence[Ensemble]) -> Columns:
-    """Means and standard deviations against inclination, as columns for the figure."""
-
-    def over(statistic: Callable[[Iterable[float]], float], key: str) -> list[float]:
-        return [statistic([truth[key] for truth in ensemble]) for ensemble in ensembles]
-
-    return {
-        "incline_deg": over(fmean, "incline_deg"),
-        SEPARATION.name: over(fmean, _SEPARATION),
-        SEPARATION.key("sd"): over(stdev, _SEPARATION),
-        SPEED.name: over(fmean, _SPEED),
-        SPEED.key("sd"): over(stdev, _SPEED),
-        "contact_height_m": over(fmean, "contact_height_m"),
-        "falls": [float(len(ensemble)) for ensemble in ensembles],
-    }
+def figure_3() -> Columns:
+    """Let the chains of Fig. 3 fall at each of `INCLINES`; return means and deviations."""
+    uniform = f"rods: {paper.RODS}, diameter: 12.7 mm"
+    ensembles = _ensembles(uniform, 12.0, INCLINES)
+    columns: Columns = {}
+    for name, key in _MEASURED.items():
+        values = [[truth[key] for truth in ensemble] for ensemble in ensembles]
+        columns[name] = [*map(fmean, values)]
+        if name in MEASURANDS:
+            columns[MEASURANDS[name].key("sd")] = [*map(stdev, values)]
+    return columns | {"falls": [float(DROPS)] * len(ensembles)}
 
 
-def figure_4(ensemble: Ensemble) -> Columns:
-    """Height of the top rod against V², striking and free, of the fall nearest to the mean Δz."""
+def figure_4() -> Columns:
+    """Let the chain of Fig. 4 fall; return the top rods' heights against V².
+
+    Of the fall nearest to the mean Δz.
+    """
+    groups = [f"{{count: 4, diameter: {1e3 * d:g} mm}}" for d in paper.GRADED_DIAMETERS[::4]]
+    rods = f"rods: [{', '.join(groups)}], spacing: equal-gaps"
+    (ensemble,) = _ensembles(rods, 21.0, (paper.MIDDLE_INCLINE,))
     middle = fmean(truth[_SEPARATION] for truth in ensemble)
     track = min(ensemble, key=lambda truth: abs(truth[_SEPARATION] - middle))["track"]
     times = np.asarray(track["times_s"])
@@ -108,3 +102,6 @@ def figure_4(ensemble: Ensemble) -> Columns:
         columns[f"{name}height_m"] = heights[1:-1].tolist()
         columns[f"{name}speed2"] = (speeds**2).tolist()
     return columns
+
+
+FIGURES: Mapping[int, Callable[[], Columns]] = {3: figure_3, 4: figure_4}

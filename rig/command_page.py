@@ -1,0 +1,81 @@
+"""What ``command_help.txt`` says of the commands, and the first help, as quick as Python itself."""
+
+from __future__ import annotations
+
+from rig import __version__
+
+_HEAD = """\
+usage: rig [-h] [--version] COMMAND ...
+
+Lab-rig controller for falling-chain and photogate experiments.
+
+options:
+  -h, --help  show this help message and exit
+  --version   show program's version number and exit
+"""
+_TAIL = """
+Exit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a run was
+void, 4 device trouble, 130 interrupted. rig replay: 1 the results differ.
+"""
+
+
+class Command:
+    """One command, or one of two words below another.
+
+    Attributes
+    ----------
+    name, text
+        Its words, and what it does.
+    arguments
+        Rows for `rig.command_help`.
+    examples
+        Whole command lines.
+    """
+
+    def __init__(self, name: str, text: str, arguments: list[str], examples: list[str]) -> None:
+        self.name = name
+        self.text = text
+        self.arguments = arguments
+        self.examples = examples
+
+
+def _read_page() -> dict[str, list[Command]]:
+    """Return the commands of each group."""
+    place = __file__.replace("command_page.py", "command_help.txt")
+    with open(place, encoding="utf-8") as page:  # noqa: PTH123 - pathlib takes 5 ms
+        paragraphs = page.read().strip().split("\n\n")
+    groups: dict[str, list[Command]] = {}
+    shared: dict[str, str] = {}
+    for paragraph in paragraphs:
+        head, *lines = paragraph.splitlines()
+        if head == "shared":
+            shared = {line.partition(" |")[0]: line for line in lines}
+        elif head.startswith("## "):
+            groups[head.removeprefix("## ")] = commands = []
+        elif not head.startswith("#"):
+            examples = [line.strip(" $") for line in lines if line.startswith("  $ ")]
+            name, text = head.split(": ", 1)
+            rows = [shared.get(line, line) for line in lines[: len(lines) - len(examples)]]
+            commands.append(Command(name, text, rows, examples))
+    return groups
+
+
+GROUPS = _read_page()
+"""Every command by its group, in the order in which they are met."""
+COMMANDS = {command.name: command for commands in GROUPS.values() for command in commands}
+
+
+def first_help() -> str:
+    """Return what ``rig --help`` prints."""
+    lines = []
+    for group, commands in GROUPS.items():
+        top = (command for command in commands if " " not in command.name)
+        lines += ["", f"{group}:", *(f"  {command.name:<12}{command.text}" for command in top)]
+    return "\n".join([_HEAD.rstrip(), *lines, _TAIL])
+
+
+def first_answer(words: list[str]) -> str:
+    """Return what answers a command line that names no command; empty for any other."""
+    if words in (["-h"], ["--help"]):
+        return first_help()
+    return f"rig {__version__}\n" if words == ["--version"] else ""

@@ -1,0 +1,3 @@
+"""Drops of a fence to damage."""
+
+from tests.cli.conftest import fences  # noqa: F401 - a fixture
