@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rig.arrays import Array
+    from rig.clock.epochs import Moment
     from rig.records import Pulse
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
@@ -114,29 +115,25 @@ def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
         The rate; the nominal one when there are not two pulses of one stretch. A pulse that was
         missed or one too many begins a new stretch.
     """
-    pieces: list[Array] = []
-    stretch: list[tuple[int, int]] = []  # count and wide tick
-    began_ns, epoch = 0, -1
+    stretches: list[list[tuple[int, Moment]]] = []  # counts, and where each pulse belongs
     for pulse in sorted(pulses):
         host_ns = (pulse.host_send_ns + pulse.host_recv_ns) // 2
         moment = split.place(pulse.tick, host_ns, pings.hz, _STALE_S, 0.0)
         if moment is None:
             continue
-        if stretch and moment.epoch == epoch:
-            count, tick = stretch[-1]
-            if moment.tick == tick:
+        if stretches and moment.epoch == stretches[-1][-1][1].epoch:
+            count, last = stretches[-1][-1]
+            if moment.tick == last.tick:
                 continue  # the same pulse again
-            seconds = (moment.tick - tick) / pings.hz
+            seconds = (moment.tick - last.tick) / pings.hz
             counted = (pulse.number - count) % _COUNT_WRAP
             counted += round((seconds - counted) / _COUNT_WRAP) * _COUNT_WRAP
             if abs(seconds - counted) < _ODD_S + _ODD * counted:
-                stretch.append((count + counted, moment.tick))
+                stretches[-1].append((count + counted, moment))
                 continue
-        pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
-        stretch = [(pulse.number, moment.tick)]
-        began_ns, epoch = moment.at_ns, moment.epoch
-    pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
-    return _fit_track([piece for piece in pieces if piece.shape[1] > 1], split.nominal_hz)
+        stretches.append([(pulse.number, moment)])
+    pieces = [_pulse_piece(pulses, split.nominal_hz) for pulses in stretches if len(pulses) > 1]
+    return _fit_track(pieces, split.nominal_hz)
 
 
 def _ping_piece(pings: Samples, nominal_hz: int) -> Array:
@@ -158,13 +155,14 @@ def _ping_piece(pings: Samples, nominal_hz: int) -> Array:
     return np.array([at, excess / nominal_hz - rest_ns2 * 0.5e-9, sigma])
 
 
-def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: int) -> Array:
+def _pulse_piece(stretch: Sequence[tuple[int, Moment]], nominal_hz: int) -> Array:
     """Turn a stretch of pulses, none missed, into readings."""
     sigma = sqrt(_EDGE_S**2 + 1 / (12 * nominal_hz**2))
-    columns = np.array(stretch, np.int64).reshape(-1, 2)
-    seconds, ticks = (columns - columns[:1]).T
+    columns = np.array([(count, moment.tick) for count, moment in stretch], np.int64)
+    seconds, ticks = (columns - columns[0]).T
     excess = (ticks - nominal_hz * seconds) / nominal_hz
-    return np.array([began_ns * 1e-9 + seconds, excess, np.full(len(stretch), sigma)])
+    at = stretch[0][1].at_ns * 1e-9 + seconds
+    return np.array([at, excess, np.full(len(stretch), sigma)])
 
 
 def _fit_track(pieces: Sequence[Array], nominal_hz: int) -> TickRate:

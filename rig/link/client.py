@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.boards import LONGEST_RECORD_MS
@@ -74,15 +73,15 @@ class Device(Exchange):
         """
         self.expect_boot = True
         tries = min(self.tries, _IDENTIFY_TRIES)
-        outwait = partial(self.wait_for, LOADER_WAIT_S, _is_boot)
-        ways: tuple[Callable[[], object], ...] = (self._leave_loader, outwait)
         try:
             self.write(DELIMITER)  # ends whatever junk the line has seen so far
             self.wait_for(boot_wait_s, _is_boot)
-            for end_loader in ways:
-                with suppress(DeviceTimeoutError):
-                    return self._identify(tries)
-                end_loader()
+            with suppress(DeviceTimeoutError):
+                return self._identify(tries)
+            self._leave_loader()
+            with suppress(DeviceTimeoutError):
+                return self._identify(tries)
+            self.wait_for(LOADER_WAIT_S, _is_boot)
             return self._identify(tries)
         finally:
             self.expect_boot = False
@@ -176,13 +175,7 @@ class Device(Exchange):
             A gate is blocked or was since arming, or the device is not armed any more; nothing
             was released.
         """
-        try:
-            return self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
-        except DeviceRefusedError as refused:
-            if refused.reason is not wire.RefusalReason.NOT_ARMED:
-                raise
-            disarmed = self.transcript.disarmed
-            raise DeviceRefusedError(refused.reason, refused.detail, disarmed) from None
+        return self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""

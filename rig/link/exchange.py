@@ -135,7 +135,7 @@ class Exchange:
             if isinstance(answer, expected):
                 return answer
             if isinstance(answer, wire.Refused):
-                raise DeviceRefusedError(answer.reason, answer.detail)
+                raise DeviceRefusedError(answer.reason, answer.detail, self.transcript.disarmed)
             if answer is not None:
                 names = {"request": type(message).__name__, "answer": type(answer).__name__}
                 raise make_error(DeviceError, "device_confused", **names)

@@ -6,6 +6,7 @@ import errno
 import socket
 import warnings
 from typing import Any, Protocol
+from urllib.parse import urlsplit
 
 import serial
 
@@ -71,6 +72,7 @@ def open_port(url: str) -> Port:
     """
     check_name(url)
     _add_handlers()
+    scheme = urlsplit(url).scheme
     try:
         with warnings.catch_warnings():
             # Pyserial 3.5 starts its RFC 2217 reader in a way Python has given up since.
@@ -81,7 +83,7 @@ def open_port(url: str) -> Port:
     except RigError:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
-        if _scheme(url) in _NETWORK:
+        if scheme in _NETWORK:
             # Pyserial keeps the cause only behind its own words.
             cause = error.__context__ if isinstance(error.__context__, OSError) else error
             raise make_error(DeviceError, "port_unreachable", port=url, text=cause) from error
@@ -90,10 +92,10 @@ def open_port(url: str) -> Port:
         code, text = _CODES.get(number, "port_failed"), _PLAIN.get(number, str(error))
         raise make_error(DeviceError, code, port=url, text=text) from error
     except ValueError as error:
-        if _scheme(url) == "emu":  # pyserial says no more of a handler it cannot import
+        if scheme == "emu":  # pyserial says no more of a handler it cannot import
             raise make_error(DeviceError, "emulator_missing") from error
         raise make_error(DeviceError, "port_failed", port=url, text=error) from error
-    return NetworkPort(port) if _scheme(url) == "socket" else port
+    return NetworkPort(port) if scheme == "socket" else port
 
 
 def check_url(url: str) -> None:
@@ -116,10 +118,6 @@ def _add_handlers() -> None:
     for package in (simulation_package(), "rig_emulator"):  # of sim:// and emu://
         if package not in serial.protocol_handler_packages:
             serial.protocol_handler_packages.append(package)
-
-
-def _scheme(url: str) -> str:
-    return url.partition("://")[0].lower() if "://" in url else ""
 
 
 def port_clock(port: object) -> Clock:
