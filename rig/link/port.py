@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import serial
+from serial.urlhandler import protocol_socket
 
 from rig.clock.host import Clock, SystemClock
 from rig.errors import DeviceError, InputError, RigError
@@ -77,9 +78,9 @@ def open_port(url: str) -> Port:
         with warnings.catch_warnings():
             # Pyserial 3.5 starts its RFC 2217 reader in a way Python has given up since.
             warnings.filterwarnings("ignore", r"set(Daemon|Name)\(\)", DeprecationWarning)
-            port: Any = serial.serial_for_url(  # a subclass of SerialBase
-                url, baudrate=BAUDRATE, timeout=READ_TIMEOUT_S, exclusive=True
-            )
+            opener: Any = NetworkPort if scheme == "socket" else serial.serial_for_url
+            port: Port = opener(url, baudrate=BAUDRATE, timeout=READ_TIMEOUT_S, exclusive=True)
+            return port
     except RigError:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
@@ -95,7 +96,6 @@ def open_port(url: str) -> Port:
         if scheme == "emu":  # pyserial says no more of a handler it cannot import
             raise make_error(DeviceError, "emulator_missing") from error
         raise make_error(DeviceError, "port_failed", port=url, text=error) from error
-    return NetworkPort(port) if scheme == "socket" else port
 
 
 def check_url(url: str) -> None:
@@ -137,33 +137,25 @@ def port_clock(port: object) -> Clock:
     return SystemClock() if clock is None else clock
 
 
-class NetworkPort:
+class NetworkPort(protocol_socket.Serial):
     """A ``socket://`` port that says how much has really arrived.
 
     Pyserial's own says 1 when anything has: everything would be read byte by byte, each a record
     of its own in the session.
-
-    Parameters
-    ----------
-    port
-        Pyserial's.
     """
 
-    def __init__(self, port: Any) -> None:
-        self._port = port
-        self._socket = port._socket
-        self.baudrate = BAUDRATE
-        self.read = port.read
-        self.write = port.write
+    _socket: Any  # pyserial's, which its types do not name
 
     def close(self) -> None:
         """Hang up."""
-        self._port.close()
-        self._socket.close()  # pyserial forgets to, where the other end has hung up already
+        line = self._socket
+        super().close()
+        if line is not None:
+            line.close()  # pyserial forgets to, where the other end has hung up already
 
     @property
     def in_waiting(self) -> int:
         """Bytes that can be read at once."""
-        if not self._port.in_waiting:  # also says when the port is closed
+        if not super().in_waiting:  # also says when the port is closed
             return 0
         return len(self._socket.recv(_PEEK, socket.MSG_PEEK))
