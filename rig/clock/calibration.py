@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import floor, hypot, log2, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -11,6 +10,7 @@ import numpy as np
 from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
 from rig.clock.rate import TickRate, ping_rate, pulse_rate
 from rig.clock.samples import HostTime, Samples, one_axis, samples
+from rig.reasons import make_reason
 from rig.records import Pulse
 from rig.threads import one_thread
 from rig.units import significant
@@ -88,8 +88,7 @@ class Source(NamedTuple):
 
     def mean(self) -> TimeScale:
         """Time scale over all its samples."""
-        rate = self.rate
-        return TimeScale(rate.hz, hypot(rate.u_hz / rate.hz, self.u))
+        return TimeScale(self.rate.hz, hypot(self.rate.u_hz / self.rate.hz, self.u))
 
     def sometime(self) -> TimeScale:
         """Time scale at a moment nobody knows: the mean, and how far the rate may be from it."""
@@ -103,8 +102,7 @@ class Source(NamedTuple):
         return TimeScale(hz, hypot(u_hz / hz, self.u))
 
 
-@dataclass(frozen=True, slots=True)
-class FireTimes:
+class FireTimes(NamedTuple):
     """When drops were fired.
 
     Attributes
@@ -137,8 +135,7 @@ class FireTimes:
         return next((moment.at_ns * 1e-9 for moment in moments if moment is not None), None)
 
 
-@dataclass(frozen=True, slots=True)
-class Calibration:
+class Calibration(NamedTuple):
     """The time scale of a session.
 
     Attributes
@@ -257,24 +254,15 @@ def _notes(sources: list[Source], breaks: int) -> list[str]:
     """Say what a reader should know before trusting the time scale."""
     notes = []
     if sources[0].name == "stated":
-        notes.append("too few clock samples: times are by the board's nominal rate, ±0.5 %")
+        notes.append(make_reason("clock_nominal"))
     if breaks:
         times = "once" if breaks == 1 else f"{breaks} times"
-        notes.append(
-            f"the host slept or its clock was set {times}: no clock sample from before is compared "
-            "with one from after"
-        )
+        notes.append(make_reason("host_clock_broken", times=times))
     if (track := sources[0].rate.track) is not None and track.seen:
-        notes.append(
-            f"the board's clock wanders, by {significant(track.wander * 60e6)} ppm in an hour: "
-            "each drop has the rate of its own time"
-        )
+        notes.append(make_reason("clock_wanders", wander_ppm=significant(track.wander * 60e6)))
     if len(sources) > 1:
         first, second = (source.mean() for source in sources)
         apart = first.hz / second.hz - 1.0
         if abs(apart) > 2.0 * hypot(first.u, second.u):
-            notes.append(
-                f"host clock and 1 Hz reference are {abs(apart) * 1e6:.0f} ppm apart, more than "
-                "both allow: is the reference what the protocol says?"
-            )
-    return notes
+            notes.append(make_reason("reference_apart", apart_ppm=abs(apart) * 1e6))
+    return [note.text for note in notes]

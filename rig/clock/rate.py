@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,13 +27,6 @@ _STALE_S = 1.2  # an older pulse is the last of a reference that was taken away
 _COUNT_WRAP = 1 << 16
 _ODD = 1e-3  # part of the ticks between two pulses that may be missing or too many
 _ODD_S = 0.1
-
-
-class Rate(NamedTuple):
-    """Ticks a second, and the standard uncertainty (k = 1) of that."""
-
-    hz: float
-    u_hz: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +59,10 @@ class TickRate:
     nominal_hz: float = 0.0
     track: Track | None = field(default=None, compare=False, repr=False)
 
-    def at(self, seconds: float) -> Rate:
-        """Return the rate at a moment, s on the axis of the samples' host times."""
+    def at(self, seconds: float) -> tuple[float, float]:
+        """Return `hz` and `u_hz` at a moment, s on the axis of the samples' host times."""
         if self.track is None:
-            return Rate(self.hz, self.u_hz)
+            return self.hz, self.u_hz
         return _least(self.nominal_hz, self.track.rate(seconds))
 
 
@@ -178,7 +171,6 @@ def _fit_track(pieces: Sequence[Array], nominal_hz: int) -> TickRate:
     epoch = np.repeat(np.arange(len(pieces)), [piece.shape[1] for piece in pieces])
     at, phase, sigma = np.concatenate([np.empty((3, 0)), *pieces], axis=1)
     everything = Readings(at, phase, sigma, epoch)
-    nominal = TickRate(*_least(nominal_hz), 0, 0.0, nominal_hz=nominal_hz)
     # A walk can follow stray samples, and a steady rate takes a walk's ends for stray: what
     # little strays from a steady rate is left out first, and the rest asked whether it wanders.
     readings, track = _reject_outliers(everything, steady=True)
@@ -186,16 +178,14 @@ def _fit_track(pieces: Sequence[Array], nominal_hz: int) -> TickRate:
         track.search()
         if track.seen or readings.at.size < _MOSTLY * everything.at.size:
             readings, track = _reject_outliers(everything, steady=False)
-    if track is None:
-        return nominal
-    hz, u_hz = _least(nominal_hz, track.mean())
-    if hz == nominal.hz and u_hz == nominal.u_hz:
-        return nominal
+    nominal, rate = _least(nominal_hz), _least(nominal_hz, track.mean() if track else None)
+    if track is None or rate == nominal:
+        return TickRate(*nominal, 0, 0.0, nominal_hz=nominal_hz)
     ends = np.flatnonzero(np.diff(readings.epoch, append=-1))
     starts = np.flatnonzero(np.diff(readings.epoch, prepend=-1))
     span = float((readings.at[ends] - readings.at[starts]).sum())
     n = readings.at.size
-    return TickRate(hz, u_hz, n, span, everything.at.size - n, nominal_hz, track)
+    return TickRate(*rate, n, span, everything.at.size - n, nominal_hz, track)
 
 
 def _reject_outliers(readings: Readings, *, steady: bool) -> tuple[Readings, Track | None]:
@@ -214,9 +204,9 @@ def _reject_outliers(readings: Readings, *, steady: bool) -> tuple[Readings, Tra
     return readings, track
 
 
-def _least(nominal_hz: float, relative: tuple[float, float] | None = None) -> Rate:
-    """Turn a relative rate to Hz; the nominal one where that is as well known."""
+def _least(nominal_hz: float, relative: tuple[float, float] | None = None) -> tuple[float, float]:
+    """Turn a relative rate and its uncertainty to Hz; the nominal ones where they say no more."""
     u = RESONATOR_TOLERANCE / sqrt(3)
     if relative is None or relative[1] >= u:
-        return Rate(nominal_hz, nominal_hz * u)
-    return Rate(nominal_hz * (1.0 + relative[0]), nominal_hz * relative[1])
+        return nominal_hz, nominal_hz * u
+    return nominal_hz * (1.0 + relative[0]), nominal_hz * relative[1]

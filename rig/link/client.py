@@ -49,9 +49,6 @@ class Device(Exchange):
     is never behind what was acted upon; for the parameters see `rig.link.exchange.Exchange`.
     """
 
-    _order: wire.Arm | None = None
-    """Of the drop that was armed last."""
-
     def connect(self, boot_wait_s: float = BOOT_WAIT_S) -> wire.Identity:
         """Find out who is there.
 
@@ -152,9 +149,7 @@ class Device(Exchange):
             A gate is blocked, the release is too warm, another drop is held, a parameter is out
             of range, the emergency stop is open.
         """
-        token = self.request(order, wire.Armed).token
-        self._order = order
-        return token
+        return self.request(order, wire.Armed).token
 
     def fire(self, token: int) -> int:
         """Let go; from now until `collect` returns the host stays silent.
@@ -222,10 +217,9 @@ class Device(Exchange):
         DeviceError
             The board restarted, lost the drop, or fell silent.
         """
-        if timeout is None:
-            order = self._order
-            timeout = (order.record_ms / 1000 if order and order.label == label else 0.0) + _LATE_S
         drop = self.transcript.assembly(label)
+        if timeout is None:
+            timeout = drop.record_ms / 1000 + _LATE_S
         now_ns = self.clock.now_ns
         hopeless = now_ns() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)
         ask = now_ns() + round(timeout * 1e9)

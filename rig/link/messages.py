@@ -60,8 +60,7 @@ def pack_events(events: Iterable[tuple[int, int]]) -> bytes:
     return b"".join([EVENT.pack(*event) for event in events])
 
 
-@dataclass(frozen=True, slots=True)
-class UnsignedInt:
+class UnsignedInt(NamedTuple):
     """An unsigned little-endian integer of `size` bytes."""
 
     size: int
@@ -76,8 +75,7 @@ class UnsignedInt:
         return int.from_bytes(value, "little"), end
 
 
-@dataclass(frozen=True, slots=True)
-class Raw:
+class Raw(NamedTuple):
     """Exactly `size` bytes; as a tail, any number of them up to the end of the payload."""
 
     size: int
@@ -95,8 +93,7 @@ class Raw:
         return self.pack(payload[at:end]), end
 
 
-@dataclass(frozen=True, slots=True)
-class Chars:
+class Chars(NamedTuple):
     """UTF-8 behind a length byte, at most `limit` bytes."""
 
     limit: int

@@ -19,14 +19,9 @@ from rig.reasons import make_error
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
 READ_TIMEOUT_S = 0.02
-_CODES = {
-    errno.ENOENT: "no_port",
-    errno.ENODEV: "no_port",
-    errno.EACCES: "port_denied",
-    errno.EPERM: "port_denied",
-    errno.EBUSY: "port_taken",
-    errno.EAGAIN: "port_taken",
-}
+_CODES = dict.fromkeys((errno.ENOENT, errno.ENODEV), "no_port")
+_CODES |= dict.fromkeys((errno.EACCES, errno.EPERM), "port_denied")
+_CODES |= dict.fromkeys((errno.EBUSY, errno.EAGAIN), "port_taken")
 _PLAIN = {errno.ENOTTY: "it is no serial port", errno.EISDIR: "it is a folder"}
 _PEEK = 1 << 16  # bytes; more than a session reads at once
 _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
