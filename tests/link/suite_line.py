@@ -21,27 +21,6 @@ class LineSuite(Suite):
         assert line.ask(wire.Status(), 2).phase is Phase.ARMED
         assert line.ask(order(), 1) != armed
 
-    def test_a_lost_request_is_sent_again(self, bench, device, identity):
-        port = LossyPort(bench)
-        device = Device(port, bench.clock())
-        device.connect(boot_wait_s=0)
-        port.lose_tx = 2
-        token = arm(device)
-        port.lose_tx = 2
-        device.fire(token)
-        self.check(bench, device.collect(LABEL), identity)
-        assert bench.lab.drops == [LABEL]
-
-    def test_a_lost_answer_to_fire_does_not_fire_again(self, bench):
-        port = LossyPort(bench)
-        device = Device(port, bench.clock())
-        device.connect()
-        token = arm(device)
-        port.lose_rx_until_ns = bench.clock().now_ns() + 80_000_000
-        device.fire(token)
-        assert bench.lab.drops == [LABEL]
-        self.check(bench, device.collect(LABEL), device.transcript.identity)
-
     def test_lost_events_and_certificate_are_read_again(self, bench):
         port = LossyPort(bench)
         device = Device(port, bench.clock())
