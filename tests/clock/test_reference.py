@@ -103,6 +103,7 @@ def test_pulses_come_out_of_the_bytes_and_repeats_do_not():
     # What is not wired has no pulse.
     assert talk(("tx", ask, True), ("rx", wire.ReferencePulse(0, 0), True)) == []
     ping, pong = wire.Ping(), wire.Pong(77)
+    assert talk(("tx", ping, True), ("tx", ping, False), ("rx", pong, True)) == []
     both = talk(("tx", ping, True), ("rx", pong, True), ("tx", ask, True), ("rx", answer, True))
     assert both == [ClockSample(0, 1000, 77), Pulse(2000, 3000, 12, 6_500_000)]
 

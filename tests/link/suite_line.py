@@ -29,14 +29,6 @@ class LineSuite(Suite):
         port.lose_rx_until_ns = bench.clock().now_ns() + 200_000_000
         self.check(bench, device.collect(LABEL), device.transcript.identity)
 
-    def test_repeated_pings_give_no_sample(self, bench):
-        port = LossyPort(bench)
-        device = Device(port, bench.clock())
-        device.connect()
-        port.lose_tx = 1
-        assert device.ping() is None
-        assert device.ping() is not None
-
     @pytest.mark.parametrize("seed", range(3))
     def test_one_percent_of_damaged_bytes_changes_nothing(self, bench, seed):
         port = NoisyPort(bench.port(), 0.01, seed)
