@@ -11,6 +11,7 @@ from rig.cli import main
 from rig.errors import RigError
 from rig.link.messages import Phase
 from rig.session.store import Session
+from tests.daemon.test_control import states
 from tests.waiting import PATIENCE_S, until
 
 IDLE_S = 0.4
@@ -52,11 +53,6 @@ def ended(processes):
     assert processes.daemon.returncode == 0, told
     assert not processes.socket.exists()
     return told.splitlines()
-
-
-def states(processes):
-    with Session.open(processes.session, readonly=True) as session:
-        return [(e.run, e.attempt, str(e.state)) for e in session.states()]
 
 
 def test_it_stays_while_a_client_is_there_and_ends_after_it(processes, client):
