@@ -10,7 +10,6 @@ from mpmath import mp
 
 from rig.errors import DomainError
 from rig.model.continuum import UniformChain, end, speed
-from rig.model.quadrature import gauss
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 from tests.model.continuum_reference import closed_end, printed_squared_speed
@@ -80,9 +79,3 @@ def test_above_the_surface_the_chain_falls_freely():
 def test_says_what_is_wrong_with_a_chain(change, message):
     with pytest.raises(DomainError, match=message):
         replace(PAPER, **change)
-
-
-def test_rules_are_shared_and_cannot_be_spoilt():
-    assert gauss(7) is gauss(7)
-    with pytest.raises(ValueError, match="read-only"):
-        gauss(7).weights[0] = 0.0
