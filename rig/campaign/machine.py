@@ -265,7 +265,9 @@ class Flow:
     verdict, reasons
         Of this drop, as logged.
     judged
-        The verdict and reasons that it had before it was rejected.
+        The verdict and reasons of the analysis.
+    rejection, note
+        What the operator has to say against the drop, and about it; each a reason or none.
     trouble
         What went wrong last; empty when it is over.
     home
@@ -289,6 +291,8 @@ class Flow:
     verdict: str = ""
     reasons: tuple[Reason, ...] = ()
     judged: tuple[str, tuple[Reason, ...]] = ("", ())
+    rejection: tuple[Reason, ...] = ()
+    note: tuple[Reason, ...] = ()
     trouble: str = ""
     home: Stage = Stage.PREPARE
     refusals: int = 0
@@ -321,7 +325,9 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case Tick(seconds) if flow.stage is Stage.COUNTDOWN:
             return _tick(flow, seconds)
         case DropVerdict(flow.ticket, verdict, reasons, row) if flow.stage is Stage.JUDGING:
-            return _log(replace(flow, row=flow.row if row is None else row), verdict, reasons)
+            row = flow.row if row is None else row
+            judged = verdict, reasons
+            return _log(replace(flow, row=row, judged=judged, rejection=(), note=()))
         case GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
         case Try() if flow.stage in _IDLE:
@@ -335,31 +341,20 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case Again(job) if flow.stage in {*_IDLE, *_VERDICT}:
             return _onward(flow, job)
         case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
-            if flow.verdict != "rejected":
-                flow = replace(flow, judged=(flow.verdict, flow.reasons))
-            return _log(flow, "rejected", (plain_reason(cause.strip(), OPERATOR), *_notes(flow)))
-        case Restore() if flow.stage is Stage.RESULT and flow.verdict == "rejected":
-            verdict, reasons = flow.judged
-            return _log(flow, verdict, (*_noteless(reasons), *_notes(flow)))
+            return _log(replace(flow, rejection=(plain_reason(cause.strip(), OPERATOR),)))
+        case Restore() if flow.stage is Stage.RESULT and flow.rejection:
+            return _log(replace(flow, rejection=()))
         case Note(text) if flow.stage is Stage.RESULT:
             note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
-            if note != _notes(flow):  # what was noted before stays in the log
-                return _log(flow, flow.verdict, (*_noteless(flow.reasons), *note))
+            if note != flow.note:  # what was noted before stays in the log
+                return _log(replace(flow, note=note))
     return flow, ()
-
-
-def _notes(flow: Flow) -> tuple[Reason, ...]:
-    return tuple(reason for reason in flow.reasons if reason.code == NOTE)
-
-
-def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
-    return tuple(reason for reason in reasons if reason.code != NOTE)
 
 
 def _stop(flow: Flow) -> Outcome:
     if flow.stage in BEFORE_RELEASE:
         why_safe = "the release is off" if flow.stage is Stage.TESTING else "nothing fell"
-        return flow.to(flow.home, f"stopped: {why_safe}"), (Stop(),)
+        flow = flow.to(flow.home, f"stopped: {why_safe}")
     return flow, (Stop(),)
 
 
@@ -444,10 +439,12 @@ def _onward(flow: Flow, job: Job | None) -> Outcome:
     return replace(flow, job=job).to(Stage.PREPARE), ()
 
 
-def _log(flow: Flow, state: str, reasons: tuple[Reason, ...]) -> Outcome:
+def _log(flow: Flow) -> Outcome:
     """Have a verdict logged, the drop's first or another one."""
     job = flow.job
     assert job is not None
+    state, reasons = ("rejected", flow.rejection) if flow.rejection else flow.judged
+    reasons += flow.note
     row = after(flow.row, job, state, reasons)
     flow = replace(flow.to(Stage.RESULT), verdict=state, reasons=reasons, logged=False, row=row)
     return flow, (Log(job, state, reasons),)

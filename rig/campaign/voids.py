@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.reasons import Reason, summarize_reasons
+from rig.reasons import Reason, make_reason, remedies, summarize_reasons
 from rig.records import Job
 
 if TYPE_CHECKING:
@@ -57,14 +56,11 @@ def why_halted(row: VoidRow) -> str:
     reasons = in_common(row)
     if not reasons:
         return ""
-    return (
-        f"the last {MANY} drops are void for the same reason: {'; '.join(reasons)}\n"
-        f"put that right at the rig, then go on: run {row[-1].job.run} is tried again"
-    )
+    why = make_reason("halted", many=MANY, why="; ".join(reasons), run=row[-1].job.run)
+    return "\n".join([why.text, *remedies([why])])
 
 
-@dataclass(frozen=True, slots=True)
-class Voids:
+class Voids(NamedTuple):
     """What the log of a session says of voids.
 
     Attributes

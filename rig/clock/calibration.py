@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import floor, hypot, log2, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -11,13 +10,15 @@ import numpy as np
 from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
 from rig.clock.rate import TickRate, ping_rate, pulse_rate
 from rig.clock.samples import HostTime, Samples, one_axis, samples
+from rig.reasons import make_reason
+from rig.records import Pulse
 from rig.threads import one_thread
 from rig.units import significant
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rig.records import ClockSample, Drop, HostBreak, Pulse
+    from rig.records import ClockSample, Drop, HostBreak
 
 HOST_U = 50e-6 / sqrt(3)
 """Of a computer's clock, relative: ±50 ppm for its quartz with temperature and age; a steered one
@@ -26,6 +27,7 @@ _UNKNOWN = RESONATOR_TOLERANCE / sqrt(3)
 _ROUGH = 1e-4
 """Of a time scale, relative: 0.1 mm in a metre, far less than from rod to rod."""
 _WORDS = {
+    "stated": "nominal tick rate: too few clock samples",
     "pings": "device against host clock, {} samples",
     "reference": "device against 1 Hz reference, {} pulses",
 }
@@ -67,14 +69,13 @@ class ClockLog(Protocol):
         """When each run and attempt was fired."""
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(NamedTuple):
     """One clock that the board was compared with.
 
     Attributes
     ----------
     name
-        ``pings`` (the host's clock) or ``reference``.
+        ``pings`` (the host's clock), ``reference``, or ``stated`` for the nominal rate.
     rate
         The board's rate by that clock.
     u
@@ -87,8 +88,7 @@ class Source:
 
     def mean(self) -> TimeScale:
         """Time scale over all its samples."""
-        rate = self.rate
-        return TimeScale(rate.hz, hypot(rate.u_hz / rate.hz, self.u))
+        return TimeScale(self.rate.hz, hypot(self.rate.u_hz / self.rate.hz, self.u))
 
     def sometime(self) -> TimeScale:
         """Time scale at a moment nobody knows: the mean, and how far the rate may be from it."""
@@ -102,8 +102,7 @@ class Source:
         return TimeScale(hz, hypot(u_hz / hz, self.u))
 
 
-@dataclass(frozen=True, slots=True)
-class FireTimes:
+class FireTimes(NamedTuple):
     """When drops were fired.
 
     Attributes
@@ -136,8 +135,7 @@ class FireTimes:
         return next((moment.at_ns * 1e-9 for moment in moments if moment is not None), None)
 
 
-@dataclass(frozen=True, slots=True)
-class Calibration:
+class Calibration(NamedTuple):
     """The time scale of a session.
 
     Attributes
@@ -151,7 +149,7 @@ class Calibration:
     timer_u
         Relative standard uncertainty of the time scale of imported edges.
     sources
-        Clocks the board was compared with, the best one first.
+        Clocks the board was compared with, the best one first; without any its nominal rate.
     fired
         When drops were fired.
     """
@@ -175,8 +173,6 @@ class Calibration:
     def _scale_of(self, drop: Drop) -> tuple[str, TimeScale]:
         if drop.certificate is None or self.device is None:
             return "stated", TimeScale(drop.tick_hz, self.timer_u)
-        if not self.sources:
-            return "stated", self.device
         when = self.fired.when(drop) if self.fired else None
         choice = [
             (source.name, source.sometime() if when is None else source.at(when))
@@ -220,33 +216,29 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
     split = epochs(axis.pings, nominal, axis.cuts_ns)
     by_host = Source("pings", ping_rate(split), 0.0 if session.simulated else HOST_U)
     shifted = [
-        pulse._replace(
-            host_send_ns=pulse.host_send_ns + shift, host_recv_ns=pulse.host_recv_ns + shift
-        )
-        for pulse in session.pulses()
-        for shift in axis.shifts(pulse.host_send_ns)
+        Pulse(send_ns + shift, recv_ns + shift, number, tick)
+        for send_ns, recv_ns, number, tick in session.pulses()
+        for shift in axis.shifts(send_ns)
     ]
     reference = Source("reference", pulse_rate(split, shifted, by_host.rate), reference_u)
     sources = [source for source in (by_host, reference) if source.rate.n]
+    sources = sources or [by_host._replace(name="stated", u=0.0)]
     sources.sort(key=lambda source: source.mean().u)
-    scale = sources[0].mean() if sources else TimeScale(nominal, _UNKNOWN)
-    said |= {"rate_ppm": (scale.hz / nominal - 1.0) * 1e6, "u_ppm": scale.u * 1e6}
-    said["nominal_tick_hz"] = nominal
-    words, best = "nominal tick rate: too few clock samples", by_host
-    if sources:
-        best = sources[0]
-        words = _WORDS[best.name].format(best.rate.n)
-        said |= {"source": best.name, "clock_u_ppm": best.u * 1e6, "span_s": best.rate.span_s}
-        if best.rate.track is not None:
-            said["wander_ppm_sqrt_h"] = best.rate.track.wander * 60.0 * 1e6
-    if by_host in sources:
+    best, scale = sources[0], sources[0].mean()
+    said |= {"source": best.name, "rate_ppm": (scale.hz / nominal - 1.0) * 1e6}
+    said |= {"u_ppm": scale.u * 1e6, "nominal_tick_hz": nominal}
+    if best.rate.n:
+        said |= {"clock_u_ppm": best.u * 1e6, "span_s": best.rate.span_s}
+    if best.rate.track is not None:
+        said["wander_ppm_sqrt_h"] = best.rate.track.wander * 60.0 * 1e6
+    if by_host.rate.n:
         said |= {"pings": by_host.rate.n, "outliers": by_host.rate.outliers}
-    if reference in sources:
+    if reference.rate.n:
         said["pulses"] = reference.rate.n
     said |= {"epochs": len(split.pings), "host_breaks": len(breaks)}
     said["notes"] = _notes(sources, len(breaks))
     details = {
-        "source": words,
+        "source": _WORDS[best.name].format(best.rate.n),
         "tick_hz": scale.hz,
         "nominal_tick_hz": nominal,
         "error_ppm": said["rate_ppm"],
@@ -261,25 +253,16 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
 def _notes(sources: list[Source], breaks: int) -> list[str]:
     """Say what a reader should know before trusting the time scale."""
     notes = []
-    if not sources:
-        notes.append("too few clock samples: times are by the board's nominal rate, ±0.5 %")
+    if sources[0].name == "stated":
+        notes.append(make_reason("clock_nominal"))
     if breaks:
         times = "once" if breaks == 1 else f"{breaks} times"
-        notes.append(
-            f"the host slept or its clock was set {times}: no clock sample from before is compared "
-            "with one from after"
-        )
-    if sources and (track := sources[0].rate.track) is not None and track.seen:
-        notes.append(
-            f"the board's clock wanders, by {significant(track.wander * 60e6)} ppm in an hour: "
-            "each drop has the rate of its own time"
-        )
+        notes.append(make_reason("host_clock_broken", times=times))
+    if (track := sources[0].rate.track) is not None and track.seen:
+        notes.append(make_reason("clock_wanders", wander_ppm=significant(track.wander * 60e6)))
     if len(sources) > 1:
         first, second = (source.mean() for source in sources)
         apart = first.hz / second.hz - 1.0
         if abs(apart) > 2.0 * hypot(first.u, second.u):
-            notes.append(
-                f"host clock and 1 Hz reference are {abs(apart) * 1e6:.0f} ppm apart, more than "
-                "both allow: is the reference what the protocol says?"
-            )
-    return notes
+            notes.append(make_reason("reference_apart", apart_ppm=abs(apart) * 1e6))
+    return [note.text for note in notes]

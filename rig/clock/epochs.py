@@ -86,9 +86,8 @@ class Epochs:
         if number < 0:
             return None
         pings = self.pings[number]
-        send_ns, recv_ns, near = map(
-            int, pings[int(np.searchsorted(pings[:, SEND], host_ns, "right")) - 1]
-        )
+        latest = int(np.searchsorted(pings[:, SEND], host_ns, "right")) - 1
+        send_ns, recv_ns, near = pings[latest].tolist()
         gap_s = (host_ns - (send_ns + recv_ns) // 2) * 1e-9
         expected = near + round(gap_s * hz)
         off = (tick - expected + WRAP // 2) % WRAP - WRAP // 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from rig.arrays import Array
+    from rig.clock.epochs import Moment
     from rig.records import Pulse
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
@@ -26,13 +27,6 @@ _STALE_S = 1.2  # an older pulse is the last of a reference that was taken away
 _COUNT_WRAP = 1 << 16
 _ODD = 1e-3  # part of the ticks between two pulses that may be missing or too many
 _ODD_S = 0.1
-
-
-class Rate(NamedTuple):
-    """Ticks a second, and the standard uncertainty (k = 1) of that."""
-
-    hz: float
-    u_hz: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +59,10 @@ class TickRate:
     nominal_hz: float = 0.0
     track: Track | None = field(default=None, compare=False, repr=False)
 
-    def at(self, seconds: float) -> Rate:
-        """Return the rate at a moment, s on the axis of the samples' host times."""
+    def at(self, seconds: float) -> tuple[float, float]:
+        """Return `hz` and `u_hz` at a moment, s on the axis of the samples' host times."""
         if self.track is None:
-            return Rate(self.hz, self.u_hz)
+            return self.hz, self.u_hz
         return _least(self.nominal_hz, self.track.rate(seconds))
 
 
@@ -114,29 +108,25 @@ def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
         The rate; the nominal one when there are not two pulses of one stretch. A pulse that was
         missed or one too many begins a new stretch.
     """
-    pieces: list[Array] = []
-    stretch: list[tuple[int, int]] = []  # count and wide tick
-    began_ns, epoch = 0, -1
+    stretches: list[list[tuple[int, Moment]]] = []  # counts, and where each pulse belongs
     for pulse in sorted(pulses):
         host_ns = (pulse.host_send_ns + pulse.host_recv_ns) // 2
         moment = split.place(pulse.tick, host_ns, pings.hz, _STALE_S, 0.0)
         if moment is None:
             continue
-        if stretch and moment.epoch == epoch:
-            count, tick = stretch[-1]
-            if moment.tick == tick:
+        if stretches and moment.epoch == stretches[-1][-1][1].epoch:
+            count, last = stretches[-1][-1]
+            if moment.tick == last.tick:
                 continue  # the same pulse again
-            seconds = (moment.tick - tick) / pings.hz
+            seconds = (moment.tick - last.tick) / pings.hz
             counted = (pulse.number - count) % _COUNT_WRAP
             counted += round((seconds - counted) / _COUNT_WRAP) * _COUNT_WRAP
             if abs(seconds - counted) < _ODD_S + _ODD * counted:
-                stretch.append((count + counted, moment.tick))
+                stretches[-1].append((count + counted, moment))
                 continue
-        pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
-        stretch = [(pulse.number, moment.tick)]
-        began_ns, epoch = moment.at_ns, moment.epoch
-    pieces.append(_pulse_piece(stretch, began_ns, split.nominal_hz))
-    return _fit_track([piece for piece in pieces if piece.shape[1] > 1], split.nominal_hz)
+        stretches.append([(pulse.number, moment)])
+    pieces = [_pulse_piece(pulses, split.nominal_hz) for pulses in stretches if len(pulses) > 1]
+    return _fit_track(pieces, split.nominal_hz)
 
 
 def _ping_piece(pings: Samples, nominal_hz: int) -> Array:
@@ -158,13 +148,14 @@ def _ping_piece(pings: Samples, nominal_hz: int) -> Array:
     return np.array([at, excess / nominal_hz - rest_ns2 * 0.5e-9, sigma])
 
 
-def _pulse_piece(stretch: Sequence[tuple[int, int]], began_ns: int, nominal_hz: int) -> Array:
+def _pulse_piece(stretch: Sequence[tuple[int, Moment]], nominal_hz: int) -> Array:
     """Turn a stretch of pulses, none missed, into readings."""
     sigma = sqrt(_EDGE_S**2 + 1 / (12 * nominal_hz**2))
-    columns = np.array(stretch, np.int64).reshape(-1, 2)
-    seconds, ticks = (columns - columns[:1]).T
+    columns = np.array([(count, moment.tick) for count, moment in stretch], np.int64)
+    seconds, ticks = (columns - columns[0]).T
     excess = (ticks - nominal_hz * seconds) / nominal_hz
-    return np.array([began_ns * 1e-9 + seconds, excess, np.full(len(stretch), sigma)])
+    at = stretch[0][1].at_ns * 1e-9 + seconds
+    return np.array([at, excess, np.full(len(stretch), sigma)])
 
 
 def _fit_track(pieces: Sequence[Array], nominal_hz: int) -> TickRate:
@@ -180,7 +171,6 @@ def _fit_track(pieces: Sequence[Array], nominal_hz: int) -> TickRate:
     epoch = np.repeat(np.arange(len(pieces)), [piece.shape[1] for piece in pieces])
     at, phase, sigma = np.concatenate([np.empty((3, 0)), *pieces], axis=1)
     everything = Readings(at, phase, sigma, epoch)
-    nominal = TickRate(*_least(nominal_hz), 0, 0.0, nominal_hz=nominal_hz)
     # A walk can follow stray samples, and a steady rate takes a walk's ends for stray: what
     # little strays from a steady rate is left out first, and the rest asked whether it wanders.
     readings, track = _reject_outliers(everything, steady=True)
@@ -188,16 +178,14 @@ def _fit_track(pieces: Sequence[Array], nominal_hz: int) -> TickRate:
         track.search()
         if track.seen or readings.at.size < _MOSTLY * everything.at.size:
             readings, track = _reject_outliers(everything, steady=False)
-    if track is None:
-        return nominal
-    hz, u_hz = _least(nominal_hz, track.mean())
-    if hz == nominal.hz and u_hz == nominal.u_hz:
-        return nominal
+    nominal, rate = _least(nominal_hz), _least(nominal_hz, track.mean() if track else None)
+    if track is None or rate == nominal:
+        return TickRate(*nominal, 0, 0.0, nominal_hz=nominal_hz)
     ends = np.flatnonzero(np.diff(readings.epoch, append=-1))
     starts = np.flatnonzero(np.diff(readings.epoch, prepend=-1))
     span = float((readings.at[ends] - readings.at[starts]).sum())
     n = readings.at.size
-    return TickRate(hz, u_hz, n, span, everything.at.size - n, nominal_hz, track)
+    return TickRate(*rate, n, span, everything.at.size - n, nominal_hz, track)
 
 
 def _reject_outliers(readings: Readings, *, steady: bool) -> tuple[Readings, Track | None]:
@@ -216,9 +204,9 @@ def _reject_outliers(readings: Readings, *, steady: bool) -> tuple[Readings, Tra
     return readings, track
 
 
-def _least(nominal_hz: float, relative: tuple[float, float] | None = None) -> Rate:
-    """Turn a relative rate to Hz; the nominal one where that is as well known."""
+def _least(nominal_hz: float, relative: tuple[float, float] | None = None) -> tuple[float, float]:
+    """Turn a relative rate and its uncertainty to Hz; the nominal ones where they say no more."""
     u = RESONATOR_TOLERANCE / sqrt(3)
     if relative is None or relative[1] >= u:
-        return Rate(nominal_hz, nominal_hz * u)
-    return Rate(nominal_hz * (1.0 + relative[0]), nominal_hz * relative[1])
+        return nominal_hz, nominal_hz * u
+    return nominal_hz * (1.0 + relative[0]), nominal_hz * relative[1]

@@ -123,11 +123,9 @@ class Track:
         at
             s, on the axis of the readings; outside of them the walk goes on.
         """
-        x, end = self._x, (at - self.begin) / self.span
-        with_phase = (
-            np.where(x <= end, x**2 / 2.0, end * x - end**2 / 2.0) if end > 0.0 else 0.0 * x
-        )
-        return self._estimate(with_phase, abs(end))
+        end = (at - self.begin) / self.span
+        shared = np.minimum(self._x, max(0.0, end))  # of the walk, by each reading and the moment
+        return self._estimate(shared * self._x - shared**2 / 2.0, abs(end))
 
     def mean(self) -> tuple[float, float]:
         """Mean rate less nominal from the first reading to the last, and its uncertainty."""

@@ -8,23 +8,15 @@ from dataclasses import fields
 from typing import Any
 
 from rig.boards import GATES
-from rig.link.messages import (
-    EVENT,
-    DropCertificate,
-    DropCertificate2,
-    EventsFrame,
-    PulseEnd,
-    pack_events,
-    unpack_label,
-)
+from rig.link import messages as wire
 from rig.reasons import Reason, make_reason
 from rig.records import Certificate, Drop, Edge
 
 ALL_GATES = (1 << GATES) - 1
 _CUT = {
-    PulseEnd.STOPPED: "pulse_stopped",
-    PulseEnd.ABORTED: "pulse_aborted",
-    PulseEnd.DEVICE: "pulse_cut",
+    wire.PulseEnd.STOPPED: "pulse_stopped",
+    wire.PulseEnd.ABORTED: "pulse_aborted",
+    wire.PulseEnd.DEVICE: "pulse_cut",
 }
 _HALF = 1 << 31
 
@@ -38,6 +30,8 @@ class Assembly:
         The drop's label.
     gates
         Mask of the gates that count (from ARM; the certificate repeats it).
+    record_ms
+        How long after FIRE it is recorded, as ARM said; 0 where that was not heard.
 
     Attributes
     ----------
@@ -51,11 +45,12 @@ class Assembly:
         Number of the oldest event that can still be read, as far as the device has said so.
     """
 
-    def __init__(self, label: int, gates: int = ALL_GATES) -> None:
+    def __init__(self, label: int, gates: int = ALL_GATES, record_ms: int = 0) -> None:
         self.label = label
         self.gates = gates
+        self.record_ms = record_ms
         self.fire_tick: int | None = None
-        self.certificate: DropCertificate | None = None
+        self.certificate: wire.DropCertificate | None = None
         self.reset = False
         self.first_kept = 0
         self._events: dict[int, tuple[int, int]] = {}  # tick and state by number
@@ -65,9 +60,9 @@ class Assembly:
         """Whether anything of the drop itself was seen."""
         return bool(self._events) or self.fire_tick is not None or self.certificate is not None
 
-    def add(self, frame: EventsFrame) -> None:
+    def add(self, frame: wire.EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
-        self._events |= dict(enumerate(EVENT.iter_unpack(frame.events), frame.first))
+        self._events |= dict(enumerate(wire.EVENT.iter_unpack(frame.events), frame.first))
 
     def missing(self, first: int = 0) -> list[int]:
         """List the numbers of events, from `first` on, that are not known.
@@ -103,7 +98,7 @@ class Assembly:
         Drop
             With a fault for everything that is not as it should be.
         """
-        run, attempt = unpack_label(self.label)
+        run, attempt = wire.unpack_label(self.label)
         seen = self.certificate
         fire_tick = seen.fire_tick if seen else self.fire_tick
         # A device arms only with its gates clear, so 0 stands in where no certificate came.
@@ -122,7 +117,7 @@ class Assembly:
     def _crc(self) -> int:
         """CRC-32 over all events, as they are on the wire; none is missing."""
         total = self.certificate.events if self.certificate else 0
-        return zlib.crc32(pack_events(self._events[number] for number in range(total)))
+        return zlib.crc32(wire.pack_events(self._events[number] for number in range(total)))
 
     def _edges(self, state: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
@@ -149,15 +144,13 @@ class Assembly:
             yield make_reason("crc_mismatch")
         if seen.overflows:
             yield make_reason("edges_lost", lost=seen.overflows)
-        if isinstance(seen, DropCertificate2) and seen.pulse_end in _CUT and tick_hz:
+        if isinstance(seen, wire.DropCertificate2) and seen.pulse_end in _CUT and tick_hz:
             yield make_reason(_CUT[seen.pulse_end], lasting_s=seen.pulse_ticks / tick_hz)
 
 
-def _account(seen: DropCertificate) -> Certificate:
+def _account(seen: wire.DropCertificate) -> Certificate:
     sense = ticks_since(seen.fire_tick, seen.sense_tick) if seen.sensed else None
-    values: dict[str, Any] = {
-        field.name: getattr(seen, field.name, None) for field in fields(Certificate)
-    }
+    values: dict[str, Any] = {f.name: getattr(seen, f.name, None) for f in fields(Certificate)}
     return Certificate(**values | {"release_sense": sense})
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import partial
 from typing import TYPE_CHECKING
 
 from rig.boards import LONGEST_RECORD_MS
@@ -50,9 +49,6 @@ class Device(Exchange):
     is never behind what was acted upon; for the parameters see `rig.link.exchange.Exchange`.
     """
 
-    _order: wire.Arm | None = None
-    """Of the drop that was armed last."""
-
     def connect(self, boot_wait_s: float = BOOT_WAIT_S) -> wire.Identity:
         """Find out who is there.
 
@@ -74,15 +70,15 @@ class Device(Exchange):
         """
         self.expect_boot = True
         tries = min(self.tries, _IDENTIFY_TRIES)
-        outwait = partial(self.wait_for, LOADER_WAIT_S, _is_boot)
-        ways: tuple[Callable[[], object], ...] = (self._leave_loader, outwait)
         try:
             self.write(DELIMITER)  # ends whatever junk the line has seen so far
             self.wait_for(boot_wait_s, _is_boot)
-            for end_loader in ways:
-                with suppress(DeviceTimeoutError):
-                    return self._identify(tries)
-                end_loader()
+            with suppress(DeviceTimeoutError):
+                return self._identify(tries)
+            self._leave_loader()
+            with suppress(DeviceTimeoutError):
+                return self._identify(tries)
+            self.wait_for(LOADER_WAIT_S, _is_boot)
             return self._identify(tries)
         finally:
             self.expect_boot = False
@@ -153,9 +149,7 @@ class Device(Exchange):
             A gate is blocked, the release is too warm, another drop is held, a parameter is out
             of range, the emergency stop is open.
         """
-        token = self.request(order, wire.Armed).token
-        self._order = order
-        return token
+        return self.request(order, wire.Armed).token
 
     def fire(self, token: int) -> int:
         """Let go; from now until `collect` returns the host stays silent.
@@ -176,13 +170,7 @@ class Device(Exchange):
             A gate is blocked or was since arming, or the device is not armed any more; nothing
             was released.
         """
-        try:
-            return self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
-        except DeviceRefusedError as refused:
-            if refused.reason is not wire.RefusalReason.NOT_ARMED:
-                raise
-            disarmed = self.transcript.disarmed
-            raise DeviceRefusedError(refused.reason, refused.detail, disarmed) from None
+        return self.request(wire.Fire(token), wire.Fired, wait=_FIRE_WAIT_S).tick
 
     def abort(self) -> None:
         """Switch the release off, disarm, end a recording."""
@@ -229,10 +217,9 @@ class Device(Exchange):
         DeviceError
             The board restarted, lost the drop, or fell silent.
         """
-        if timeout is None:
-            order = self._order
-            timeout = (order.record_ms / 1000 if order and order.label == label else 0.0) + _LATE_S
         drop = self.transcript.assembly(label)
+        if timeout is None:
+            timeout = drop.record_ms / 1000 + _LATE_S
         now_ns = self.clock.now_ns
         hopeless = now_ns() + round((LONGEST_RECORD_MS / 1e3 + timeout) * 1e9)
         ask = now_ns() + round(timeout * 1e9)

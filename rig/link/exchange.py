@@ -36,6 +36,18 @@ _AT_ONCE = 1 << 16
 _NOISE = 4096  # bytes without a delimiter that are no half of a frame any more
 
 
+@contextmanager
+def _line() -> Iterator[None]:
+    """Say of a port that fails that the connection is lost."""
+    try:
+        yield
+    except OSError as error:  # SerialException is one
+        # Of a serial port that is gone the cause is pyserial's own, and not the system's.
+        is_gone = isinstance(error.__context__, serial.SerialException)
+        text = "the port is gone" if is_gone else str(error)
+        raise make_error(DeviceError, "connection_lost", text=text) from error
+
+
 class Exchange:
     """One port, and the conversation over it.
 
@@ -135,7 +147,7 @@ class Exchange:
             if isinstance(answer, expected):
                 return answer
             if isinstance(answer, wire.Refused):
-                raise DeviceRefusedError(answer.reason, answer.detail)
+                raise DeviceRefusedError(answer.reason, answer.detail, self.transcript.disarmed)
             if answer is not None:
                 names = {"request": type(message).__name__, "answer": type(answer).__name__}
                 raise make_error(DeviceError, "device_confused", **names)
@@ -210,13 +222,13 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        if self._part:
-            self._log_part()
+        self._log_part()
         self.tx_bytes += len(data)
         self._log("tx", data)
         with _line():
             self._port.write(data)
 
+    @_line()
     def set_rate(self, baudrate: int) -> None:
         """Change the line's rate, bit/s.
 
@@ -225,8 +237,7 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        with _line():
-            self._port.baudrate = baudrate
+        self._port.baudrate = baudrate
 
     def abort_past(self) -> None:
         """Send ABORT at once, from any thread, past a request that is under way.
@@ -241,6 +252,7 @@ class Exchange:
         self._past.append((self.clock.now_ns(), _ABORT))
         self._port.write(_ABORT)
 
+    @_line()
     def waiting(self) -> int:
         """Count the bytes that have arrived and were not read yet.
 
@@ -249,12 +261,11 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        with _line():
-            return self._port.in_waiting
+        return self._port.in_waiting
 
     def _log_part(self) -> list[Record]:
         part, self._part = self._part, b""
-        return self._log("rx", part)
+        return self._log("rx", part) if part else []
 
     def log_past(self) -> None:
         """Give the tap what other threads have sent, before anything else or at the end."""
@@ -271,15 +282,3 @@ class Exchange:
         for record in records:
             self._on_record(record)
         return records
-
-
-@contextmanager
-def _line() -> Iterator[None]:
-    """Say of a port that fails that the connection is lost."""
-    try:
-        yield
-    except OSError as error:  # SerialException is one
-        # Of a serial port that is gone the cause is pyserial's own, and not the system's.
-        is_gone = isinstance(error.__context__, serial.SerialException)
-        text = "the port is gone" if is_gone else str(error)
-        raise make_error(DeviceError, "connection_lost", text=text) from error

@@ -171,7 +171,6 @@ class Decoder:
         self.good = 0
         self.bad = 0
         self._partial = b""
-        self._overlong = False
 
     def feed(self, data: bytes) -> list[Frame]:
         """Take the next bytes of the stream.
@@ -189,18 +188,11 @@ class Decoder:
         *complete, partial = (self._partial + data).split(DELIMITER)
         frames: list[Frame] = []
         for stuffed in complete:
-            if self._overlong:  # the end of a stretch already counted as bad
-                self._overlong = False
-            elif stuffed:  # nothing between two delimiters is idle line, not a fault
+            if stuffed:  # nothing between two delimiters is idle line, not a fault
                 try:
                     frames.append(decode(stuffed))
                 except FrameError:
                     self.bad += 1
         self.good += len(frames)
-        if len(partial) >= FRAME_LIMIT or self._overlong:
-            # Keep no more than is needed to know that this stretch is hopeless.
-            self.bad += not self._overlong
-            self._overlong = True
-            partial = b""
-        self._partial = partial
+        self._partial = partial[:FRAME_LIMIT]  # as much as tells that the stretch is too long
         return frames

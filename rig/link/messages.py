@@ -60,28 +60,22 @@ def pack_events(events: Iterable[tuple[int, int]]) -> bytes:
     return b"".join([EVENT.pack(*event) for event in events])
 
 
-@dataclass(frozen=True, slots=True)
-class UnsignedInt:
-    """An unsigned little-endian integer by its `struct` code."""
+class UnsignedInt(NamedTuple):
+    """An unsigned little-endian integer of `size` bytes."""
 
-    code: str
-
-    @property
-    def size(self) -> int:
-        """Bytes on the wire."""
-        return struct.calcsize("<" + self.code)
+    size: int
 
     def pack(self, value: int) -> bytes:
         """Write a value."""
-        return struct.pack("<" + self.code, value)
+        return value.to_bytes(self.size, "little")
 
     def unpack(self, payload: bytes, at: int) -> tuple[int, int]:
         """Read a value; give where the next one starts, too."""
-        return struct.unpack_from("<" + self.code, payload, at)[0], at + self.size
+        value, end = Raw(self.size).unpack(payload, at)
+        return int.from_bytes(value, "little"), end
 
 
-@dataclass(frozen=True, slots=True)
-class Raw:
+class Raw(NamedTuple):
     """Exactly `size` bytes; as a tail, any number of them up to the end of the payload."""
 
     size: int
@@ -99,8 +93,7 @@ class Raw:
         return self.pack(payload[at:end]), end
 
 
-@dataclass(frozen=True, slots=True)
-class Chars:
+class Chars(NamedTuple):
     """UTF-8 behind a length byte, at most `limit` bytes."""
 
     limit: int
@@ -117,11 +110,11 @@ class Chars:
         return text.decode(), end
 
 
-_BYTE = UnsignedInt("B")
+_BYTE = UnsignedInt(1)
 
 U8: TypeAlias = Annotated[int, _BYTE]
-U16: TypeAlias = Annotated[int, UnsignedInt("H")]
-U32: TypeAlias = Annotated[int, UnsignedInt("I")]
+U16: TypeAlias = Annotated[int, UnsignedInt(2)]
+U32: TypeAlias = Annotated[int, UnsignedInt(4)]
 UniqueId: TypeAlias = Annotated[bytes, Raw(8)]
 Name: TypeAlias = Annotated[str, Chars(24)]
 Line: TypeAlias = Annotated[str, Chars(96)]
@@ -484,7 +477,7 @@ def pack(message: Message) -> tuple[int, bytes]:
         value = getattr(message, name)
         try:
             payload += wire.pack(value)
-        except (struct.error, ValueError) as error:
+        except (OverflowError, ValueError) as error:
             raise MessageError(f"{name}={value!r} does not fit: {error}") from error
     return CODES[type(message)], payload
 
@@ -515,7 +508,7 @@ def unpack(code: int, payload: bytes) -> Message:
         for _, python, wire in FIELDS[kind]:
             value, at = wire.unpack(payload, at)
             values.append(python(value))
-    except (struct.error, IndexError, ValueError) as error:
+    except (IndexError, ValueError) as error:
         raise MessageError(f"bad {kind.__name__}: {error}") from error
     if at != len(payload):
         raise MessageError(f"bad {kind.__name__}: {len(payload) - at} bytes too many")

@@ -6,8 +6,10 @@ import errno
 import socket
 import warnings
 from typing import Any, Protocol
+from urllib.parse import urlsplit
 
 import serial
+from serial.urlhandler import protocol_socket
 
 from rig.clock.host import Clock, SystemClock
 from rig.errors import DeviceError, InputError, RigError
@@ -17,14 +19,9 @@ from rig.reasons import make_error
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
 READ_TIMEOUT_S = 0.02
-_CODES = {
-    errno.ENOENT: "no_port",
-    errno.ENODEV: "no_port",
-    errno.EACCES: "port_denied",
-    errno.EPERM: "port_denied",
-    errno.EBUSY: "port_taken",
-    errno.EAGAIN: "port_taken",
-}
+_CODES = dict.fromkeys((errno.ENOENT, errno.ENODEV), "no_port")
+_CODES |= dict.fromkeys((errno.EACCES, errno.EPERM), "port_denied")
+_CODES |= dict.fromkeys((errno.EBUSY, errno.EAGAIN), "port_taken")
 _PLAIN = {errno.ENOTTY: "it is no serial port", errno.EISDIR: "it is a folder"}
 _PEEK = 1 << 16  # bytes; more than a session reads at once
 _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
@@ -71,17 +68,18 @@ def open_port(url: str) -> Port:
     """
     check_name(url)
     _add_handlers()
+    scheme = urlsplit(url).scheme
     try:
         with warnings.catch_warnings():
             # Pyserial 3.5 starts its RFC 2217 reader in a way Python has given up since.
             warnings.filterwarnings("ignore", r"set(Daemon|Name)\(\)", DeprecationWarning)
-            port: Any = serial.serial_for_url(  # a subclass of SerialBase
-                url, baudrate=BAUDRATE, timeout=READ_TIMEOUT_S, exclusive=True
-            )
+            opener: Any = NetworkPort if scheme == "socket" else serial.serial_for_url
+            port: Port = opener(url, baudrate=BAUDRATE, timeout=READ_TIMEOUT_S, exclusive=True)
+            return port
     except RigError:
         raise  # a simulated port knows better what is wrong
     except OSError as error:  # SerialException is one
-        if _scheme(url) in _NETWORK:
+        if scheme in _NETWORK:
             # Pyserial keeps the cause only behind its own words.
             cause = error.__context__ if isinstance(error.__context__, OSError) else error
             raise make_error(DeviceError, "port_unreachable", port=url, text=cause) from error
@@ -90,10 +88,9 @@ def open_port(url: str) -> Port:
         code, text = _CODES.get(number, "port_failed"), _PLAIN.get(number, str(error))
         raise make_error(DeviceError, code, port=url, text=text) from error
     except ValueError as error:
-        if _scheme(url) == "emu":  # pyserial says no more of a handler it cannot import
+        if scheme == "emu":  # pyserial says no more of a handler it cannot import
             raise make_error(DeviceError, "emulator_missing") from error
         raise make_error(DeviceError, "port_failed", port=url, text=error) from error
-    return NetworkPort(port) if _scheme(url) == "socket" else port
 
 
 def check_url(url: str) -> None:
@@ -118,10 +115,6 @@ def _add_handlers() -> None:
             serial.protocol_handler_packages.append(package)
 
 
-def _scheme(url: str) -> str:
-    return url.partition("://")[0].lower() if "://" in url else ""
-
-
 def port_clock(port: object) -> Clock:
     """Find the clock that goes with a port.
 
@@ -139,33 +132,25 @@ def port_clock(port: object) -> Clock:
     return SystemClock() if clock is None else clock
 
 
-class NetworkPort:
+class NetworkPort(protocol_socket.Serial):
     """A ``socket://`` port that says how much has really arrived.
 
     Pyserial's own says 1 when anything has: everything would be read byte by byte, each a record
     of its own in the session.
-
-    Parameters
-    ----------
-    port
-        Pyserial's.
     """
 
-    def __init__(self, port: Any) -> None:
-        self._port = port
-        self._socket = port._socket
-        self.baudrate = BAUDRATE
-        self.read = port.read
-        self.write = port.write
+    _socket: Any  # pyserial's, which its types do not name
 
     def close(self) -> None:
         """Hang up."""
-        self._port.close()
-        self._socket.close()  # pyserial forgets to, where the other end has hung up already
+        line = self._socket
+        super().close()
+        if line is not None:
+            line.close()  # pyserial forgets to, where the other end has hung up already
 
     @property
     def in_waiting(self) -> int:
         """Bytes that can be read at once."""
-        if not self._port.in_waiting:  # also says when the port is closed
+        if not super().in_waiting:  # also says when the port is closed
             return 0
         return len(self._socket.recv(_PEEK, socket.MSG_PEEK))

@@ -18,17 +18,16 @@ class DeviceRefusedError(DeviceError):
     detail
         What the reason's definition says it is.
     disarmed
-        Why the device had disarmed itself before, where that is the cause.
+        Why the device had disarmed itself before, where that is the cause: it is not armed.
     """
 
     def __init__(
         self, reason: RefusalReason, detail: int, disarmed: DisarmReason | None = None
     ) -> None:
-        if disarmed is None:
-            code, values = f"refused_{reason.name.lower()}", _values(reason, detail)
-        else:
-            code, values = f"disarmed_{disarmed.name.lower()}", {}
-        why = make_reason(code, **values)
+        if reason is not RefusalReason.NOT_ARMED:
+            disarmed = None
+        code = f"disarmed_{disarmed.name}" if disarmed else f"refused_{reason.name}"
+        why = make_reason(code.lower(), **_values(reason, detail))
         super().__init__(why.text, *remedies([why]))
         self.reasons = (why,)
         self.reason = reason
@@ -38,15 +37,13 @@ class DeviceRefusedError(DeviceError):
 
 def _values(reason: RefusalReason, detail: int) -> dict[str, object]:
     """Return what the detail of a refusal says."""
-    match reason:
-        case RefusalReason.GATE_BLOCKED | RefusalReason.GATE_UNSTEADY:
-            return {"channels": [n for n in range(GATES) if detail >> n & 1]}
-        case RefusalReason.HOLDING_A_DROP:
-            return {"run": detail}
-        case RefusalReason.VERSION:
-            return {"firmware": detail, "program": PROTOCOL_VERSION}
-        case RefusalReason.COOLING:
-            return {"rest_s": detail / 1000}
-        case RefusalReason.NOT_KEPT:
-            return {"first": detail}
-    return {}
+    channels = [n for n in range(GATES) if detail >> n & 1]
+    values: dict[RefusalReason, dict[str, object]] = {
+        RefusalReason.GATE_BLOCKED: {"channels": channels},
+        RefusalReason.GATE_UNSTEADY: {"channels": channels},
+        RefusalReason.HOLDING_A_DROP: {"run": detail},
+        RefusalReason.VERSION: {"firmware": detail, "program": PROTOCOL_VERSION},
+        RefusalReason.COOLING: {"rest_s": detail / 1000},
+        RefusalReason.NOT_KEPT: {"first": detail},
+    }
+    return values.get(reason, {})

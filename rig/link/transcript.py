@@ -7,8 +7,7 @@ times of clock samples and for the lone delimiter with which a client begins a c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
@@ -20,8 +19,7 @@ Direction: TypeAlias = Literal["tx", "rx"]
 _CAUSES = {1: "power", 2: "reset pin", 4: "brown-out", 8: "watchdog"}
 
 
-@dataclass(frozen=True, slots=True)
-class Incoming:
+class Incoming(NamedTuple):
     """One message from the device; `ack` is the request's seq, 0 when it answers none."""
 
     host_ns: int
@@ -29,8 +27,7 @@ class Incoming:
     message: wire.Message
 
 
-@dataclass(frozen=True, slots=True)
-class Restart:
+class Restart(NamedTuple):
     """A restart of the board that the opening of the port does not explain.
 
     Attributes
@@ -236,7 +233,7 @@ class Transcript:
                 if isinstance(asked, wire.Arm):
                     self._tokens = {token: asked.label}
                     self._given.discard(asked.label)
-                    self._drops[asked.label] = Assembly(asked.label, asked.gates)
+                    self._drops[asked.label] = Assembly(asked.label, asked.gates, asked.record_ms)
             case wire.Disarmed(_, reason):
                 self.disarmed = reason
             case wire.Fired(tick=tick) if isinstance(asked, wire.Fire):

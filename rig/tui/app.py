@@ -391,7 +391,7 @@ class RigApp(App[None], inherit_bindings=False):
         """
         name, screen = self.action_of.get(key), self.screen
         if name == "stop" or (key == "escape" and not isinstance(self.focused, Input)):
-            self.action_do("stop")
+            self.driver.take(campaign.StopRequest())
             if isinstance(screen, Dialog) and (
                 not isinstance(screen, Ask)
                 or (key == "escape" and screen.is_mounted)  # a click has left its field

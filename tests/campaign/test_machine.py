@@ -50,13 +50,6 @@ def test_a_run_goes_from_the_protocol_to_its_verdict():
     ]  # fmt: skip
 
 
-def test_a_run_takes_two_keys():
-    flow, _ = through(Flow(), *TO_RESULT, DONE)
-    flow, effects = through(flow, on.GoOn(NEXT), on.GoOn(NEXT, 5.0))
-    assert effects == [on.Wait(5.0)]
-    assert flow.job == NEXT
-
-
 def test_a_verdict_stays_until_it_is_in_the_file_and_acknowledged():
     flow, _ = through(Flow(), *TO_RESULT)
     assert step(flow, on.GoOn(NEXT))[0].stage is Stage.RESULT

@@ -92,6 +92,13 @@ def seconds(clock: Clock, first: int, count: int, ppm: float = 0.0, number: int 
     return found
 
 
+def moved(record, ns: int):
+    """Put a sample or a pulse so much later by the host's clock; the board's count stays."""
+    return record._replace(
+        host_send_ns=record.host_send_ns + ns, host_recv_ns=record.host_recv_ns + ns
+    )
+
+
 def ppm(hz: float, true: float) -> float:
     """Error of a rate, where the true one is `true` off nominal, relative."""
     return (hz / HZ - 1.0 - true) * 1e6

@@ -7,17 +7,9 @@ from rig.clock.host import TOLERANCE_NS, HostClocks, HostWatch, read_clocks
 from rig.clock.rate import ping_rate
 from rig.clock.samples import SEND, one_axis
 from rig.records import HostBreak
-from tests.clock.clocks import HZ, Clock, compared, ppm
+from tests.clock.clocks import HZ, Clock, compared, moved, ppm
 
 S = 10**9
-
-
-def moved(pings, seconds):
-    ns = round(seconds * 1e9)
-    return [
-        p._replace(host_send_ns=p.host_send_ns + ns, host_recv_ns=p.host_recv_ns + ns)
-        for p in pings
-    ]
 
 
 def rate_of(axis):
@@ -29,7 +21,8 @@ def test_a_sleeping_host_spoils_nothing(slept):
     """The monotonic clock stands still meanwhile, the board does not; a whole wrap hides best."""
     clock = Clock(1, last=5000)
     before = compared(clock, 1, 60.0)
-    after = moved(compared(clock, 2, 60.0, begin=100.0 + slept), -slept)
+    awake = compared(clock, 2, 60.0, begin=100.0 + slept)
+    after = [moved(ping, -round(slept * S)) for ping in awake]
     told = one_axis(before + after, breaks=[HostBreak(99 * S, round(slept * S), 0)])
     rate = rate_of(told)
     assert abs(ppm(rate.hz, -1300e-6)) < 3.0

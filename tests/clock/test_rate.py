@@ -7,8 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.records import ClockSample
-from tests.clock.clocks import HZ, Clock, compared, exponential, heavy, ppm, stalled, tick_rate
+from tests.clock.clocks import (
+    HZ,
+    Clock,
+    compared,
+    exponential,
+    heavy,
+    moved,
+    ppm,
+    stalled,
+    tick_rate,
+)
 from tests.examples import examples
 
 TRIALS = 120
@@ -91,12 +100,9 @@ RATE = tick_rate(SAMPLES, HZ)
 )
 def test_neither_hour_nor_count_nor_order_matters(shift, offset, order):
     """Host clocks begin anywhere, counters too, and a file may be sorted as it likes."""
-    moved = [
-        ClockSample(p.host_send_ns + shift, p.host_recv_ns + shift, (p.tick + offset) % 2**32)
-        for p in SAMPLES
-    ]
-    order.shuffle(moved)
-    rate = tick_rate(moved, HZ)
+    others = [moved(p, shift)._replace(tick=(p.tick + offset) % 2**32) for p in SAMPLES]
+    order.shuffle(others)
+    rate = tick_rate(others, HZ)
     assert (rate.n, rate.outliers) == (RATE.n, RATE.outliers)
     assert abs(rate.hz - RATE.hz) < 1e-3 * RATE.u_hz
     assert rate.u_hz == pytest.approx(RATE.u_hz, rel=1e-3)

@@ -86,7 +86,7 @@ def test_between_and_beyond_samples_a_wandering_rate_is_known_less():
     clock = Clock(3, walk=200.0, last=4000)
     pings = compared(clock, 3, 600.0) + compared(clock, 4, 600.0, begin=3000.0)
     rate = tick_rate(pings, HZ)
-    u = [rate.at(at).u_hz / HZ * 1e6 for at in (300.0, 1800.0, 3300.0, 3600.0, 7200.0)]
+    u = [rate.at(at)[1] / HZ * 1e6 for at in (300.0, 1800.0, 3300.0, 3600.0, 7200.0)]
     assert u[0] < 10.0
     assert u[2] < 10.0
     assert u[1] > 5.0 * u[0]

@@ -17,22 +17,14 @@ from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase
 from rig.recorder.interrupts import StoppedError
 from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.daemon.at_work import working
+from tests.daemon.at_work import states, working
 from tests.waiting import PATIENCE_S, until
 
 
 @pytest.fixture
-def armed(processes, client):
+def armed(driver):
     """Have a client in control that has armed the first run; give it and the token."""
-    one = client("one")
-    one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
-    return one, one.arm(1, 1)
-
-
-def states(processes):
-    with Session.open(processes.session, readonly=True) as session:
-        return [(e.run, e.attempt, str(e.state)) for e in session.states()]
+    return driver, driver.arm(1, 1)
 
 
 def talked(processes, *kinds):
@@ -93,8 +85,9 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
     with Session.open(processes.session, readonly=True) as session:
         (reason,) = session.latest_state(1).reasons
-    assert (reason.code, reason.values["client"]) == ("client_silent", "one")
-    assert re.fullmatch(r"nothing was heard from one for \d\.\d s, so it lost control", reason.text)
+    assert (reason.code, reason.values["client"]) == ("client_silent", "the driver")
+    silent = r"nothing was heard from the driver for \d\.\d s, so it lost control"
+    assert re.fullmatch(silent, reason.text)
     one, token = armed
     with pytest.raises(StoppedError, match=reason.text):
         one.fire(token)
@@ -158,25 +151,19 @@ def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(unheard):
     assert seen.index(Abort) < seen.index(DropCertificate2)
 
 
-def test_a_stop_ends_a_wait(processes, client):
-    one, two = client("one"), client("two")
-    one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
-    waiting = one.line.ask("wait", seconds=600)
+def test_a_stop_ends_a_wait(driver, client):
+    two, waiting = client("two"), driver.line.ask("wait", seconds=600)
     while not waiting.done():  # a stop may overtake even the request for the wait
         two.stop("no need")
     with pytest.raises(StoppedError, match="no need"):
         waiting.result()
-    assert one.arm(1, 1)
+    assert driver.arm(1, 1)
 
 
-def test_a_board_that_answers_late_does_not_cost_control(processes, client):
-    one = client("one")
-    one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
+def test_a_board_that_answers_late_does_not_cost_control(processes, driver):
     processes.board.send_signal(signal.SIGSTOP)
     threading.Timer(1.2 * LEASE_S, processes.board.send_signal, [signal.SIGCONT]).start()
-    assert one.arm(1, 1)
+    assert driver.arm(1, 1)
 
 
 def test_a_daemon_that_is_asked_to_end_disarms(processes, armed):

@@ -1,6 +1,5 @@
 """Kills, pulls and resets at random moments; `./run bench faults` does it hundreds of times."""
 
-import resource
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -39,26 +38,21 @@ def test_nothing_is_lost_with_the_real_firmware():
     assert (tally.broken, tally.runs, tally.disturbed) == ([], 1, 1)
 
 
-def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(processes, client):
-    one = client("one")
-    one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
-    one.fire(one.arm(1, 1))
-    full = processes.session.with_name("session-wal").stat().st_size
-    resource.prlimit(processes.daemon.pid, resource.RLIMIT_FSIZE, (full, resource.RLIM_INFINITY))
+def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(processes, driver):
+    driver.fire(driver.arm(1, 1))
+    processes.fill_disk()
     with pytest.raises(SessionError):
-        one.collect(1, 1)
-    state = one.call("subscribe")["state"]
+        driver.collect(1, 1)
+    state = driver.call("subscribe")["state"]
     assert state["phase"] == "trouble"
     assert state["error"]["kind"] == "SessionError"
     processes.await_phase(Phase.HOLDING)
     assert list(processes.happened())[-1]["phase"] == Phase.HOLDING
     with Session.open(processes.session, readonly=True) as session:
         assert session.drop(1, 1) is None, "it is readable, and does not claim to have the drop"
-    no_limit = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
-    resource.prlimit(processes.daemon.pid, resource.RLIMIT_FSIZE, no_limit)
+    processes.free_disk()
     processes.await_phase(Phase.IDLE)  # by itself, as soon as there is room
-    assert one.collect(1, 1).faults == ()
-    one.close()
+    assert driver.collect(1, 1).faults == ()
+    driver.close()
     assert processes.run() == 0, processes.told
     assert broken(processes.session, processes.happened(), processes.runs) == []

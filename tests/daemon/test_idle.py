@@ -11,7 +11,7 @@ from rig.cli import main
 from rig.errors import RigError
 from rig.link.messages import Phase
 from rig.session.store import Session
-from tests.daemon.test_control import states
+from tests.daemon.at_work import states
 from tests.waiting import PATIENCE_S, until
 
 IDLE_S = 0.4

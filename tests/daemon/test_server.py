@@ -89,32 +89,32 @@ def test_a_client_of_another_version_is_told_so_and_sent_away(door):
     door(test)
 
 
-@pytest.mark.parametrize(
-    ("line", "code"),
-    [
-        (b"what?\n", rpc.PARSE),
-        (rpc.request("dance", {}, 2), rpc.NO_METHOD),
-        (rpc.request("arm", {"run": 1}, 2), rpc.BAD_PARAMS),
-        (rpc.request("fire", {"token": "x"}, 2), rpc.BAD_PARAMS),
-        (rpc.request("wait", {"seconds": -1}, 2), rpc.BAD_PARAMS),
-        (rpc.request("wait", {"seconds": True}, 2), rpc.BAD_PARAMS),
-        (rpc.request("wait", {"seconds": float("nan")}, 2), rpc.PARSE),
-        (rpc.request("open_session", {"protocol": "p.yaml", "session": "/s"}, 2), rpc.BAD_PARAMS),
-        (rpc.request("open_session", {"protocol": "/p\0", "session": "/s"}, 2), rpc.BAD_PARAMS),
-        (rpc.request("open_session", {"protocol": "/\ud800", "session": "/s"}, 2), rpc.BAD_PARAMS),
-        (b"[]\n", rpc.INVALID),
-        (b'{"jsonrpc":"2.0","method":"renew"}\n', rpc.INVALID),
-        (b'[{"jsonrpc":"2.0","id":1,"method":"renew"}]\n', rpc.INVALID),
-        (rpc.request("subscribe", {"to": "all"}, 2), rpc.BAD_PARAMS),
-        (rpc.request("log_state", {"run": 1, "attempt": 1, "state": "fine", "reasons": []}, 2),
-         rpc.BAD_PARAMS),
-    ],
-)  # fmt: skip
-def test_nonsense_gets_its_code_and_the_next_request_its_answer(door, line, code):
+NONSENSE = [
+    (b"what?\n", rpc.PARSE),
+    (rpc.request("dance", {}, 2), rpc.NO_METHOD),
+    (rpc.request("arm", {"run": 1}, 2), rpc.BAD_PARAMS),
+    (rpc.request("fire", {"token": "x"}, 2), rpc.BAD_PARAMS),
+    (rpc.request("wait", {"seconds": -1}, 2), rpc.BAD_PARAMS),
+    (rpc.request("wait", {"seconds": True}, 2), rpc.BAD_PARAMS),
+    (rpc.request("wait", {"seconds": float("nan")}, 2), rpc.PARSE),
+    (rpc.request("open_session", {"protocol": "p.yaml", "session": "/s"}, 2), rpc.BAD_PARAMS),
+    (rpc.request("open_session", {"protocol": "/p\0", "session": "/s"}, 2), rpc.BAD_PARAMS),
+    (rpc.request("open_session", {"protocol": "/\ud800", "session": "/s"}, 2), rpc.BAD_PARAMS),
+    (b"[]\n", rpc.INVALID),
+    (b'{"jsonrpc":"2.0","method":"renew"}\n', rpc.INVALID),
+    (b'[{"jsonrpc":"2.0","id":1,"method":"renew"}]\n', rpc.INVALID),
+    (rpc.request("subscribe", {"to": "all"}, 2), rpc.BAD_PARAMS),
+    (rpc.request("log_state", {"run": 1, "attempt": 1, "state": "fine", "reasons": []}, 2),
+     rpc.BAD_PARAMS),
+]  # fmt: skip
+
+
+def test_nonsense_gets_its_code_and_the_next_request_its_answer(door):
     async def test(server, path):
-        _, nonsense, answer = await told(path, HELLO, line, rpc.request("unsubscribe", {}, 3))
-        assert nonsense["error"]["code"] == code
-        assert answer["result"] == {}
+        for line, code in NONSENSE:
+            _, nonsense, answer = await told(path, HELLO, line, rpc.request("unsubscribe", {}, 3))
+            assert nonsense["error"]["code"] == code, line
+            assert answer["result"] == {}
 
     door(test)
 

@@ -21,11 +21,9 @@ def frames(session, direction):
     return Decoder().feed(b"".join(data for _, way, data in session.byte_log() if way == direction))
 
 
-def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
-    one, two = client("one"), client("two")
-    one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
-    one.arm(1, 1)
+def test_stop_goes_past_a_disk_that_does_not_answer(processes, driver, client):
+    two = client("two")
+    driver.arm(1, 1)
     processes.await_phase(Phase.ARMED)
     seen = []
     with closing(sqlite3.connect(processes.session, PATIENCE_S, isolation_level=None)) as other:
@@ -42,7 +40,7 @@ def test_stop_goes_past_a_disk_that_does_not_answer(processes, client):
         until(trouble, lambda: seen[-5:])
         other.execute("ROLLBACK")
     until(lambda: two.call("subscribe")["state"]["error"] is None)
-    one.stop("and again, with a disk that does")
+    driver.stop("and again, with a disk that does")
     with Session.open(processes.session, readonly=True) as session:
         # Where nothing is armed any more, what was said is on the disk some seconds later.
         until(lambda: any(f.seq == 255 and f.type == CODES[Abort] for f in frames(session, "tx")))

@@ -16,6 +16,7 @@ _TURN_TICKS = 1 << 16
 
 class AvrBench(VirtualBench):
     serial_type = EmulatedSerial
+    touch_s = 1e-3
     tick_tolerance = 5  # an edge waits for the instruction that it interrupts
 
     def __init__(self, lab: ScriptedLab, name: str) -> None:
@@ -24,10 +25,6 @@ class AvrBench(VirtualBench):
         make(image)
         self.can_sense = wiring.sense is not None
         super().__init__(lab, EmulatedBoard(wiring, FIRMWARE / image, lab, seed=1, ppm=2000))
-
-    def touch(self, gates):
-        super().touch(gates)
-        self.clock().sleep(1e-3)  # a shorter pulse would tell that a gate moved, but not which
 
     def preset_tick(self, seconds_before_wrap):
         avr = self.now().avr

@@ -13,10 +13,7 @@ from tests.link.virtual import VirtualBench
 
 class CoreBench(VirtualBench):
     tick_tolerance = 2
-
-    def touch(self, gates):
-        super().touch(gates)
-        self.clock().sleep(1e-3)  # a shorter pulse would tell that a gate moved, but not which
+    touch_s = 1e-3
 
     def preset_tick(self, seconds_before_wrap):
         self.now().preset(round(-seconds_before_wrap * 16e6) % 2**32)

@@ -28,15 +28,12 @@ FENCE = FIRMWARE.parent / "protocols" / "picket-fence.yaml"
 
 class PicoBench(VirtualBench):
     serial_type = EmulatedSerial
+    touch_s = 1e-3  # nothing shorter than 50 ns is seen
     brown_out_cause = 1  # the chip cannot tell it from power
 
     def __init__(self, lab: ScriptedLab) -> None:
         board = EmulatedPico(PICO, build(), lab, seed=1, ppm=2000, baudrate=USB_RATE)
         super().__init__(lab, board)
-
-    def touch(self, gates):
-        super().touch(gates)
-        self.clock().sleep(1e-3)  # nothing shorter than 50 ns is seen
 
     def preset_tick(self, seconds_before_wrap):
         chip = self.now().avr

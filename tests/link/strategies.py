@@ -1,11 +1,18 @@
 """Any message of the wire's table, for hypothesis."""
 
+import re
+
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
 from rig.link.messages import Chars, Raw, UnsignedInt
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
+
+
+def name_in_c(kind: type) -> str:
+    """Name a message as the firmware and its page do."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__.removesuffix("Frame")).upper()
 
 
 def values(field) -> st.SearchStrategy:

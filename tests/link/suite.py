@@ -81,6 +81,12 @@ class Suite:
             messages += [r.message for r in device.receive() if isinstance(r, Incoming)]
         return messages
 
+    def reconnected(self, bench: Bench, port=None) -> Device:
+        """Come to a device that runs, through its port or one that spoils the line."""
+        device = Device(port or bench.port(), bench.clock())
+        device.connect(boot_wait_s=0)
+        return device
+
     def restart(self, bench: Bench, device: Device) -> None:
         """Press reset, and see that the device says so."""
         bench.reset()

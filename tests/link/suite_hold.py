@@ -4,7 +4,6 @@ import pytest
 
 from rig.errors import DeviceError
 from rig.link import messages as wire
-from rig.link.client import Device
 from rig.link.messages import Phase, RefusalReason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
@@ -16,8 +15,7 @@ class HoldSuite(Suite):
         drop = self.drop(device)
         bench.reopen()
         bench.clock().sleep(0.4)
-        again = Device(bench.port(), bench.clock())
-        again.connect(boot_wait_s=0)
+        again = self.reconnected(bench)
         assert again.status().label == LABEL
         assert again.fetch(LABEL) == drop
         self.release(again, drop)
@@ -33,15 +31,6 @@ class HoldSuite(Suite):
         assert many.first == 0
         assert 0 < len(many.snapshots) <= wire.EVENTS_PER_FRAME
         assert list(many.snapshots) == events[: len(many.snapshots)]
-
-    def test_abort_ends_a_recording_and_keeps_it(self, bench, device):
-        device.fire(arm(device, record_ms=20_000))
-        start = bench.clock().now_ns()
-        drop = device.collect(LABEL, stop=lambda: bench.clock().now_ns() > start + 60_000_000)
-        assert bench.clock().now_ns() < start + 1_000_000_000
-        assert drop.faults == ()
-        assert 0 < len(drop.edges) < len(bench.lab.changes)
-        assert device.status().phase is Phase.HOLDING
 
     # -- resets
 
@@ -60,8 +49,7 @@ class HoldSuite(Suite):
         device.abort()
         self.restart(bench, device)
         self.restart(bench, device)
-        again = Device(bench.port(), bench.clock())
-        again.connect(boot_wait_s=0)
+        again = self.reconnected(bench)
         state = again.status()
         assert (state.phase, state.label) == (Phase.HOLDING, LABEL)
         assert state.events == drop.certificate.events

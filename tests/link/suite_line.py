@@ -21,27 +21,6 @@ class LineSuite(Suite):
         assert line.ask(wire.Status(), 2).phase is Phase.ARMED
         assert line.ask(order(), 1) != armed
 
-    def test_a_lost_request_is_sent_again(self, bench, device, identity):
-        port = LossyPort(bench)
-        device = Device(port, bench.clock())
-        device.connect(boot_wait_s=0)
-        port.lose_tx = 2
-        token = arm(device)
-        port.lose_tx = 2
-        device.fire(token)
-        self.check(bench, device.collect(LABEL), identity)
-        assert bench.lab.drops == [LABEL]
-
-    def test_a_lost_answer_to_fire_does_not_fire_again(self, bench):
-        port = LossyPort(bench)
-        device = Device(port, bench.clock())
-        device.connect()
-        token = arm(device)
-        port.lose_rx_until_ns = bench.clock().now_ns() + 80_000_000
-        device.fire(token)
-        assert bench.lab.drops == [LABEL]
-        self.check(bench, device.collect(LABEL), device.transcript.identity)
-
     def test_lost_events_and_certificate_are_read_again(self, bench):
         port = LossyPort(bench)
         device = Device(port, bench.clock())
@@ -49,14 +28,6 @@ class LineSuite(Suite):
         device.fire(arm(device))
         port.lose_rx_until_ns = bench.clock().now_ns() + 200_000_000
         self.check(bench, device.collect(LABEL), device.transcript.identity)
-
-    def test_repeated_pings_give_no_sample(self, bench):
-        port = LossyPort(bench)
-        device = Device(port, bench.clock())
-        device.connect()
-        port.lose_tx = 1
-        assert device.ping() is None
-        assert device.ping() is not None
 
     @pytest.mark.parametrize("seed", range(3))
     def test_one_percent_of_damaged_bytes_changes_nothing(self, bench, seed):

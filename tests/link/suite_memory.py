@@ -5,7 +5,6 @@ from itertools import pairwise
 import pytest
 
 from rig.link import messages as wire
-from rig.link.client import Device
 from rig.link.messages import RefusalReason
 from rig.reasons import make_reason
 from tests.link.bench import LABEL
@@ -68,8 +67,7 @@ class MemorySuite(Suite):
         count = identity.capacity + 60
         bench.lab.changes = blinking(count)
         port = LossyPort(bench)
-        device = Device(port, bench.clock())
-        device.connect(boot_wait_s=0)
+        device = self.reconnected(bench, port)
         device.fire(arm(device, record_ms=record_ms(count)))
         port.lose_rx_until_ns = bench.clock().now_ns() + (record_ms(count) + 20) * 1_000_000
         drop = device.collect(LABEL)
@@ -112,8 +110,3 @@ class MemorySuite(Suite):
         gaps = [(b.tick - a.tick) % 2**32 for a, b in pairwise(events)]
         assert len(gaps) == 3
         assert certificate.late == sum(gap < identity.late_ticks for gap in gaps) == 1
-
-    def reconnected(self, bench) -> Device:
-        device = Device(bench.port(), bench.clock())
-        device.connect(boot_wait_s=0)
-        return device

@@ -93,17 +93,6 @@ class OutputSuite(Suite):
 
 
 class SilenceSuite(Suite):
-    def test_a_silent_host_disarms(self, bench, device):
-        token = arm(device)
-        assert self.heard(bench, device, 0.18) == []
-        assert device.status().phase is Phase.ARMED
-        assert self.heard(bench, device, 0.18) == []
-        assert self.heard(bench, device, 0.15) == [wire.Disarmed(LABEL, DisarmReason.HOST_SILENT)]
-        assert device.status().phase is Phase.IDLE
-        error = self.refused(RefusalReason.NOT_ARMED, device.fire, token)
-        assert "silent" in error.message
-        device.fire(arm(device))
-
     @pytest.mark.parametrize("request_", [wire.Status(), wire.Ping(), wire.Fire(0), wire.Done()])
     def test_any_request_every_100_ms_keeps_it_armed(self, bench, request_):
         line = Wire(bench)

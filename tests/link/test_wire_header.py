@@ -8,7 +8,7 @@ from hypothesis import given
 from rig.link import frames
 from rig.link import messages as wire
 from rig.link.messages import Chars, Raw, UnsignedInt
-from tests.link.strategies import MESSAGES
+from tests.link.strategies import MESSAGES, name_in_c
 
 HEADER = Path(__file__).parents[2] / "firmware/core/wire.h"
 
@@ -21,10 +21,6 @@ def defines(text: str) -> dict[str, int]:
 
 
 C = defines(HEADER.read_text("utf-8"))
-
-
-def in_c(name: str) -> str:
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name.removesuffix("Frame")).upper()
 
 
 def test_every_name_is_there_with_its_value():
@@ -43,11 +39,11 @@ def test_every_name_is_there_with_its_value():
         )
         for value in kind
     }
-    codes = {f"MSG_{in_c(kind.__name__)}": code for code, kind in wire.TABLE.items()}
+    codes = {f"MSG_{name_in_c(kind)}": code for code, kind in wire.TABLE.items()}
     expected = limits | enums | codes
     assert {name: C[name] for name in expected} == expected
     places = {
-        f"{in_c(kind.__name__)}_{place}"
+        f"{name_in_c(kind)}_{place}"
         for kind, fields in wire.FIELDS.items()
         for place in (
             *("SIZE", "RECORD"),
@@ -60,7 +56,7 @@ def test_every_name_is_there_with_its_value():
 @given(MESSAGES)
 def test_fields_are_where_the_header_says(message):
     code, payload = wire.pack(message)
-    name = in_c(type(message).__name__)
+    name = name_in_c(type(message))
     assert C[f"MSG_{name}"] == code
     fixed, varying = True, 0
     for field in wire.FIELDS[type(message)]:

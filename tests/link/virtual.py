@@ -5,9 +5,13 @@ from tests.link.bench import Bench, ScriptedLab
 
 
 class VirtualBench(Bench):
-    """`board` is a `sim.board.VirtualBoard` or has its face."""
+    """`board` is a `sim.board.VirtualBoard` or has its face.
+
+    A shorter touch than `touch_s` would tell it that a gate moved, but not which.
+    """
 
     serial_type = SimulatedSerial
+    touch_s = 0.0
     can_preset_tick = can_stop = can_reference = can_sense = can_see_outputs = True
 
     def __init__(self, lab: ScriptedLab, board, **line) -> None:
@@ -23,6 +27,7 @@ class VirtualBench(Bench):
 
     def touch(self, gates):
         self.now().touch(gates)
+        self.clock().sleep(self.touch_s)
 
     def reset(self):
         self.board.reset(self.clock().now_ns())
