@@ -65,11 +65,6 @@ class Row(NamedTuple):
         return form("mark").fullmatch(text) is not None
 
     @property
-    def has_numbers(self) -> bool:
-        """Whether it numbers the columns: ``x-axis,1,2``."""
-        return len(self.texts) > 2 and all(map(form("bare number").fullmatch, self.texts[1:]))
-
-    @property
     def has_units(self) -> bool:
         """Whether it has units only, perhaps behind their name: ``Y_Unit_Label``."""
         texts = [vocabulary.normal(text.strip("()[]- ")) for text in self.texts]
@@ -215,17 +210,15 @@ class Table:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if "," in line and (self.separator != "," or '"' in line):
-            has_comma = form("decimal comma").fullmatch
-            return [t.replace(",", ".") if has_comma(t[:LONGEST]) else t for t in cells]
-        return cells
+        if "," not in line:  # as most
+            return cells
+        has_comma = form("decimal comma").fullmatch
+        return [t.replace(",", ".") if has_comma(t[:LONGEST]) else t for t in cells]
 
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
         for number, line in self._lines:
-            if not line or line.isspace():
-                continue
             if block.width and form("plain row").fullmatch(line):
                 yield block, Row(number, self.split(line), line)
                 continue
@@ -260,10 +253,10 @@ class Table:
         if usual and not any(is_filled for is_filled, _ in usual[:2]):
             # Samples of an oscilloscope, beside which settings may stand.
             shape = tuple(a if b[0] else b for a, b in zip(shape, usual, strict=False))
-        if any(texts) and (shape == usual or _is_data(texts)):
+        if shape == usual or _is_data(texts):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
-        if len(texts) < 2 or not any(map(is_number, texts)):
+        if not any(map(is_number, texts)):
             return False
         named = {len(above.texts) for above in block.headings if len(above.texts) == above.known}
         return len(texts) == block.width or (len(texts) in named and not row.known)
@@ -321,9 +314,8 @@ def find_separator(lines: Sequence[str]) -> str:
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
     numbers = [row.replace(",", ".") for row in rows if form("decimal comma").fullmatch(row)]
     if not is_named and len(numbers) * 2 > len(rows):
-        # 0,25 below 1,5 is no decimal comma: times go on. Levels of inputs are 0 and 1.
-        is_rising = sorted(numbers, key=float) == numbers and set("".join(rows)) - set("01,")
-        return ";" if is_rising else ","
+        # 0,25 below 1,5 is no decimal comma: times go on.
+        return ";" if sorted(numbers, key=float) == numbers else ","
     # Blanks part values; a comma behind one parts them, too.
     parted = [row.split() for row in rows if ", " not in row and " " in row]
     return " " if sum(all(map(kinds_of, row)) for row in parted) * 2 > len(rows) else ","
