@@ -31,7 +31,7 @@ _MOST_COLUMNS = 200
 _BESIDE = 0.1
 """Share of the rows below which a column has settings that stand beside samples."""
 _FEWEST_TIMES = 4
-"""Columns, each later than the one before, that are times side by side."""
+"""Columns of numbers without a heading that are times side by side, as programs print lists."""
 
 
 @cache
@@ -138,7 +138,8 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     table = {
         "single": len(facts) == 1,
         "rising": any({"rises", "fractions"} <= fact for fact in facts.values()),
-        "listed": _is_each_row_rising(rows, width),
+        "listed": len(facts) >= _FEWEST_TIMES
+        and all(fact.isdisjoint({"levels", "few", "words", "many"}) for fact in facts.values()),
         "worded": any("levels" in fact and "plain" not in fact for fact in facts.values()),
         "rated": block.find_time_base() is not None,
         "paired": len(filled) == 2,
@@ -151,7 +152,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     if heading is None:
         inputs = [column for column in columns if column.role in SAMPLED]
         count = [f"D{n}" for n, column in enumerate(inputs) if column.role == "level"]
-        names = block.find_inputs([column.at for column in inputs]) or count
+        names = block.find_inputs(len(inputs)) or count
         for column, name in zip(inputs, names, strict=False):
             column.gate = column.name = name
     # Of columns that say the same times in other units, the finest is kept.
@@ -174,13 +175,6 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         file.base = "ns" if file.base == "ns" or any(clock.wrap for clock in unknown) else "s"
     _check_columns(columns, heading, rows[0], file.problems)
     return columns
-
-
-def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
-    """Whether each row is a list of times, one after the other, as programs print them."""
-    numbers = [[float(text) for text in row.texts if is_number(text)] for row in rows]
-    is_list = all(len(row) == width and sorted(set(row)) == row for row in numbers)
-    return width >= _FEWEST_TIMES and is_list
 
 
 def _check_columns(
@@ -227,7 +221,7 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
     named |= {"unitless": not unit, "bare": not is_named, "first": not n}
     named |= {"labelled": column.gate, "numbered": column.run}
-    facts = facts | vocabulary.roles_in(name) | _held(named)
+    facts = facts | vocabulary.roles_in(bare) | _held(named)
     column.role = next(
         role
         for role, rule in vocabulary.read_rows("columns.txt", ":")
@@ -253,7 +247,6 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "levels": all("state" in kind for kind in kinds),
         "suffixed": all({"timed", "clock"} & kind for kind in kinds),
         "plain": not any({"blocked", "clear"} & kind for kind in kinds),
-        "signals": all({"high", "low"} & kind for kind in kinds),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
         "counts": is_numeric and is_whole and numbers[0] in {0, 1} and steps == {1.0},
@@ -262,7 +255,6 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "bits": set(texts) <= {"0", "1"},
         "constant": len(set(texts)) == 1 < len(texts),
         "words": not numbers,
-        "short": len(texts) < 3,
         "many": len(texts) > 30,
     }
     return _held(facts)
