@@ -52,6 +52,8 @@ class TimerColumn:
         Its heading.
     role
         A key of `roles`.
+    unit
+        What its heading, or a row of units, says; see `vocabulary.unit_of`.
     power
         Of times: decimal power from seconds, `None` where the file does not say their unit.
     gate, run
@@ -67,6 +69,7 @@ class TimerColumn:
     at: int
     name: str
     role: str = ""
+    unit: str = ""
     power: int | None = 0
     gate: str = ""
     run: str = ""
@@ -170,7 +173,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
     for n, column in enumerate(unclear if is_open else ()):
         file.ways, column.role = len(readings), readings[(file.way + n) % len(readings)]
-    unknown = [column for column in columns if column.role == "time" and column.power is None]
+    unknown = [column for column in columns if column.power is None]
     if unknown:
         file.base = "ns" if file.base == "ns" or any(clock.wrap for clock in unknown) else "s"
     _check_columns(columns, heading, rows[0], file.problems)
@@ -185,16 +188,12 @@ def _check_columns(
     if heading is None and "other" in roles_there:
         place = first.place(next(column.at for column in columns if column.role == "other"))
         problems.add(*place, "", "no_heading", columns=len(columns))
-    for column in columns if heading else ():
-        place, unit = above.place(column.at), vocabulary.unit_of(column.name)
+    for column in columns:
+        place, unit = above.place(column.at), column.unit
         if column.role == "setting" or "|" in column.role:
             values = {"column": column.name, "readings": column.meaning}
             problems.add(*place, column.name, "ambiguous", **values)
-        elif (
-            column.role == "time"
-            and unit not in {*POWERS, ""}
-            and not (find_label(unit, "gate") or find_label(unit, "run"))
-        ):
+        elif column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
             problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
     if not roles_there & {"time", *SAMPLED}:
         durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
@@ -207,17 +206,17 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
     name = heading.cell(n) if heading else ""
     column = TimerColumn(n, name or f"column {n + 1}", run=find_label(name, "run"))
-    prefix, colon, rest = name.partition(":")
-    if colon and rest.strip() and not find_label(prefix, "gate"):
+    is_named = bool(name)
+    prefix, _, rest = name.partition(":")
+    if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name).replace(column.run, "")
     texts = (bare, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
     units = list(map(vocabulary.unit_of, texts))
-    unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
+    column.unit = unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
     column.gate = next(filter(None, labels), "")
     is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
-    is_named = heading is not None and (heading.line or heading.cell(n))
     named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
     named |= {"unitless": not unit, "bare": not is_named, "first": not n}
     named |= {"labelled": column.gate, "numbered": column.run}
@@ -228,7 +227,7 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
     if column.role == "time":
-        column.power = 0 if "suffixed" in facts else POWERS.get(unit or normal(name))
+        column.power = 0 if "suffixed" in facts else POWERS.get(unit)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = bool({"moment", "listed"} & facts)
         if "counted" in facts and column.power in {None, 3, 6}:
@@ -249,7 +248,7 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "plain": not any({"blocked", "clear"} & kind for kind in kinds),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
-        "counts": is_numeric and is_whole and numbers[0] in {0, 1} and steps == {1.0},
+        "counts": is_numeric and steps == {1.0},
         "counted": is_count and abs(int(texts[-1]) - int(texts[0])) > 100,
         "few": is_whole and len(texts) >= 2 * len(set(texts)),
         "bits": set(texts) <= {"0", "1"},
