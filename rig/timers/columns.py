@@ -272,7 +272,11 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[ColumnPair]:
     pairs = []
     for clock in times:
         own = [column for column in columns if _clock_of(column, times) is clock]
-        names = [_find_name(role, own, [] if is_sampled else columns) for role in ("run", "gate")]
+        own_first = [] if is_sampled else [*own, *columns]
+        names = [
+            next((column.at for column in own_first if column.role == role), sys.maxsize)
+            for role in ("run", "gate")
+        ]
         values = [column for column in own if column.role in chosen]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
@@ -284,12 +288,6 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[ColumnPair]:
             moment = replace(clock, at=sys.maxsize, role="moment")
             pairs.append(ColumnPair(clock, moment, clock.run, clock.gate, *names))
     return pairs
-
-
-def _find_name(role: str, own: Sequence[TimerColumn], columns: Sequence[TimerColumn]) -> int:
-    """Return which column says the run or the gate: one that belongs to the times, or any."""
-    beside = [column.at for column in own if column.role == role and column in columns]
-    return next(iter([*beside, *(c.at for c in columns if c.role == role)]), sys.maxsize)
 
 
 def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:

@@ -46,7 +46,7 @@ def find_crossings(samples: Array, threshold: tuple[float, float]) -> Array:
 
 def find_threshold(volts: Array) -> tuple[float, float] | None:
     """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
-    low, high = float(volts.min()), float(volts.max())
+    low, high = float(volts.min(initial=np.inf)), float(volts.max(initial=-np.inf))
     for _ in range(50):  # two means, one for each level
         above = volts > 0.5 * (low + high)
         if above.all() or not above.any():

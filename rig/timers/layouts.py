@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -163,18 +163,16 @@ def find_layouts(
     levels = ["high", "low"] if states & {"high", "low"} else ["states"]
     # More times than bars: it darkens and clears in turns.
     times = ["each", "turns", "turns-clear", "each"][max(counts.values()) > bars :][:3]
-    choices: dict[str, Sequence[Any]] = {
-        "unit": list(POWERS) if file.base else [""],
-        "dark": levels if states - {""} else times,
-        "groups": _groupings(file, gates, bars),
-    }
-    open_names = choices.keys() - ({"unit"} if not file.base else set())
-    choices |= {name: [value] for name, value in stated.items() if name in open_names}
-    for unit, dark, groups in itertools.product(*choices.values()):
-        pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, unit, groups)
-        maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, groups)
+    choices: dict[str, Sequence[Any]] = {"unit": list(POWERS)} if file.base else {}
+    choices["dark"] = levels if states - {""} else times
+    choices["groups"] = _groupings(file, gates, bars)
+    choices |= {name: [value] for name, value in stated.items() if name in choices}
+    for values in itertools.product(*choices.values()):
+        layout = FileLayout(**dict(zip(choices, values, strict=True)))
+        maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, layout)
+        pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, layout)
         for channels, pause in itertools.product(maps, pauses):
-            yield FileLayout(unit, dark, groups, pause, channels)
+            yield replace(layout, channels=channels, pause_s=pause)
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
@@ -188,16 +186,16 @@ def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
     return groups
 
 
-def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
+def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
     """Return the pause, s, at which drops one after the other are parted, if there may be any.
 
     Between drops nothing passes for far longer than within one: of the pauses in order, the first
     of half a second or more that is three times as long as the one before.
     """
     parts = file.parts()
-    is_parted = file.is_wide or (len(parts) > 1 and groups == "runs")
+    is_parted = file.is_wide or (len(parts) > 1 and layout.groups == "runs")
     for part in [] if is_parted else parts:
-        ticks = sorted(file.tick_in(unit, event.tick) for event in part)
+        ticks = sorted(file.tick_in(layout.unit, event.tick) for event in part)
         pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
         for before, pause in itertools.pairwise(pauses):
             if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
@@ -205,10 +203,10 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     return [0.0]
 
 
-def _channels(file: TimerFile, gates: Sequence[int], groups: str) -> list[dict[str, int]]:
+def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list[dict[str, int]]:
     """Return which gate each input may be; by its number if all are told apart by it."""
-    labels = input_names(file, groups, gates)
-    if groups == "passing":
+    labels = input_names(file, layout.groups, gates)
+    if layout.groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if len(set(by_number.values())) == len(labels):

@@ -6,6 +6,7 @@ time, an input had a value. Rows are read into signals, and only then are events
 
 from __future__ import annotations
 
+import itertools
 import math
 from array import array
 from functools import lru_cache
@@ -23,7 +24,6 @@ from rig.timers.vocabulary import POWERS, is_number, state_of
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from rig.arrays import Array
     from rig.timers.columns import ColumnPair, TimerColumn
     from rig.timers.events import TimerFile
     from rig.timers.table import Row, TimeBase
@@ -33,6 +33,10 @@ STATES = ("low", "high", "clear", "blocked")
 """What may begin with an event: of the signal, or of the beam."""
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
+
+
+Sample = tuple[float, float, float]
+"""Its line, its time since the first of its column, ps, and its value."""
 
 
 class Signal(NamedTuple):
@@ -58,10 +62,11 @@ class Signal(NamedTuple):
         """Return what a value means; nothing where the file does not say."""
         return "" if math.isnan(value) else STATES[int(value)]
 
-    def known(self) -> Array:
-        """Return the samples whose values are known, or are not said at all, a row each."""
-        rows = np.array(self.samples).reshape(-1, 3)
-        return rows[np.isfinite(rows[:, 2])] if self.pair.value.role in SAMPLED else rows
+    def known(self) -> list[Sample]:
+        """Return the samples whose values are known, or are not said at all."""
+        samples = zip(*[iter(self.samples)] * 3, strict=True)
+        is_sampled = self.pair.value.role in SAMPLED
+        return [sample for sample in samples if not (is_sampled and math.isnan(sample[2]))]
 
 
 class SignalReader:
@@ -100,7 +105,7 @@ class SignalReader:
         if not (is_gate or self.has_runs):  # rows that do not say their run
             self.file.open_parts = {}
         self.base, self.latest, self.starts = base, dict[int, int](), dict[int, int]()
-        self.signals = dict[tuple[object, ...], Signal]()
+        self.signals = dict[tuple[int, str, str], Signal]()
         silent, count, before = 0, 0, list[str]()
         for count, row in enumerate(rows, 1):
             ticks = dict(self._read_times(row, count - 1))
@@ -156,7 +161,7 @@ class SignalReader:
     def _add_values(self, row: Row, ticks: Mapping[int, int], words: Sequence[str]) -> None:
         """Add what a row says to the signals; where several inputs have cells, some are empty."""
         is_read = False
-        for pair, word in zip(self.pairs, words, strict=True):
+        for n, (pair, word) in enumerate(zip(self.pairs, words, strict=True)):
             is_moment = pair.value.role == "moment"
             if pair.clock.at not in ticks or (self.has_several and not word and not is_moment):
                 continue
@@ -165,47 +170,49 @@ class SignalReader:
             if value is None:
                 self._reject(row, pair.value)
                 continue
-            key = pair, row.cell(pair.run_at), row.cell(pair.gate_at)
+            key = n, row.cell(pair.run_at), row.cell(pair.gate_at)
             if (signal := self.signals.get(key)) is None:
-                names = key[1] or pair.run, key[2] or pair.label
-                signal = self.signals[key] = Signal(pair, *names, array("d"))
+                run, label = key[1] or pair.run, key[2] or pair.label
+                signal = self.signals[key] = Signal(pair, run, label, array("d"))
             tick = ticks[pair.clock.at] - self.starts[pair.clock.at]
             signal.samples.extend((row.line, tick, value))
         self.file.unread += [] if is_read else [row.line]
 
-    def _find_changes(self, signal: Signal, *, is_each: bool) -> Array:
+    def _find_changes(self, signal: Signal, *, is_each: bool) -> list[Sample]:
         """Return the samples at which something changes, or each but the state at the beginning."""
-        samples, role = signal.known(), signal.pair.value.role
-        if role == "volts":
-            return self._find_crossings(signal.label, samples)
-        is_change = np.append(True, samples[1:, 2] != samples[:-1, 2]) | is_each
-        is_begin = not is_each or self.starts[signal.pair.clock.at] + samples[0, 1] == 0
-        is_clear = signal.state(samples[0, 2]) == "clear"
-        is_change[0] = not (role in SAMPLED or (is_begin and is_clear))
-        return samples[is_change[: len(samples)]]
+        if signal.pair.value.role == "volts":
+            return self._find_crossings(signal)
+        samples = signal.known()
+        changes = [b for a, b in itertools.pairwise(samples) if is_each or a[2] != b[2]]
+        if signal.pair.value.role in SAMPLED:
+            return changes
+        is_begin = not is_each or self.starts[signal.pair.clock.at] + samples[0][1] == 0
+        is_state = is_begin and signal.state(samples[0][2]) == "clear"
+        return changes if is_state else samples[:1] + changes
 
-    def _find_crossings(self, label: str, samples: Array) -> Array:
+    def _find_crossings(self, signal: Signal) -> list[Sample]:
         """Return where volts cross the middle; note how many do, or that nothing passes."""
-        volts = samples[:, 2]
-        threshold = find_threshold(volts) if volts.size else None
-        if threshold is None:
+        samples = np.array(signal.samples).reshape(-1, 3)
+        samples = samples[np.isfinite(samples[:, 2])]
+        volts, name = samples[:, 2], signal.label
+        if (threshold := find_threshold(volts)) is None:
             low, high = min(volts, default=math.nan), max(volts, default=math.nan)
-            self.file.notes.append(make_reason("no_passage", input=label, low=low, high=high))
-            return samples[:0]
-        crossings = find_crossings(samples, threshold)
+            self.file.notes.append(make_reason("no_passage", input=name, low=low, high=high))
+            return []
+        crossings: list[Sample] = find_crossings(samples, threshold).tolist()
         counts = {"crossings": len(crossings), "level": threshold[0]}
-        self.file.notes.append(make_reason("crossings", input=label, **counts))
+        self.file.notes.append(make_reason("crossings", input=name, **counts))
         return crossings
 
-    def _find_firsts(self) -> Iterator[tuple[Signal, Array]]:
+    def _find_firsts(self) -> Iterator[tuple[Signal, Sample]]:
         """Yield the first change of each input of a log of changes, if its first state is one.
 
         An input that is not in the end what it was at first changed then, or began dark. Inputs
         that the log names later than others changed; of those at its begin either may hold.
         """
         known = [(signal, signal.known()) for signal in self.signals.values()]
-        odd = [(signal, x[0]) for signal, x in known if x.size and x[0, 2] != x[-1, 2]]
-        begin = min((samples[0, 0] for _, samples in known if samples.size), default=0)
+        odd = [(signal, x[0]) for signal, x in known if x and x[0][2] != x[-1][2]]
+        begin = min((samples[0][0] for _, samples in known if samples), default=0)
         yield from ((signal, first) for signal, first in odd if first[0] > begin)
         unclear = [(signal, first) for signal, first in odd if first[0] == begin]
         if len(unclear) == 1:
@@ -224,7 +231,8 @@ class SignalReader:
         since = max(latest.values(), default=0) if self.is_single else latest.get(label, 0)
         if self.is_stacked and label in latest and tick < since:
             part, latest = len(events), {}
-        self.file.open_parts[key] = part, latest | {label: tick}
+        latest[label] = tick
+        self.file.open_parts[key] = part, latest
         events.append(TimerEvent(tick, label, signal.state(value), int(line), signal.run, part))
         if len(events) > MAX_EVENTS:
             self.file.problems.refuse(int(line), 1, "too_many_events", limit=MAX_EVENTS)

@@ -43,8 +43,7 @@ def read_file(file: TimerFile) -> TimerFile:
         numbered = enumerate(itertools.chain(head, lines), 1)
         is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
         table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
-        separator = _SEPARATORS[table.separator]
-        file.kind = f"a table, its cells {separator}"
+        file.kind = f"a table, its cells {_SEPARATORS[table.separator]}"
         readers: dict[object, SignalReader] = {}
         for block, rows in table.blocks():
             _read_block(file, block, rows, readers)
