@@ -176,18 +176,24 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     unknown = [column for column in columns if column.power is None]
     if unknown:
         file.base = "ns" if file.base == "ns" or any(clock.wrap for clock in unknown) else "s"
-    _check_columns(columns, heading, rows[0], file.problems)
+    _check_columns(columns, block.headings, heading, rows[0], file.problems)
     return columns
 
 
 def _check_columns(
-    columns: Sequence[TimerColumn], heading: Row | None, first: Row, problems: ProblemList
+    columns: Sequence[TimerColumn],
+    headings: Sequence[Row],
+    heading: Row | None,
+    first: Row,
+    problems: ProblemList,
 ) -> None:
     """Refuse columns without a heading that may be something else, and units that are none."""
     roles_there, above = {column.role for column in columns}, heading or first
-    if heading is None and "other" in roles_there:
-        place = first.place(next(column.at for column in columns if column.role == "other"))
-        problems.add(*place, "", "no_heading", columns=len(columns))
+    unclear = [column.at for column in columns if column.role == "other"]
+    # A row that names more columns than there are has a name with a separator in it.
+    unclear += [0 for row in headings if len(row.texts) > len(first.texts) and row.known > 2]
+    if heading is None and unclear:
+        problems.add(*first.place(unclear[0]), "", "no_heading", columns=len(columns))
     for column in columns:
         place, unit = above.place(column.at), column.unit
         if column.role == "setting" or "|" in column.role:

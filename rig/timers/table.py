@@ -31,8 +31,8 @@ TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
 _COLUMN_ROLES = {"time", "elapsed", "state", "edge", "volts", "gate", "run", "duration"}
 _COLUMN_ROLES |= {"index", "derived"}
-_UNFILLED = {"setting", "index"}
-"""Roles of columns that may have a name and no values: a rate, or comments."""
+_UNFILLED = {"setting", "index", "derived"}
+"""Roles of columns that may have a name and no values: a rate, comments, or distances."""
 _PREFIXES = {"k": 3, "m": 6, "g": 9}
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
