@@ -158,6 +158,12 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         names = block.find_inputs(len(inputs)) or count
         for column, name in zip(inputs, names, strict=False):
             column.gate = column.name = name
+        others = [column.at for column in columns if column.role == "other"]
+        # A row that names more columns than there are has a name with a separator in it.
+        others += [0 for row in block.headings if len(row.texts) > width and row.known > 2]
+        if others:
+            place = rows[0].place(others[0])
+            file.problems.add(*place, "", "no_heading", columns=len(columns))
     # Of columns that say the same times in other units, the finest is kept.
     times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
     finest = {(c.gate, c.run, c.state): c.power for c in sorted(times, key=attrgetter("power"))}
@@ -176,24 +182,13 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     unknown = [column for column in columns if column.power is None]
     if unknown:
         file.base = "ns" if file.base == "ns" or any(clock.wrap for clock in unknown) else "s"
-    _check_columns(columns, block.headings, heading, rows[0], file.problems)
+    _check_columns(columns, heading or rows[0], file.problems)
     return columns
 
 
-def _check_columns(
-    columns: Sequence[TimerColumn],
-    headings: Sequence[Row],
-    heading: Row | None,
-    first: Row,
-    problems: ProblemList,
-) -> None:
-    """Refuse columns without a heading that may be something else, and units that are none."""
-    roles_there, above = {column.role for column in columns}, heading or first
-    unclear = [column.at for column in columns if column.role == "other"]
-    # A row that names more columns than there are has a name with a separator in it.
-    unclear += [0 for row in headings if len(row.texts) > len(first.texts) and row.known > 2]
-    if heading is None and unclear:
-        problems.add(*first.place(unclear[0]), "", "no_heading", columns=len(columns))
+def _check_columns(columns: Sequence[TimerColumn], above: Row, problems: ProblemList) -> None:
+    """Refuse columns that may be something else, and units that are none."""
+    roles_there = {column.role for column in columns}
     for column in columns:
         place, unit = above.place(column.at), column.unit
         if column.role == "setting" or "|" in column.role:
