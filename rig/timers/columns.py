@@ -7,9 +7,10 @@ Facts are collected of each column (of its heading, its unit, its values), and t
 from __future__ import annotations
 
 import itertools
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
@@ -30,7 +31,7 @@ _MOST_COLUMNS = 200
 _BESIDE = 0.1
 """Share of the rows below which a column has settings that stand beside samples."""
 _FEWEST_TIMES = 4
-"""Columns, each later than the one before, that are times side by side."""
+"""Columns of numbers without a heading that are times side by side, as programs print lists."""
 
 
 @cache
@@ -51,9 +52,10 @@ class TimerColumn:
         Its heading.
     role
         A key of `roles`.
-    power, has_unit
-        Of times: decimal power from seconds, `None` for counts of an unknown unit, and whether the
-        file says it.
+    unit
+        What its heading, or a row of units, says; see `vocabulary.unit_of`.
+    power
+        Of times: decimal power from seconds, `None` where the file does not say their unit.
     gate, run
         Which input and which run all its values are of; empty where the heading does not say.
     state
@@ -67,8 +69,8 @@ class TimerColumn:
     at: int
     name: str
     role: str = ""
+    unit: str = ""
     power: int | None = 0
-    has_unit: bool = True
     gate: str = ""
     run: str = ""
     state: str = ""
@@ -86,7 +88,7 @@ ROW_COUNT = TimerColumn(-1, "", "index")
 """Where rows have neither times nor numbers, they are counted."""
 
 
-class Signal(NamedTuple):
+class ColumnPair(NamedTuple):
     """A column of times with the column that says what happened, of an input and of a run.
 
     Attributes
@@ -94,15 +96,19 @@ class Signal(NamedTuple):
     clock
         Of its times, or of the numbers of its samples.
     value
-        Its states, levels or volts; `None` where all its times are of the same kind.
+        Its states, levels or volts; itself as moments where the heading says what happened.
     run, label
         What the file calls the run and the input; empty where it does not say.
+    run_at, gate_at
+        Columns that say these in each row; far away where there is none.
     """
 
     clock: TimerColumn
-    value: TimerColumn | None
+    value: TimerColumn
     run: str
     label: str
+    run_at: int
+    gate_at: int
 
 
 def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[TimerColumn]:
@@ -135,8 +141,9 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     table = {
         "single": len(facts) == 1,
         "rising": any({"rises", "fractions"} <= fact for fact in facts.values()),
-        "listed": _is_each_row_rising(rows, width),
-        "digital": all("levels" in fact for fact in facts.values()),
+        "listed": len(facts) >= _FEWEST_TIMES
+        and all(fact.isdisjoint({"levels", "few", "words", "many"}) for fact in facts.values()),
+        "worded": any("levels" in fact and "plain" not in fact for fact in facts.values()),
         "rated": block.find_time_base() is not None,
         "paired": len(filled) == 2,
         "several": len(filled) > 2,
@@ -148,45 +155,42 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     if heading is None:
         inputs = [column for column in columns if column.role in SAMPLED]
         count = [f"D{n}" for n, column in enumerate(inputs) if column.role == "level"]
-        names = block.find_inputs([column.at for column in inputs]) or count
+        names = block.find_inputs(len(inputs)) or count
         for column, name in zip(inputs, names, strict=False):
             column.gate = column.name = name
+        others = [column.at for column in columns if column.role == "other"]
+        # A row that names more columns than there are has a name with a separator in it.
+        others += [0 for row in block.headings if len(row.texts) > width and row.known > 2]
+        if others:
+            place = rows[0].place(others[0])
+            file.problems.add(*place, "", "no_heading", columns=len(columns))
     # Of columns that say the same times in other units, the finest is kept.
     times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
     finest = {(c.gate, c.run, c.state): c.power for c in sorted(times, key=attrgetter("power"))}
     for column in times:
         if column.power != finest[column.gate, column.run, column.state]:
             column.role = "coarse"
+    if any(column.role == "volts" for column in columns):
+        for column in columns:  # volts that are 0 at first seem to be a level
+            column.role = column.role.replace("level", "volts")
     unclear = [column for column in columns if "|" in column.role]
     readings = unclear[0].role.split("|") if unclear else []
     # Two that may be the same two are one each; of others, falls cannot decide.
     is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
     for n, column in enumerate(unclear if is_open else ()):
         file.ways, column.role = len(readings), readings[(file.way + n) % len(readings)]
-    clocks = [column for column in columns if column.role == "time"]
-    file.has_unit &= all(clock.has_unit for clock in clocks)
-    file.is_counted |= any(clock.power is None for clock in clocks)
-    _check_columns(columns, heading, rows[0], file.problems)
+    unknown = [column for column in columns if column.power is None]
+    if unknown:
+        file.base = "ns" if file.base == "ns" or any(clock.wrap for clock in unknown) else "s"
+    _check_columns(columns, heading or rows[0], file.problems)
     return columns
 
 
-def _is_each_row_rising(rows: Sequence[Row], width: int) -> bool:
-    """Whether each row is a list of times, one after the other, as programs print them."""
-    numbers = [[float(text) for text in row.texts if is_number(text)] for row in rows]
-    is_list = all(len(row) == width and sorted(set(row)) == row for row in numbers)
-    return width >= _FEWEST_TIMES and is_list
-
-
-def _check_columns(
-    columns: Sequence[TimerColumn], heading: Row | None, first: Row, problems: ProblemList
-) -> None:
-    """Refuse columns without a heading that may be something else, and units that are none."""
-    roles_there, above = {column.role for column in columns}, heading or first
-    if heading is None and "other" in roles_there:
-        place = first.place(next(column.at for column in columns if column.role == "other"))
-        problems.add(*place, "", "no_heading", columns=len(columns))
-    for column in columns if heading else ():
-        place, unit = above.place(column.at), vocabulary.unit_of(column.name)
+def _check_columns(columns: Sequence[TimerColumn], above: Row, problems: ProblemList) -> None:
+    """Refuse columns that may be something else, and units that are none."""
+    roles_there = {column.role for column in columns}
+    for column in columns:
+        place, unit = above.place(column.at), column.unit
         if column.role == "setting" or "|" in column.role:
             values = {"column": column.name, "readings": column.meaning}
             problems.add(*place, column.name, "ambiguous", **values)
@@ -203,35 +207,32 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
     name = heading.cell(n) if heading else ""
     column = TimerColumn(n, name or f"column {n + 1}", run=find_label(name, "run"))
-    prefix, colon, rest = name.partition(":")
-    if colon and rest.strip() and not find_label(prefix, "gate"):
+    is_named = bool(name)
+    prefix, _, rest = name.partition(":")
+    if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
-    texts = (name, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
+    bare = vocabulary.without_accents(name).replace(column.run, "")
+    texts = (bare, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
     units = list(map(vocabulary.unit_of, texts))
-    unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
+    column.unit = unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
-    numbers = (row.cell(n) for row in block.headings if row.has_numbers)
-    column.gate = next(filter(None, itertools.chain(labels, numbers)), "")
+    column.gate = next(filter(None, labels), "")
     is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
-    is_named = heading is not None and (heading.line or heading.cell(n))
     named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
     named |= {"unitless": not unit, "bare": not is_named, "first": not n}
     named |= {"labelled": column.gate, "numbered": column.run}
-    facts = facts | vocabulary.roles_in(name) | _held(named)
+    facts = facts | vocabulary.roles_in(bare) | _held(named)
     column.role = next(
         role
         for role, rule in vocabulary.read_rows("columns.txt", ":")
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
     if column.role == "time":
-        power = POWERS.get(unit or normal(name))
-        column.has_unit = power is not None or "suffixed" in facts
-        # Fractions are seconds, and so are small whole numbers.
-        column.power = power if power is not None or "counted" in facts else 0
+        column.power = 0 if "suffixed" in facts else POWERS.get(unit)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = bool({"moment", "listed"} & facts)
         if "counted" in facts and column.power in {None, 3, 6}:
-            column.wrap = 2**32 * 10 ** (12 - (column.power or 0))
+            column.wrap = 2**32 * 10 ** (12 - (column.power or POWERS["ns"]))
     return column
 
 
@@ -246,15 +247,14 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "levels": all("state" in kind for kind in kinds),
         "suffixed": all({"timed", "clock"} & kind for kind in kinds),
         "plain": not any({"blocked", "clear"} & kind for kind in kinds),
-        "signals": all({"high", "low"} & kind for kind in kinds),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
-        "counts": is_numeric and is_whole and numbers[0] in {0, 1} and steps == {1.0},
+        "counts": is_numeric and steps == {1.0},
         "counted": is_count and abs(int(texts[-1]) - int(texts[0])) > 100,
         "few": is_whole and len(texts) >= 2 * len(set(texts)),
         "bits": set(texts) <= {"0", "1"},
+        "constant": len(set(texts)) == 1 < len(texts),
         "words": not numbers,
-        "short": len(texts) < 3,
         "many": len(texts) > 30,
     }
     return _held(facts)
@@ -264,25 +264,31 @@ def _held(facts: Mapping[str, object]) -> set[str]:
     return {fact for fact, holds in facts.items() if holds}
 
 
-def find_signals(columns: Sequence[TimerColumn]) -> list[Signal]:
-    """Give each column of times the values that belong to it: of its run, and of its input."""
-    chosen = ([c for c in columns if c.role in listed] for listed in VALUES)
-    values = next(filter(None, chosen), [])
+def pair_columns(columns: Sequence[TimerColumn]) -> list[ColumnPair]:
+    """Give each column of times what belongs to it: values of its run and input, and names."""
     counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
     times = [column for column in columns if column.role == "time"] or counts
-    is_sampled = any(value.role in SAMPLED for value in values)
-    signals = []
+    chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
+    is_sampled = chosen == SAMPLED
+    pairs = []
     for clock in times:
-        own = [value for value in values if _clock_of(value, times) is clock]
-        named = Counter(map(_label_of, own))
-        for n, value in enumerate(own, 1):
-            is_beside = is_sampled or len(own) > 1
+        own = [column for column in columns if _clock_of(column, times) is clock]
+        own_first = [] if is_sampled else [*own, *columns]
+        names = [
+            next((column.at for column in own_first if column.role == role), sys.maxsize)
+            for role in ("run", "gate")
+        ]
+        values = [column for column in own if column.role in chosen]
+        labels = Counter(map(_label_of, values))
+        for n, value in enumerate(values, 1):
+            is_beside = is_sampled or len(values) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate
-            label += f" ({n})" if is_sampled and named[label] > 1 else ""
-            signals.append(Signal(clock, value, clock.run or value.run, label))
-        if not own and not is_sampled:
-            signals.append(Signal(clock, None, clock.run, clock.gate))
-    return signals
+            label += f" ({n})" if is_sampled and labels[label] > 1 else ""
+            pairs.append(ColumnPair(clock, value, clock.run or value.run, label, *names))
+        if not values and not is_sampled:
+            moment = replace(clock, at=sys.maxsize, role="moment")
+            pairs.append(ColumnPair(clock, moment, clock.run, clock.gate, *names))
+    return pairs
 
 
 def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:

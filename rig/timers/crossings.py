@@ -6,7 +6,6 @@ straight line between two samples crosses that middle.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,22 +21,32 @@ _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
 
 
-def find_crossings(
-    times: Array, volts: Array, threshold: tuple[float, float]
-) -> Iterator[tuple[int, float, bool]]:
-    """Yield the sample behind each crossing, its moment, and whether it rises."""
+def find_crossings(samples: Array, threshold: tuple[float, float]) -> Array:
+    """Return where volts cross a threshold, with 1 where they rise and 0 where they fall.
+
+    Parameters
+    ----------
+    samples
+        Line, time and volts of each.
+
+    Returns
+    -------
+    array
+        Of each crossing the line of the sample behind it, its moment, and the level that begins.
+    """
+    lines, times, volts = samples.T
     is_high = volts > threshold[0]
     sure = np.flatnonzero(np.abs(volts - threshold[0]) > threshold[1])
     turns = sure[1:][is_high[sure[1:]] != is_high[sure[:-1]]]
     crossings = np.flatnonzero(is_high[1:] != is_high[:-1]) + 1
-    for n in crossings[np.searchsorted(crossings, turns, side="right") - 1]:
-        share = (volts[n] - threshold[0]) / (volts[n] - volts[n - 1])
-        yield int(n), float(times[n] - share * (times[n] - times[n - 1])), bool(is_high[n])
+    at = crossings[np.searchsorted(crossings, turns, side="right") - 1]
+    share = (volts[at] - threshold[0]) / (volts[at] - volts[at - 1])
+    return np.array([lines[at], times[at] - share * (times[at] - times[at - 1]), is_high[at]]).T
 
 
 def find_threshold(volts: Array) -> tuple[float, float] | None:
     """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
-    low, high = float(volts.min()), float(volts.max())
+    low, high = float(volts.min(initial=np.inf)), float(volts.max(initial=-np.inf))
     for _ in range(50):  # two means, one for each level
         above = volts > 0.5 * (low + high)
         if above.all() or not above.any():

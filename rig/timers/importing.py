@@ -20,16 +20,15 @@ from rig.errors import InputError
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
 from rig.timers.edge_rows import HEADER, is_own, read_edges
+from rig.timers.events import TimerFile
 from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, read_drops
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList, refusal
-from rig.timers.timer_file import read_ways
-from rig.timers.vocabulary import POWERS, form
+from rig.timers.timer_file import read_file
+from rig.timers.vocabulary import form
 
 if TYPE_CHECKING:
     from argparse import Namespace
-
-    from rig.timers.events import TimerFile
 
 Fit = Callable[[Sequence[Drop], bool], "FallMatch"]
 
@@ -121,12 +120,16 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
             drops = read_edges(enumerate(rows, 1), ProblemList(place))
         return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
     readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
-    for file in read_ways(place):
+    for way in itertools.count():
+        file = TimerFile(place, way)
         try:
+            read_file(file)
             stated = _read_stated(options, file, gates)
             readings += [read_drops(file, way) for way in find_layouts(file, gates, bars, stated)]
         except InputError as error:
             faults.append(error)
+        if way + 1 >= file.ways:
+            break
     if not any(reading.drops for reading in readings):
         pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
@@ -198,7 +201,9 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
     for drop in reading.drops:
-        moments = _fine_moments(drop)
+        # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
+        is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
+        moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
         same = Counter(earlier[moment] for moment in moments & earlier.keys())
         earlier |= dict.fromkeys(moments, drop.run)
         run, count = max(same.items(), key=itemgetter(1), default=(0, 0))
@@ -209,26 +214,16 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
                 excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
                 raise refusal(place, "more_edges", **excess)
     # Of changes alone, two in a row mean that the row of the first is missing.
-    changes = Counter((event.line, event.tick) for part in file.parts for event in part.events)
+    changes = Counter((event.line, event.tick) for event in file.events)
     lines = [line for (line, _), count in changes.items() if count > 1]
-    if lines and file.period_s is None:  # regular samples see changes together
+    if lines and file.period is None:  # regular samples see changes together
         raise refusal(place, "at_once", lines=_some(lines))
-
-
-def _fine_moments(drop: Drop) -> set[object]:
-    """Return the edges of a drop, at times that no other has by chance, or all as they are.
-
-    Of coarse times only those of a whole drop are a copy's; of fine ones, rows may be missing.
-    """
-    if all(edge.tick % _COARSE == 0 for edge in drop.edges):
-        return {drop.edges}
-    return {(edge.tick, edge.channel, edge.blocked) for edge in drop.edges}
 
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
     file = reading.file
-    lines = {event.line for part in file.parts for event in part.events}
+    lines = {event.line for event in file.events}
     # A level that changes may be of an input that is no gate.
     unused = sorted({*file.unread, *(() if file.is_sampled else lines - reading.lines)})
     edges = sum(len(drop.edges) for drop in reading.drops)
@@ -251,8 +246,8 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
     if layout.pause_s:
         drops = len(reading.drops)
         yield make_reason("several_drops", drops=drops, pause_s=layout.pause_s)
-    if file.period_s:
-        period_us = file.period_s * 1e6 / 10 ** POWERS.get(layout.unit, 0)
+    if file.period:
+        period_us = file.tick_in(layout.unit, file.period) / 1e6
         yield make_reason("samples", period_us=period_us, u_us=period_us / math.sqrt(12.0))
     if absent := [str(n) for n in gates if n not in channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))

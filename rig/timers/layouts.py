@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -67,7 +67,7 @@ class FileLayout:
     def text(self) -> str:
         """What ``--map`` accepts."""
         stated = asdict(self) | {x or "input": channel for x, channel in self.channels.items()}
-        usual = "", 0.0, "states", "runs", self.channels
+        usual = "", "s", 0.0, "states", "runs", self.channels
         pairs = ((x, y) for x, y in stated.items() if x not in SETTINGS or y not in usual)
         return ",".join(f"{name}={value}" for name, value in pairs if name != "channels")
 
@@ -98,8 +98,7 @@ class FileReading(NamedTuple):
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    inputs, scale = [*layout.channels], 10 ** POWERS.get(layout.unit, 0)
-    runs, lines, last = dict[int, list[Edge]](), set[int](), 0
+    runs, lines, last, inputs = dict[int, list[Edge]](), set[int](), 0, [*layout.channels]
     for number, drop in _group_events(file, layout):
         edges, counts = list[Edge](), Counter[str]()
         share = max(1, len(drop) // max(1, len(inputs)))
@@ -109,7 +108,8 @@ def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
                 label = inputs[min(k // share, len(inputs) - 1)]
             if label in layout.channels:
                 dark = layout.is_dark(event, counts[label])
-                edges.append(Edge(event.tick // scale, layout.channels[label], dark))
+                tick = file.tick_in(layout.unit, event.tick)
+                edges.append(Edge(tick, layout.channels[label], dark))
                 lines.add(event.line)
                 counts[label] += 1
         if edges:
@@ -123,18 +123,17 @@ def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
 
 def _group_events(file: TimerFile, layout: FileLayout) -> Iterator[tuple[int, list[TimerEvent]]]:
     """Yield the events of each drop, with its number in the file; those without one come last."""
-    limit = round(layout.pause_s * TICK_HZ) * 10 ** POWERS.get(layout.unit, 0)
+    limit = round(layout.pause_s * TICK_HZ)
     by_row = file.is_wide and layout.groups != "runs"
     groups: dict[tuple[bool, int, int], list[TimerEvent]] = defaultdict(list)
-    for n, part in enumerate(file.parts):
-        number = number_of(part.run) or 0
-        for event in part.events:
-            groups[not number, event.line if by_row else n, number].append(event)
+    for event in file.events:
+        number = number_of(event.run) or 0
+        groups[not number, event.line if by_row else event.part, number].append(event)
     for (_, _, number), events in sorted(groups.items()):
         drops: list[list[TimerEvent]] = [[]]
         for event in sorted(events, key=attrgetter("tick")):  # equal ones stay in order
             last = drops[-1][-1] if drops[-1] else event
-            if 0 < limit <= event.tick - last.tick:
+            if 0 < limit <= file.tick_in(layout.unit, event.tick - last.tick):
                 drops.append([])
             if last is event or event[:3] != last[:3]:  # nothing does the same twice at once
                 drops[-1].append(event)
@@ -159,48 +158,44 @@ def find_layouts(
     stated
         What is decided: attributes of `FileLayout`.
     """
-    counts = Counter((n, e.label) for n, part in enumerate(file.parts) for e in part.events)
-    states = {event.state for part in file.parts for event in part.events}
+    counts = Counter((event.part, event.label) for event in file.events)
+    states = {event.state for event in file.events}
     levels = ["high", "low"] if states & {"high", "low"} else ["states"]
     # More times than bars: it darkens and clears in turns.
     times = ["each", "turns", "turns-clear", "each"][max(counts.values()) > bars :][:3]
-    choices: dict[str, Sequence[Any]] = {
-        "unit": list(POWERS) if file.is_counted else [""],
-        "dark": levels if states - {""} else times,
-        "groups": _groupings(file, gates, bars),
-    }
-    said = {"unit"} if file.has_unit else set()
-    choices |= {name: [value] for name, value in stated.items() if name in choices.keys() - said}
-    for unit, dark, groups in itertools.product(*choices.values()):
-        power = POWERS[unit or "s"]
-        pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, power, groups)
-        maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, groups)
+    choices: dict[str, Sequence[Any]] = {"unit": list(POWERS)} if file.base else {}
+    choices["dark"] = levels if states - {""} else times
+    choices["groups"] = _groupings(file, gates, bars)
+    choices |= {name: [value] for name, value in stated.items() if name in choices}
+    for values in itertools.product(*choices.values()):
+        layout = FileLayout(**dict(zip(choices, values, strict=True)))
+        maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, layout)
+        pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, layout)
         for channels, pause in itertools.product(maps, pauses):
-            yield FileLayout(unit, dark, groups, pause, channels)
+            yield replace(layout, channels=channels, pause_s=pause)
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    groups = ["runs"]
-    lines = Counter(event.line for part in file.parts for event in part.events)
-    is_wide = file.is_wide and max(lines.values()) > 1  # a row with a single time is no drop
-    if is_wide:
-        ticks = [event.tick for event in file.parts[0].events]
+    groups, events = ["runs"], file.events
+    if file.is_wide and len({event.line for event in events}) < len(events):
         # Times that begin anew with each row are of a drop each.
-        groups.insert(len(file.parts) == 1 and ticks == sorted(ticks), "rows")
-    if (is_wide or len(file.labels) < 2) and bars == 1 and len(gates) > 1:
+        is_one = len({event.part for event in events}) == 1
+        groups.insert(is_one and events == sorted(events, key=attrgetter("tick")), "rows")
+    if len(file.labels) < 2 and bars == 1 and len(gates) > 1:
         groups.append("passing")
     return groups
 
 
-def _pauses(file: TimerFile, power: int, groups: str) -> list[float]:
+def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
     """Return the pause, s, at which drops one after the other are parted, if there may be any.
 
     Between drops nothing passes for far longer than within one: of the pauses in order, the first
     of half a second or more that is three times as long as the one before.
     """
-    is_parted = file.is_wide or (len(file.parts) > 1 and groups == "runs")
-    for part in [] if is_parted else file.parts:
-        ticks = sorted(event.tick // 10**power for event in part.events)
+    parts = file.parts()
+    is_parted = file.is_wide or (len(parts) > 1 and layout.groups == "runs")
+    for part in [] if is_parted else parts:
+        ticks = sorted(file.tick_in(layout.unit, event.tick) for event in part)
         pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
         for before, pause in itertools.pairwise(pauses):
             if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
@@ -208,15 +203,15 @@ def _pauses(file: TimerFile, power: int, groups: str) -> list[float]:
     return [0.0]
 
 
-def _channels(file: TimerFile, gates: Sequence[int], groups: str) -> list[dict[str, int]]:
+def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list[dict[str, int]]:
     """Return which gate each input may be; by its number if all are told apart by it."""
-    labels = input_names(file, groups, gates)
-    if groups == "passing":
+    labels = input_names(file, layout.groups, gates)
+    if layout.groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if len(set(by_number.values())) == len(labels):
         return [by_number]
-    first = {e.label: e.tick for part in file.parts for e in reversed(part.events)}
+    first = {event.label: event.tick for event in reversed(file.events)}
     passed = sorted(labels, key=lambda label: first.get(label, 0))
     # In order of their numbers, or as they are passed first; and the reverse.
     maps = [

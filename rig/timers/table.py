@@ -29,9 +29,10 @@ from rig.timers.vocabulary import (
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
-_COLUMN_ROLES = {"time", "state", "edge", "volts", "gate", "run", "duration", "index", "derived"}
-_UNFILLED = {"setting", "index"}
-"""Roles of columns that may have a name and no values: a rate, or comments."""
+_COLUMN_ROLES = {"time", "elapsed", "state", "edge", "volts", "gate", "run", "duration"}
+_COLUMN_ROLES |= {"index", "derived"}
+_UNFILLED = {"setting", "index", "derived"}
+"""Roles of columns that may have a name and no values: a rate, comments, or distances."""
 _PREFIXES = {"k": 3, "m": 6, "g": 9}
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
@@ -54,8 +55,7 @@ class Row(NamedTuple):
     @property
     def known(self) -> int:
         """How many cells say what a column is."""
-        texts = [text for text in self.texts if text and not is_number(text)]
-        roles = [{*_COLUMN_ROLES & roles_in(x), vocabulary.unit_of(x)} - {""} for x in texts]
+        roles = [{*_COLUMN_ROLES & roles_in(x), vocabulary.unit_of(x)} - {""} for x in self.texts]
         return sum(map(bool, roles)) if set().union(*roles) - {"derived", "index"} else 0
 
     @property
@@ -63,11 +63,6 @@ class Row(NamedTuple):
         """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
         text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
         return form("mark").fullmatch(text) is not None
-
-    @property
-    def has_numbers(self) -> bool:
-        """Whether it numbers the columns: ``x-axis,1,2``."""
-        return len(self.texts) > 2 and all(map(form("bare number").fullmatch, self.texts[1:]))
 
     @property
     def has_units(self) -> bool:
@@ -135,6 +130,7 @@ class RowBlock:
             row
             for row in self.headings or [row for row in remarks if len(row.texts) == width]
             if row.known
+            and not row.is_mark
             and (len(row.texts) > 1 or len(filled) == 1)
             and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
             and not any(MEASURED & kinds_of(text) for text in row.texts[:width])
@@ -158,18 +154,12 @@ class RowBlock:
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
         return (stated.get("start", 0.0), step) if step else None
 
-    def find_inputs(self, columns: Sequence[int]) -> list[str]:
-        """Return names for columns without a heading: those of a row that lists as many inputs.
-
-        Where it is as wide as the rows, each is as far to the left of its own column.
-        """
+    def find_inputs(self, count: int) -> list[str]:
+        """Return names of inputs without a heading: those of a row that lists as many."""
         for row in [*self.remarks, *self.headings]:
-            labels = (find_label(text.rpartition(":")[2], "gate") for text in row.texts)
-            names = {n: label for n, label in enumerate(labels) if label}
-            apart = {at - n for at, n in zip(columns, names, strict=False)}
-            is_left = len(apart) == 1 and min(apart) >= 0
-            if len(names) == len(columns) and (is_left or len(row.texts) < self.width):
-                return [*names.values()]
+            labels = [find_label(text.rpartition(":")[2], "gate") for text in row.texts]
+            if len(names := [label for label in labels if label]) == count:
+                return names
         return []
 
 
@@ -215,16 +205,16 @@ class Table:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if "," in line and (self.separator != "," or '"' in line):
-            has_comma = form("decimal comma").fullmatch
-            return [t.replace(",", ".") if has_comma(t[:LONGEST]) else t for t in cells]
-        return cells
+        if "," not in line:  # as most
+            return cells
+        has_comma = form("decimal comma").fullmatch
+        return [t.replace(",", ".") if has_comma(t[:LONGEST]) else t for t in cells]
 
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
         for number, line in self._lines:
-            if not line or line.isspace():
+            if not line.strip():
                 continue
             if block.width and form("plain row").fullmatch(line):
                 yield block, Row(number, self.split(line), line)
@@ -260,13 +250,13 @@ class Table:
         if usual and not any(is_filled for is_filled, _ in usual[:2]):
             # Samples of an oscilloscope, beside which settings may stand.
             shape = tuple(a if b[0] else b for a, b in zip(shape, usual, strict=False))
-        if any(texts) and (shape == usual or _is_data(texts)):
+        if shape == usual or _is_data(texts):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
-        if len(texts) < 2 or not any(map(is_number, texts)):
+        if not any(map(is_number, texts)):
             return False
         named = {len(above.texts) for above in block.headings if len(above.texts) == above.known}
-        return len(texts) == block.width or (len(texts) in named and not row.known)
+        return len(texts) == block.width or len(texts) in named
 
 
 def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
@@ -304,9 +294,9 @@ def _find_names(lines: Sequence[str]) -> list[str]:
     """Return what most lines that have values name before these; nothing if they do not."""
     rows = [tuple(name for name, _ in _named_values(line)) for line in lines[:100]]
     usual, count = next(iter(Counter(filter(None, rows)).most_common(1)), ((), 0))
+    marks = [[line.count(mark) for mark in "\t;,"] for line in lines[:100]]
     is_named = len(set(usual) - {""}) > 1 and 2 * count > sum(map(bool, rows))
     # Below a heading with as many cells, words beside values are parts of cells: Gate 1, Run 2.
-    marks = [[line.count(mark) for mark in "\t;,"] for line in lines[:100]]
     heads = [cells for row, cells in zip(rows, marks, strict=True) if not row and any(cells)]
     is_named &= not any(cells in heads for row, cells in zip(rows, marks, strict=True) if row)
     return list(usual) if is_named else []
@@ -321,9 +311,8 @@ def find_separator(lines: Sequence[str]) -> str:
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
     numbers = [row.replace(",", ".") for row in rows if form("decimal comma").fullmatch(row)]
     if not is_named and len(numbers) * 2 > len(rows):
-        # 0,25 below 1,5 is no decimal comma: times go on. Levels of inputs are 0 and 1.
-        is_rising = sorted(numbers, key=float) == numbers and set("".join(rows)) - set("01,")
-        return ";" if is_rising else ","
+        # 0,25 below 1,5 is no decimal comma: times go on.
+        return ";" if sorted(numbers, key=float) == numbers else ","
     # Blanks part values; a comma behind one parts them, too.
     parted = [row.split() for row in rows if ", " not in row and " " in row]
     return " " if sum(all(map(kinds_of, row)) for row in parted) * 2 > len(rows) else ","

@@ -10,101 +10,89 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rig.errors import InputError
 from rig.reasons import make_reason
 from rig.timers.columns import columns_of
-from rig.timers.events import EventReader, FilePart, TimerFile
 from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import TICK_HZ
-from rig.timers.problems import ProblemList
+from rig.timers.signals import SignalReader
 from rig.timers.table import Row, RowBlock, Table
 from rig.timers.vcd import BEGINNINGS, vcd_rows
 
+if TYPE_CHECKING:
+    from rig.timers.events import TimerEvent, TimerFile
+    from rig.timers.problems import ProblemList
+
 _SAMPLE = 200
 """Rows that show what columns are."""
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks", "|": "bars"}
+_SEPARATORS = {"\t": "separated by tabs", ";": "separated by semicolons", "|": "separated by bars"}
+_SEPARATORS |= {",": "separated by commas", " ": "separated by blanks", "": "between words"}
 
 
-def read_ways(path: str | Path) -> list[TimerFile]:
-    """Find out what a file says, in every way in which its columns may be understood.
+def read_file(file: TimerFile) -> TimerFile:
+    """Find out what a file says, in the way in which its columns are to be understood.
 
     Raises
     ------
     InputError
         Every fault of the file at its line and column, or what it is instead.
     """
-    files, faults = list[TimerFile](), list[InputError]()
-    for way in itertools.count():
-        file = TimerFile(ProblemList(str(path), make_reason("timer_files").text), way)
-        try:
-            with closing(read_lines(path)) as lines:
-                _read(file, lines)
-            files.append(file)
-        except InputError as error:
-            faults.append(error)
-        if file.ways <= way + 1:
-            break
-    if not files:
-        raise faults[0]
-    for file in files if is_cut(path) else ():
-        file.notes.append(make_reason("last_line_cut"))
-    return files
-
-
-def _read(file: TimerFile, lines: Iterator[str]) -> None:
-    head = list(itertools.islice(lines, 50))
-    numbered = enumerate(itertools.chain(head, lines), 1)
-    is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
-    table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
-    cells = f"separated by {_SEPARATORS[table.separator]}" if table.separator else "between words"
-    file.kind = f"a table, its cells {cells}"
-    readers: dict[object, EventReader] = {}
-    for block, rows in table.blocks():
-        _read_block(file, block, rows, readers)
-        file.problems.raise_if_any()
+    with closing(read_lines(file.path)) as lines:
+        head = list(itertools.islice(lines, 50))
+        numbered = enumerate(itertools.chain(head, lines), 1)
+        is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
+        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
+        file.kind = f"a table, its cells {_SEPARATORS[table.separator]}"
+        readers: dict[object, SignalReader] = {}
+        for block, rows in table.blocks():
+            _read_block(file, block, rows, readers)
+            file.problems.raise_if_any()
     file.rows += len(table.strays)
     file.unread += table.strays
-    if not file.parts:
+    if not file.events:
         notes = "".join(f"; {note}" for note in file.notes)
         file.problems.refuse(1, 1, "nothing_passes" if file.rows else "no_edges", notes=notes)
+    file.notes += [make_reason("last_line_cut")] if is_cut(file.path) else []
+    return file
 
 
 def _read_block(
-    file: TimerFile, block: RowBlock, rows: Iterator[Row], readers: dict[object, EventReader]
+    file: TimerFile, block: RowBlock, rows: Iterator[Row], readers: dict[object, SignalReader]
 ) -> None:
     """Add what a block says; its columns are those of earlier ones with the same heading."""
-    start, key = len(file.parts), block.key
+    start, key = len(file.events), block.key
     if key not in readers:
         sample = list(itertools.islice(rows, _SAMPLE))
         columns = columns_of(file, block, sample)
         file.columns |= {column.name: column.meaning for column in columns}
-        readers[key], rows = EventReader(file, columns), itertools.chain(sample, rows)
+        readers[key], rows = SignalReader(file, columns), itertools.chain(sample, rows)
         unused = readers[key].unused
         file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
     reader = readers[key]
-    base = (0.0, 1.0) if "time" in reader.roles else block.find_time_base()
+    base = (0.0, 1.0) if "time" in reader.places else block.find_time_base()
     if reader.is_sampled and base is None:
         lacks = "a column of times or a rate"
         file.problems.refuse(next(rows).line, 1, "no_rate", lacks=lacks)
     reader.read(rows, base or (0.0, 1.0), is_gate=block.is_gate)
     if reader.is_stacked:
-        parts = sorted(file.parts[start:], key=lambda part: part.run)
-        if not {"edge", "state", "cleared", "gate"} & reader.roles:
+        parts = sorted(file.parts(start), key=lambda part: part[0].run)
+        if not {"edge", "state", "cleared", "gate"} & reader.places.keys():
             _check_moments(parts, reader.unused, file.problems)
         for before, part in itertools.pairwise(parts):
-            if before.run == part.run and min(len(before.events), len(part.events)) == 1:
-                text = f"{part.events[0].tick / TICK_HZ:.9g}"
-                file.problems.add(part.events[0].line, 1, "time", "backwards", text=text)
+            if before[0].run == part[0].run and min(len(before), len(part)) == 1:
+                text = f"{part[0].tick / TICK_HZ:.9g}"
+                file.problems.add(part[0].line, 1, "time", "backwards", text=text)
 
 
-def _check_moments(parts: Sequence[FilePart], unused: str, problems: ProblemList) -> None:
+def _check_moments(
+    parts: Sequence[Sequence[TimerEvent]], unused: str, problems: ProblemList
+) -> None:
     """Refuse numbers that are no moments of a passage: durations, or samples of something else."""
-    if len(parts) > 2 and 4 * (len(parts) - 1) > sum(len(part.events) for part in parts):
+    if len(parts) > 2 and 4 * (len(parts) - 1) > sum(map(len, parts)):
         numbers = "these numbers go up and down: they"
-        problems.refuse(parts[0].events[0].line, 1, "durations", numbers=numbers)
+        problems.refuse(parts[0][0].line, 1, "durations", numbers=numbers)
     for part in parts if unused else ():
-        steps = [b.tick - a.tick for a, b in itertools.pairwise(part.events)]
+        steps = [b.tick - a.tick for a, b in itertools.pairwise(part)]
         if len(steps) > 3 and max(steps) < 1.5 * min(steps):
-            problems.refuse(part.events[0].line, 1, "regular_samples", columns=unused)
+            problems.refuse(part[0].line, 1, "regular_samples", columns=unused)

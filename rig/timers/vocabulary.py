@@ -75,6 +75,7 @@ def roles_in(heading: str) -> frozenset[str]:
     return frozenset(facts | ({"setting"} if is_setting else set()))
 
 
+@lru_cache(10_000)
 def find_label(name: str, role: str) -> str:
     """Return the part of a heading that names an input, or a run, with its number."""
     match = form(f"{role} label").search(without_accents(name[:LONGEST]))

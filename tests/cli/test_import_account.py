@@ -5,7 +5,8 @@ import time
 import pytest
 
 from rig.errors import InputError
-from rig.timers.timer_file import read_ways
+from rig.timers.events import TimerFile
+from rig.timers.timer_file import read_file
 from tests.cli.lab import PROTOCOLS
 from tests.timers.shapes import RUNS, shapes
 
@@ -122,5 +123,5 @@ def test_a_hostile_file_is_read_or_refused_at_once(tmp_path, content):
     path.write_text(content, "utf-8")
     start = time.process_time()
     with pytest.raises(InputError):
-        read_ways(path)
+        read_file(TimerFile(path))
     assert time.process_time() - start < 1.0

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.records import Drop
-from rig.timers import events
+from rig.timers import signals
 from rig.timers.edge_rows import is_own
+from rig.timers.events import TimerFile
 from rig.timers.layouts import find_layouts, read_drops
 from rig.timers.lines import read_lines
 from rig.timers.moments import TICK_HZ
-from rig.timers.timer_file import read_ways
+from rig.timers.timer_file import read_file
 from tests.examples import examples
 from tests.timers.test_edges_csv import faults_of
 from tests.timers.test_edges_csv import read as read_own
@@ -38,7 +39,7 @@ def drops_of(file, channels: dict[str, int], bars: int, dark: str | None = None)
 def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
     path = tmp_path / "export.txt"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return drops_of(read_ways(path)[0], {"": 3}, bars)
+    return drops_of(read_file(TimerFile(path)), {"": 3}, bars)
 
 
 def told(drop: Drop) -> list[tuple[float, bool]]:
@@ -170,7 +171,7 @@ def test_stacked_runs_are_runs_of_their_own(tmp_path):
 def test_a_column_a_gate(tmp_path):
     path = tmp_path / "export"
     path.write_text("Photogate 1 (ms)\tPhotogate 2 (ms)\n100\t101\n110\t112\n\t115\n")
-    (drop,) = drops_of(read_ways(path)[0], {"Photogate 1": 4, "Photogate 2": 3}, 8)
+    (drop,) = drops_of(read_file(TimerFile(path)), {"Photogate 1": 4, "Photogate 2": 3}, 8)
     seen = [(edge.tick // 10**9, edge.channel) for edge in drop.edges]
     assert seen == [(100, 4), (101, 3), (110, 4), (112, 3), (115, 3)]
 
@@ -226,8 +227,7 @@ def _row(times, separator=","):
 def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, passed):
     path = tmp_path / "table.csv"
     path.write_text(text, "utf-8")
-    parts = read_ways(path)[0].parts
-    run = sorted((event for part in parts for event in part.events), key=lambda event: event.line)
+    run = sorted(read_file(TimerFile(path)).events, key=lambda event: event.line)
     origin = min(one.tick for one in run) - round(FALL[0] * TICK_HZ)  # of a date it is far away
     found = {}
     for one in run:
@@ -244,7 +244,7 @@ def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, t
     "$timescale 1 us $end\n$var wire 1 ! D0 $end\n$enddefinitions $end\n"
     "#0 0!\n#1 1!\n#2 0!\n#3 1!\n"])  # fmt: skip
 def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
-    monkeypatch.setattr(events, "MAX_EVENTS", 2)
+    monkeypatch.setattr(signals, "MAX_EVENTS", 2)
     assert faults(tmp_path, content)
 
 
@@ -258,5 +258,5 @@ def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
 def test_a_number_that_may_be_cut_off_is_said(tmp_path, end, is_said):
     path = tmp_path / "export.txt"
     path.write_text(f"Time (s)\n0.251234\n0.262345\n0.473456\n{end}", "utf-8")
-    notes = {note.code for note in read_ways(path)[0].notes}
+    notes = {note.code for note in read_file(TimerFile(path)).notes}
     assert ("last_line_cut" in notes) is is_said
