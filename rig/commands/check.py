@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Describe a protocol, or what any protocol may say."""
     if arguments.protocol is None:
         from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol
 
         print_data(schema(), [page().rstrip()], as_json=arguments.schema)
-        return 0
+        return
     protocol = reader.read(arguments.protocol)
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
@@ -34,7 +34,6 @@ def main(arguments: Namespace) -> int:
 
         write_figure(Path(arguments.output), mounting_figure(protocol, check_gates(protocol)))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
-    return 0
 
 
 def _trials(protocol: Protocol) -> list[str]:

@@ -19,7 +19,7 @@ from rig.results.together import TogetherResults, results_together
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Compare sessions with the first of them."""
     together = read_together(arguments)
     lines = difference_lines(together)
@@ -30,7 +30,6 @@ def main(arguments: Namespace) -> int:
         else:
             write_figure(Path(arguments.output), draw_comparison(together))
         say(f"comparison: {arguments.output}")
-    return 0
 
 
 def analyze_together(arguments: Namespace) -> int:

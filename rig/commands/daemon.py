@@ -52,7 +52,7 @@ class StderrHandler(logging.Handler):
                 os.write(2, f"{line}\n".encode())  # past Python's buffer and its lock
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Own a port and serve clients, in the foreground, until a signal or the idle time ends it."""
     require_sockets()
     check_url(arguments.port)
@@ -78,4 +78,3 @@ def main(arguments: Namespace) -> int:
         asyncio.run(server.run(ready))
     logging.shutdown()  # the last lines go out
     say("rig daemon: ended")
-    return 0

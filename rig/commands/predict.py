@@ -23,16 +23,15 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
         _write_figure(arguments.figure, arguments.output)
-        return 0
+        return
     protocol = reader.read(arguments.protocol)
     lines = predictions(protocol)
     data = {"predictions": [line.json() for line in lines]}
     print_data(data, _write_table(protocol, lines), as_json=arguments.json)
-    return 0
 
 
 def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]:

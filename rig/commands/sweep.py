@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Compute a sweep and write it to a file."""
     output = Path(arguments.output)
     if output.suffix in ENDINGS:  # found out now, not after a long computation
@@ -38,7 +38,6 @@ def main(arguments: Namespace) -> int:
         swept = _compute(layout, arguments.jobs, arguments.cluster)
         _write(output, protocol, layout, swept)
     say(f"{output}: {_summary(swept)}")
-    return 0
 
 
 def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:

@@ -18,7 +18,7 @@ from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Show the session, and carry it out."""
     options = _options(arguments)
     keys = read_keys(Path(arguments.keys) if arguments.keys else None)
@@ -29,7 +29,6 @@ def main(arguments: Namespace) -> int:
         )
     # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
     asyncio.run(_show(RigApp(options, keys, loaded=gc.freeze)))
-    return 0
 
 
 async def _show(app: RigApp) -> None:
