@@ -90,17 +90,16 @@ class Voids:
 def voids_of(entries: Iterable[StateEntry]) -> Voids:
     """Go through the log of a session."""
     row: VoidRow = ()
-    held: set[Job] = set()
+    verdicts: dict[Job, str] = {}
     forgiven: set[Job] = set()
     for entry in entries:
         job = Job(entry.run, entry.attempt)
         if entry.state not in _VERDICTS or job in forgiven:
             continue
         row = after(row, job, entry.state, entry.reasons)
-        held.discard(job)
-        if entry.state == "void":
-            held.add(job)
+        verdicts[job] = entry.state
         if in_common(row):
             forgiven.update(drop.job for drop in row)
             row = ()
-    return Voids(row, frozenset(held - forgiven), frozenset(forgiven))
+    held = frozenset(job for job, verdict in verdicts.items() if verdict == "void")
+    return Voids(row, held - forgiven, frozenset(forgiven))
