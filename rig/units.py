@@ -103,9 +103,7 @@ _PLAIN = re.compile(
     rf"(?P<value>{_NUMBER}){_LAST_DIGITS}\s*(?P<unit>{_UNIT})?\s*"
     rf"(?:{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*(?P<u_unit>{_UNIT})?)?"
 )
-_BRACKETED = re.compile(
-    rf"\(\s*(?P<value>{_NUMBER})\s*{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*\)\s*(?P<unit>{_UNIT})?"
-)
+_BRACKETED = re.compile(rf"\(\s*({_NUMBER})\s*({_PLUS_MINUS})\s*({_NUMBER})\s*\)(.*)")
 _DECIMAL_COMMA = re.compile(r"([0-9]),([0-9])")
 _LONGEST = 100
 _LARGEST_EXPONENT = 400  # beyond any float, and small enough to expand into a fraction
@@ -147,19 +145,19 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     clean = " ".join(text.split()).replace("−", "-")
     if len(clean) > _LONGEST:
         raise UnitError(f"found a text of {len(clean)} characters; {accepted_form}")
-    match = _BRACKETED.fullmatch(clean) or _PLAIN.fullmatch(clean)
+    match = _match(clean)
     if match is None:
         pointed = _DECIMAL_COMMA.sub(r"\1.\2", clean)
-        if pointed != clean and (_BRACKETED.fullmatch(pointed) or _PLAIN.fullmatch(pointed)):
+        if _match(pointed) is not None:
             accepted_form = f"write a decimal point, not a comma: {pointed}"
         raise UnitError(f"found {quote(text)}; {accepted_form}")
     parts = match.groupdict()
-    unit, u_unit = parts["unit"], parts.get("u_unit")
-    if parts["u"] is not None and match.re is _PLAIN:
+    unit, u_unit = parts["unit"], parts["u_unit"]
+    if parts["u"] is not None:
         unit, u_unit = _shared_unit(clean, unit, u_unit)
     factor = _factor(unit, dimension, clean)
-    value = _scale(parts["value"], factor / int(parts.get("per") or 1), clean)
-    if parts.get("last"):
+    value = _scale(parts["value"], factor / int(parts["per"] or 1), clean)
+    if parts["last"]:
         if parts["u"] is not None:
             raise UnitError(f"found {quote(text)} with two uncertainties; {accepted_form}")
         digits = Decimal(parts["value"]).as_tuple().exponent
@@ -170,6 +168,11 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     if u < 0:
         raise UnitError(f"found {quote(text)}; an uncertainty is at least 0")
     return Quantity(value, u)
+
+
+def _match(text: str) -> re.Match[str] | None:
+    """Match a quantity; a unit behind brackets is of both numbers in them."""
+    return _PLAIN.fullmatch(_BRACKETED.sub(r"\1 \4 \2 \3 \4", text))
 
 
 def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str | None, str | None]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import re
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from rig.boards import GATES
@@ -51,11 +51,11 @@ def _place(names: str, text: str) -> str:
         A file could not be written there.
     """
     name, *others = names.split(",")
-    endings = os.path.splitext(name)[1], *others  # noqa: PTH122 - pathlib takes 5 ms
-    if text.endswith("/") or os.path.isdir(text):  # noqa: PTH112
-        text = os.path.join(text, name)  # noqa: PTH118
-    elif not os.path.splitext(text)[1]:  # noqa: PTH122
-        text = text if os.path.exists(text) else text + endings[0]  # noqa: PTH110
+    endings, place = (Path(name).suffix, *others), Path(text)
+    if text.endswith("/") or place.is_dir():
+        text = str(place / name)
+    elif not place.suffix:
+        text = text if place.exists() else text + endings[0]
     elif not text.endswith(endings):
         raise argparse.ArgumentTypeError(f"found '{text}'; accepted endings: {', '.join(endings)}")
     check_place(text)
