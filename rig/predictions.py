@@ -135,18 +135,16 @@ def group_notes(lines: Sequence[PredictedIncline]) -> list[str]:
 def _free_fall(protocol: Protocol) -> PredictedIncline:
     """Predict the fall of a chain that strikes nothing."""
     ((name, rods),) = protocol.chains.items()
-    drop, gravity, start = (
-        value.value for value in (protocol.drop, protocol.gravity, protocol.initial_speed)
-    )
+    length = protocol.drop.value + rods.chain.length
+    start, gravity = protocol.initial_speed.value, protocol.gravity.value
     if protocol.drag is None:
         from rig.model.fall import free_leg  # noqa: PLC0415 - all that this scene needs
 
-        speed, time = free_leg(drop + rods.chain.length, start, gravity)
+        speed, time = free_leg(length, start, gravity)
     else:
         from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
 
-        kappa = air_of(protocol, name)[0]
-        speed, time = drag_leg(drop + rods.chain.length, start, gravity, kappa)
+        speed, time = drag_leg(length, start, gravity, air_of(protocol, name)[0])
     scene = "free fall" if protocol.track is None else "track"
     return PredictedIncline(
         incline_deg=0.0,

@@ -88,10 +88,8 @@ UNITS: dict[str, tuple[Dimension, Fraction]] = {
 """What each unit measures, and what it is in base units."""
 # The micro sign and the Greek letter look alike and both come off keyboards.
 _SPELLINGS = str.maketrans({"μ": "µ", "²": "^2", "³": "^3", "°": "deg"})
-_ALIASES = {
-    "um": "µm", "us": "µs", "m/s2": "m/s^2", "cm/s2": "cm/s^2", "ft/s2": "ft/s^2",
-    "kg/m3": "kg/m^3", "g/cm3": "g/cm^3",
-}  # fmt: skip
+_ALIASES = {"um": "µm", "us": "µs"}
+_POWER = re.compile(r"(?<=[a-z])(?=[23]$)")  # m/s2
 _RELATIVE = ("%", "ppm")
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -191,7 +189,7 @@ def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str |
 def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
     """Return what one `unit` is in base units, if it measures `dimension`."""
     name = "".join((unit or "1").split()).translate(_SPELLINGS).replace("**", "^")
-    name = _ALIASES.get(name, name)
+    name = _ALIASES.get(name, _POWER.sub("^", name))
     accepted = f"{dimension.noun} is written in {', '.join(dimension.factors)}"
     if name not in UNITS:
         import difflib  # noqa: PLC0415 - only a mistake needs it

@@ -355,10 +355,9 @@ def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
 
 
 def _stop(flow: Flow) -> Outcome:
-    if flow.stage in BEFORE_RELEASE:
-        why_safe = "the release is off" if flow.stage is Stage.TESTING else "nothing fell"
-        return flow.to(flow.home, f"stopped: {why_safe}"), (Stop(),)
-    return flow, (Stop(),)
+    why_safe = "the release is off" if flow.stage is Stage.TESTING else "nothing fell"
+    is_early = flow.stage in BEFORE_RELEASE
+    return flow.to(flow.home, f"stopped: {why_safe}") if is_early else flow, (Stop(),)
 
 
 def _lost(flow: Flow, trouble: str) -> Outcome:

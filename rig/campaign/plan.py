@@ -41,7 +41,7 @@ class RunLine(NamedTuple):
 
 def plan_lines(planned: Iterable[Run], log: Iterable[StateEntry]) -> list[RunLine]:
     """Say where each planned run stands by the log of a session."""
-    last = {entry.run: (entry.attempt, str(entry.state), entry.reasons) for entry in log}
+    last = {entry.run: (entry.attempt, entry.state, entry.reasons) for entry in log}
     return [
         RunLine(run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ()))
         for run in planned

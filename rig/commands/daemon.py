@@ -8,7 +8,7 @@ import os
 import queue
 import threading
 from argparse import Namespace
-from contextlib import ExitStack, closing, suppress
+from contextlib import closing, nullcontext, suppress
 from pathlib import Path
 
 from rig.board.process import BoardProcess
@@ -60,21 +60,14 @@ def main(arguments: Namespace) -> None:
 
     def ready() -> None:
         say(f"rig daemon: {arguments.port} at {path}")
-        for board in boards:
+        if board:
             say(f"rig daemon: page to look on, {board.words}")
 
     logging.basicConfig(handlers=[StderrHandler()], level="INFO", format="%(message)s")
-    with ExitStack() as stack:
-        boards = [
-            stack.enter_context(closing(BoardProcess(*place)))
-            for place in filter(None, [arguments.board])
-        ]
-        server = Server(
-            arguments.port,
-            path,
-            idle_s=arguments.idle_timeout,
-            onlookers=[board.follow for board in boards],
-        )
+    page = closing(BoardProcess(*arguments.board)) if arguments.board else nullcontext()
+    with page as board:
+        onlookers = [board.follow] if board else []
+        server = Server(arguments.port, path, idle_s=arguments.idle_timeout, onlookers=onlookers)
         asyncio.run(server.run(ready))
     logging.shutdown()  # the last lines go out
     say("rig daemon: ended")

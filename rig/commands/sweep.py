@@ -28,11 +28,10 @@ if TYPE_CHECKING:
 def main(arguments: Namespace) -> None:
     """Compute a sweep and write it to a file."""
     output = Path(arguments.output)
-    if output.suffix in ENDINGS:  # found out now, not after a long computation
-        import_module("matplotlib")
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
-    if output.suffix in ENDINGS:
+    if output.suffix in ENDINGS:  # found out now, not after a long computation
+        import_module("matplotlib")
         _check_drawable(layout)
     with goes_on("nothing was written"):
         swept = _compute(layout, arguments.jobs, arguments.cluster)
