@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
@@ -32,7 +31,7 @@ def main(arguments: Namespace) -> None:
         from rig.report.canvas import write_figure  # noqa: PLC0415 - matplotlib, only here
         from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
 
-        write_figure(Path(arguments.output), mounting_figure(protocol, check_gates(protocol)))
+        write_figure(arguments.output, mounting_figure(protocol, check_gates(protocol)))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
 
 

@@ -9,7 +9,6 @@ import queue
 import threading
 from argparse import Namespace
 from contextlib import closing, nullcontext, suppress
-from pathlib import Path
 
 from rig.board.process import BoardProcess
 from rig.commands.output import say
@@ -56,7 +55,7 @@ def main(arguments: Namespace) -> None:
     """Own a port and serve clients, in the foreground, until a signal or the idle time ends it."""
     require_sockets()
     check_url(arguments.port)
-    path = Path(arguments.socket).absolute() if arguments.socket else default_socket()
+    path = (arguments.socket or default_socket()).absolute()
 
     def ready() -> None:
         say(f"rig daemon: {arguments.port} at {path}")

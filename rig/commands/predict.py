@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ from rig.text_table import csv_text
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable
+    from pathlib import Path
 
     from rig.measurands import Measurand
     from rig.model.prediction import PredictedIncline
@@ -61,12 +61,11 @@ def _value(line: PredictedIncline, row: Measurand) -> SimpleNamespace:
     return SimpleNamespace(value=getattr(line, row.name), expanded=u and COVERAGE_95 * u)
 
 
-def _write_figure(number: int, output: str) -> None:
+def _write_figure(number: int, path: Path) -> None:
     """Write a figure of the paper, and its numbers as CSV beside it."""
     from rig.report.canvas import write_figure  # noqa: PLC0415 - it needs matplotlib
     from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
 
-    path = Path(output)
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
     drawing, columns = paper_figure(number)
     rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))

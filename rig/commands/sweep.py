@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Namespace) -> None:
     """Compute a sweep and write it to a file."""
-    output = Path(arguments.output)
+    output: Path = arguments.output
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
     if output.suffix in ENDINGS:  # found out now, not after a long computation

@@ -21,7 +21,7 @@ from rig.tui.keys import read_keys
 def main(arguments: Namespace) -> None:
     """Show the session, and carry it out."""
     options = _options(arguments)
-    keys = read_keys(Path(arguments.keys) if arguments.keys else None)
+    keys = read_keys(arguments.keys)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise InputError(
             "rig tui needs a terminal",
@@ -68,7 +68,7 @@ def _options(arguments: Namespace) -> Options:
         port=arguments.port or "",
         session=Path(arguments.session or fresh),
         seed=arguments.seed,
-        socket=Path(arguments.socket).absolute() if arguments.socket else None,
+        socket=arguments.socket and arguments.socket.absolute(),
         offline=offline,
         bell=arguments.bell,
         ascii=arguments.ascii or ascii_only(os.environ),

@@ -58,8 +58,9 @@ class StateFeed:
 
     def state(self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...]) -> None:
         """Take a line of the log of run states."""
-        why = reasons_json(reasons, Reason.record)
-        self._published.run(run, attempt=attempt, state=str(state), **why)
+        self._published.run(
+            run, attempt=attempt, state=str(state), **reasons_json(reasons, Reason.record)
+        )
         label = wire.pack_label(run, attempt)
         if state is RunState.ARMED:
             self._label, self._gates = label, 0

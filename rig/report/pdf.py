@@ -25,13 +25,14 @@ except OSError as error:
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from rig.report.figure import Chart
 
 _DRAWN = re.compile(r'(?<=<figure class="fig">).*?(?=<figcaption>)', re.DOTALL)
 
 
-def write_pdf(path: str, html: str, figures: Sequence[Chart]) -> None:
+def write_pdf(path: Path, html: str, figures: Sequence[Chart]) -> None:
     """Write a page as PDF, with figures as in their files, and attachments.
 
     Parameters
