@@ -28,13 +28,12 @@ def predictions(protocol: Protocol) -> list[PredictedIncline]:
     """
     if protocol.surface is None:
         return [_free_fall(protocol)]
-    lines = []
-    for incline in dict.fromkeys(protocol.plan.inclines):
-        for struck in protocol.strikers:
-            model = predict_incline(protocol, incline, struck)
-            chain = struck if protocol.unlike_chains else None
-            lines.append(replace(model, impact_chain=chain))
-    return lines
+    inclines, unlike = dict.fromkeys(protocol.plan.inclines), protocol.unlike_chains
+    return [
+        replace(predict_incline(protocol, at, struck), impact_chain=struck if unlike else None)
+        for at in inclines
+        for struck in protocol.strikers
+    ]
 
 
 def predict_incline(protocol: Protocol, incline_deg: float, struck: str) -> PredictedIncline:

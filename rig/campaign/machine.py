@@ -355,9 +355,10 @@ def _noteless(reasons: tuple[Reason, ...]) -> tuple[Reason, ...]:
 
 
 def _stop(flow: Flow) -> Outcome:
-    why_safe = "the release is off" if flow.stage is Stage.TESTING else "nothing fell"
-    is_early = flow.stage in BEFORE_RELEASE
-    return flow.to(flow.home, f"stopped: {why_safe}") if is_early else flow, (Stop(),)
+    if flow.stage in BEFORE_RELEASE:
+        why_safe = "the release is off" if flow.stage is Stage.TESTING else "nothing fell"
+        flow = flow.to(flow.home, f"stopped: {why_safe}")
+    return flow, (Stop(),)
 
 
 def _lost(flow: Flow, trouble: str) -> Outcome:
