@@ -47,7 +47,7 @@ def loop() -> str:
     """
     protocol = read(ROOT / "protocols/inclined-uniform.yaml")
     chain, drop, gravity = protocol.chains["A"].chain, protocol.drop.value, protocol.gravity.value
-    model = predict_incline(protocol, INCLINE_DEG, "A", "B")
+    model = predict_incline(protocol, INCLINE_DEG, "A")
     assert model.alpha is not None
     assert model.gamma is not None
     gains = np.array(kicks(chain, [model.alpha] * chain.rods, model.gamma))

@@ -55,5 +55,3 @@ UNO = Capabilities("Arduino Uno", 12, 2, 0.5, 191, streams=True)
 PICO = Capabilities("Raspberry Pi Pico", 16, 2, 0.5, 16384, streams=False)
 BOARDS = {"pico": PICO, "mega": MEGA, "uno": UNO}
 """By the word for them at the command line."""
-FLASHED = {**BOARDS, "nano-old": UNO}
-"""By the word for them where they are flashed: to all else an old Nano is an Uno."""

@@ -92,7 +92,7 @@ def _carry_out(words: list[str], struck: list[object]) -> int:
 
     command = import_module(f"rig.commands.{arguments.module}")
     with ctrl_c_goes_to(strike):
-        code: int = command.main(arguments)
+        code: int = command.main(arguments) or 0
         sys.stdout.flush()
     return code
 

@@ -163,13 +163,8 @@ class RecordedSession:
             raise SessionError(
                 f"run {run}, attempt {drop.attempt}: {drop.damage}", "see rig recover SESSION"
             )
-        ticks, channels, blocked = zip(*drop.edges, strict=True) if drop.edges else ((), (), ())
-        hz = calibration(self._file).scale(drop).hz
-        return Edges(
-            np.array(ticks, dtype=np.float64) / hz,
-            np.array(channels, dtype=np.int64),
-            np.array(blocked, dtype=np.bool_),
-        )
+        ticks, channels, blocked = np.array(drop.edges, np.int64).reshape(-1, 3).T
+        return Edges(ticks / calibration(self._file).scale(drop).hz, channels, blocked != 0)
 
     def close(self) -> None:
         """Let go of the file."""

@@ -108,11 +108,6 @@ def averaged() -> Iterator[Measurand]:
     return (row for row in MEASURANDS.values() if row.averaged)
 
 
-def listed() -> Iterator[Measurand]:
-    """Yield those in the list of runs."""
-    return (row for row in MEASURANDS.values() if row.listed)
-
-
 def told() -> Iterator[Measurand]:
     """Yield those that one line on a drop names."""
     return (row for row in MEASURANDS.values() if row.told)

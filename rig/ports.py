@@ -57,10 +57,16 @@ def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: 
                 "leave the seed out to continue it, or give a new session file",
             )
         settings = earlier | settings
-    settings.setdefault("protocol", str(protocol.resolve()))
-    settings.setdefault("truth", str(truth_file(session)))
-    settings.setdefault("seed", "0")
-    return _join_url(parts, settings)
+    places = {"protocol": str(protocol.resolve()), "truth": str(truth_file(session))}
+    return add_settings(_join_url(parts, settings), **places, seed="0")
+
+
+def add_settings(url: str, **settings: str) -> str:
+    """Add those settings to a simulation's URL that it lacks; a real port comes back as it is."""
+    if not is_simulated(url):
+        return url
+    before = read_settings(url)
+    return _join_url(_split(url), before | {n: settings[n] for n in settings if n not in before})
 
 
 def check_name(url: str) -> None:

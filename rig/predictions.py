@@ -28,31 +28,23 @@ def predictions(protocol: Protocol) -> list[PredictedIncline]:
     """
     if protocol.surface is None:
         return [_free_fall(protocol)]
-    lines = []
-    for incline in dict.fromkeys(protocol.plan.inclines):
-        for struck in protocol.strikers:
-            model = predict_incline(protocol, incline, struck, beside(protocol, struck))
-            chain = struck if protocol.unlike_chains else None
-            lines.append(replace(model, impact_chain=chain))
-    return lines
+    inclines, unlike = dict.fromkeys(protocol.plan.inclines), protocol.unlike_chains
+    return [
+        replace(predict_incline(protocol, at, struck), impact_chain=struck if unlike else None)
+        for at in inclines
+        for struck in protocol.strikers
+    ]
 
 
-def beside(protocol: Protocol, struck: str) -> str | None:
-    """Name the chain that falls freely beside the one that strikes."""
-    return next((name for name in protocol.chains if name != struck), None)
-
-
-def predict_incline(
-    protocol: Protocol, incline_deg: float, struck: str, free: str | None = None
-) -> PredictedIncline:
+def predict_incline(protocol: Protocol, incline_deg: float, struck: str) -> PredictedIncline:
     """Predict the fall of a chain that strikes a surface, beside one that does not.
 
     Parameters
     ----------
     protocol
         With a surface.
-    struck, free
-        Names of the chains; without a second one Δz is from a twin of the first.
+    struck
+        Name of the chain; where there is no other one, Δz is from its twin.
     """
     from rig.model.predict import predict  # noqa: PLC0415 - only where something is struck
 
@@ -67,6 +59,7 @@ def predict_incline(
         kappas=kappas,
         drag_u=drag_u,
     )
+    free = next((name for name in protocol.chains if name != struck), None)
     if free is None or model.separation_m is None or model.fall_time_s is None:
         return model
     # Top rods of unlike chains start at unlike heights.
@@ -80,7 +73,7 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     if run.impact is None:
         row = GRAVITY if protocol.track is None else ACCELERATION
         return {row.name: protocol.gravity}
-    model = predict_incline(protocol, run.incline_deg, run.impact, run.free)
+    model = predict_incline(protocol, run.incline_deg, run.impact)
     rows = (SEPARATION, SPEED, FALL_TIME) if run.free is not None else (SPEED, FALL_TIME)
     return {
         row.name: Quantity(value, getattr(model, row.key("u")) or 0.0)
@@ -141,18 +134,16 @@ def group_notes(lines: Sequence[PredictedIncline]) -> list[str]:
 def _free_fall(protocol: Protocol) -> PredictedIncline:
     """Predict the fall of a chain that strikes nothing."""
     ((name, rods),) = protocol.chains.items()
-    drop, gravity, start = (
-        value.value for value in (protocol.drop, protocol.gravity, protocol.initial_speed)
-    )
+    length = protocol.drop.value + rods.chain.length
+    start, gravity = protocol.initial_speed.value, protocol.gravity.value
     if protocol.drag is None:
         from rig.model.fall import free_leg  # noqa: PLC0415 - all that this scene needs
 
-        speed, time = free_leg(drop + rods.chain.length, start, gravity)
+        speed, time = free_leg(length, start, gravity)
     else:
         from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
 
-        kappa = air_of(protocol, name)[0]
-        speed, time = drag_leg(drop + rods.chain.length, start, gravity, kappa)
+        speed, time = drag_leg(length, start, gravity, air_of(protocol, name)[0])
     scene = "free fall" if protocol.track is None else "track"
     return PredictedIncline(
         incline_deg=0.0,

@@ -131,16 +131,14 @@ def notes_in(reasons: Iterable[Reason]) -> list[str]:
     return [reason.values["text"] for reason in reasons if reason.code == NOTE]
 
 
-def reasons_json(reasons: Sequence[Reason]) -> dict[str, list[Any]]:
-    """Return reasons as JSON has them: ``reasons`` for people, ``reason_codes`` for programs."""
-    texts = [reason.text for reason in reasons]
-    return {"reasons": texts, "reason_codes": [reason.json() for reason in reasons]}
+def reasons_json(
+    reasons: Sequence[Reason], write: Callable[[Reason], dict[str, Any]] = Reason.json
+) -> dict[str, list[Any]]:
+    """Return reasons as JSON has them: ``reasons`` for people, ``reason_codes`` for programs.
 
-
-def published_reasons(reasons: Iterable[Reason]) -> dict[str, list[Any]]:
-    """Return reasons as a daemon publishes them; `read_record` takes each of ``reason_codes``."""
-    records = [reason.record() for reason in reasons]
-    return {"reasons": [record["text"] for record in records], "reason_codes": records}
+    A daemon publishes `Reason.record` of each, for `read_record`.
+    """
+    return {"reasons": [reason.text for reason in reasons], "reason_codes": [*map(write, reasons)]}
 
 
 def remedies(reasons: Iterable[Reason]) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.campaign import machine
 from rig.campaign.machine import Effect, Event, Flow, Stage, step
-from rig.campaign.plan import RunLine, describe_setup, next_job, rest_s
+from rig.campaign.plan import describe_setup, job_to_judge, next_job, plan_lines, rest_s
 from rig.campaign.voids import voids_of
 from rig.daemon.connecting import connect
 from rig.errors import DeviceError
@@ -19,7 +19,6 @@ from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.recorder.interrupts import Interrupts
-from rig.records import Drop, Job
 from rig.report.numbers import plus_minus, signed
 from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from rig.analysis.result import DropResult
     from rig.daemon.client import Client
     from rig.protocol.protocol import Protocol
+    from rig.records import Drop, Job
 
 
 _FALL = (machine.FireRelease, machine.Collect, machine.Stop)
@@ -129,15 +129,9 @@ class Campaign:
         self.session = rig.session
         self.operator = operator
         self.interrupts = interrupts
-        self.plan = runs(protocol)
-        voids = voids_of(self.session.states())
-        self._forgiven = voids.forgiven
-        self.flow = Flow(
-            Stage.DEVICE, countdown_s=0.0, attended=operator.ask is not None, row=voids.row
-        )
-        self._left = deque(self.plan)  # runs that are not done yet
-        self._unjudged: deque[Job] = deque()
-        self._effects: deque[Effect] = deque()
+        self.plan = {run.number: run for run in runs(protocol)}
+        attended, row = operator.ask is not None, voids_of(self.session.states()).row
+        self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=attended, row=row)
         self.live = LiveAnalysis(self.session.path)
         self._clock_u: float | None = None
         self._drop: Drop | None = None  # collected last
@@ -152,13 +146,10 @@ class Campaign:
         DeviceError
             The device is in trouble, or refuses what nobody there can help.
         """
-        for run in self.plan:
-            entry = self.session.latest_state(run.number)
-            if entry is not None and entry.state is RunState.RECORDED:
-                self._unjudged.append(Job(run.number, entry.attempt))
         while self.flow.stage not in {Stage.DONE, Stage.HALTED}:
-            self._take(self._next())
-            self._carry_out()
+            effects = deque(self._take(self._next()))
+            while effects:
+                effects += self._take(self._carry_out(effects.popleft()))
         if self.flow.stage is Stage.HALTED:
             why, _, hint = self.flow.trouble.partition("\n")
             self.operator.say(f"stopped: {why}\n  hint: {hint} (the same command continues)")
@@ -167,28 +158,16 @@ class Campaign:
         """Say what the operator would: at each stage where the campaign waits for one."""
         if self.flow.stage is Stage.COUNTDOWN:
             return machine.Tick(0.0)
-        if self._unjudged and self.flow.stage is not Stage.RESULT:
-            return machine.Found(self._unjudged.popleft())
-        job = self._unjudged[0] if self._unjudged else self._next_job()
+        log = self.session.states()
+        lines = plan_lines(self.plan.values(), log)
+        unjudged = job_to_judge(lines)
+        if unjudged is not None and self.flow.stage is not Stage.RESULT:
+            return machine.Found(unjudged)
+        job = unjudged or next_job(lines, voids_of(log).counts())
         if self.flow.stage is not Stage.PREPARE or job is None:
             return machine.GoOn(job)
         self._request(job)
         return machine.GoOn(job, self._rest_s())
-
-    def _next_job(self) -> Job | None:
-        """Name the next attempt; runs before it are done for good."""
-        while self._left:
-            run = self._left[0]
-            entries = self.session.states(run.number)
-            line = RunLine(run.number, run.incline_deg, run.impact, run.free)
-            if entries:
-                line = line._replace(attempt=entries[-1].attempt, state=entries[-1].state)
-            void = {Job(*entry[:2]) for entry in entries if entry.state is RunState.VOID}
-            job = next_job([line], {run.number: len(void - self._forgiven)})
-            if job is not None:
-                return job
-            self._left.popleft()
-        return None
 
     def _request(self, job: Job) -> None:
         """Ask the operator to prepare the drop, or to remove what prevents it."""
@@ -199,7 +178,7 @@ class Campaign:
         if self.operator.ask is None:
             return
         again = f", attempt {job.attempt}" if job.attempt > 1 else ""
-        request = f"run {job.run} of {len(self.plan)}{again}: {describe_setup(self._left[0])}"
+        request = f"run {job.run} of {len(self.plan)}{again}: {describe_setup(self.plan[job.run])}"
         with self.interrupts.let_through():
             self.operator.ask(f"not armed: {trouble}" if trouble and not unfired else request)
 
@@ -212,40 +191,27 @@ class Campaign:
 
     # ------------------------------------------------------------------ effects
 
-    def _take(self, event: Event) -> None:
-        self.flow, wanted = step(self.flow, event)
-        self._effects += wanted
+    def _take(self, event: Event | None) -> tuple[Effect, ...]:
+        """Tell the plan what came of an effect, if anything, and return what it wants now."""
+        if event is None:
+            return ()
+        self.flow, effects = step(self.flow, event)
+        return effects
 
-    def _carry_out(self) -> None:
-        """Carry out what is wanted, and what comes of that, until nothing is."""
-        while self._effects:
-            match self._effects[0]:
-                case machine.FireRelease():
-                    self._fall()
-                case machine.GiveUp():
-                    assert self._failed is not None
-                    raise self._failed
-                case effect:
-                    self._effects.popleft()
-                    self._do(effect)
+    def _carry_out(self, effect: Effect) -> Event | None:
+        """Carry one effect out, and return what came of it.
 
-    def _fall(self) -> None:
-        """Let go, and stay until the drop is recorded: preparing it took minutes."""
-        try:
-            while self._effects and isinstance(self._effects[0], _FALL):
-                self._do(self._effects.popleft())
-        except KeyboardInterrupt:
-            self._stop("interrupted by the operator")
-            raise
-
-    def _do(self, effect: Effect) -> None:
-        """Carry one effect out and tell the plan what came of it."""
+        Once the release is fired this stays until the drop is recorded: preparing it took minutes.
+        """
         token = None
         try:
             match effect:
                 case machine.Stop(reason):
                     self._stop(reason)
-                    return
+                    return None
+                case machine.GiveUp():
+                    assert self._failed is not None
+                    raise self._failed
                 case machine.Wait(seconds):
                     self.rig.wait(seconds)
                 case machine.ArmRelease(job):
@@ -255,24 +221,28 @@ class Campaign:
                 case machine.Collect(job):
                     self._drop = self.rig.collect(*job)
                 case machine.Judge(job):
-                    self._judge(job)
-                    return
+                    return self._judge(job)
                 case machine.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
                     self.operator.say(narration(self._result, len(self.plan)))
         except DeviceRefusedError as refusal:
+            if refusal is self._failed:
+                raise
             self._failed = refusal
-            self._take(machine.effect_failure(self.flow.ticket, refusal))
-        else:
-            self._take(machine.EffectDone(self.flow.ticket, token))
+            return machine.effect_failure(self.flow.ticket, refusal)
+        except KeyboardInterrupt:
+            if isinstance(effect, _FALL):
+                self._stop("interrupted by the operator")
+            raise
+        return machine.EffectDone(self.flow.ticket, token)
 
-    def _judge(self, job: Job) -> None:
+    def _judge(self, job: Job) -> Event:
         if self._drop is None or job != self._drop.job:
             self._drop = self.rig.collect(*job)
         with self.interrupts.let_through():
             result = self._result = self.live.judge(self.session, self._drop)
-        self._take(machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons))
+        return machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons)
 
     def _stop(self, why: str) -> None:
         with suppress(DeviceError):

@@ -88,10 +88,8 @@ UNITS: dict[str, tuple[Dimension, Fraction]] = {
 """What each unit measures, and what it is in base units."""
 # The micro sign and the Greek letter look alike and both come off keyboards.
 _SPELLINGS = str.maketrans({"μ": "µ", "²": "^2", "³": "^3", "°": "deg"})
-_ALIASES = {
-    "um": "µm", "us": "µs", "m/s2": "m/s^2", "cm/s2": "cm/s^2", "ft/s2": "ft/s^2",
-    "kg/m3": "kg/m^3", "g/cm3": "g/cm^3",
-}  # fmt: skip
+_ALIASES = {"um": "µm", "us": "µs"}
+_POWER = re.compile(r"(?<=[a-z])(?=[23]$)")  # m/s2
 _RELATIVE = ("%", "ppm")
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -103,9 +101,7 @@ _PLAIN = re.compile(
     rf"(?P<value>{_NUMBER}){_LAST_DIGITS}\s*(?P<unit>{_UNIT})?\s*"
     rf"(?:{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*(?P<u_unit>{_UNIT})?)?"
 )
-_BRACKETED = re.compile(
-    rf"\(\s*(?P<value>{_NUMBER})\s*{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*\)\s*(?P<unit>{_UNIT})?"
-)
+_BRACKETED = re.compile(rf"\(\s*({_NUMBER})\s*({_PLUS_MINUS})\s*({_NUMBER})\s*\)(.*)")
 _DECIMAL_COMMA = re.compile(r"([0-9]),([0-9])")
 _LONGEST = 100
 _LARGEST_EXPONENT = 400  # beyond any float, and small enough to expand into a fraction
@@ -147,19 +143,19 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     clean = " ".join(text.split()).replace("−", "-")
     if len(clean) > _LONGEST:
         raise UnitError(f"found a text of {len(clean)} characters; {accepted_form}")
-    match = _BRACKETED.fullmatch(clean) or _PLAIN.fullmatch(clean)
+    match = _match(clean)
     if match is None:
         pointed = _DECIMAL_COMMA.sub(r"\1.\2", clean)
-        if pointed != clean and (_BRACKETED.fullmatch(pointed) or _PLAIN.fullmatch(pointed)):
+        if _match(pointed) is not None:
             accepted_form = f"write a decimal point, not a comma: {pointed}"
         raise UnitError(f"found {quote(text)}; {accepted_form}")
     parts = match.groupdict()
-    unit, u_unit = parts["unit"], parts.get("u_unit")
-    if parts["u"] is not None and match.re is _PLAIN:
+    unit, u_unit = parts["unit"], parts["u_unit"]
+    if parts["u"] is not None:
         unit, u_unit = _shared_unit(clean, unit, u_unit)
     factor = _factor(unit, dimension, clean)
-    value = _scale(parts["value"], factor / int(parts.get("per") or 1), clean)
-    if parts.get("last"):
+    value = _scale(parts["value"], factor / int(parts["per"] or 1), clean)
+    if parts["last"]:
         if parts["u"] is not None:
             raise UnitError(f"found {quote(text)} with two uncertainties; {accepted_form}")
         digits = Decimal(parts["value"]).as_tuple().exponent
@@ -170,6 +166,11 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     if u < 0:
         raise UnitError(f"found {quote(text)}; an uncertainty is at least 0")
     return Quantity(value, u)
+
+
+def _match(text: str) -> re.Match[str] | None:
+    """Match a quantity; a unit behind brackets is of both numbers in them."""
+    return _PLAIN.fullmatch(_BRACKETED.sub(r"\1 \4 \2 \3 \4", text))
 
 
 def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str | None, str | None]:
@@ -188,7 +189,7 @@ def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str |
 def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
     """Return what one `unit` is in base units, if it measures `dimension`."""
     name = "".join((unit or "1").split()).translate(_SPELLINGS).replace("**", "^")
-    name = _ALIASES.get(name, name)
+    name = _ALIASES.get(name, _POWER.sub("^", name))
     accepted = f"{dimension.noun} is written in {', '.join(dimension.factors)}"
     if name not in UNITS:
         import difflib  # noqa: PLC0415 - only a mistake needs it

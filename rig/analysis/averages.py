@@ -25,7 +25,7 @@ def mean(runs: Sequence[Measured]) -> Measured:
     average = combine([runs], [1.0])
     if len(runs) > 1:
         return average
-    return replace(runs[0], budget=average.budget, shared=None, deviation=None)
+    return replace(runs[0], budget=average.budget, deviation=None)
 
 
 def combine(
@@ -65,10 +65,11 @@ def combine(
         chi2 += float(np.sum((values - values.mean()) ** 2)) / single
         common.append(weight * (shared.mean(axis=0) if joint else np.sqrt(parts.mean())))
     freedom = max(1.0, len(runs) - len(groups))
-    foretold, share = math.sqrt(own), float(np.linalg.norm(sum(common) if joint else common))
+    vector = sum(common) if joint else None
+    foretold, share = math.sqrt(own), float(np.linalg.norm(common if vector is None else vector))
     seen, freedom = scatter or (foretold * math.sqrt(chi2 / freedom), freedom)
     single, degrees_alone = max(foretold, seen), min(max(1.0, run.degrees) for run in runs)
     u = math.hypot(single, share)
     fourth = single**4 / (freedom if seen > foretold else degrees_alone) + share**4 / degrees_alone
     degrees = u**4 / fourth if fourth > 0.0 else math.inf
-    return Measured(value, u, degrees, {"runs": single, "common": share})
+    return Measured(value, u, degrees, {"runs": single, "common": share}, vector)

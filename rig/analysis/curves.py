@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.distributions import coverage_factor
 from rig.measurands import SEPARATION, SPEED
-from rig.predictions import beside, predict_incline
+from rig.predictions import predict_incline
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
@@ -37,7 +37,7 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
         edge = surface.pile.below_deg
         points |= {edge, float(np.nextafter(edge, 0.0))}
     predictions = [
-        (struck, predict_incline(protocol, incline, struck, beside(protocol, struck)))
+        (struck, predict_incline(protocol, incline, struck))
         for struck in protocol.strikers
         for incline in sorted(points)
     ]

@@ -73,13 +73,6 @@ class _Answers(BaseHTTPRequestHandler):
     timeout = _PATIENCE_S
     protocol_version = default_request_version = "HTTP/1.1"
 
-    def handle_one_request(self) -> None:
-        """Answer, unless the browser has gone."""
-        try:
-            super().handle_one_request()
-        except OSError:
-            self.close_connection = True
-
     def parse_request(self) -> bool:
         """Refuse whatever is no wish to read; what comes behind a body is not read."""
         if not super().parse_request():

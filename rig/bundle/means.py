@@ -6,9 +6,6 @@ import math
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rig.analysis.summary import good_cases
 from rig.text_table import csv_text
 
 if TYPE_CHECKING:
@@ -25,15 +22,13 @@ def mean_tables(protocol: Protocol, analysis: Analysis) -> dict[str, str]:
     """
     means: list[dict[str, object]] = []
     shared = {}
-    cases = good_cases(protocol, analysis.runs) if analysis.summary else []  # none while blind
-    for line, drops in zip(analysis.summary, cases, strict=True):
+    for line in analysis.summary:
         at = line.condition.json() if protocol.surface is not None else {}
         for name, mean in line.means.items():
             degrees = mean.degrees if math.isfinite(mean.degrees) else "INF"
             means.append({**at, "n": line.n, "quantity": name, **mean.json(), "degrees": degrees})
-            vectors = [drop.quantities[name].shared for drop in drops]
-            if all(vector is not None for vector in vectors):
-                shared[line.condition, name] = np.mean(np.array(vectors, float), axis=0)
+            if mean.shared is not None:
+                shared[line.condition, name] = mean.shared
     covariances: list[dict[str, object]] = [
         {
             **first.json(),

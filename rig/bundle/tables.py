@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
 _EDGES = "edges.csv"
-_ROWS_OF = {"states.csv": "run_state", "pings.csv": "ping", _EDGES: "edge"}
+_ROWS_OF = {"states.csv: ": "run_state", "pings.csv: ": "ping", "edges.csv: ": "edge"}
 """Whose raw records a file has, for the meaning of its columns."""
 
 
@@ -36,8 +36,7 @@ def _read_columns(measurands: tuple[Measurand, ...]) -> tuple[dict[str, str], di
         meanings[row.name] = row.meaning
         meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
         meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
-    raw = [(f"{file}: ", _ROWS_OF[file]) for file in _ROWS_OF]
-    for head, table in [*raw, ("", "run_state")]:
+    for head, table in [*_ROWS_OF.items(), ("", "run_state")]:
         for column in TABLES[table].columns:
             meanings.setdefault(head + column.name, column.meaning)
     return {name: unit for name, unit in rows.items() if name.startswith("_")}, meanings
@@ -107,7 +106,8 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
         runs = [{**run, "superseded": 0} for run in runs]
         runs += [{**row(run), "superseded": 1} for run in superseded]
         runs.sort(key=lambda run: (run.get("run", 0), run.get("attempt", 0)))
-    tables = {
+    gates = [{**names(run), **flatten(gate)} for run in latest for gate in run.get("gates", ())]
+    return {
         "runs": runs,
         "summary": [row(line) for line in analysis.get("summary", [])],
         "budget": [
@@ -115,11 +115,8 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
             for run in (*latest, *superseded)
             for line in run.get("budget", [])
         ],
-        "gates": [
-            {**names(run), **flatten(gate)} for run in latest for gate in run.get("gates", ())
-        ],
+        **({"gates": gates} if gates else {}),
     }
-    return tables if tables["gates"] else {n: rows for n, rows in tables.items() if n != "gates"}
 
 
 def column_unit(column: str) -> str:

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-_ARRAY, _LIST, _MAPPING, _TUPLE = "array", "list", "mapping", "tuple"
+_ARRAY, _MAPPING = "array", "mapping"
+_SEQUENCES = {"list": list, "tuple": tuple}
 _SCALARS = (type(None), bool, int, float, str)
 
 
@@ -47,7 +48,7 @@ def from_text(text: str) -> Any:
         raise ValueError(f"no kept result: {error}") from error
 
 
-def _plain(value: object) -> object:
+def _plain(value: Any) -> object:
     if type(value) in _SCALARS:
         return value
     if isinstance(value, np.generic):
@@ -56,9 +57,9 @@ def _plain(value: object) -> object:
         return [_ARRAY, value.dtype.str, value.shape, base64.b64encode(value.tobytes()).decode()]
     if isinstance(value, Mapping):
         return [_MAPPING, [*map(_plain, value)], [*map(_plain, value.values())]]
-    if type(value) is list or type(value) is tuple:
-        return [_LIST if type(value) is list else _TUPLE, *map(_plain, value)]
-    kind: type = type(value)
+    kind: Any = type(value)
+    if kind in _SEQUENCES.values():
+        return [kind.__name__, *map(_plain, value)]
     parts = (_plain(getattr(value, name)) for name in _fields(kind))
     return [f"{kind.__module__}:{kind.__qualname__}", *parts]
 
@@ -74,8 +75,8 @@ def _record(value: Any) -> Any:
         keys, values = parts
         return dict(zip(map(_record, keys), map(_record, values), strict=True))
     records = [_record(part) if type(part) is list else part for part in parts]
-    if kind in {_LIST, _TUPLE}:
-        return records if kind == _LIST else tuple(records)
+    if kind in _SEQUENCES:
+        return _SEQUENCES[kind](records)
     record_type = _class(kind)
     return record_type(**dict(zip(_fields(record_type), records, strict=True)))
 

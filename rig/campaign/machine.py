@@ -104,10 +104,8 @@ class EffectFailure(NamedTuple):
 
 def effect_failure(ticket: int, error: RigError) -> EffectFailure:
     """Make the event of an error."""
-    trouble = f"{error.message}\n{error.hint}"
-    if isinstance(error, DeviceRefusedError):
-        return EffectFailure(ticket, trouble, error.reason, error.detail)
-    return EffectFailure(ticket, trouble)
+    own = (error.reason, error.detail) if isinstance(error, DeviceRefusedError) else ()
+    return EffectFailure(ticket, f"{error.message}\n{error.hint}", *own)
 
 
 class Tick(NamedTuple):
@@ -359,13 +357,12 @@ def _stop(flow: Flow) -> Outcome:
 
 
 def _lost(flow: Flow, trouble: str) -> Outcome:
-    if flow.stage in BEFORE_RELEASE:
-        # Where it is only late, it must not go on with what was armed.
-        return flow.to(flow.home, trouble), (Stop(trouble.partition("\n")[0]),)
-    if flow.stage in {Stage.LIVE, Stage.JUDGING}:
-        # A chain that fell is recorded by the daemon, and found when it is back.
-        return flow.to(flow.home, trouble), ()
-    return flow, ()
+    if flow.stage not in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
+        return flow, ()
+    # Where the daemon is only late, it must not go on with what was armed. A chain that fell is
+    # recorded by it, and found when it is back.
+    stop = (Stop(trouble.partition("\n")[0]),) if flow.stage in BEFORE_RELEASE else ()
+    return flow.to(flow.home, trouble), stop
 
 
 def _take_answer(flow: Flow, token: int | None) -> Outcome:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from rig.records import Job
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from rig.protocol.protocol import Run
     from rig.reasons import Reason
+    from rig.session.reading import StateEntry
 
 ATTEMPTS = 3
 """How often a void run is made before it stays void."""
@@ -32,6 +33,20 @@ class RunLine(NamedTuple):
     state: str = "planned"
     reasons: tuple[Reason, ...] = ()
 
+    @property
+    def again(self) -> Job:
+        """Another attempt, whatever became of the latest one."""
+        return Job(self.run, self.attempt + 1)
+
+
+def plan_lines(planned: Iterable[Run], log: Iterable[StateEntry]) -> list[RunLine]:
+    """Say where each planned run stands by the log of a session."""
+    last = {entry.run: (entry.attempt, entry.state, entry.reasons) for entry in log}
+    return [
+        RunLine(run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ()))
+        for run in planned
+    ]
+
 
 def next_job(runs: Iterable[RunLine], voids: Mapping[int, int]) -> Job | None:
     """Name the next attempt of the plan; `None` when it is done.
@@ -43,7 +58,7 @@ def next_job(runs: Iterable[RunLine], voids: Mapping[int, int]) -> Job | None:
     voids
         How many attempts at each run were void, as from `rig.campaign.voids.Voids.counts`.
     """
-    return next((_again(line) for line in runs if not done(line, voids.get(line.run, 0))), None)
+    return next((line.again for line in runs if not done(line, voids.get(line.run, 0))), None)
 
 
 def done(line: RunLine, voids: int) -> bool:
@@ -51,18 +66,9 @@ def done(line: RunLine, voids: int) -> bool:
     return line.state in SETTLED or voids >= ATTEMPTS
 
 
-def again(runs: Sequence[RunLine], run: int) -> Job | None:
-    """Name another attempt at a run, whatever became of it; `None` when it is not planned."""
-    return next((_again(line) for line in runs if line.run == run), None)
-
-
 def job_to_judge(runs: Iterable[RunLine]) -> Job | None:
     """Name a drop that was recorded and never judged."""
     return next((Job(line.run, line.attempt) for line in runs if line.state == "recorded"), None)
-
-
-def _again(line: RunLine) -> Job:
-    return Job(line.run, line.attempt + 1)
 
 
 def rest_s(settle_s: float, clock_u: float | None) -> float:

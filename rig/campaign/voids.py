@@ -32,8 +32,7 @@ VoidRow = tuple[Void, ...]
 
 def after(row: VoidRow, job: Job, verdict: str, reasons: tuple[Reason, ...]) -> VoidRow:
     """Take one more verdict; a second one of the same drop replaces the first."""
-    if row and row[-1].job == job:
-        row = row[:-1]
+    row = tuple(void for void in row if void.job != job)
     if verdict == "void":
         return (*row, Void(job, reasons))[-MANY:]
     return row if verdict == "rejected" else ()
@@ -86,17 +85,15 @@ class Voids(NamedTuple):
 def voids_of(entries: Iterable[StateEntry]) -> Voids:
     """Go through the log of a session."""
     row: VoidRow = ()
-    held: set[Job] = set()
+    verdicts: dict[Job, str] = {}
     forgiven: set[Job] = set()
     for entry in entries:
         job = Job(entry.run, entry.attempt)
-        if entry.state not in _VERDICTS or job in forgiven:
-            continue
-        row = after(row, job, entry.state, entry.reasons)
-        held.discard(job)
-        if entry.state == "void":
-            held.add(job)
+        if entry.state in _VERDICTS and job not in forgiven:
+            row = after(row, job, entry.state, entry.reasons)
+            verdicts[job] = entry.state
         if in_common(row):
             forgiven.update(drop.job for drop in row)
             row = ()
-    return Voids(row, frozenset(held - forgiven), frozenset(forgiven))
+    held = frozenset(job for job, verdict in verdicts.items() if verdict == "void")
+    return Voids(row, held - forgiven, frozenset(forgiven))

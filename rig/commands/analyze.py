@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.video import VideoFall, video_fall
 from rig.cache.entry import recall
 from rig.commands.output import print_results, progress, show
-from rig.measurands import acceleration_in
-from rig.report.numbers import plus_minus
+from rig.measurands import ACCELERATION, acceleration_in
+from rig.report.numbers import with_unit
 from rig.report.parts import scatter_parts, tables
 from rig.results import SessionResults, complete_analysis, results
 from rig.session.store import Session
@@ -37,9 +37,10 @@ def main(arguments: Namespace) -> int:
         members: dict[str, Any] = {}
         if arguments.priors:
             members["prior_sensitivity"] = _sensitivity(session, outcome, fresh=arguments.fresh)
-    video = None if track is None else video_fall(*track)
-    if video is not None and not outcome.blind:
-        members["video"] = video.json(_by_gates(outcome))
+    video = None if track is None or outcome.blind else video_fall(*track)
+    gates = _by_gates(outcome)
+    if video is not None:
+        members["video"] = video.json(gates)
     code = print_results(outcome, as_json=arguments.json, **members)
     if not arguments.json:
         summary = outcome.analysis.summary
@@ -49,8 +50,8 @@ def main(arguments: Namespace) -> int:
         asked += tables("effects", outcome.analysis.effects)
         for part in asked:
             show(["", part.heading, *part.table])
-        if video is not None and "video" in members:
-            show(["", *_video_lines(video, _by_gates(outcome))])
+        if video is not None:
+            show(["", *_video_lines(video, gates)])
     return code
 
 
@@ -74,17 +75,14 @@ def _by_gates(outcome: SessionResults) -> Measured | None:
 
 
 def _video_lines(video: VideoFall, gates: Measured | None) -> Iterator[str]:
-    yield f"acceleration by {video.frames} frames of a video: {_write(video.acceleration)}"
+    acceleration = with_unit(video.acceleration, ACCELERATION)
+    yield f"acceleration by {video.frames} frames of a video: {acceleration}"
     if gates is not None:
         error = video.beside(gates)
         word = (
             "they agree" if abs(error) <= 1.0 else "they disagree: the video's scale, or its frames"
         )
-        yield f"by the gates: {_write(gates)}; Eₙ {error:+.2f}, {word}"
+        yield f"by the gates: {with_unit(gates, ACCELERATION)}; Eₙ {error:+.2f}, {word}"
     if video.bent:
         yield "the frames follow no parabola: cut those before the release and after the end"
     yield "± is what the frames' scatter allows, without how well the video's lengths are scaled"
-
-
-def _write(value: Measured) -> str:
-    return f"{plus_minus(value, 1.0, 3)} m/s²"

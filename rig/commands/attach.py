@@ -14,7 +14,7 @@ LARGEST = 1 << 25
 """Bytes; half of what a value of a session file may have."""
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Add a file to a session, for its report."""
     path = arguments.file
     try:
@@ -26,4 +26,3 @@ def main(arguments: Namespace) -> int:
     with Session.open(arguments.session) as session:
         session.attach(Path(path).name, data)
     print(f"attached to {arguments.session}: {path}, {len(data)} bytes")
-    return 0

@@ -73,10 +73,8 @@ class Study:
             "points": [point._asdict() for point in self.points],
             "left_out": self.left_out,
         }
-        lines, rows = (
-            [*(table or self.table()), "", *self.remarks()],
-            [point.row() for point in self.points],
-        )
+        lines = [*(table or self.table()), "", *self.remarks()]
+        rows = [point.row() for point in self.points]
         picture = "" if table else choice_figure(choices)
         return Findings(record, lines, head, rows, picture, pictures)
 

@@ -22,7 +22,6 @@ from rig.session.store import Session
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from rig.analysis.monte_carlo import TrialStats
     from rig.analysis.result import Measured
     from rig.measurands import Measurand
     from rig.session.reading import Reader
@@ -82,17 +81,12 @@ def budget(
     }
     if trials is None:
         return account
-    quantities = {
-        name: _compare_trials(single.quantities[name], sample, trials)
-        for name, sample in monte_carlo.monte_carlo(fit, trials, seed).items()
-    }
+    quantities = {}
+    for name, sample in monte_carlo.monte_carlo(fit, trials, seed).items():
+        measured = single.quantities[name]
+        agreement = monte_carlo.agreement(measured.value, measured.u, sample, trials)
+        quantities[name] = sample._asdict() | agreement
     return account | {"monte_carlo": {"trials": trials, "seed": seed, "quantities": quantities}}
-
-
-def _compare_trials(measured: Measured, sample: TrialStats, trials: int) -> dict[str, Any]:
-    """Write what trials gave, and how far it agrees with a measured value."""
-    agreement = monte_carlo.agreement(measured.value, measured.u, sample, trials)
-    return sample._asdict() | agreement
 
 
 def _lines(measured: Measured) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.boards import BOARDS
@@ -18,13 +17,13 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Describe a protocol, or what any protocol may say."""
     if arguments.protocol is None:
         from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol
 
         print_data(schema(), [page().rstrip()], as_json=arguments.schema)
-        return 0
+        return
     protocol = reader.read(arguments.protocol)
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
@@ -32,9 +31,8 @@ def main(arguments: Namespace) -> int:
         from rig.report.canvas import write_figure  # noqa: PLC0415 - matplotlib, only here
         from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
 
-        write_figure(Path(arguments.output), mounting_figure(protocol, check_gates(protocol)))
+        write_figure(arguments.output, mounting_figure(protocol, check_gates(protocol)))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
-    return 0
 
 
 def _trials(protocol: Protocol) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from argparse import Namespace
 from contextlib import ExitStack
-from pathlib import Path
 
 from rig.commands.output import VOID, print_data, progress, say
 from rig.files import write_atomic
@@ -19,18 +18,17 @@ from rig.results.together import TogetherResults, results_together
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Compare sessions with the first of them."""
     together = read_together(arguments)
     lines = difference_lines(together)
     print_data(together.comparison_json(), lines, as_json=arguments.json)
     if arguments.output is not None:
-        if arguments.output.endswith((".html", ".htm")):
+        if arguments.output.suffix in {".html", ".htm"}:
             write_atomic(arguments.output, comparison_page(together))
         else:
-            write_figure(Path(arguments.output), draw_comparison(together))
+            write_figure(arguments.output, draw_comparison(together))
         say(f"comparison: {arguments.output}")
-    return 0
 
 
 def analyze_together(arguments: Namespace) -> int:

@@ -8,8 +8,7 @@ import os
 import queue
 import threading
 from argparse import Namespace
-from contextlib import ExitStack, closing, suppress
-from pathlib import Path
+from contextlib import closing, nullcontext, suppress
 
 from rig.board.process import BoardProcess
 from rig.commands.output import say
@@ -52,30 +51,22 @@ class StderrHandler(logging.Handler):
                 os.write(2, f"{line}\n".encode())  # past Python's buffer and its lock
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Own a port and serve clients, in the foreground, until a signal or the idle time ends it."""
     require_sockets()
     check_url(arguments.port)
-    path = Path(arguments.socket).absolute() if arguments.socket else default_socket()
+    path = (arguments.socket or default_socket()).absolute()
 
     def ready() -> None:
         say(f"rig daemon: {arguments.port} at {path}")
-        for board in boards:
+        if board:
             say(f"rig daemon: page to look on, {board.words}")
 
     logging.basicConfig(handlers=[StderrHandler()], level="INFO", format="%(message)s")
-    with ExitStack() as stack:
-        boards = [
-            stack.enter_context(closing(BoardProcess(*place)))
-            for place in filter(None, [arguments.board])
-        ]
-        server = Server(
-            arguments.port,
-            path,
-            idle_s=arguments.idle_timeout,
-            onlookers=[board.follow for board in boards],
-        )
+    page = closing(BoardProcess(*arguments.board)) if arguments.board else nullcontext()
+    with page as board:
+        onlookers = [board.follow] if board else []
+        server = Server(arguments.port, path, idle_s=arguments.idle_timeout, onlookers=onlookers)
         asyncio.run(server.run(ready))
     logging.shutdown()  # the last lines go out
     say("rig daemon: ended")
-    return 0

@@ -14,14 +14,13 @@ from rig.analysis.result import GOOD
 from rig.commands import report
 from rig.commands.output import exit_code, goes_on, say
 from rig.files import make_folder, write_atomic
-from rig.measurands import averaged
+from rig.measurands import MEASURANDS
 from rig.ports import truth_file
 from rig.protocol.plan import runs
 from rig.protocol.reader import parse
 from rig.ready import ready_protocol
-from rig.report.numbers import fixed, plus_minus
+from rig.report.columns import table_parts
 from rig.runner import Operator, run_protocol
-from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -75,26 +74,19 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
     """
     lines = map(json.loads, truth_file(session).read_text("utf-8").splitlines())
     truths = {(truth["run"], truth["attempt"]): truth for truth in lines}
-    rows: list[dict[str, str]] = []
-    agreements: list[bool] = []
-    for result in sorted(analysis.runs, key=lambda result: result.run.incline_deg):
-        true = truths.get((result.run.number, result.attempt))
-        if true is None or result.verdict not in GOOD:
-            continue
-        cells = {"incline (°)": f"{result.run.incline_deg:g}"}
-        for row in averaged():
-            value, hidden = result.quantities.get(row.name), true.get(row.name)
-            if value is not None and hidden is not None:
-                cells[f"{row.symbol} ± U ({row.unit})"] = plus_minus(value, row.scale, row.decimals)
-                cells[f"true {row.symbol}"] = fixed(hidden * row.scale, row.decimals)
-                agreements.append(abs(value.value - hidden) <= value.expanded)
-        rows.append(cells)
-    if not rows:
-        return ["no good drop to compare with the truth"]
-    headings = max(rows, key=len)
-    table = [[cells.get(heading, "") for heading in headings] for cells in rows]
+    drops = [
+        (result, truths[result.run.number, result.attempt])
+        for result in sorted(analysis.runs, key=lambda result: result.run.incline_deg)
+        if result.verdict in GOOD and (result.run.number, result.attempt) in truths
+    ]
+    agreements = [
+        abs(value.value - truth[name]) <= value.expanded
+        for result, truth in drops
+        for name, value in result.quantities.items()
+        if MEASURANDS[name].averaged and name in truth
+    ]
     return [
-        *text_table([[*headings], *table], rule=True),
+        *(row for part in table_parts("truth", drops) for row in part.table),
         f"{sum(agreements)} of {len(agreements)} results agree with the hidden truth "
         "within ± U (95 % expected)",
     ]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 SPACING_M = 0.01
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Predict the uncertainties of a layout, and search for a better layout."""
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
@@ -55,7 +55,6 @@ def main(arguments: Namespace) -> int:
             write_atomic(arguments.output, rewrite_heights(proposed))
             say(f"protocol: {arguments.output}")
     print_data(layouts, design_lines(layouts), as_json=arguments.json)
-    return 0
 
 
 def _read_scatter(path: str, protocol: Protocol) -> Components:

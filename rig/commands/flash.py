@@ -12,7 +12,7 @@ from rig.reasons import make_error
 
 
 @goes_on("the firmware may be incomplete; run the same command again")
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Flash a board and say what it is now."""
     board, avrdude, drive = arguments.board, arguments.avrdude, arguments.drive
     if TARGETS[board] is DRIVE and avrdude is not None:
@@ -25,4 +25,3 @@ def main(arguments: Namespace) -> int:
         f"id {identity.unique_id.hex()}: flashed and verified"
     )
     say(f"this firmware was {UNSEEN}")
-    return 0

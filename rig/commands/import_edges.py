@@ -41,8 +41,8 @@ _MOST = 120
 """Drops that are compared at most, evenly over a long session."""
 
 
-def main(arguments: Namespace) -> int:
-    """Make a session from a file, or say how it would be read; returns the exit code."""
+def main(arguments: Namespace) -> None:
+    """Make a session from a file, or say how it would be read."""
     protocol = reader.read(arguments.protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
     imported = import_with_protocol(protocol, arguments)
@@ -52,7 +52,7 @@ def main(arguments: Namespace) -> int:
         say(note.text)
     if arguments.dry_run:
         print("\n".join([*imported.lines, *_describe_drops(drops)]))
-        return 0
+        return
     if arguments.session is None:
         raise refusal("--session", "no_session_file")
     timer: dict[str, object] = {"source": "imported edges", "file": events}
@@ -72,7 +72,6 @@ def main(arguments: Namespace) -> int:
             session.add_state(drop.run, drop.attempt, RunState.RECORDED, now_ns)
     counted = f"{len(drops)} run{'s' if len(drops) > 1 else ''}"
     say(f"{sum(len(drop.edges) for drop in drops)} edges of {counted} → {arguments.session}")
-    return 0
 
 
 def import_with_protocol(protocol: Protocol, arguments: Namespace) -> Import:

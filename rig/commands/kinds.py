@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import re
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from rig.boards import GATES
@@ -40,7 +40,7 @@ def _accept(
     return {"type": convert}
 
 
-def _place(names: str, text: str) -> str:
+def _place(names: str, text: str) -> Path:
     """Read a file's place: in a folder it has the first name, else its ending or another one.
 
     What ends otherwise is of another kind, such as a protocol that a page would replace.
@@ -51,18 +51,18 @@ def _place(names: str, text: str) -> str:
         A file could not be written there.
     """
     name, *others = names.split(",")
-    endings = os.path.splitext(name)[1], *others  # noqa: PTH122 - pathlib takes 5 ms
-    if text.endswith("/") or os.path.isdir(text):  # noqa: PTH112
-        text = os.path.join(text, name)  # noqa: PTH118
-    elif not os.path.splitext(text)[1]:  # noqa: PTH122
-        text = text if os.path.exists(text) else text + endings[0]  # noqa: PTH110
+    endings, place = (Path(name).suffix, *others), Path(text)
+    if text.endswith("/") or place.is_dir():
+        place /= name
+    elif not place.suffix:
+        place = place if place.exists() else Path(text + endings[0])
     elif not text.endswith(endings):
         raise argparse.ArgumentTypeError(f"found '{text}'; accepted endings: {', '.join(endings)}")
-    check_place(text)
-    return text
+    check_place(place)
+    return place
 
 
-def _new_place(names: str, text: str) -> str:
+def _new_place(names: str, text: str) -> Path:
     """Read a place as `_place` does where no file is yet: people wrote what it would replace."""
     place = _place(names, text)
     check_new(place)
@@ -75,9 +75,9 @@ def _quantity(text: str, dimension: str) -> float:
     return float(units.parse(text, units.Dimension[dimension]).value)
 
 
-def _socket(name: str) -> str:
+def _socket(name: str) -> Any:
     """Return the socket of the daemon of a rig, by the rig's name."""
-    return str(import_module("rig.daemon.socket_path").default_socket(_NAME["type"](name)))
+    return import_module("rig.daemon.socket_path").default_socket(_NAME["type"](name))
 
 
 _NAME = _accept("letters, digits, - and _", str, re.compile(r"(?a:[\w-]{1,40})").fullmatch)
@@ -119,5 +119,6 @@ KINDS: dict[str, dict[str, Any]] = {
     "trials": _accept("a whole number from 2", int, lambda trials: trials >= 2),
     "file": {"type": _place},
     "new": {"type": _new_place},
+    "path": {"type": Path},
     "formats": {"action": _ListFormats, "nargs": 0},
 }

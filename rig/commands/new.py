@@ -37,7 +37,7 @@ _CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
 
 def main(arguments: Namespace) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
-    path = Path(arguments.output)
+    path: Path = arguments.output
     places = {word: path.with_name(f"{path.stem}-{word}.svg") for word in ("mounting", "wiring")}
     for place in places.values():
         check_new(place)

@@ -11,7 +11,7 @@ from rig.session.store import Session
 from rig.wordings import NOTE
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Add a note to a recorded run; its verdict stays."""
     with Session.open(arguments.session) as session:
         last = session.latest_state(arguments.run)
@@ -23,4 +23,3 @@ def main(arguments: Namespace) -> int:
         # The host's clock may have begun anew since the drop: the entry keeps the drop's time.
         session.add_state(last.run, last.attempt, last.state, last.host_ns, reasons)
     print(f"noted to run {last.run}, attempt {last.attempt}: {arguments.text}")
-    return 0

@@ -17,7 +17,7 @@ from rig.reasons import make_reason
 from rig.usb.listing import SerialPort, serial_ports
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """List the ports, and ask who is there where that is wanted."""
     ports = serial_ports()
     chosen = arguments.identify
@@ -28,7 +28,7 @@ def main(arguments: Namespace) -> int:
     records = [_describe(port, ask=port.path in (chosen or ())) for port in ports]
     print_data({"ports": records}, map(_line, records), as_json=arguments.json)
     if arguments.json:
-        return 0
+        return
     ids = Counter(record["identity"]["unique_id"] for record in records if record["identity"])
     for shared in (number for number, count in ids.items() if count > 1):
         say(f"several boards have the id {shared}: erase the EEPROM of all but one board")
@@ -38,7 +38,6 @@ def main(arguments: Namespace) -> int:
         say(f"{make_reason('pico_unmounted').text}: rig flash --board pico")
     if not any(port.candidate for port in ports):
         say("no board found: check its plug, and use a USB cable with data wires")
-    return 0
 
 
 def _describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:

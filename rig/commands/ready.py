@@ -11,16 +11,15 @@ from rig.ready import ready_protocol, ready_protocols
 from rig.text_table import text_table
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """List the ready protocols, or copy one into this folder."""
     if arguments.name is None:
         rows = [[name, reader.read(path).title] for name, path in ready_protocols().items()]
         print("\n".join(text_table(rows, left={0, 1})))
         say("try one: rig run NAME --port sim:// --session my.session; copy one: rig ready NAME")
-        return 0
+        return
     copy = f"{arguments.name}.yaml"
     text = ready_protocol(arguments.name).read_text("utf-8")
     check_new(copy)
     write_atomic(copy, text)
     say(f"protocol: {copy}")
-    return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from pathlib import Path
 
 from rig.commands.output import goes_on, print_results
 from rig.report.finding import finding
@@ -20,14 +19,8 @@ def main(arguments: Namespace) -> int:
     attended = not arguments.yes and sys.stdin.isatty()
     operator = Operator(say, _ask if attended else None)
     with goes_on("the same command continues the session"):
-        outcome = run_protocol(
-            arguments.protocol,
-            arguments.port,
-            arguments.session,
-            operator,
-            arguments.seed,
-            arguments.socket and Path(arguments.socket),
-        )
+        places = arguments.protocol, arguments.port, arguments.session
+        outcome = run_protocol(*places, operator, arguments.seed, arguments.socket)
         code = print_results(outcome, as_json=arguments.json)
     say(f"session: {arguments.session}")
     say(f"{sentence('counted', outcome.analysis)}." if outcome.blind else finding(outcome.analysis))

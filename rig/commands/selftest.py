@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from argparse import Namespace
 from contextlib import closing, nullcontext
 from pathlib import Path
-from urllib.parse import quote
 
 from rig.commands.output import print_findings, say
 from rig.errors import DeviceError
 from rig.link.port import open_port, port_clock
-from rig.ports import is_simulated, read_settings
+from rig.ports import add_settings
 from rig.protocol import reader
 from rig.selftest.board import SelftestOptions
 from rig.selftest.run import selftest
@@ -21,9 +19,7 @@ def main(arguments: Namespace) -> int:
     """Make all checks, and say what to do about those that failed."""
     gates, url = arguments.gates, arguments.port
     if arguments.protocol is not None:
-        if is_simulated(url) and "protocol" not in read_settings(url):
-            scene = quote(os.fsencode(Path(arguments.protocol).resolve()))
-            url += f"{'&' if '?' in url else '?'}protocol={scene}"
+        url = add_settings(url, protocol=str(Path(arguments.protocol).resolve()))
         protocol = reader.read(arguments.protocol)
         gates = (gates or 0) | (protocol.gates.mask if protocol.gates else 0)
     release = arguments.release or arguments.judge is not None

@@ -14,7 +14,7 @@ from rig.ready import find_resource
 from rig.usb.listing import sole_port
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Write the user's systemd unit that keeps a daemon running at the board's port."""
     rig, port = arguments.name, _lasting_name(arguments.port or sole_port())
     template = "chainrig@.service" if rig else "chainrig.service"
@@ -33,7 +33,6 @@ def main(arguments: Namespace) -> int:
     if "://" not in port and not Path(port).exists():
         say(f"nothing is at {port} now: plug the board in, or name another port; see rig ports")
     say(f"start it: systemctl --user daemon-reload && systemctl --user enable --now {service}")
-    return 0
 
 
 def _lasting_name(port: str) -> str:

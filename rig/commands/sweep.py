@@ -25,20 +25,18 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Compute a sweep and write it to a file."""
-    output = Path(arguments.output)
-    if output.suffix in ENDINGS:  # found out now, not after a long computation
-        import_module("matplotlib")
+    output: Path = arguments.output
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
-    if output.suffix in ENDINGS:
+    if output.suffix in ENDINGS:  # found out now, not after a long computation
+        import_module("matplotlib")
         _check_drawable(layout)
     with goes_on("nothing was written"):
         swept = _compute(layout, arguments.jobs, arguments.cluster)
         _write(output, protocol, layout, swept)
     say(f"{output}: {_summary(swept)}")
-    return 0
 
 
 def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:

@@ -18,10 +18,10 @@ from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Show the session, and carry it out."""
     options = _options(arguments)
-    keys = read_keys(Path(arguments.keys) if arguments.keys else None)
+    keys = read_keys(arguments.keys)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise InputError(
             "rig tui needs a terminal",
@@ -29,7 +29,6 @@ def main(arguments: Namespace) -> int:
         )
     # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
     asyncio.run(_show(RigApp(options, keys, loaded=gc.freeze)))
-    return 0
 
 
 async def _show(app: RigApp) -> None:
@@ -69,7 +68,7 @@ def _options(arguments: Namespace) -> Options:
         port=arguments.port or "",
         session=Path(arguments.session or fresh),
         seed=arguments.seed,
-        socket=Path(arguments.socket).absolute() if arguments.socket else None,
+        socket=arguments.socket and arguments.socket.absolute(),
         offline=offline,
         bell=arguments.bell,
         ascii=arguments.ascii or ascii_only(os.environ),

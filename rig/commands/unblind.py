@@ -9,7 +9,7 @@ from rig.results import kept_back, protocol_of
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Namespace) -> None:
     """Record that a blind session's numbers may be seen from now on."""
     with Session.open(arguments.session) as session:
         if not kept_back(session, protocol_of(session)):
@@ -19,4 +19,3 @@ def main(arguments: Namespace) -> int:
             )
         session.unblind()
         print(f"unblinded at {session.unblinded}; results: rig analyze {arguments.session}")
-    return 0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Incoming, Record
-from rig.reasons import Reason, published_reasons
+from rig.reasons import Reason, reasons_json
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -58,7 +58,9 @@ class StateFeed:
 
     def state(self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...]) -> None:
         """Take a line of the log of run states."""
-        self._published.run(run, attempt=attempt, state=str(state), **published_reasons(reasons))
+        self._published.run(
+            run, attempt=attempt, state=str(state), **reasons_json(reasons, Reason.record)
+        )
         label = wire.pack_label(run, attempt)
         if state is RunState.ARMED:
             self._label, self._gates = label, 0

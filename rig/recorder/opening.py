@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
-from rig.reasons import make_error, published_reasons
+from rig.reasons import Reason, make_error, reasons_json
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def describe_session(
                 "free": run.free,
                 "attempt": entry.attempt if entry else 0,
                 "state": str(entry.state) if entry else "planned",
-                **published_reasons(entry.reasons if entry else ()),
+                **reasons_json(entry.reasons if entry else (), Reason.record),
             }
         )
     about = {

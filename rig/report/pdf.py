@@ -10,7 +10,7 @@ from io import StringIO
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
-from rig.files import replacing
+from rig.files import write_atomic
 from rig.report.canvas import figure_file
 
 try:
@@ -25,13 +25,14 @@ except OSError as error:
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from rig.report.figure import Chart
 
 _DRAWN = re.compile(r'(?<=<figure class="fig">).*?(?=<figcaption>)', re.DOTALL)
 
 
-def write_pdf(path: str, html: str, figures: Sequence[Chart]) -> None:
+def write_pdf(path: Path, html: str, figures: Sequence[Chart]) -> None:
     """Write a page as PDF, with figures as in their files, and attachments.
 
     Parameters
@@ -46,5 +47,4 @@ def write_pdf(path: str, html: str, figures: Sequence[Chart]) -> None:
         svg = base64.b64encode(figure_file(chart, "svg")).decode()
         return f'<img alt="{escape(chart.title)}" src="data:image/svg+xml;base64,{svg}">'
 
-    with replacing(path) as stream:
-        HTML(string=_DRAWN.sub(picture, html)).write_pdf(stream)
+    write_atomic(path, HTML(string=_DRAWN.sub(picture, html)).write_pdf())

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
 from rig.campaign.machine import Again, GoOn, Note, Notice, Reject, Restore, Stage, StopRequest, Try
-from rig.campaign.plan import again
 from rig.errors import RigError
 from rig.reasons import notes_in
 from rig.tui.actions import ACTIONS, help_text, shown_key
@@ -323,7 +322,7 @@ def _repeat(app: RigApp) -> None:
     """Ask, then go back to a run for another attempt."""
     model = app.model
     job = model.flow.job or model.job
-    next_run = again(model.runs, job.run) if job else None
+    next_run = model.again(job.run) if job else None
     if next_run is not None:
         title = f"Repeat run {next_run.run} (attempt {next_run.attempt})?"
         question = "This only prepares the run; nothing is armed yet."

@@ -117,8 +117,12 @@ class Model:
     def next_job(self) -> Job | None:
         """The next attempt; `None` when the plan is complete."""
         if self.flow.stage is Stage.PREPARE and self.flow.job is not None:
-            return plan.again(self.runs, self.flow.job.run)
+            return self.again(self.flow.job.run)
         return plan.next_job(self.runs, self.voids.counts(self.runs))
+
+    def again(self, run: int) -> Job | None:
+        """Return another attempt at a run; `None` if it is not planned."""
+        return next((line.again for line in self.runs if line.run == run), None)
 
     @property
     def job(self) -> Job | None:

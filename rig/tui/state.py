@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from rig.campaign.plan import RunLine
+from rig.campaign.plan import RunLine, plan_lines
 from rig.reasons import read_record
 
 if TYPE_CHECKING:
@@ -110,10 +110,6 @@ def _line(run: Mapping[str, Any]) -> RunLine:
 
 def state_of(view: SessionView) -> DaemonState:
     """Return the state that a daemon would have for a file without a writer."""
-    last = {entry.run: (entry.attempt, str(entry.state), entry.reasons) for entry in view.states}
-    runs = [
-        RunLine(run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ()))
-        for run in view.plan.values()
-    ]
+    runs = plan_lines(view.plan.values(), view.states)
     session = {"path": str(view.path), "title": view.protocol.title, "simulated": view.simulated}
     return DaemonState(0, {"session": session}, tuple(runs))

@@ -4,7 +4,6 @@ from rig.campaign.plan import (
     CLOCK_S,
     CLOCK_U,
     RunLine,
-    again,
     describe_setup,
     job_to_judge,
     next_job,
@@ -24,7 +23,7 @@ def test_runs_come_in_order_until_each_is_settled_or_void_too_often():
     assert next_job(runs, {4: 3}) == Job(5, 2)
     assert next_job(lines("accepted"), {}) is None
     assert next_job(lines("interrupted", "planned"), {}) == Job(1, 2)
-    assert again(runs, 1) == Job(1, 2)
+    assert runs[0].again == Job(1, 2)
     assert job_to_judge(lines("accepted", "recorded")) == Job(2, 1)
 
 

@@ -5,12 +5,13 @@ import shlex
 
 import pytest
 
-from rig.boards import BOARDS, FLASHED
+from rig.boards import BOARDS
 from rig.cli import BAD_INPUT, INTERRUPTED, _parser
 from rig.command_page import COMMANDS
 from rig.commands.output import VOID
 from rig.commands.replay import DIFFERENT
 from rig.errors import DeviceError, InputError, RigError
+from rig.flash.boards import TARGETS
 from tests.cli.lab import PROTOCOLS
 
 
@@ -55,7 +56,7 @@ def test_each_board_is_a_choice():
 
     assert choices("check") == list(BOARDS)
     assert choices("new") == [*BOARDS, "other"]
-    assert choices("flash") == list(FLASHED)
+    assert choices("flash") == list(TARGETS)
 
 
 def test_every_exit_code_is_listed():

@@ -83,7 +83,7 @@ def test_the_table_says_the_same(call, tmp_path):
     assert row.split()[1:3] == ["0.1551", "11.55"]
     path = tmp_path / "p.yaml"
     path.write_text(SINGULAR, "utf-8")
-    heading, first, *_ = call("predict", path).out.splitlines()
+    _, _, first, *_ = call("predict", path).out.splitlines()
     assert first.split()[:3] == ["5", "–", "–"]
 
 
@@ -149,7 +149,7 @@ def test_check_says_what_predict_notes(call, tmp_path):
     path.write_text(unlike, "utf-8")
     assert "  note: 0° A, 0° B: rods gather on a pile" in call("check", path).out
     path.write_text(short("[0 deg, 20 deg, 40 deg]"), "utf-8")
-    noted = {one.partition(": ")[2] for one in call("predict", path).out.splitlines()[5:]}
+    noted = {one.partition(": ")[2] for one in call("predict", path).out.splitlines()[6:]}
     assert noted == {note.partition("°: ")[2]}
 
 
@@ -162,7 +162,7 @@ def test_check_counts_runs_and_trial_drops(call, finished):
 def test_a_table_has_no_columns_of_what_is_not_there(call):
     fence = call("predict", PROTOCOLS / "picket-fence.yaml").out.splitlines()
     assert fence[0].split() == ["speed", "(m/s)", "t", "(s)", "model"]
-    assert len(fence) == 2
+    assert len(fence) == 3
     single = call("predict", PROTOCOLS / "single-chain.yaml").out
     assert "V ± U (m/s)" in single
     assert "Δz" not in single

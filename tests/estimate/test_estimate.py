@@ -219,7 +219,7 @@ def test_air_that_the_protocol_states_counts_once(u):
 def test_the_models_curves_end_at_the_prediction_where_rods_touch_higher_than_the_top_one(air):
     protocol = parse(BOARD_GRADED.text + air)
     (curve,) = estimate(protocol, dropped(protocol, first(1, protocol, (40.0,)))).json()["curves"]
-    expected = predict_incline(protocol, 40.0, "A", "B")
+    expected = predict_incline(protocol, 40.0, "A")
     assert curve["speed2_m2_s2_model"][-1] == pytest.approx(expected.speed_m_s**2)
     assert curve["separation_m_model"][-1] == pytest.approx(expected.separation_m, rel=1e-3)
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
-from rig.boards import FLASHED
 from rig.flash.boards import TARGETS
 from rig.link.client import Device
 from rig.link.messages import Arm, Phase
@@ -53,7 +52,7 @@ def bought(tmp_path):
 
 
 def wiring_of(board: str) -> Wiring:
-    return next(w for word, w in BOARDS.items() if FLASHED[word] is FLASHED[board])
+    return next(w for word, w in BOARDS.items() if TARGETS[word].board is TARGETS[board].board)
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,6 @@ def test_points_of_a_perfect_separation_lie_on_the_models_line(protocol, run):
     assert max(map(abs, residuals)) < 0.2
     free_fall, model, *_ = speeds.panels[0].series
     assert free_fall.y[-1] == model.y[-1] == 0.0
-    stated = predict_incline(protocol, drop.run.incline_deg, "A", "B")
+    stated = predict_incline(protocol, drop.run.incline_deg, "A")
     assert model.x[-1] == pytest.approx(stated.speed_m_s**2)
     assert free_fall.x[-1] == pytest.approx(stated.free_fall_speed_m_s**2)
