@@ -18,7 +18,6 @@ import numpy as np
 
 from rig.analysis.air import prior_air
 from rig.analysis.chain_records import WIDER
-from rig.analysis.components import above
 from rig.analysis.discrepancy import LOWEST_START
 from rig.analysis.free_flight import FAINT
 from rig.analysis.trajectory import COMMON, GRAVITY, ONE, free_trajectory, struck_trajectory
@@ -44,9 +43,8 @@ STRAYS = 2.0
 """Prior rate of stray edges at a gate, 1/s."""
 ANY_ALPHA = (-0.10, 0.60)
 """Range of the impact coefficient: energy allows 0 to ½, with a margin at both ends."""
-RELEASE, START, CLOCK, PULL, DRAG, ALPHA, GROWTH, UNKNOWNS = range(8)
-"""Columns of a fall's unknowns: release time, start height, clock rate, g, κ, α and the growth of
-the last impulses; and their number."""
+RELEASE, START, CLOCK, PULL, DRAG, ALPHA, UNKNOWNS = range(7)
+"""Columns of a fall's unknowns: release time, start height, clock rate, g, κ, α; their number."""
 PART = 6.0
 """Least spacing of two rods over σ of the first step: narrow enough to resolve neighbours."""
 _BROADER = 2.0
@@ -389,7 +387,6 @@ class SideFall:
         if record.ratios is not None:
             # Standard deviation of a uniform distribution over the range of α.
             sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
-            sd[GROWTH] = protocol.priors.strings * abs(record.alpha)
         stated, gravity = Guess.from_protocol(protocol, record), protocol.gravity.value
         return cls(record, pairing, stated, gravity, sd, sigma)
 
@@ -426,7 +423,6 @@ class SideFall:
         by = np.zeros((COMMON + 2 * rods, UNKNOWNS))
         by[[1, GRAVITY, 3], [START, PULL, DRAG]] = 1.0
         by[COMMON : COMMON + rods, ALPHA] = 1.0
-        by[COMMON : COMMON + rods, GROWTH] = above(self.record.chain.chain)[:rods] ** -2.0
         return by * self.sd
 
     def path(self, falls: Array) -> Trajectory:
@@ -436,8 +432,8 @@ class SideFall:
         kappa = self.stated.kappa + off[DRAG]
         if record.ratios is None:
             return free_trajectory(0.0, start, gravity, kappa, record.air)
-        gains = record.alpha + off[ALPHA] + off[GROWTH] * above(record.chain.chain) ** -2.0
         strikes = record.strikes
+        gains = record.alpha + off[ALPHA] + np.zeros(strikes.size)
         return struck_trajectory(
             0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air
         )

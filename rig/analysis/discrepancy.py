@@ -10,11 +10,11 @@ chain as a whole, times a function that grows in time and a function that soon b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.trajectory import struck_trajectory
+from rig.analysis.trajectory import free_trajectory, struck_trajectory
 
 if TYPE_CHECKING:
     from rig.analysis.chain_records import ChainRecord
@@ -40,19 +40,6 @@ STRETCHES = ("stretch", "usual stretch")
 """Blocks of unknowns: of a drop alone, and shared by all drops of a condition."""
 
 
-class StretchModes(NamedTuple):
-    """Distance of rods ahead of their chain by each mode, at some moments.
-
-    Attributes
-    ----------
-    way, rate
-        Distance in amplitudes, and its time derivative, 1/s; shape ``(moments, MODES)``.
-    """
-
-    way: Array
-    rate: Array
-
-
 @dataclass(frozen=True)
 class Discrepancy:
     """Model discrepancy of a striking chain, evaluated on its nominal fall.
@@ -65,7 +52,9 @@ class Discrepancy:
     nominal
         The fall by the protocol.
     stretch
-        `StretchModes.way` at each expected edge, shape ``(edges, MODES)``.
+        `stretch_modes` at each expected edge, shape ``(edges, MODES)``.
+    lead
+        Distance by which impacts bring the chain ahead of a free fall until the last, m.
     late_pull, late_way
         Gain of speed of the top rod by the whole last impulse, m/s, and the distance below the
         lowest beam, m, where no edge measures that gain.
@@ -73,6 +62,7 @@ class Discrepancy:
 
     nominal: Trajectory
     stretch: Array
+    lead: float
     late_pull: float
     late_way: float
 
@@ -88,23 +78,25 @@ class Discrepancy:
         nominal = struck_trajectory(
             0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air
         )
-        stretch = stretch_modes(nominal, edges.rods, edges.levels).way
+        stretch = stretch_modes(nominal, edges.rods, edges.levels)
+        free = free_trajectory(0.0, start, gravity, kappa, record.air)
+        lead = float((free.heights(nominal.time[-1:])[0] - nominal.height[-1:])[0])
         if nominal.hits is None or strikes.size < 2:
-            return cls(nominal, stretch, 0.0, 0.0)
+            return cls(nominal, stretch, lead, 0.0, 0.0)
         pull = abs(record.alpha) * float(nominal.hits.ratio[-2] * nominal.hits.arrival[-2])
         seeing = [train for train in record.trains if strikes.size - 1 in train.rods]
         lowest = min((protocol.gates.gates[beam.gate].height for beam in seeing), default=np.inf)
         hidden = max(0.0, min(lowest, float(strikes[-1] - strikes[-2])))
-        return cls(nominal, stretch, pull, hidden)
+        return cls(nominal, stretch, lead, pull, hidden)
 
-    def top(self, levels: Array) -> StretchModes:
+    def top(self, levels: Array) -> Array:
         """Return the modes of the top rod for levels of the reference point, m."""
         last = self.nominal.time.size - 2
         return stretch_modes(self.nominal, np.full(levels.shape, last), levels)
 
 
-def stretch_modes(nominal: Trajectory, rods: Index, levels: Array) -> StretchModes:
-    """Return the stretch modes at some rods and levels; zero for a single rod.
+def stretch_modes(nominal: Trajectory, rods: Index, levels: Array) -> Array:
+    """Return how far rods are ahead of their chain by each mode; zero for a single rod.
 
     Parameters
     ----------
@@ -114,22 +106,18 @@ def stretch_modes(nominal: Trajectory, rods: Index, levels: Array) -> StretchMod
         Rods counted from the bottom, shape ``(moments,)``.
     levels
         Levels of the reference point, m, shape ``(moments,)``.
+
+    Returns
+    -------
+    ndarray
+        In amplitudes, shape ``(moments, MODES)``.
     """
     last = nominal.time.size - 2
     if last < 1:
-        nothing = np.zeros((levels.size, MODES))
-        return StretchModes(nothing, nothing)
+        return np.zeros((levels.size, MODES))
     first, lasting = float(nominal.time[1]), float(nominal.time[-1] - nominal.time[1])
     share = np.maximum(nominal.times(levels) - first, 0.0) / lasting
-    begun = np.where(share > 0.0, 1.0, 0.0)
-    fading: Array = begun * np.exp(-_SOON * share)
     along = np.stack([size * (rods / last) ** power for power, size in _POWERS.items()], axis=1)
-
-    def product(growing: Array, staying: Array) -> Array:
-        in_time = np.stack([growing, staying], axis=1)
-        return (along[:, :, None] * in_time[:, None, :]).reshape(levels.size, MODES)
-
-    return StretchModes(
-        product(_GROWTH * share, begun - fading),
-        product(begun * _GROWTH / lasting, fading * _SOON / lasting),
-    )
+    in_time = np.stack([_GROWTH * share, -np.expm1(-_SOON * share)], axis=1)
+    modes: Array = along[:, :, None] * in_time[:, None, :]
+    return modes.reshape(levels.size, MODES)

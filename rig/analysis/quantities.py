@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from rig.arrays import Array
 
 
+_STEP = 1e-3
+"""Way over which a rod's speed along its chain is taken, m: strings act over a hundred times it."""
+
+
 class BudgetLine(NamedTuple):
     """Properties of a line of the uncertainty budget.
 
@@ -174,23 +178,28 @@ class AdjustedDrop:
         # A swinging chain turns as it falls, which lowers its top rod.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
         level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
-        highest = np.full(levels.value.shape, chain.rods - 1)
-        fall = self.model.records[role], protocol.drop.value, highest, levels.value
-        behind = slack(*fall)
-        level += self.linear(f"{role} air lag", lags(*fall)[:, None])
-        level += self.linear(f"{role} slack", behind) + self.linear(f"{role} usual slack", behind)
+        level -= self.ahead(role, levels.value)
         if role == "free":
             return level
         last: Array = levels.value < self._path(role).height[chain.rods - 1]  # falls alone
-        return level + self.linear("top") * last - self.stretch(levels.value)[0]
+        return level + self.linear("top") * last
 
-    def stretch(self, levels: Array) -> tuple[Dual, Dual]:
-        """Return the stretch of the top rod, m, and its rate, m/s, at these levels."""
+    def ahead(self, role: str, levels: Array) -> Dual:
+        """Return how far the top rod is ahead of its place in the chain at these levels, m."""
+        record, drop = self.model.records[role], self.model.protocol.drop.value
+        fall = record, drop, np.full(levels.shape, record.chain.chain.rods - 1), levels
+        behind = slack(*fall)
+        way = self.linear(f"{role} air lag", -lags(*fall)[:, None])
+        way -= self.linear(f"{role} slack", behind) + self.linear(f"{role} usual slack", behind)
+        if role == "free":
+            return way
         modes = self.model.discrepancy.top(levels)
-        ahead, faster = (
-            self.linear(STRETCHES[0], part) + self.linear(STRETCHES[1], part) for part in modes
-        )
-        return ahead, faster
+        return way + self.linear(STRETCHES[0], modes) + self.linear(STRETCHES[1], modes)
+
+    def lead(self, levels: Array, speed: Dual) -> Dual:
+        """Return the speed of the struck top rod less that of its chain at these levels, m/s."""
+        before, after = (self.ahead("impact", levels + way) for way in (0.5 * _STEP, -0.5 * _STEP))
+        return (after - before) * speed * (1.0 / _STEP)
 
     @property
     def late(self) -> Dual:
@@ -209,18 +218,17 @@ class AdjustedDrop:
 
     @cached_property
     def _arrival(self) -> tuple[Dual, Dual]:
-        """V and its time, from the path and first-order corrections for the strings.
+        """V and its time, from the path and first-order corrections.
 
-        The stretch has brought the top rod ahead by w at the rate w′: it arrives e = w/(V + w′)
-        earlier, and slower by g·e. A late pull acts over the distance below the lowest beam. Both
-        are small, and second-order terms are left out.
+        The top rod is ahead of its place by w and faster than its chain by w′: it arrives
+        e = w/(V + w′) earlier, and slower by g·e. A late pull acts over the distance below the
+        lowest beam. All are small, and second-order terms are left out.
         """
-        path = self._path("impact")
+        path, level = self._path("impact"), -self.model.records["impact"].strikes[-1:]
         speed = self._by_path("impact", path.arrival, path.slopes.arrival)
         hit = self._by_path("impact", float(path.time[-1]), path.slopes.time[-1])
-        ahead, faster = self.stretch(-self.model.records["impact"].strikes[-1:])
-        fast = speed + faster[0]
-        early = ahead[0] / fast
+        fast = speed + self.lead(level, speed)[0]
+        early = self.ahead("impact", level)[0] / fast
         speed = fast - self.gravity * early
         later = 0.5 * self.model.discrepancy.late_way * self.late / (speed * speed)
         return speed + self.late, hit - early - later

@@ -192,10 +192,14 @@ def _top_sd(side: Side) -> float:
 
 
 def _stretch_sd(side: Side) -> list[float]:
-    """Prior of each stretch mode; the other half of the variance is common to all drops."""
-    priors = side.protocol.priors
-    size = priors.stretch * math.hypot(side.record.alpha, priors.impulse_floor)
-    return [math.sqrt(0.5) * size * side.record.chain.chain.length] * MODES
+    """Prior of each stretch mode; the other half of the variance is common to all drops.
+
+    It is in proportion to what impacts do; the floor of impulses is that of a chain that they
+    would hardly pull.
+    """
+    priors, lead = side.protocol.priors, side.model.discrepancy.lead
+    size = math.hypot(lead, priors.impulse_floor * side.record.chain.chain.length)
+    return [math.sqrt(0.5) * priors.stretch * size] * MODES
 
 
 def _late_sd(side: Side) -> float:

@@ -116,7 +116,8 @@ def _squares(drop: AdjustedDrop, heights: Array) -> Dual:
     levels -= drop.model.records["impact"].chain.chain.length
     for _ in range(2):  # what the top rod is off its chain hardly depends on the level
         levels = levels + heights - drop.top("impact", levels)
-    speed = drop.squares("impact", levels).root() + drop.stretch(levels.value)[1]
+    speed = drop.squares("impact", levels).root()
+    speed += drop.lead(levels.value, speed)
     if (catching_up := drop.model.discrepancy.late_way) > 0.0:  # below the lowest beam
         speed += drop.late * np.clip(1.0 - heights / catching_up, 0.0, 1.0)
     return speed * speed

@@ -58,12 +58,10 @@ class StateFeed:
 
     def state(self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...]) -> None:
         """Take a line of the log of run states."""
-        self._published.run(
-            run, attempt=attempt, state=str(state), **reasons_json(reasons, Reason.record)
-        )
-        label = wire.pack_label(run, attempt)
+        fields = reasons_json(reasons, Reason.record)
+        self._published.run(run, attempt=attempt, state=str(state), **fields)
         if state is RunState.ARMED:
-            self._label, self._gates = label, 0
+            self._label, self._gates = wire.pack_label(run, attempt), 0
             self._published.replace_edges(())
             self._begin(run, attempt, "armed")
             self._published.set(phase="armed")

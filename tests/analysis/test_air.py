@@ -13,7 +13,10 @@ from bench.studies.time_scales import time_scale
 from rig.analysis.air import lags, unlike
 from rig.analysis.chain_records import chain_records
 from rig.analysis.drop import DropCase
+from rig.analysis.drop_model import DropModel
+from rig.analysis.dual import Dual
 from rig.analysis.gravity import free_gravity
+from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.session import analyze
 from rig.analysis.swing import strike_shifts
 from rig.predictions import air_shares
@@ -87,6 +90,20 @@ def test_a_chain_of_another_wood_needs_not_fall_as_its_width_says():
         assert result.learned
         for name, measured in result.quantities.items():
             assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u, name
+
+
+@pytest.mark.parametrize("block", ["impact air lag", "impact slack", "stretch"])
+def test_a_chain_arrives_when_its_top_rod_does(block):
+    """By what it is off its place in the chain, too."""
+    records = [record_of("graded", role) for role in ("impact", "free")]
+    model = DropModel.of(SCENES["graded"], records, None, 0.0)
+    x, level = model.first(), -model.records["impact"].strikes[-1:]
+    x[model.unknowns[block]] = 1e-3
+    drop = AdjustedDrop(model, x)
+    moment = Dual(np.array([drop.hit.value]), drop.hit.slopes[None])
+    off = abs(drop.ahead("impact", level).value[0])
+    assert off > 0.5e-3
+    assert abs(drop.top("impact", drop.levels("impact", moment))[0].value) < 0.01 * off
 
 
 @pytest.mark.usefixtures("loops_compiled")

@@ -67,7 +67,7 @@ RIGS = {
     "sharp": (SHARP, 1e-9),
     "every prior zero": (replace(PLAIN, priors=scaled(0.0)), 1e-6),
     "everything zero": (replace(exact_rig(PLAIN), priors=scaled(0.0)), 1e-9),
-    "every prior huge": (replace(PLAIN, priors=scaled(1e6, jitter=2e-6)), 1e-4),
+    "every prior huge": (replace(PLAIN, priors=scaled(1e5, jitter=2e-6, strings=5e4)), 1e-4),
     "sharp, the air unknown": (replace(SHARP, priors=replace(SHARP.priors, drag=1e6)), 1e-9),
 }
 """Protocols, and how sharp their edges are, m."""
