@@ -58,8 +58,9 @@ class StateFeed:
 
     def state(self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...]) -> None:
         """Take a line of the log of run states."""
-        fields = reasons_json(reasons, Reason.record)
-        self._published.run(run, attempt=attempt, state=str(state), **fields)
+        self._published.run(
+            run, attempt=attempt, state=str(state), **reasons_json(reasons, Reason.record)
+        )
         if state is RunState.ARMED:
             self._label, self._gates = wire.pack_label(run, attempt), 0
             self._published.replace_edges(())
