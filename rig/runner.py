@@ -130,7 +130,8 @@ class Campaign:
         self.operator = operator
         self.interrupts = interrupts
         self.plan = {run.number: run for run in runs(protocol)}
-        attended, row = operator.ask is not None, voids_of(self.session.states()).row
+        self._log = self.session.states()
+        attended, row = operator.ask is not None, voids_of(self._log).row
         self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=attended, row=row)
         self.live = LiveAnalysis(self.session.path)
         self._clock_u: float | None = None
@@ -158,12 +159,12 @@ class Campaign:
         """Say what the operator would: at each stage where the campaign waits for one."""
         if self.flow.stage is Stage.COUNTDOWN:
             return machine.Tick(0.0)
-        log = self.session.states()
-        lines = plan_lines(self.plan.values(), log)
+        self._log += self.session.states(after=len(self._log))
+        lines = plan_lines(self.plan.values(), self._log)
         unjudged = job_to_judge(lines)
         if unjudged is not None and self.flow.stage is not Stage.RESULT:
             return machine.Found(unjudged)
-        job = unjudged or next_job(lines, voids_of(log).counts())
+        job = unjudged or next_job(lines, voids_of(self._log).counts())
         if self.flow.stage is not Stage.PREPARE or job is None:
             return machine.GoOn(job)
         self._request(job)

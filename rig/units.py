@@ -101,7 +101,7 @@ _PLAIN = re.compile(
     rf"(?P<value>{_NUMBER}){_LAST_DIGITS}\s*(?P<unit>{_UNIT})?\s*"
     rf"(?:{_PLUS_MINUS}\s*(?P<u>{_NUMBER})\s*(?P<u_unit>{_UNIT})?)?"
 )
-_BRACKETED = re.compile(rf"\(\s*({_NUMBER})\s*({_PLUS_MINUS})\s*({_NUMBER})\s*\)(.*)")
+_BRACKETED = re.compile(rf"^\(\s*({_NUMBER})\s*({_PLUS_MINUS})\s*({_NUMBER})\s*\)(.*)")
 _DECIMAL_COMMA = re.compile(r"([0-9]),([0-9])")
 _LONGEST = 100
 _LARGEST_EXPONENT = 400  # beyond any float, and small enough to expand into a fraction

@@ -306,7 +306,7 @@ class ChainLab:
             alpha += dials.impact_error * chain.alpha.u * self._rng("alpha").normal()
         alphas = alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
         # What touches the board higher hangs as much lower, as far as its strike goes.
-        strikes = body.offsets - np.array(higher_contacts(incline, body.spec))
+        strikes = body.offsets - np.array(higher_contacts(self.protocol, incline, body.spec))
         strikes[:-1] -= self._contact(run)  # the last one is judged at the level
         bottom = float(strikes[0])
         actual = Chain(chain.masses, tuple((strikes - bottom).tolist()), chain.inertia)

@@ -325,5 +325,5 @@ def _impacts(protocol: Protocol, run: Run, role: Side, chain: RodChain) -> dict[
         "uneven": uneven,
         "incline_deg": run.incline_deg or 0.0,
         "condition": str(protocol.condition(run)),
-        "higher": higher_contacts(run.incline_deg or 0.0, chain),
+        "higher": higher_contacts(protocol, run.incline_deg or 0.0, chain),
     }

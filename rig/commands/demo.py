@@ -79,6 +79,8 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
         for result in sorted(analysis.runs, key=lambda result: result.run.incline_deg)
         if result.verdict in GOOD and (result.run.number, result.attempt) in truths
     ]
+    if not drops:
+        return ["no good drop to compare with the truth"]
     agreements = [
         abs(value.value - truth[name]) <= value.expanded
         for result, truth in drops

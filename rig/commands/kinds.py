@@ -54,7 +54,7 @@ def _place(names: str, text: str) -> Path:
     endings, place = (Path(name).suffix, *others), Path(text)
     if text.endswith("/") or place.is_dir():
         place /= name
-    elif not place.suffix:
+    elif not place.suffix and not text.endswith("."):
         place = place if place.exists() else Path(text + endings[0])
     elif not text.endswith(endings):
         raise argparse.ArgumentTypeError(f"found '{text}'; accepted endings: {', '.join(endings)}")
@@ -119,6 +119,6 @@ KINDS: dict[str, dict[str, Any]] = {
     "trials": _accept("a whole number from 2", int, lambda trials: trials >= 2),
     "file": {"type": _place},
     "new": {"type": _new_place},
-    "path": {"type": Path},
+    "path": {"type": lambda text: Path(text) if text else None},
     "formats": {"action": _ListFormats, "nargs": 0},
 }

@@ -154,6 +154,6 @@ def model_fall(protocol: Protocol, run: Run, role: Side) -> Trajectory:
     gains = kicks(chain, [impact.alpha] * chain.rods, impact.gamma)
     # Of the top rod, as each touches: one that touches higher does so earlier.
     touching = chain.length - np.array(chain.heights)
-    touching += higher_contacts(run.incline_deg, rods)
+    touching += higher_contacts(protocol, run.incline_deg, rods)
     path = np.array(gains), np.ones(chain.rods), -touching
     return struck_trajectory(0.0, start, gravity, *path, 1.0, np.array([*kappas, kappas[-1]]))

@@ -68,7 +68,7 @@ def open_port(url: str) -> Port:
     """
     check_name(url)
     _add_handlers()
-    scheme = urlsplit(url).scheme
+    scheme = urlsplit(url).scheme if "://" in url else ""
     try:
         with warnings.catch_warnings():
             # Pyserial 3.5 starts its RFC 2217 reader in a way Python has given up since.

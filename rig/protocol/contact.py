@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from operator import lt, sub
 from typing import TYPE_CHECKING
 
 from rig.units import Quantity
@@ -28,7 +29,7 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
     incline_deg
         Inclination of the board, below 90°.
     """
-    sine, cosine = _sine(chain), math.cos(math.radians(incline_deg))
+    sine, cosine = math.sin(math.radians(chain.tilt_deg)), math.cos(math.radians(incline_deg))
     end = 0.5 * chain.rod_length * sine if sine else 0.0
     across = math.sqrt(1.0 - (sine * cosine) ** 2) / cosine
     return tuple(end + 0.5 * diameter * across for diameter in chain.diameters)
@@ -36,23 +37,21 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
 
 def lacking_geometry(chain: RodChain) -> tuple[str, ...]:
     """Return the missing keys of a chain that `touching_heights` needs."""
-    needed = {"diameter", "rod_length"} if _sine(chain) else {"diameter"}
+    needed = {"diameter", "rod_length"} if chain.tilt_deg else {"diameter"}
     return tuple(key for key in chain.missing_keys if key in needed)
 
 
-def _sine(chain: RodChain) -> float:
-    return abs(math.sin(math.radians(chain.tilt_deg)))
-
-
-def higher_contacts(incline_deg: float, chain: RodChain) -> tuple[float, ...]:
+def higher_contacts(protocol: Protocol, incline_deg: float, chain: RodChain) -> tuple[float, ...]:
     """Return each rod's contact height less that of the top rod, m; bottom up.
 
-    Zero for a chain without complete geometry.
+    Zero for a chain without complete geometry, and on a board so steep that rods of unlike
+    thickness would strike before the release, or out of turn.
     """
-    if lacking_geometry(chain):
-        return (0.0,) * chain.chain.rods
-    heights = touching_heights(chain, incline_deg)
-    return tuple(height - heights[-1] for height in heights)
+    heights = () if lacking_geometry(chain) else touching_heights(chain, incline_deg)
+    higher = tuple(height - heights[-1] for height in heights)
+    strikes = -protocol.drop.value, *map(sub, chain.chain.heights, higher)
+    in_turn = higher and all(map(lt, strikes, strikes[1:]))
+    return higher if in_turn else (0.0,) * chain.chain.rods
 
 
 def as_struck(protocol: Protocol, incline_deg: float, struck: str) -> tuple[Chain, Quantity]:
@@ -65,13 +64,10 @@ def as_struck(protocol: Protocol, incline_deg: float, struck: str) -> tuple[Chai
     protocol
         A protocol with heights relative to the contact point, see `at_contact`.
     """
-    chain, drop = protocol.chains[struck].chain, protocol.drop
-    higher = higher_contacts(incline_deg, protocol.chains[struck])
-    if not any(higher):
-        return chain, drop
-    lowest = chain.heights[0] - higher[0]
-    heights = tuple(z - more - lowest for z, more in zip(chain.heights, higher, strict=True))
-    return replace(chain, heights=heights), Quantity(drop.value + lowest, drop.u)
+    rods, drop = protocol.chains[struck], protocol.drop
+    strikes = [*map(sub, rods.chain.heights, higher_contacts(protocol, incline_deg, rods))]
+    heights = tuple(place - strikes[0] for place in strikes)
+    return replace(rods.chain, heights=heights), Quantity(drop.value + strikes[0], drop.u)
 
 
 def contact_level(protocol: Protocol, incline_deg: float, struck: str) -> Quantity:

@@ -200,15 +200,14 @@ class Reader:
         drops = (drop for drop in self.drops() if run in {None, drop.run})
         return [*{drop.run: drop for drop in sorted(drops, key=lambda drop: drop.job)}.values()]
 
-    def states(self, run: int | None = None) -> list[StateEntry]:
-        """Return the log of run states in order, of all runs or of one."""
-        which = "WHERE ?1 IS NULL OR run = ?1 ORDER BY id"
-        return [*self._records(_state, "run_state", which, run)]
+    def states(self, run: int | None = None, after: int = 0) -> list[StateEntry]:
+        """Return the log of run states in order, of all runs or of one, without the first few."""
+        which = "WHERE ?1 IS NULL OR run = ?1 ORDER BY id LIMIT -1 OFFSET ?2"
+        return [*self._records(_state, "run_state", which, run, after)]
 
     def fired_ns(self) -> dict[tuple[int, int], int]:
         """Return the host time of firing from the log of states, by run and attempt."""
-        states = self.states()
-        return {entry[:2]: entry.host_ns for entry in states if entry.state is RunState.FIRED}
+        return {row[:2]: row.host_ns for row in self.states() if row.state is RunState.FIRED}
 
     def latest_state(self, run: int) -> StateEntry | None:
         """Return the latest state of a run; `None` if it has none."""
