@@ -199,6 +199,6 @@ _WAYS: dict[str, Callable[..., str]] = {
     "fine": lambda value, row: fixed(value and value * row.fine_scale, row.fine_decimals),
     "predicted": _prediction,
     "plus_minus": lambda value, _, scale=1.0: plus_minus(value, scale),
-    "usual": lambda value, row: plus_minus(value, row.scale, row.decimals),
+    "usual": lambda value, row, more=0: plus_minus(value, row.scale, row.decimals + int(more)),
     "small": lambda value, row: plus_minus(value, row.fine_scale, row.fine_decimals),
 }
