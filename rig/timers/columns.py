@@ -56,6 +56,8 @@ class TimerColumn:
         What its heading, or a row of units, says; see `vocabulary.unit_of`.
     power
         Of times: decimal power from seconds, `None` where the file does not say their unit.
+    assumed
+        That in which these are read: of nanoseconds for counts, of seconds for others.
     gate, run
         Which input and which run all its values are of; empty where the heading does not say.
     state
@@ -71,6 +73,7 @@ class TimerColumn:
     role: str = ""
     unit: str = ""
     power: int | None = 0
+    assumed: int = 0
     gate: str = ""
     run: str = ""
     state: str = ""
@@ -179,9 +182,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
     for n, column in enumerate(unclear if is_open else ()):
         file.ways, column.role = len(readings), readings[(file.way + n) % len(readings)]
-    unknown = [column for column in columns if column.power is None]
-    if unknown:
-        file.base = "ns" if file.base == "ns" or any(clock.wrap for clock in unknown) else "s"
+    file.has_unit &= all(column.power is not None for column in columns)
     _check_columns(columns, heading or rows[0], file.problems)
     return columns
 
@@ -219,9 +220,14 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     column.gate = next(filter(None, labels), "")
     is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
     named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
-    named |= {"unitless": not unit, "bare": not is_named, "first": not n}
-    named |= {"labelled": column.gate, "numbered": column.run}
-    facts = facts | vocabulary.roles_in(bare) | _held(named)
+    named |= {
+        "unitless": not unit,
+        "bare": not is_named,
+        "first": not n,
+        "labelled": column.gate,
+        "numbered": column.run,
+    }
+    facts |= vocabulary.roles_in(bare) | _held(named)
     column.role = next(
         role
         for role, rule in vocabulary.read_rows("columns.txt", ":")
@@ -232,7 +238,8 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = bool({"moment", "listed"} & facts)
         if "counted" in facts and column.power in {None, 3, 6}:
-            column.wrap = 2**32 * 10 ** (12 - (column.power or POWERS["ns"]))
+            column.assumed = 0 if column.power else POWERS["ns"]
+            column.wrap = 2**32 * 10 ** (12 - (column.power or column.assumed))
     return column
 
 
@@ -247,6 +254,8 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "levels": all("state" in kind for kind in kinds),
         "suffixed": all({"timed", "clock"} & kind for kind in kinds),
         "plain": not any({"blocked", "clear"} & kind for kind in kinds),
+        "beams": all({"blocked", "clear"} & kind for kind in kinds),
+        "signals": all({"high", "low"} & kind for kind in kinds),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
         "counts": is_numeric and steps == {1.0},

@@ -23,7 +23,7 @@ def strangers() -> dict[str, Shape]:
     """Return files that may be read as the truth, or refused, but never read as anything else."""
     one, files = RUNS[0], {}
 
-    def put(name: str, content: str, truth=RUNS[:1], **more) -> None:
+    def put(name, content, truth=RUNS[:1], **more) -> None:
         files[name] = Shape(content.encode(), truth, **more)
 
     files |= from_rows("strangers")
@@ -113,6 +113,9 @@ def strangers() -> dict[str, Shape]:
     put("A bouncing gate", GTS + write("{c},{s},{d}\n", runs=bouncing), bouncing)
     ms = GTS.replace("(s)", "(ms)") + "".join(f"{c},{t * 1e3:.0f},{int(d)}\n" for t, c, d in one)
     put("Times rounded to ms", ms, sampled=5e-4)
+    put("Counts below decimals", "Run 1\ngate,time,state\n" + write("{c},{ms},{d}\n")
+        + "Run 2\nstate,gate,time\n" + write("{d},{c},{coarse}\n", runs=RUNS[1:2]),
+        RUNS[:2], sampled=5e-4)  # fmt: skip
     bits = "".join(f"{n},{','.join(map(str, levels(one, n * STEP)))}\n" for n in range(4000))
     put("Samples with an index", "n,D0,D1,D2,D3\n" + bits, sampled=STEP)
     put("Samples at a stated rate", "# Fs = 5 kHz\nn,D0,D1,D2,D3\n" + bits, sampled=STEP)
@@ -155,7 +158,7 @@ REFUSED = {"a fault in the first row": b"gate,time (s),state\n0,0.4O0305,1\n0,0.
            b"1,0.553153,1\n1,0.561398,0\n2,0.641801,1\n2,0.647889,0\n",
            "counts of years": b"gate,time,state\n0,1,1\n0,9999999999,0\n1,999999999900,1\n",
            "empty": b"", "blank": b" \n\n", "binary": bytes(range(256)) * 40,
-           "zip": b"PK\x03\x04" * 9,
+           "zip": b"PK\x03\x04PK\x03\x04",
            "picture": b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 9, "numbers": b"1\n2\n3\n",
            "zeros": b"\0" * 5000, "a heading": b"gate,time (s),state\n",
            "a broken setting": b"gate,start (s),duration (s)\n0,0.40030590.020295\n1,0.553153,"
