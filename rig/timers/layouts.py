@@ -67,7 +67,7 @@ class FileLayout:
     def text(self) -> str:
         """What ``--map`` accepts."""
         stated = asdict(self) | {x or "input": channel for x, channel in self.channels.items()}
-        usual = "", "s", 0.0, "states", "runs", self.channels
+        usual = "", 0.0, "states", "runs", self.channels
         pairs = ((x, y) for x, y in stated.items() if x not in SETTINGS or y not in usual)
         return ",".join(f"{name}={value}" for name, value in pairs if name != "channels")
 

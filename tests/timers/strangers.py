@@ -8,6 +8,7 @@ from tests.timers.shapes import (
     STEP,
     Shape,
     by_gate,
+    csv,
     from_rows,
     levels,
     scope,
@@ -123,7 +124,6 @@ def strangers() -> dict[str, Shape]:
         f"{n * 1e-3:.3f},{max(levels(one, n * 1e-3))}\n" for n in range(800)),
         sampled=1e-3)  # fmt: skip
     for name, head, separator, form in (
-        ("Axes by numbers", "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", ",", "{:+.5E}"),
         ("Names repeated", "Time,Ampl,Ampl,Ampl,Ampl\n", ",", "{:.4e}"),
         ("Units in words", "Time,CH1,CH2,CH3,CH4\nin s,in V,in V,in V,in V\n", ",", "{:.4e}"),
         ("LabVIEW, inputs without names", "time\tY[0]\tY[1]\tY[2]\tY[3]\n", "\t", "{:.6f}"),
@@ -137,6 +137,9 @@ def strangers() -> dict[str, Shape]:
         point = "," if "," in form else "."
         files[name] = scope(head, lambda k, t, v, s=separator, f=form, p=point: s.join(
             f.replace(",", "").format(x).replace(".", p) for x in (t, *v)) + "\n")  # fmt: skip
+    files["Axes by numbers"] = scope(
+        "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", csv, options=("map", "1=0,2=1,3=2,4=3")
+    )
     files["Rows of a period"] = scope(
         "Memory Length,4000,\nSampling Period,2e-04,\nCH1,CH2,CH3,CH4,\n",
         lambda k, t, v: ",".join(f"{x:.4f}" for x in v) + ",\n", bare=True)  # fmt: skip
