@@ -56,6 +56,8 @@ class TimerColumn:
         What its heading, or a row of units, says; see `vocabulary.unit_of`.
     power
         Of times: decimal power from seconds, `None` where the file does not say their unit.
+    assumed
+        That in which these are read: of nanoseconds for counts, of seconds for others.
     gate, run
         Which input and which run all its values are of; empty where the heading does not say.
     state
@@ -71,6 +73,7 @@ class TimerColumn:
     role: str = ""
     unit: str = ""
     power: int | None = 0
+    assumed: int = 0
     gate: str = ""
     run: str = ""
     state: str = ""
@@ -164,24 +167,24 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         if others:
             place = rows[0].place(others[0])
             file.problems.add(*place, "", "no_heading", columns=len(columns))
+    there = {column.role for column in columns}
+    meant = {"elapsed": "duration" if "time" in there else "time"}
+    meant |= {"level": "volts"} if "volts" in there else {}  # those that are 0 at first
+    for column in columns:
+        column.role = meant.get(column.role, column.role)
+        file.has_unit &= column.role != "time" or column.power is not None
     # Of columns that say the same times in other units, the finest is kept.
     times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
     finest = {(c.gate, c.run, c.state): c.power for c in sorted(times, key=attrgetter("power"))}
     for column in times:
         if column.power != finest[column.gate, column.run, column.state]:
             column.role = "coarse"
-    if any(column.role == "volts" for column in columns):
-        for column in columns:  # volts that are 0 at first seem to be a level
-            column.role = column.role.replace("level", "volts")
     unclear = [column for column in columns if "|" in column.role]
     readings = unclear[0].role.split("|") if unclear else []
     # Two that may be the same two are one each; of others, falls cannot decide.
     is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
     for n, column in enumerate(unclear if is_open else ()):
         file.ways, column.role = len(readings), readings[(file.way + n) % len(readings)]
-    unknown = [column for column in columns if column.power is None]
-    if unknown:
-        file.base = "ns" if file.base == "ns" or any(clock.wrap for clock in unknown) else "s"
     _check_columns(columns, heading or rows[0], file.problems)
     return columns
 
@@ -207,7 +210,6 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     """Find out what a column is by its heading; the other rows above it may say unit or gate."""
     name = heading.cell(n) if heading else ""
     column = TimerColumn(n, name or f"column {n + 1}", run=find_label(name, "run"))
-    is_named = bool(name)
     prefix, _, rest = name.partition(":")
     if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
@@ -216,23 +218,30 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     units = list(map(vocabulary.unit_of, texts))
     column.unit = unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
-    column.gate = next(filter(None, labels), "")
+    rows = (row for row in block.headings if form("row of numbers").fullmatch(row.raw))
+    column.gate = next(filter(None, (*labels, *(row.cell(n) for row in rows))), "")
     is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
     named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
-    named |= {"unitless": not unit, "bare": not is_named, "first": not n}
-    named |= {"labelled": column.gate, "numbered": column.run}
-    facts = facts | vocabulary.roles_in(bare) | _held(named)
+    named |= {
+        "unitless": not unit,
+        "bare": not name,
+        "first": not n,
+        "labelled": column.gate,
+        "numbered": column.run,
+    }
+    facts |= vocabulary.roles_in(bare) | _held(named)
     column.role = next(
         role
         for role, rule in vocabulary.read_rows("columns.txt", ":")
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
-    if column.role == "time":
+    if column.role in {"time", "elapsed"}:
         column.power = 0 if "suffixed" in facts else POWERS.get(unit)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = bool({"moment", "listed"} & facts)
-        if "counted" in facts and column.power in {None, 3, 6}:
-            column.wrap = 2**32 * 10 ** (12 - (column.power or POWERS["ns"]))
+        if "counted" in facts and column.power not in {0, 9}:
+            column.assumed = 0 if column.power else POWERS["ns"]
+            column.wrap = 2**32 * 10 ** (12 - (column.power or column.assumed))
     return column
 
 
@@ -247,6 +256,8 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "levels": all("state" in kind for kind in kinds),
         "suffixed": all({"timed", "clock"} & kind for kind in kinds),
         "plain": not any({"blocked", "clear"} & kind for kind in kinds),
+        "beams": all({"blocked", "clear"} & kind for kind in kinds),
+        "signals": all({"high", "low"} & kind for kind in kinds),
         "fractions": any("." in text or "," in text for text in texts),
         "rises": is_numeric and min(steps, default=0.0) >= 0.0,
         "counts": is_numeric and steps == {1.0},

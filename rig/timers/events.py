@@ -61,9 +61,8 @@ class TimerFile:
     period
         Of samples that are all as far apart, so that a row may have several changes: no edge is
         known better than that, ps; `None` for others.
-    base
-        The unit in which times are read whose unit the file does not say: ``ns`` for counts, ``s``
-        for others; empty where it says all.
+    has_unit
+        Whether it says the unit of its times; those without are kept as if they were seconds.
     is_sampled
         Whether it has samples: a level that changes may be of an input that is no gate.
     is_wide
@@ -88,7 +87,7 @@ class TimerFile:
     events: list[TimerEvent] = field(default_factory=list)
     open_parts: dict[tuple[str, int], tuple[int, dict[str, int]]] = field(default_factory=dict)
     period: int | None = None
-    base: str = ""
+    has_unit: bool = True
     is_sampled: bool = False
     is_wide: bool = False
     begins_late: bool = False
@@ -109,8 +108,7 @@ class TimerFile:
 
     def tick_in(self, unit: str, tick: int) -> int:
         """Return a time, ps, if those that the file writes without their unit are of this one."""
-        power = POWERS[self.base or "s"]
-        return int(tick * 10**power // 10 ** POWERS.get(unit, power))
+        return int(tick // 10 ** POWERS[unit or "s"])
 
     def parts(self, start: int = 0) -> list[list[TimerEvent]]:
         """Return the events of each part that begins there or later."""

@@ -67,7 +67,7 @@ class FileLayout:
     def text(self) -> str:
         """What ``--map`` accepts."""
         stated = asdict(self) | {x or "input": channel for x, channel in self.channels.items()}
-        usual = "", "s", 0.0, "states", "runs", self.channels
+        usual = "", 0.0, "states", "runs", self.channels
         pairs = ((x, y) for x, y in stated.items() if x not in SETTINGS or y not in usual)
         return ",".join(f"{name}={value}" for name, value in pairs if name != "channels")
 
@@ -163,7 +163,7 @@ def find_layouts(
     levels = ["high", "low"] if states & {"high", "low"} else ["states"]
     # More times than bars: it darkens and clears in turns.
     times = ["each", "turns", "turns-clear", "each"][max(counts.values()) > bars :][:3]
-    choices: dict[str, Sequence[Any]] = {"unit": list(POWERS)} if file.base else {}
+    choices: dict[str, Sequence[Any]] = {} if file.has_unit else {"unit": list(POWERS)}
     choices["dark"] = levels if states - {""} else times
     choices["groups"] = _groupings(file, gates, bars)
     choices |= {name: [value] for name, value in stated.items() if name in choices}

@@ -19,7 +19,7 @@ from rig.timers.columns import SAMPLED, pair_columns, roles
 from rig.timers.crossings import find_crossings, find_threshold
 from rig.timers.events import TimerEvent
 from rig.timers.moments import LONGEST_S, TICK_HZ, moment
-from rig.timers.vocabulary import POWERS, is_number, state_of
+from rig.timers.vocabulary import is_number, state_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -119,7 +119,7 @@ class SignalReader:
         if self.is_sampled and ("volts" in self.places or 2 * silent > count):
             at = self.clocks[0].at
             lasting = self.latest.get(at, 0) - self.starts.get(at, 0)
-            self.file.period = lasting // max(1, count - 1)
+            self.file.period = lasting * 10 ** self.clocks[0].assumed // max(1, count - 1)
         filled = sum(len(signal.samples) for signal in self.signals.values()) // 3
         is_whole = self.has_several and 2 * filled >= (len(self.signals) + 1) * count
         changes = [
@@ -137,8 +137,7 @@ class SignalReader:
         for clock in self.clocks:
             at = clock.at
             text = row.cell(at) if at >= 0 else str(count)
-            power = POWERS[self.file.base or "s"] if clock.power is None else clock.power
-            tick = moment(text, power)
+            tick = moment(text, clock.assumed if clock.power is None else clock.power)
             if text and tick is None:
                 self._reject(row, clock)
             # Of another input's row nothing is said; telephones fill up with zeros.
@@ -225,7 +224,8 @@ class SignalReader:
         """Add an event to the part of its run, or to a new one where times begin anew."""
         clock, events, label = signal.pair.clock, self.file.events, signal.label
         is_one = self.is_single or clock.numbered or signal.run or label
-        tick, key = self.starts[clock.at] + round(offset), (signal.run, 0 if is_one else clock.at)
+        tick = (self.starts[clock.at] + round(offset)) * 10**clock.assumed
+        key = signal.run, 0 if is_one else clock.at
         part, latest = self.file.open_parts.get(key, (len(events), dict[str, int]()))
         # Where each row has a single time, one before any above it begins anew.
         since = max(latest.values(), default=0) if self.is_single else latest.get(label, 0)
@@ -255,8 +255,8 @@ def read_value(role: str, word: str) -> float | None:
     """
     if role == "volts" and is_number(word):
         return float(word)
-    state, (*_, bits) = state_of(word), roles()[role]
+    state, pair = state_of(word), roles()[role][-1].split()
     if state in {"unknown", "missing"} and role in {*SAMPLED, "moment"}:
         return math.nan
-    state = dict(zip(("zero", "one"), bits.split(), strict=False)).get(state, state)
-    return float(STATES.index(state)) if state in STATES and role != "volts" else None
+    state = dict(zip(("zero", "one"), pair, strict=False)).get(state, state)
+    return STATES.index(state) if state in pair else None

@@ -44,7 +44,7 @@ class Shape:
     bare: bool = False
 
 
-def text(content: str, runs: int = 1, encoding: str = "utf-8", **more) -> Shape:
+def text(content: str, runs=1, encoding="utf-8", **more) -> Shape:
     return Shape(content.encode(encoding), RUNS[:runs], **more)
 
 

@@ -8,6 +8,7 @@ from tests.timers.shapes import (
     STEP,
     Shape,
     by_gate,
+    csv,
     from_rows,
     levels,
     scope,
@@ -23,7 +24,7 @@ def strangers() -> dict[str, Shape]:
     """Return files that may be read as the truth, or refused, but never read as anything else."""
     one, files = RUNS[0], {}
 
-    def put(name: str, content: str, truth=RUNS[:1], **more) -> None:
+    def put(name, content, truth=RUNS[:1], **more) -> None:
         files[name] = Shape(content.encode(), truth, **more)
 
     files |= from_rows("strangers")
@@ -113,6 +114,9 @@ def strangers() -> dict[str, Shape]:
     put("A bouncing gate", GTS + write("{c},{s},{d}\n", runs=bouncing), bouncing)
     ms = GTS.replace("(s)", "(ms)") + "".join(f"{c},{t * 1e3:.0f},{int(d)}\n" for t, c, d in one)
     put("Times rounded to ms", ms, sampled=5e-4)
+    put("Counts below decimals", "Run 1\ngate,time,state\n" + write("{c},{ms},{d}\n")
+        + "Run 2\nstate,gate,time\n" + write("{d},{c},{coarse}\n", runs=RUNS[1:2]),
+        RUNS[:2], sampled=5e-4)  # fmt: skip
     bits = "".join(f"{n},{','.join(map(str, levels(one, n * STEP)))}\n" for n in range(4000))
     put("Samples with an index", "n,D0,D1,D2,D3\n" + bits, sampled=STEP)
     put("Samples at a stated rate", "# Fs = 5 kHz\nn,D0,D1,D2,D3\n" + bits, sampled=STEP)
@@ -120,7 +124,6 @@ def strangers() -> dict[str, Shape]:
         f"{n * 1e-3:.3f},{max(levels(one, n * 1e-3))}\n" for n in range(800)),
         sampled=1e-3)  # fmt: skip
     for name, head, separator, form in (
-        ("Axes by numbers", "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", ",", "{:+.5E}"),
         ("Names repeated", "Time,Ampl,Ampl,Ampl,Ampl\n", ",", "{:.4e}"),
         ("Units in words", "Time,CH1,CH2,CH3,CH4\nin s,in V,in V,in V,in V\n", ",", "{:.4e}"),
         ("LabVIEW, inputs without names", "time\tY[0]\tY[1]\tY[2]\tY[3]\n", "\t", "{:.6f}"),
@@ -134,6 +137,9 @@ def strangers() -> dict[str, Shape]:
         point = "," if "," in form else "."
         files[name] = scope(head, lambda k, t, v, s=separator, f=form, p=point: s.join(
             f.replace(",", "").format(x).replace(".", p) for x in (t, *v)) + "\n")  # fmt: skip
+    files["Axes by numbers"] = scope(
+        "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", csv, options=("map", "1=0,2=1,3=2,4=3")
+    )
     files["Rows of a period"] = scope(
         "Memory Length,4000,\nSampling Period,2e-04,\nCH1,CH2,CH3,CH4,\n",
         lambda k, t, v: ",".join(f"{x:.4f}" for x in v) + ",\n", bare=True)  # fmt: skip
@@ -155,7 +161,7 @@ REFUSED = {"a fault in the first row": b"gate,time (s),state\n0,0.4O0305,1\n0,0.
            b"1,0.553153,1\n1,0.561398,0\n2,0.641801,1\n2,0.647889,0\n",
            "counts of years": b"gate,time,state\n0,1,1\n0,9999999999,0\n1,999999999900,1\n",
            "empty": b"", "blank": b" \n\n", "binary": bytes(range(256)) * 40,
-           "zip": b"PK\x03\x04" * 9,
+           "zip": b"PK\x03\x04PK\x03\x04",
            "picture": b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 9, "numbers": b"1\n2\n3\n",
            "zeros": b"\0" * 5000, "a heading": b"gate,time (s),state\n",
            "a broken setting": b"gate,start (s),duration (s)\n0,0.40030590.020295\n1,0.553153,"
