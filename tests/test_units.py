@@ -99,6 +99,7 @@ def test_quantities_are_read_to_the_last_bit(text, dimension, value, u):
         ("5 mm ± 2 %", Dimension.LENGTH, "is a plain number"),
         ("0.5 ± 10 %", Dimension.NUMBER, "two meanings"),
         ("5(1) ± 1 mm", Dimension.LENGTH, "two uncertainties"),
+        ("18(0 ± 1) mm", Dimension.LENGTH, "found '18(0 ± 1) mm'"),
         ("15,0 cm", Dimension.LENGTH, "not a comma: 15.0 cm"),
         ("1,5 ± 0,2 cm", Dimension.LENGTH, "not a comma: 1.5 ± 0.2 cm"),
         ("(1,5 ± 0,2) cm", Dimension.LENGTH, "not a comma: (1.5 ± 0.2) cm"),

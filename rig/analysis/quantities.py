@@ -196,7 +196,7 @@ class AdjustedDrop:
         modes = self.model.discrepancy.top(levels)
         return way + self.linear(STRETCHES[0], modes) + self.linear(STRETCHES[1], modes)
 
-    def lead(self, levels: Array, speed: Dual) -> Dual:
+    def speed_ahead(self, levels: Array, speed: Dual) -> Dual:
         """Return the speed of the struck top rod less that of its chain at these levels, m/s."""
         before, after = (self.ahead("impact", levels + way) for way in (0.5 * _STEP, -0.5 * _STEP))
         return (after - before) * speed * (1.0 / _STEP)
@@ -227,7 +227,7 @@ class AdjustedDrop:
         path, level = self._path("impact"), -self.model.records["impact"].strikes[-1:]
         speed = self._by_path("impact", path.arrival, path.slopes.arrival)
         hit = self._by_path("impact", float(path.time[-1]), path.slopes.time[-1])
-        fast = speed + self.lead(level, speed)[0]
+        fast = speed + self.speed_ahead(level, speed)[0]
         early = self.ahead("impact", level)[0] / fast
         speed = fast - self.gravity * early
         later = 0.5 * self.model.discrepancy.late_way * self.late / (speed * speed)

@@ -194,8 +194,8 @@ def _top_sd(side: Side) -> float:
 def _stretch_sd(side: Side) -> list[float]:
     """Prior of each stretch mode; the other half of the variance is common to all drops.
 
-    It is in proportion to what impacts do; the floor of impulses is that of a chain that they
-    would hardly pull.
+    In proportion to the distance that impacts gain by the model; `impulse_floor` of the chain's
+    length where they gain hardly any.
     """
     priors, lead = side.protocol.priors, side.model.discrepancy.lead
     size = math.hypot(lead, priors.impulse_floor * side.record.chain.chain.length)

@@ -52,12 +52,15 @@ def _place(names: str, text: str) -> Path:
     """
     name, *others = names.split(",")
     endings, place = (Path(name).suffix, *others), Path(text)
-    if text.endswith("/") or place.is_dir():
-        place /= name
-    elif not place.suffix and not text.endswith("."):
-        place = place if place.exists() else Path(text + endings[0])
-    elif not text.endswith(endings):
-        raise argparse.ArgumentTypeError(f"found '{text}'; accepted endings: {', '.join(endings)}")
+    with suppress(OSError):  # what may not be looked at is told when it is written
+        if text.endswith("/") or place.is_dir():
+            place /= name
+        elif "." not in place.name[1:]:
+            place = place if place.exists() else Path(text + endings[0])
+        elif not text.endswith(endings):
+            raise argparse.ArgumentTypeError(
+                f"found '{text}'; accepted endings: {', '.join(endings)}"
+            )
     check_place(place)
     return place
 

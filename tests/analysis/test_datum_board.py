@@ -11,7 +11,12 @@ from rig.analysis.session import analyze
 from rig.errors import InputError
 from rig.predictions import predicted_run
 from rig.protocol import reader
-from rig.protocol.contact import at_contact, contact_level, touching_heights
+from rig.protocol.contact import (
+    at_contact,
+    contact_level,
+    higher_contacts,
+    touching_heights,
+)
 from rig.protocol.describe import describe
 from rig.reasons import sentences
 from rig.units import Quantity
@@ -56,6 +61,17 @@ def test_a_touching_rod_has_one_point_on_the_board_and_none_below(incline):
     board = np.array([0.0, np.sin(theta), np.cos(theta)])
     lowest = min(float((points @ board).min()) for points in ends)
     assert lowest == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("incline", "unlike"), [(0.0, True), (40.0, True), (89.0, False), (90.0, False)]
+)
+def test_rods_strike_after_the_release_and_in_turn(incline, unlike):
+    """Or all at one height: no fall has them in another order."""
+    rods = BOARD_GRADED.chains["A"]
+    higher = np.array(higher_contacts(BOARD_GRADED, incline, rods))
+    assert higher.any() == unlike
+    assert np.all(np.diff([-BOARD_GRADED.drop.value, *(rods.chain.heights - higher)]) > 0.0)
 
 
 @pytest.mark.parametrize("incline", [10.0, 50.0])

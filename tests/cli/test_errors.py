@@ -49,6 +49,7 @@ def test_a_simulation_that_cannot_be_is_bad_input(call, protocol, tmp_path, port
         ("/dev/nonexistent", "cannot open /dev/nonexistent: there is no such port\n  hint: "),
         ("/dev/null", "cannot open /dev/null: "),
         ("no://such", "'no' not known"),
+        ("socket:nobody", "cannot open socket:nobody: there is no such port"),
         ("hwgrep://nobody", "cannot open hwgrep://nobody: "),
         ("loop://", "did not answer"),
     ],

@@ -105,6 +105,7 @@ def test_examples_are_commands(line):
         (["report", "x", "-o", "x.html", "--pdf", "x.html"], "accepted endings: .pdf"),
         (["sweep", "x", "--vary", "friction=0..1:3", "-o", "s.txt"], "endings: .csv, .npz, .svg"),
         (["export", "x", "--bundle", "x.yaml"], "accepted endings: .eln"),
+        (["export", "x", "--bundle", "x."], "accepted endings: .eln"),
         (["analyze", "x", "--trials", "5"], "--trials needs --budget"),
         (["new", "x.yaml", "--scene", "object", "--length", "1 m"], "--length: not in the scene"),
         (
