@@ -78,10 +78,6 @@ class Estimate:
         """Standard uncertainty of each unknown."""
         return np.asarray(np.linalg.norm(self.inverse, axis=1) * self.sd)
 
-    def u(self, gradient: Array) -> float:
-        """Return the standard uncertainty of a function with this gradient."""
-        return float(np.linalg.norm((gradient * self.sd) @ self.inverse))
-
     @cached_property
     def degrees(self) -> float:
         """Degrees of freedom: edges less the unknowns that they determine."""
@@ -299,7 +295,11 @@ class _Search:
 
         The total never falls below the stated scatter.
         """
-        seen, inverse = point.seen, np.linalg.inv(point.root.matrix)
+        seen = point.seen
+        # The scatter would be at most this if every unknown used a whole degree of freedom.
+        if self.inflation == 1.0 and seen.chi2 < _MORE**2 * (seen.size - point.y.size):
+            return 1.0
+        inverse = np.linalg.inv(point.root.matrix)
         degrees = max(1.0, seen.size - len(inverse) + float(np.sum(inverse**2)))
         factor = max(math.sqrt(seen.chi2 / degrees), 1.0 / self.inflation)
         return 1.0 if 1.0 / _MORE < factor < _MORE else factor

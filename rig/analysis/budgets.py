@@ -14,6 +14,7 @@ as α, the prediction has the true value: they add nothing to g·g, but 2 e·w w
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,6 +25,7 @@ from rig.analysis.gate_passages import gate_passages
 from rig.analysis.quantities import BUDGET, COMMON, AdjustedDrop, effective_degrees, measurands
 from rig.analysis.result import Deviation, Measured
 from rig.analysis.unknowns import Side
+from rig.measurands import MEASURANDS
 from rig.protocol.protocol import GUESSED
 
 if TYPE_CHECKING:
@@ -75,7 +77,12 @@ class Budgets:
     def measure_all(self, drop: JointDrop) -> dict[str, Measured]:
         """Return all measurands of the scene with budgets, by JSON name."""
         values = measurands(drop.model, drop.x)
-        return dict(zip(values, self._measure(drop, [*values.values()]), strict=True))
+        measured = zip(values, self._measure(drop, [*values.values()]), strict=True)
+        # Only means are compared with a prediction.
+        return {
+            name: value if MEASURANDS[name].averaged else replace(value, deviation=None)
+            for name, value in measured
+        }
 
     def gates(self, drop: JointDrop) -> tuple[GatePassage, ...]:
         """Return the passages of a single object through each gate."""
@@ -124,9 +131,8 @@ class Budgets:
             budget = {name: part for name, part in row if part > 0.0}
             degrees = effective_degrees(u, budget, line_nu)
             scatter_nu = nu.get("impulse", degrees) if "impact" in drop.model.records else degrees
-            deviation = Deviation(
-                max(0.0, float(parts[0][n])), scatter_nu, parts[1][n], parts[2][n]
-            )
+            vectors = (part[n].copy() for part in parts[1:])  # not views of all values' vectors
+            deviation = Deviation(max(0.0, float(parts[0][n])), scatter_nu, *vectors)
             vector = shared[n] if shared.size else None
             measured.append(Measured(float(value.value), u, degrees, budget, vector, deviation))
         return measured

@@ -6,7 +6,7 @@ import math
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from rig.analysis.unknowns import Unknowns, side_slopes
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from rig.analysis.chain_records import ChainRecord
     from rig.analysis.trajectory import Trajectory
@@ -36,12 +36,11 @@ if TYPE_CHECKING:
     from rig.arrays import Array, Flags, Index
     from rig.protocol.protocol import Protocol
 
-
-T = TypeVar("T")
-
 _TOLD = 0.5
 """Share of the prior uncertainty of strike heights that is assumed to remain during a fit. With
 0.3 or 0.7 a joint fit takes as many rounds, with 0 or 1 twice as many."""
+_RECENT = 8
+"""Results kept of drops in work: matching and fitting ask twice for each side."""
 
 
 class DropModel:
@@ -95,7 +94,7 @@ class DropModel:
         if "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
             self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
-        self._held: dict[tuple[str, str], tuple[object, Any]] = {}
+        self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
         self.unknowns = Unknowns(self)
         self.slopes = {role: side_slopes(self, role) for role in self.records}
 
@@ -127,7 +126,7 @@ class DropModel:
     def copy_with(self, **attributes: Any) -> DropModel:
         """Return a copy with these attributes, and with priors recomputed from them."""
         model = copy(self)
-        vars(model).update(attributes, _held={})
+        vars(model).update(attributes, _seen={})
         model.unknowns = Unknowns(model)
         if "suspects" in attributes:
             model.slopes = {role: side_slopes(model, role) for role in model.records}
@@ -210,17 +209,9 @@ class DropModel:
         """Return κ of the first chain as a whole, 1/m."""
         return self._kappa + float(x[self.unknowns["drag"]][0])
 
-    def _last(self, kind: str, role: str, key: object, make: Callable[[], T]) -> T:
-        """Return the last result if its key is the same: matching and fitting ask twice."""
-        held = self._held.get((kind, role))
-        if held is None or held[0] != key:
-            held = self._held[kind, role] = key, make()
-        value: T = held[1]
-        return value
-
     def trajectory(self, role: str, x: Array) -> Trajectory:
         """Return the trajectory of one side for given unknowns."""
-        return self._last("path", role, x.tobytes(), lambda: self._trajectory(role, x))
+        return _path_at(self, role, x.tobytes())
 
     def _trajectory(self, role: str, x: Array) -> Trajectory:
         record, parameters = self.records[role], self.slopes[role].path @ x
@@ -248,30 +239,26 @@ class DropModel:
 
     def all_levels(self, role: str, x: Array) -> Array:
         """Return the height of the reference point at every expected edge of a side, m."""
-
-        def levels() -> Array:
-            return self.expected[role].levels + self.slopes[role].levels @ x
-
-        return self._last("levels", role, x.tobytes(), levels)
+        return _levels_at(self, role, x.tobytes())
 
     def _matched_edges(self, role: str, matches: Sequence[Index]) -> Seen:
         """Collect the matched edges; cached, as a matching lasts for many steps of a fit."""
-
-        def seen() -> tuple[Sequence[Index], Seen]:
+        last, seen = self._seen.get(role, (None, None))
+        if seen is None or last is not matches:
             pairing = self.pairings[role]
             pick, edge = pairing.indices(matches)
             seen = self.expected[role].seen(pick, pairing.times[edge], pairing.burst[edge])
-            return matches, seen  # keeps the list alive, so that its id stays unique
-
-        return self._last("matched", role, id(matches), seen)[1]
+            self._seen[role] = matches, seen
+        return seen
 
     def residuals(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
         """Return the residuals of one side's matched edges."""
         seen = self._matched_edges(role, matches)
         times = seen.times * self.rate(x)
-        height, speed = self.trajectory(role, x).heights(times)
+        path = self.trajectory(role, x)
+        height, speed = path.heights(times)
         values = height - self.all_levels(role, x)[seen.pick]
-        loose = _loose(self.trajectory(role, x), times, seen)
+        loose = np.where(seen.alone, 0.0, path.loose(times))
         return Residuals(values, self._sigma(seen, speed, loose), speed, seen.burst == 0.0, loose)
 
     def decorrelate(self, role: str, rows: Residuals, matches: Sequence[Index]) -> Residuals:
@@ -302,34 +289,6 @@ class DropModel:
         sigma: Array = np.sqrt(variance + scales.departures(loose))
         return sigma
 
-    def _stamps(self, role: str, x: Array, seen: Seen) -> tuple[Array, Array, Array, Array]:
-        """Return each edge's expected time and its excess over the stamp, s.
-
-        Then its level, m, and how loose the chain was (`Trajectory.loose`).
-        """
-        path = self.trajectory(role, x)
-        levels = self.all_levels(role, x)[seen.pick]
-        stamps = seen.times * self.rate(x)
-        height, speed = path.heights(stamps)
-        off = height - levels
-        loose = _loose(path, stamps, seen)
-        near = np.abs(off) <= STRAY * self._sigma(seen, speed, loose)
-        late = np.divide(off, speed, out=np.zeros_like(off), where=near & (speed > 0.0))
-        return stamps + late, late, levels, loose
-
-    def _strike_u(self, role: str) -> Array:
-        """Return the uncertainty of each rod's strike height, see `Trajectory.sights`, m.
-
-        At most a part of a rod's width, as no step leads further.
-        """
-
-        def strike_u() -> Array:
-            _, places = np.split(self.slopes[role].path[COMMON:], 2)
-            sd = np.sqrt(places**2 @ self.unknowns.sd**2)
-            return np.clip(_TOLD * sd, SHARPEST, min(self.records[role].chain.widths) / PART)
-
-        return self._last("strike u", role, None, strike_u)
-
     def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
         """Return the observation equations of one side's matched edges.
 
@@ -337,22 +296,46 @@ class DropModel:
         would depend on the stamp's error, and bias the clock rate towards a slow clock.
         """
         acts, seen = self.slopes[role], self._matched_edges(role, matches)
-        path = self.trajectory(role, x)
-        times, late, levels, loose = self._stamps(role, x, seen)
-        moving = acts.path[:, acts.columns[: acts.moving]]
-        height, speed, moved = path.sights(times, moving, self._strike_u(role))
-        values = height - levels + speed * late
-        sigma = self._sigma(seen, speed, loose)
-        slopes = -acts.levels[seen.pick[:, None], acts.columns]
-        slopes[:, : acts.moving] += moved
+        stamped = self.residuals(role, x, matches)
+        late = np.zeros_like(stamped.values)
+        near = (np.abs(stamped.values) <= STRAY * stamped.sigma) & (stamped.speed > 0.0)
+        np.divide(stamped.values, stamped.speed, out=late, where=near)
+        times, path = seen.times * self.rate(x) + late, self.trajectory(role, x)
+        height, speed, moved = path.sights(times, acts.moving, _strike_u(self, role))
+        values = height - self.all_levels(role, x)[seen.pick] + speed * late
+        sigma = self._sigma(seen, speed, stamped.loose)
+        slopes = acts.sights.take(seen.pick, axis=0)
+        slopes[:, : moved.shape[1]] += moved
         # With a slow clock the true time is later, and the chain is lower.
         rates = self.unknowns.rate[acts.columns[acts.clocks]]
         slopes[:, acts.clocks] -= np.outer(speed * times / self.rate(x), rates)
-        carried = self._part(seen, loose > 0.0, values, sigma)
+        carried = self._part(seen, stamped.loose > 0.0, values, sigma)
         second = np.flatnonzero(carried)
         slopes[second] -= carried[second, None] * slopes[second - 1]
-        residuals = Residuals(values, sigma, speed, seen.burst == 0.0, loose)
+        residuals = stamped._replace(values=values, sigma=sigma, speed=speed)
         return Equations(residuals, carried, slopes, acts.columns)
+
+
+@lru_cache(maxsize=_RECENT)
+def _path_at(model: DropModel, role: str, x: bytes) -> Trajectory:
+    return model._trajectory(role, np.frombuffer(x))
+
+
+@lru_cache(maxsize=_RECENT)
+def _levels_at(model: DropModel, role: str, x: bytes) -> Array:
+    levels: Array = model.expected[role].levels + model.slopes[role].levels @ np.frombuffer(x)
+    return levels
+
+
+@lru_cache(maxsize=_RECENT)
+def _strike_u(model: DropModel, role: str) -> Array:
+    """Return the uncertainty of each rod's strike height, see `Trajectory.sights`, m.
+
+    At most a part of a rod's width, as no step leads further.
+    """
+    _, places = np.split(model.slopes[role].path[COMMON:], 2)
+    sd = np.sqrt(places**2 @ model.unknowns.sd**2)
+    return np.clip(_TOLD * sd, SHARPEST, min(model.records[role].chain.widths) / PART)
 
 
 @dataclass(frozen=True)
@@ -391,8 +374,3 @@ def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[
 
 def _pairings(records: Sequence[ChainRecord]) -> dict[str, Pairing]:
     return {record.role: Pairing.of(record.trains, record.rebound_widths) for record in records}
-
-
-def _loose(path: Trajectory, times: Array, seen: Seen) -> Array:
-    """Return `Trajectory.loose` at each edge, 0 where the top rod falls alone."""
-    return np.where(seen.alone, 0.0, path.loose(times))

@@ -44,7 +44,7 @@ class Residuals(NamedTuple):
     clean
         Whether each edge is outside any flicker.
     loose
-        See `rig.analysis.trajectory.Trajectory.loose`.
+        `rig.analysis.trajectory.Trajectory.loose` at each edge; 0 where the top rod falls alone.
     """
 
     values: Array

@@ -126,7 +126,7 @@ def free_gravity(fit: Fit) -> Measured | None:
         return None
     sd = estimate.sd.copy()
     sd[at] = ANY_GRAVITY
-    pull, share = standardise(estimate.x, sd), 1.0
+    rows, pull, share = rows.triangle(), standardise(estimate.x, sd), 1.0
     for _ in range(2):
         # Estimate the scatter from the residuals; the stated scatter counts as `STATED_WEIGHT`.
         rows = rows._replace(slopes=rows.slopes / share, left=rows.left / share)

@@ -505,7 +505,11 @@ class SideSlopes(NamedTuple):
         Places in the drop's vector of the unknowns that act on this side; those that change the
         trajectory come first. Shape ``(columns,)``.
     moving
-        Number of columns that change the trajectory.
+        Derivatives of the trajectory's parameters by those of the columns that change it, shape
+        ``(parameters, moving)``.
+    sights
+        Derivatives of the height between chain and beam at every expected edge, for a trajectory
+        that does not change, shape ``(edges, columns)``.
     clocks
         Columns that change the time scale.
     """
@@ -513,7 +517,8 @@ class SideSlopes(NamedTuple):
     path: Array
     levels: Array
     columns: Index
-    moving: int
+    moving: Array
+    sights: Array
     clocks: Index
 
 
@@ -533,7 +538,8 @@ def side_slopes(model: DropModel, role: str) -> SideSlopes:
     moving = np.flatnonzero(path.any(axis=0))
     still = np.union1d(np.flatnonzero(levels.any(axis=0)), np.flatnonzero(at.rate))
     columns = np.append(moving, np.setdiff1d(still, moving))
-    return SideSlopes(path, levels, columns, moving.size, np.flatnonzero(at.rate[columns]))
+    parts = path[:, moving], -levels[:, columns]
+    return SideSlopes(path, levels, columns, *parts, np.flatnonzero(at.rate[columns]))
 
 
 class SharedUnknowns:
