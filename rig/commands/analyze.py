@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.analysis.video import VideoFall, video_fall
+from rig.analysis.video import video_fall
 from rig.cache.entry import recall
 from rig.commands.output import print_results, progress, show
-from rig.measurands import ACCELERATION, acceleration_in
-from rig.report.numbers import with_unit
+from rig.measurands import acceleration_in
 from rig.report.parts import scatter_parts, tables
+from rig.report.templates import lines
 from rig.results import SessionResults, complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterator
 
     from rig.analysis.result import Measured
 
@@ -51,7 +50,7 @@ def main(arguments: Namespace) -> int:
         for part in asked:
             show(["", part.heading, *part.table])
         if video is not None:
-            show(["", *_video_lines(video, gates)])
+            show(["", *lines("video", video, gates)])
     return code
 
 
@@ -72,17 +71,3 @@ def _by_gates(outcome: SessionResults) -> Measured | None:
         if row is not None:
             return line.means[row.name]
     return None if outcome.gravity is None else outcome.gravity.measured
-
-
-def _video_lines(video: VideoFall, gates: Measured | None) -> Iterator[str]:
-    acceleration = with_unit(video.acceleration, ACCELERATION)
-    yield f"acceleration by {video.frames} frames of a video: {acceleration}"
-    if gates is not None:
-        error = video.beside(gates)
-        word = (
-            "they agree" if abs(error) <= 1.0 else "they disagree: the video's scale, or its frames"
-        )
-        yield f"by the gates: {with_unit(gates, ACCELERATION)}; Eₙ {error:+.2f}, {word}"
-    if video.bent:
-        yield "the frames follow no parabola: cut those before the release and after the end"
-    yield "± is what the frames' scatter allows, without how well the video's lengths are scaled"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.bench.figures import choice_figure, work_figure
@@ -18,26 +20,11 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator, Sequence
 
-_HEAD = """\
-# Error against run time
-
-`rig bench precision`: relative error against a reference in 50 digits, and processor time, of every
-method at every setting. Times are of one machine: compare them with each other. `(rig)` is what
-this program does. Every point is in `precision.csv`.
-
-![What to choose](precision.svg)
-
-The line of each problem is the method to choose there. All methods:
-
-"""
+_HEAD = Path(__file__).with_suffix(".md").read_text("utf-8") + "\n"
 
 
-def main(arguments: Namespace) -> int:
-    """Measure problem after problem; keep what there is so far, print it at the end."""
-    return carry_out("precision", _measure, arguments)
-
-
-def _measure(arguments: Namespace) -> Iterator[Findings]:
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Measure problem after problem; yield what there is so far."""
     study = Study()
     for problem in problems(quick=arguments.quick):
         say(f"{problem.title} …")
@@ -111,6 +98,9 @@ class Study:
         routes = dict.fromkeys(one.route for one in self.problems)
         yield f"references, known to {max(1e-50, known):.0e}: {'; '.join(routes)}"
         yield from (f"left out: {setting}" for setting in self.left_out)
+
+
+main = partial(carry_out, "precision", run)
 
 
 def _words(point: Point | None) -> str:
