@@ -156,14 +156,8 @@ def _columns(rows: Iterable[Mapping[str, object]]) -> Sequence[str]:
 
 def _readme(session: Reader, described: Mapping[str, Sequence[str]]) -> str:
     lines = ["SIMULATED DATA: nothing fell.", ""] if session.simulated else []
-    lines += [
-        f"Session made {session.meta['created']} from {session.meta['origin']}",
-        f"Protocol {session.protocol_source}, SHA-256 {session.meta['protocol_sha256']}",
-        "",
-        "Text is UTF-8, numbers have a decimal point, an empty value was not measured.",
-        "Units stand at the ends of names. Behind a quantity, _u is its standard uncertainty and",
-        "_U95 its expanded uncertainty (95 %), in the same unit.",
-    ]
+    head = Path(__file__).with_name("readme.txt").read_text("utf-8")
+    lines += head.format(source=session.protocol_source, **session.meta).splitlines()
     for name, columns in sorted(described.items()):
         lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
     return "\n".join(lines) + "\n"

@@ -83,15 +83,6 @@ class Study:
             rows.append([problem.title, best[0], *again])
         return text_table(rows, left=range(5), rule=True)
 
-    def points_table(self) -> list[str]:
-        """Return every point, for problems whose errors are far from `TARGETS`."""
-        rows = [["method", "setting", "error", "ms"]]
-        rows += [
-            [point.method, point.setting, f"{point.error:.1e}", f"{1e3 * point.cpu_s:.4g}"]
-            for point in self.points
-        ]
-        return text_table(rows, left={0, 1}, rule=True)
-
     def remarks(self) -> Iterator[str]:
         """Say how well references are known, and what was left out."""
         known = max(own_error(one.exact, one.inputs) for one in self.problems)
