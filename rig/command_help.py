@@ -45,22 +45,19 @@ def _program() -> str:
     return quote(installed if here.startswith(os.pardir) else here)
 
 
+_PAIRS = re.compile(
+    r"(?<=\0--map\0)(?:(?!-)[^\0]*\0)*(?!-)[^\0]*=(?:[^\0]+|\0(?!-)[^\0]*)?(?:\0,(?=\0|$))?"
+)
+"""Words after ``--map``, up to the next option: to the last "=", the channel behind it and a comma.
+A file's name may follow."""
+
+
 def _join_pairs(typed: Sequence[str]) -> list[str]:
     """Make a single word of the pairs after ``--map``, whatever blanks were typed."""
-    words = []
-    for word in typed:
-        words += word.split("=", 1) if word.startswith("--map=") else [word]
-    if "--map" not in words:
-        return words
-    first = words.index("--map") + 1
-    end = next((n for n in range(first, len(words)) if words[n].startswith("-")), len(words))
-    # A file's name may follow: the pairs end with the last "=" and the channel behind it.
-    signs = [n for n in range(first, end) if "=" in words[n]]
-    if signs:
-        last = min(end, signs[-1] + 1 + words[signs[-1]].endswith("="))
-        last += words[last : last + 1] == [","]
-        words[first:last] = [" ".join(words[first:last])]
-    return words
+    line = "\0".join(typed).replace("\0--map=", "\0--map\0")
+    if "\0--map\0" not in line:
+        return [*typed]
+    return _PAIRS.sub(lambda pairs: pairs[0].replace("\0", " "), line).split("\0")
 
 
 class Parser(argparse.ArgumentParser):
