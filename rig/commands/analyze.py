@@ -1,9 +1,9 @@
 """``rig analyze``."""
 
-from __future__ import annotations
+from argparse import Namespace
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
+from rig.analysis.result import Measured
 from rig.analysis.video import video_fall
 from rig.cache.entry import recall
 from rig.commands.output import print_results, progress, show
@@ -13,11 +13,6 @@ from rig.report.templates import lines
 from rig.results import SessionResults, complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.analysis.result import Measured
 
 
 def main(arguments: Namespace) -> int:

@@ -1,11 +1,10 @@
 """``rig bench precision``: error against processor time of every method on every problem."""
 
-from __future__ import annotations
-
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.bench.figures import choice_figure, work_figure
 from rig.bench.findings import Findings
@@ -15,10 +14,6 @@ from rig.bench.work import TARGETS, Point, WorkProblem, cheapest, measure
 from rig.commands.output import say
 from rig.commands.study import carry_out
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator, Sequence
 
 _HEAD = Path(__file__).with_suffix(".md").read_text("utf-8") + "\n"
 

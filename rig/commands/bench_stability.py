@@ -1,26 +1,19 @@
 """``rig bench stability``."""
 
-from __future__ import annotations
-
 import math
+from argparse import Namespace
+from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.analysis.plain_data import plain
 from rig.bench.figures import conditioning_figure
 from rig.bench.findings import Findings
-from rig.bench.stability import VERDICTS, stability
+from rig.bench.stability import VERDICTS, StabilityRow, stability
 from rig.bench.work import EPSILON
 from rig.commands.study import carry_out
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterable, Iterator
-
-    from rig.bench.stability import StabilityRow
 
 _HEAD = Path(__file__).with_suffix(".md").read_text("utf-8").rstrip()
 _NAMES = {"alpha": "α", "gamma": "γ", "separation": "Δz", "speed": "V", "time": "t", "gravity": "g"}

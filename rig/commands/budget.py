@@ -1,30 +1,25 @@
 """``rig analyze --budget``: what the uncertainties of a run are made of."""
 
-from __future__ import annotations
-
+from argparse import Namespace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import DropCase
+from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
 from rig.cache.entry import recall
 from rig.commands.output import print_data, tell_damage
 from rig.errors import InputError
+from rig.measurands import Measurand
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.report.numbers import decimals_for, fixed, ranges
 from rig.report.templates import sentence
 from rig.results import SessionResults, calibration, check_open, protocol_of, results
+from rig.session.reading import Reader
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.analysis.result import Measured
-    from rig.measurands import Measurand
-    from rig.session.reading import Reader
 
 SEED = 1
 _LEAST = 0.001  # in the finer unit: less is none

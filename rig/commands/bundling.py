@@ -1,11 +1,11 @@
 """Making the files of a bundle from its session file, for ``rig export`` and ``rig verify``."""
 
-from __future__ import annotations
-
+from argparse import Namespace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from rig.analysis.session import Analysis
 from rig.bundle.archive import pack
 from rig.bundle.contents import SESSION, bundle_files, copy_session
 from rig.commands.output import progress, say, tell_damage
@@ -17,13 +17,8 @@ from rig.report.finding import deviations
 from rig.report.templates import lines
 from rig.results import protocol_of, results
 from rig.session.hashes import protocol_first
+from rig.session.reading import Reader
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.analysis.session import Analysis
-    from rig.session.reading import Reader
 
 _FIXED = {True: "yes", False: "no", None: "unknown"}
 

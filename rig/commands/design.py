@@ -1,9 +1,9 @@
 """``rig design``."""
 
-from __future__ import annotations
-
+from argparse import Namespace
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.components import Components, priors
 from rig.commands.output import print_data, say
@@ -17,17 +17,12 @@ from rig.files import write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
 from rig.report.templates import lines
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Mapping
-
-    from rig.protocol.protocol import Protocol
 
 SPACING_M = 0.01
 

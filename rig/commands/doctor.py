@@ -1,7 +1,5 @@
 """``rig doctor``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import closing

@@ -1,7 +1,5 @@
 """``rig estimate``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from dataclasses import replace
 from typing import Any

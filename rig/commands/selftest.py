@@ -1,7 +1,5 @@
 """``rig selftest``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from contextlib import closing, nullcontext
 from pathlib import Path

@@ -1,28 +1,22 @@
 """``rig sweep``."""
 
-from __future__ import annotations
-
 import sys
 import time
+from argparse import Namespace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.commands.output import goes_on, say, stage
 from rig.errors import InputError
 from rig.files import replacing
 from rig.protocol import reader
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
 from rig.report.canvas import ENDINGS, write_figure
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
 from rig.sweep.tables import provenance, write_csv, write_npz
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.protocol.protocol import Protocol
 
 
 def main(arguments: Namespace) -> None:
