@@ -169,17 +169,13 @@ def _number(text: str) -> int | str:
     return int(text) if text.isdecimal() else text
 
 
-def _matching_commands(words: Sequence[str] | None) -> list[Command]:
-    """Return the commands that words may name: that of the first one, else all, or none."""
+def _matching_commands(words: Sequence[str]) -> list[Command]:
+    """Return the commands that words may name: that of the first one, else all."""
     every = [*COMMANDS.values()]
-    if words is None:
-        return every
-    if named := [command for command in every if command.name.split()[:1] == [*words[:1]]]:
-        return named
-    return every if any(not word.startswith("-") for word in words) else []
+    return [each for each in every if each.name.split()[:1] == [*words[:1]]] or every
 
 
-def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] | None = None) -> Parser:
+def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] = ()) -> Parser:
     """Make the parser of all commands.
 
     Parameters
