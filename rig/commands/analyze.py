@@ -6,7 +6,7 @@ from typing import Any
 from rig.analysis.result import Measured
 from rig.analysis.video import video_fall
 from rig.cache.entry import recall
-from rig.commands.output import print_results, progress, show
+from rig.commands.output import print_results, progress, show, tell_damage
 from rig.measurands import acceleration_in
 from rig.report.parts import scatter_parts, tables
 from rig.report.templates import lines
@@ -21,13 +21,14 @@ def main(arguments: Namespace) -> int:
         from rig.commands.compare import analyze_together  # noqa: PLC0415 - likewise
 
         return analyze_together(arguments)
-    if arguments.budget is not None:
-        from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
-
-        return budget.main(arguments)
     track = None if arguments.video is None else read_video(arguments.video)
     with Session.open(arguments.session, readonly=True) as session:
         outcome = results(session, progress, fresh=arguments.fresh)
+        if arguments.budget is not None:
+            from rig.commands.budget import print_budget  # noqa: PLC0415 - only when it is asked for
+
+            print_budget(session, outcome, arguments)
+            return tell_damage(outcome.analysis)
         members: dict[str, Any] = {}
         if arguments.priors:
             members["prior_sensitivity"] = _sensitivity(session, outcome, fresh=arguments.fresh)
