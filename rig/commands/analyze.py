@@ -18,7 +18,7 @@ from rig.timers.video import read_video
 def main(arguments: Namespace) -> int:
     """Compute the results of a session, or of several together."""
     if arguments.further:
-        from rig.commands.compare import analyze_together  # noqa: PLC0415 - likewise
+        from rig.commands.compare import analyze_together  # noqa: PLC0415 - only for several
 
         return analyze_together(arguments)
     track = None if arguments.video is None else read_video(arguments.video)
