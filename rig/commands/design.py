@@ -71,17 +71,14 @@ def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
     """Return what a layout measures, and how well, as JSON has it."""
     expected = forecast(protocol, GateLayout.of(cases(protocol, components)))
     outcome = trials(protocol)
+    words = trials_text(outcome, protocol.vocabulary)
     return {
         "gates": [
             {"channel": gate.channel, "side": gate.side, "height_m": gate.height}
             for gate in check_gates(protocol).gates
         ],
         "readable": readable(protocol),
-        "trials": {
-            "drops": outcome.drops,
-            "read": outcome.read,
-            "text": trials_text(outcome, protocol.vocabulary),
-        },
+        "trials": {"drops": outcome.drops, "read": outcome.read, "text": words},
         "measurands": [
             {
                 "name": name,

@@ -39,13 +39,9 @@ def main(arguments: Namespace) -> int:
         make = partial(
             make_report, session, outcome, arguments.bars, estimate=estimate, fresh=fresh
         )
-        report = recall(
-            Report,
-            make,
-            # The page has the file's name.
-            *(outcome.digest, session.path.name, arguments.bars, estimate),
-            fresh=fresh,
-        )
+        # The page has the file's name.
+        content = outcome.digest, session.path.name, arguments.bars, estimate
+        report = recall(Report, make, *content, fresh=fresh)
     write_atomic(arguments.output, report.html)
     if arguments.figures is not None:
         stage("drawing figures")
