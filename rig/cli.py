@@ -116,12 +116,8 @@ def _refusal(error: BaseException) -> int:
     return BAD_INPUT
 
 
-def _parser(words: Sequence[str] | None = None) -> Parser:
+def _parser(words: Sequence[str] = ()) -> Parser:
     from rig.command_help import build_parser  # noqa: PLC0415 - `rig --help` needs none of it
     from rig.commands.kinds import KINDS  # noqa: PLC0415 - likewise
 
     return build_parser(KINDS, words)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

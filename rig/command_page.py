@@ -6,20 +6,6 @@ from collections import namedtuple
 
 from rig import __version__
 
-_HEAD = """\
-usage: rig [-h] [--version] COMMAND ...
-
-Lab-rig controller for falling-chain and photogate experiments.
-
-options:
-  -h, --help  show this help message and exit
-  --version   show program's version number and exit
-"""
-_TAIL = """
-Exit codes: 0 done, 1 internal error (with a log), 2 bad input, 3 a run was
-void, 4 device trouble, 130 interrupted. rig replay: 1 the results differ.
-"""
-
 
 # Of collections, for typing takes a third as long to load as Python.
 class Command(namedtuple("Command", "name text arguments examples")):
@@ -41,11 +27,15 @@ class Command(namedtuple("Command", "name text arguments examples")):
     examples: list[str]
 
 
+def _read_text(name: str) -> str:
+    place = __file__.replace("command_page.py", name)
+    with open(place, encoding="utf-8") as file:  # noqa: PTH123 - pathlib takes 5 ms
+        return file.read()
+
+
 def _read_page() -> dict[str, list[Command]]:
     """Return the commands of each group."""
-    place = __file__.replace("command_page.py", "command_help.txt")
-    with open(place, encoding="utf-8") as page:  # noqa: PTH123 - pathlib takes 5 ms
-        paragraphs = page.read().strip().split("\n\n")
+    paragraphs = _read_text("command_help.txt").strip().split("\n\n")
     groups: dict[str, list[Command]] = {}
     shared: dict[str, str] = {}
     for paragraph in paragraphs:
@@ -73,7 +63,7 @@ def first_help() -> str:
     for group, commands in GROUPS.items():
         top = (command for command in commands if " " not in command.name)
         lines += ["", f"{group}:", *(f"  {command.name:<12}{command.text}" for command in top)]
-    return "\n".join([_HEAD.rstrip(), *lines, _TAIL])
+    return _read_text("first_help.txt").replace("{commands}", "\n".join(lines))
 
 
 def first_answer(words: list[str]) -> str:

@@ -43,13 +43,11 @@ def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: 
     """
     if not is_simulated(url):
         return url
-    parts = _split(url)
     settings = read_settings(url)
     if seed is not None:
         settings["seed"] = str(seed)
-    old = _split(before)
-    if old.scheme == parts.scheme:
-        earlier = _settings(old)
+    if _split(before).scheme == _split(url).scheme:
+        earlier = _settings(before)
         seed_before = earlier.get("seed", "0")
         if (new := settings.get("seed", seed_before)) != seed_before:
             raise InputError(
@@ -58,15 +56,14 @@ def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: 
             )
         settings = earlier | settings
     places = {"protocol": str(protocol.resolve()), "truth": str(truth_file(session))}
-    return add_settings(_join_url(parts, settings), **places, seed="0")
+    return _with_settings(url, settings, **places, seed="0")
 
 
 def add_settings(url: str, **settings: str) -> str:
     """Add those settings to a simulation's URL that it lacks; a real port comes back as it is."""
     if not is_simulated(url):
         return url
-    before = read_settings(url)
-    return _join_url(_split(url), before | {n: settings[n] for n in settings if n not in before})
+    return _with_settings(url, read_settings(url), **settings)
 
 
 def check_name(url: str) -> None:
@@ -96,16 +93,14 @@ def read_settings(url: str) -> dict[str, str]:
         A setting that is given twice, or see `check_name`.
     """
     check_name(url)
-    return _settings(_split(url))
+    return _settings(url)
 
 
 def told(url: str) -> str:
     """Return a port's URL for the record: a simulation's without the names of files."""
     if not is_simulated(url):
         return url
-    parts = _split(url)
-    settings = _settings(parts)
-    return _join_url(parts, {name: settings[name] for name in settings if name not in _FILES})
+    return _with_settings(url, {n: text for n, text in _settings(url).items() if n not in _FILES})
 
 
 def simulation_package() -> str:
@@ -127,8 +122,8 @@ def _split(url: str) -> SplitResult:
         ) from None
 
 
-def _settings(parts: SplitResult) -> dict[str, str]:
-    settings: dict[str, str] = {}
+def _settings(url: str) -> dict[str, str]:
+    parts, settings = _split(url), dict[str, str]()
     for name, text in parse_qsl(parts.query, keep_blank_values=True, errors=_BYTES):
         if name in settings:
             raise InputError(f"{parts.scheme}://: {name} is given twice")
@@ -136,6 +131,8 @@ def _settings(parts: SplitResult) -> dict[str, str]:
     return settings
 
 
-def _join_url(parts: SplitResult, settings: dict[str, str]) -> str:
+def _with_settings(url: str, settings: dict[str, str], **usual: str) -> str:
+    """Write a URL with other settings, and what they lack of the usual ones behind them."""
+    parts, query = _split(url), urlencode({**settings, **usual, **settings}, errors=_BYTES)
     # urlunsplit would drop the empty authority that pyserial looks for.
-    return f"{parts.scheme}://{parts.netloc}{parts.path}?{urlencode(settings, errors=_BYTES)}"
+    return f"{parts.scheme}://{parts.netloc}{parts.path}?{query}"

@@ -14,7 +14,7 @@ from rig.protocol.contact import as_struck, at_contact
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from rig.model.chain import Chain
     from rig.model.surface import Surface
@@ -89,32 +89,25 @@ def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, floa
     """
     if run.impact is None:
         return {name: {"gravity": model.u} for name, model in predicted_run(protocol, run).items()}
-    slopes: dict[str, dict[str, float]] = {}
-    for name, low, high, share in _vary_coefficients(protocol, run, run.impact):
-        below, above = predicted_run(low, run), predicted_run(high, run)
-        for measurand in below.keys() & above.keys():
-            difference = above[measurand].value - below[measurand].value
-            slopes.setdefault(measurand, {})[name] = share * difference
-    return slopes
-
-
-def _vary_coefficients(
-    protocol: Protocol, run: Run, struck: str
-) -> Iterator[tuple[str, Protocol, Protocol, float]]:
-    """Each coefficient, made less and more, and its uncertainty over the distance between them."""
     from rig.model.impact import ALPHA  # noqa: PLC0415 - only where something is struck
     from rig.model.predict import moved_coefficients  # noqa: PLC0415 - likewise
 
-    surface, rods = protocol.surface, protocol.chains[struck]
-    assert surface is not None
+    struck, stated = run.impact, protocol.surface
+    assert stated is not None
+    rods = protocol.chains[struck]
 
-    def protocol_with(other: Surface, chain: Chain) -> Protocol:
+    def predicted_with(surface: Surface, chain: Chain) -> dict[str, Quantity]:
         chains = {**protocol.chains, struck: replace(rods, chain=chain)}
-        return replace(protocol, surface=other, chains=chains)
+        return predicted_run(replace(protocol, surface=surface, chains=chains), run)
 
-    own = {ALPHA: f"alpha {protocol.condition(run).impact_chain}"}
-    for name, low, high, share in moved_coefficients(surface, rods.chain, run.incline_deg):
-        yield own.get(name, name), protocol_with(*low), protocol_with(*high), share
+    slopes: dict[str, dict[str, float]] = {}
+    for name, low, high, share in moved_coefficients(stated, rods.chain, run.incline_deg):
+        own = f"alpha {protocol.condition(run).impact_chain}" if name == ALPHA else name
+        below, above = predicted_with(*low), predicted_with(*high)
+        for measurand in below.keys() & above.keys():
+            difference = above[measurand].value - below[measurand].value
+            slopes.setdefault(measurand, {})[own] = share * difference
+    return slopes
 
 
 def notes(protocol: Protocol) -> list[str]:

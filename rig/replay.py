@@ -70,30 +70,22 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
     Drops, clock samples and results are compared with what the session holds, exactly. It may
     be recording meanwhile.
     """
+    pairs: dict[str, tuple[list[Any], list[Any]]] = {}
     with session.snapshot():
-        return _compare(session, progress)
-
-
-def _compare(session: Reader, progress: Progress | None) -> Outcome:
-    lines: list[str] = []
-    differences: list[str] = []
-
-    def compare(what: str, again: list[Any], stored: list[Any]) -> None:
-        same = again == stored
-        lines.append(f"{what}: {len(stored)} {'identical' if same else 'DIFFERENT'}")
-        if not same:
-            differences.append(what)
-
-    again = _ByBytes(session)
-    if not again.chunks:
-        lines.append("no bytes were recorded: the edges come from a file")
-    else:
-        compare("drops", list(again.drops()), sorted(session.drops(), key=_JOB))
-        compare("clock samples", again.pings(), session.pings())
-        if again.pulses() or session.pulses():
-            compare("reference pulses", again.pulses(), session.pulses())
-    stored = results(session, progress).records()
-    once_more = again if again.chunks else session
-    compare("results", results(once_more, progress).records(), stored)
-    lines.append("identical" if not differences else f"DIFFERENT: {', '.join(differences)}")
-    return Outcome(tuple(lines), tuple(differences))
+        again = _ByBytes(session)
+        if again.chunks:
+            pairs["drops"] = list(again.drops()), sorted(session.drops(), key=_JOB)
+            pairs["clock samples"] = again.pings(), session.pings()
+            if any(pulses := (again.pulses(), session.pulses())):
+                pairs["reference pulses"] = pulses
+        stored = results(session, progress).records()
+        once_more = again if again.chunks else session
+        pairs["results"] = results(once_more, progress).records(), stored
+    ends = {
+        what: "identical" if pair[0] == pair[1] else "DIFFERENT" for what, pair in pairs.items()
+    }
+    differences = tuple(what for what, end in ends.items() if end == "DIFFERENT")
+    lines = [] if again.chunks else ["no bytes were recorded: the edges come from a file"]
+    lines += [f"{what}: {len(pairs[what][1])} {end}" for what, end in ends.items()]
+    lines.append(f"DIFFERENT: {', '.join(differences)}" if differences else "identical")
+    return Outcome(tuple(lines), differences)

@@ -10,8 +10,9 @@ import math
 import re
 from dataclasses import dataclass
 from decimal import Decimal
-from enum import Enum
+from enum import Enum, auto
 from fractions import Fraction
+from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +37,12 @@ class UnitError(ValueError):
     """A text is not the quantity that was asked for; says what was found and what is accepted."""
 
 
-class Dimension(Enum):
-    """What a quantity measures: its name with the article, an example to follow, its units.
+_LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
+_ROWS = dict(line.split(" | ", 1) for line in _LINES if not line.startswith("#"))
 
-    Units are in their canonical spelling, each with what it is in base units. The foot is the
-    international one, exact since 1959; π/180 has 50 digits, for no fraction gives it exactly.
+
+class Dimension(Enum):
+    """What a quantity measures, as its row of ``units.txt`` has it.
 
     Attributes
     ----------
@@ -50,32 +52,19 @@ class Dimension(Enum):
         What each accepted unit is in base units.
     """
 
-    LENGTH = (
-        "a length",
-        "180 mm",
-        "m 1, mm 1/1000, cm 1/100, µm 1/1000000, km 1000, in 0.0254, ft 0.3048",
-    )
-    TIME = ("a time", "80 ms", "s 1, ms 1/1000, µs 1/1000000, ns 1/1000000000, min 60, h 3600")
-    ANGLE = (
-        "an angle",
-        "40 deg",
-        "deg 1, rad 57.295779513082320876798154814105170332405472466564, "
-        "mrad 0.057295779513082320876798154814105170332405472466564",
-    )
-    ACCELERATION = ("an acceleration", "9.81 m/s^2", "m/s^2 1, cm/s^2 1/100, ft/s^2 0.3048")
-    SPEED = ("a speed", "5.2 m/s", "m/s 1, cm/s 1/100, km/h 5/18")
-    MASS = ("a mass", "35 g", "kg 1, g 1/1000, mg 1/1000000")
-    DENSITY = ("a density", "1.2 kg/m^3", "kg/m^3 1, g/cm^3 1000")
-    FREQUENCY = ("a frequency", "1 Hz", "Hz 1, kHz 1000")
-    TURNING = (
-        "a rate of turning",
-        "0.5 rad/s",
-        "rad/s 1, deg/s 0.017453292519943295769236907684886127134428718885417",
-    )
-    NUMBER = ("a plain number", "0.50 ± 0.05", "1 1, % 1/100, ppm 1/1000000")
+    LENGTH = auto()
+    TIME = auto()
+    ANGLE = auto()
+    ACCELERATION = auto()
+    SPEED = auto()
+    MASS = auto()
+    DENSITY = auto()
+    FREQUENCY = auto()
+    TURNING = auto()
+    NUMBER = auto()
 
-    def __init__(self, noun: str, example: str, units: str) -> None:
-        self.noun, self.example = noun, example
+    def __init__(self, _: int) -> None:
+        self.noun, self.example, units = _ROWS[self.name].split(" | ")
         pairs = map(str.split, units.split(", "))
         self.factors = {unit: Fraction(factor) for unit, factor in pairs}
 

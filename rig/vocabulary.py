@@ -6,6 +6,7 @@ Every sentence that names what falls takes its words from here.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,24 +40,14 @@ class Vocabulary:
     two_sides: bool = False
 
 
-_ROWS = """\
-object | the object | the object starts | object | the object, its drop and the gates | holding
-track | the glider | the glider starts | glider | the glider, its start and the gates | placing
-picket-fence | the fence | the fence starts | bar | the fence, its drop and the gates | holding
-free-chain | the chain | the chain hangs | rod | the chain, its drop and the gates | hanging
-one-chain | the chain | the chain hangs | rod | chain, drop, incline and gates | hanging
-two-chains | the chains | the chains hang | rod | chains, drop, incline and gates | hanging
-"""
-"""A scene a row; what is done by hand before a drop is done to what falls."""
-
-
 def _read_row(row: str) -> Vocabulary:
     scene, body, start, part, setup, handling = row.split(" | ")
     two_sides = scene == "two-chains"
     return Vocabulary(scene, body, start, part, setup, f"{handling} {body}", two_sides)
 
 
-_SCENES = [_read_row(row) for row in _ROWS.splitlines()]
+_ROWS = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
+_SCENES = [_read_row(row) for row in _ROWS if not row.startswith("#")]
 OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS = _SCENES
 ANY_SCENE = Vocabulary(
     "", "what falls", "it starts", "part", "your set-up", "preparing it", two_sides=True

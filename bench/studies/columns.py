@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from rig.bench.work import Point
 
 
 class Column(NamedTuple):
@@ -35,3 +37,14 @@ def aligned(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> lis
     heading = [column.heading for column in columns]
     cells = [[column.cell(row) for column in columns] for row in rows]
     return text_table([heading, *cells], left=words, rule=True) if rows else []
+
+
+_POINT = (
+    Column("method", "method"), Column("setting", "setting"), Column("error", "error", ".1e"),
+    Column("ms", "cpu_s", ".4g", 1e3),
+)  # fmt: skip
+
+
+def points_table(points: Iterable[Point]) -> list[str]:
+    """Write every point, for problems whose errors are far from those that others reach."""
+    return aligned(_POINT, [point._asdict() for point in points])

@@ -10,6 +10,7 @@ from statistics import fmean
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from bench.studies.columns import points_table
 from bench.studies.falls import Asked, simulation
 from bench.studies.sessions import with_repeats, without_device
 from rig.analysis.drop import DropCase
@@ -63,7 +64,7 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     say("trying every estimator")
     problem = problem_of(session)
     study.add(problem, *one_thread(measure)(problem))
-    yield replace(study.findings(study.points_table()), simulated=True)
+    yield replace(study.findings(points_table(study.points)), simulated=True)
 
 
 def problem_of(session: SimulatedSession) -> WorkProblem:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from bench.studies.columns import Column, aligned
+from bench.studies.columns import Column, aligned, points_table
 from bench.studies.resolved_paper import FIGURES
 from rig.bench.findings import Findings
 from rig.bench.work import measure as measure_problem
@@ -51,7 +51,7 @@ def _work(falls: int) -> Findings:
         Column("mean Δz (mm)", "mean_m", ".2f", 1e3), Column("± (mm)", "se_m", ".2f", 1e3),
         Column("falls", "falls", "g"), Column("s a fall", "cpu_s", ".3f"),
     )  # fmt: skip
-    found = study.findings([*study.points_table(), "", *aligned(columns, means)])
+    found = study.findings([*points_table(study.points), "", *aligned(columns, means)])
     record = {**found.record, "ensembles": means}
     return replace(found, record=record, name="resolved-work")
 

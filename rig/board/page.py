@@ -17,7 +17,7 @@ from rig.records import Job
 from rig.report import looks
 from rig.report.figure import COLUMN_PT
 from rig.report.figures import result_figure
-from rig.report.templates import environment, render
+from rig.report.templates import render
 from rig.results.live import LiveAnalysis
 from rig.tui.drop_words import LOOKS, headline, past_runs, sentence
 from rig.tui.motion import motions
@@ -44,21 +44,20 @@ class BoardPage:
     """
 
     def __init__(self, address: str) -> None:
-        from jinja2 import ChainableUndefined, FileSystemLoader  # noqa: PLC0415 - pages only
+        from jinja2 import ChainableUndefined, Environment, FileSystemLoader  # noqa: PLC0415 - pages only
 
         self._live: LiveAnalysis | None = None
         self._seen: object = None
         self._drawn: tuple[object, dict[str, Any]] = None, {}
-        templates = environment().overlay(
-            loader=FileSystemLoader(_HERE), undefined=ChainableUndefined
-        )
-        templates.globals = {
+        loader = FileSystemLoader(_HERE)
+        templates = Environment(loader=loader, autoescape=True, undefined=ChainableUndefined)
+        always = {
             "address": address,
             "code": "" if is_local(address) else _qr_code(address),
             "css": f"{render('figure.css', looks=looks)}{(_HERE / 'board.css').read_text('utf-8')}",
             "script": SCRIPT,
         }
-        self._template = templates.get_template("board.html")
+        self._template = templates.get_template("board.html", globals=always)
 
     def look(self, news: Mapping[str, Any]) -> str | None:
         """Return the page as it is now; `None` where nothing has changed.

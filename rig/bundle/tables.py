@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import csv
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.bundle.archive import sha256
-from rig.measurands import MEASURANDS, Measurand
+from rig.measurands import MEASURANDS
 from rig.reasons import sentences
 from rig.session.schema import TABLES
 from rig.text_table import csv_text
@@ -26,20 +25,23 @@ _ROWS_OF = {"states.csv: ": "run_state", "pings.csv: ": "ping", "edges.csv: ": "
 """Whose raw records a file has, for the meaning of its columns."""
 
 
-@lru_cache(maxsize=1)
-def _read_columns(measurands: tuple[Measurand, ...]) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the unit by each end of a name, and what columns mean, those of measurands too."""
-    lines = Path(__file__).with_name("columns.txt").read_text("utf-8").splitlines()
-    rows = dict(line.split(" | ") for line in lines if not line.startswith("#"))
-    meanings = {name: text for name, text in rows.items() if not name.startswith("_")}
-    for row in measurands:
+_LINES = Path(__file__).with_name("columns.txt").read_text("utf-8").splitlines()
+_ROWS = dict(line.split(" | ") for line in _LINES if not line.startswith("#"))
+"""The unit by the end of a column's name, which begins with ``_``, and what columns mean."""
+
+
+def _meanings() -> dict[str, str]:
+    """Return what columns mean, those of raw records and of measurands too."""
+    meanings = {
+        head + column.name: column.meaning
+        for head, table in [*_ROWS_OF.items(), ("", "run_state")]
+        for column in TABLES[table].columns
+    } | _ROWS
+    for row in MEASURANDS.values():
         meanings[row.name] = row.meaning
         meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
         meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
-    for head, table in [*_ROWS_OF.items(), ("", "run_state")]:
-        for column in TABLES[table].columns:
-            meanings.setdefault(head + column.name, column.meaning)
-    return {name: unit for name, unit in rows.items() if name.startswith("_")}, meanings
+    return meanings
 
 
 def csv_files(
@@ -122,8 +124,8 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
 def column_unit(column: str) -> str:
     """Return the unit of a table's column, by the end of its name; empty where there is none."""
     name = column.removesuffix("_U95").removesuffix("_u")
-    units, _ = _read_columns((*MEASURANDS.values(),))
-    return next((unit for end, unit in units.items() if name.endswith(end)), "")
+    ends = (end for end in _ROWS if end.startswith("_") and name.endswith(end))
+    return _ROWS.get(next(ends, ""), "")
 
 
 def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
@@ -156,14 +158,8 @@ def _columns(rows: Iterable[Mapping[str, object]]) -> Sequence[str]:
 
 def _readme(session: Reader, described: Mapping[str, Sequence[str]]) -> str:
     lines = ["SIMULATED DATA: nothing fell.", ""] if session.simulated else []
-    lines += [
-        f"Session made {session.meta['created']} from {session.meta['origin']}",
-        f"Protocol {session.protocol_source}, SHA-256 {session.meta['protocol_sha256']}",
-        "",
-        "Text is UTF-8, numbers have a decimal point, an empty value was not measured.",
-        "Units stand at the ends of names. Behind a quantity, _u is its standard uncertainty and",
-        "_U95 its expanded uncertainty (95 %), in the same unit.",
-    ]
+    head = Path(__file__).with_name("readme.txt").read_text("utf-8")
+    lines += head.format(source=session.protocol_source, **session.meta).splitlines()
     for name, columns in sorted(described.items()):
         lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
     return "\n".join(lines) + "\n"
@@ -179,7 +175,7 @@ def describe_column(table: str, column: str) -> tuple[str, str]:
     """Return unit and meaning of a table's column; empty where its name says all."""
     if column.endswith(("_u", "_U95")):
         return "", ""
-    _, meanings = _read_columns((*MEASURANDS.values(),))
+    meanings = _meanings()
     meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
     return column_unit(column), meaning
 

@@ -109,8 +109,6 @@ class FireTimes(NamedTuple):
     ----------
     samples
         Clock samples by epoch.
-    hz
-        The board's mean rate.
     time
         The axis of host time they are on.
     fired_ns
@@ -118,18 +116,23 @@ class FireTimes(NamedTuple):
     """
 
     samples: Epochs
-    hz: float
     time: HostTime
     fired_ns: Mapping[tuple[int, int], int]
 
-    def when(self, drop: Drop) -> float | None:
-        """Find when a drop was fired, s of host time, by its tick among the samples around it."""
+    def when(self, drop: Drop, hz: float) -> float | None:
+        """Find when a drop was fired, s of host time, by its tick among the samples around it.
+
+        Parameters
+        ----------
+        hz
+            The board's mean rate.
+        """
         fired_ns = self.fired_ns.get(drop.job)
         if fired_ns is None or drop.fire_tick is None:
             return None
         # Restarts of the host leave open which of its times a log entry means; the tick decides.
         moments = (
-            self.samples.place(drop.fire_tick, fired_ns + shift, self.hz, 0.0, _FIRED_S)
+            self.samples.place(drop.fire_tick, fired_ns + shift, hz, 0.0, _FIRED_S)
             for shift in self.time.shifts(fired_ns)
         )
         return next((moment.at_ns * 1e-9 for moment in moments if moment is not None), None)
@@ -173,7 +176,7 @@ class Calibration(NamedTuple):
     def _scale_of(self, drop: Drop) -> tuple[str, TimeScale]:
         if drop.certificate is None or self.device is None:
             return "stated", TimeScale(drop.tick_hz, self.timer_u)
-        when = self.fired.when(drop) if self.fired else None
+        when = self.fired.when(drop, self.device.hz) if self.fired else None
         choice = [
             (source.name, source.sometime() if when is None else source.at(when))
             for source in self.sources
@@ -246,7 +249,7 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
         "samples": best.rate.n,
         "span_s": best.rate.span_s,
     }
-    fired = FireTimes(split, scale.hz, axis, session.fired_ns())
+    fired = FireTimes(split, axis, session.fired_ns())
     return Calibration(scale, details, said, u, tuple(sources), fired)
 
 

@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.clock.samples import RECV, SEND, TICK, Samples, samples
+from rig.clock.samples import RECV, SEND, TICK, Samples
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
-
-    from rig.records import ClockSample
 
 RESONATOR_TOLERANCE = 0.005
 """Genuine Uno and Mega boards clock the AVR from a ceramic resonator, ±0.5 % (Murata CSTCE16M0)."""
@@ -97,9 +95,7 @@ class Epochs:
         return Moment(number, expected + off, host_ns + round(off / hz * 1e9))
 
 
-def epochs(
-    pings: Iterable[ClockSample] | Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()
-) -> Epochs:
+def epochs(pings: Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()) -> Epochs:
     """Split samples where the board's counter did not go on, and count its wraps in between.
 
     Parameters
@@ -113,10 +109,9 @@ def epochs(
         Host times over which nothing is bridged. A counter that began anew, or a host clock that
         stood still, is found without them too, when the tick jumps out of tolerance.
     """
-    columns = samples(pings)
-    if not columns.size:
+    if not pings.size:
         return Epochs(nominal_hz, ())
-    columns = columns[np.lexsort(columns.T[::-1])]  # as tuples are sorted
+    columns = pings[np.lexsort(pings.T[::-1])]  # as tuples are sorted
     cuts = np.sort(np.array(cuts_ns, np.int64))
     steps = _steps(columns, nominal_hz)
     first_cut = np.searchsorted(cuts, columns[:-1, RECV], "left")

@@ -15,8 +15,9 @@ from rig.clock.wander import Readings, Track
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from numpy.typing import NDArray
+
     from rig.arrays import Array
-    from rig.clock.epochs import Moment
     from rig.records import Pulse
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
@@ -108,24 +109,21 @@ def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
         The rate; the nominal one when there are not two pulses of one stretch. A pulse that was
         missed or one too many begins a new stretch.
     """
-    stretches: list[list[tuple[int, Moment]]] = []  # counts, and where each pulse belongs
+    placed: list[tuple[int, int, int, int]] = []
     for pulse in sorted(pulses):
         host_ns = (pulse.host_send_ns + pulse.host_recv_ns) // 2
         moment = split.place(pulse.tick, host_ns, pings.hz, _STALE_S, 0.0)
-        if moment is None:
-            continue
-        if stretches and moment.epoch == stretches[-1][-1][1].epoch:
-            count, last = stretches[-1][-1]
-            if moment.tick == last.tick:
-                continue  # the same pulse again
-            seconds = (moment.tick - last.tick) / pings.hz
-            counted = (pulse.number - count) % _COUNT_WRAP
-            counted += round((seconds - counted) / _COUNT_WRAP) * _COUNT_WRAP
-            if abs(seconds - counted) < _ODD_S + _ODD * counted:
-                stretches[-1].append((count + counted, moment))
-                continue
-        stretches.append([(pulse.number, moment)])
-    pieces = [_pulse_piece(pulses, split.nominal_hz) for pulses in stretches if len(pulses) > 1]
+        if moment is not None:
+            placed.append((*moment, pulse.number))
+    rows = np.array(placed, np.int64).reshape(-1, 4)
+    rows = rows[np.diff(rows[:, :2], axis=0, prepend=-1).any(axis=1)]  # one pulse, told twice
+    restarts, ticks, _, counts = np.diff(rows, axis=0).T
+    seconds, counted = ticks / pings.hz, counts % _COUNT_WRAP
+    counted += np.rint((seconds - counted) / _COUNT_WRAP).astype(np.int64) * _COUNT_WRAP
+    broken = (restarts != 0) | (np.abs(seconds - counted) >= _ODD_S + _ODD * counted)
+    rows[:, -1] = np.append(0, np.cumsum(counted))  # beyond its wraps
+    stretches = np.split(rows, np.flatnonzero(broken) + 1)
+    pieces = [_pulse_piece(each, split.nominal_hz) for each in stretches if len(each) > 1]
     return _fit_track(pieces, split.nominal_hz)
 
 
@@ -148,13 +146,12 @@ def _ping_piece(pings: Samples, nominal_hz: int) -> Array:
     return np.array([at, excess / nominal_hz - rest_ns2 * 0.5e-9, sigma])
 
 
-def _pulse_piece(stretch: Sequence[tuple[int, Moment]], nominal_hz: int) -> Array:
-    """Turn a stretch of pulses, none missed, into readings."""
+def _pulse_piece(stretch: NDArray[np.int64], nominal_hz: int) -> Array:
+    """Turn pulses of one stretch, each an epoch, tick, host time and count, into readings."""
     sigma = sqrt(_EDGE_S**2 + 1 / (12 * nominal_hz**2))
-    columns = np.array([(count, moment.tick) for count, moment in stretch], np.int64)
-    seconds, ticks = (columns - columns[0]).T
+    _, ticks, _, seconds = (stretch - stretch[0]).T
     excess = (ticks - nominal_hz * seconds) / nominal_hz
-    at = stretch[0][1].at_ns * 1e-9 + seconds
+    at = int(stretch[0, 2]) * 1e-9 + seconds
     return np.array([at, excess, np.full(len(stretch), sigma)])
 
 

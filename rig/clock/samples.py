@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -23,10 +23,9 @@ SEND, RECV, TICK = range(3)
 _APART_NS = 3600 * 10**9  # between two connections whose distance in time nobody knows
 
 
-def samples(pings: Iterable[ClockSample] | Samples) -> Samples:
-    """Turn clock samples into columns; columns stay what they are."""
-    rows = pings if isinstance(pings, np.ndarray) else list(pings)
-    return np.asarray(rows, np.int64).reshape(-1, 3)
+def samples(pings: Sequence[ClockSample]) -> Samples:
+    """Turn clock samples into columns."""
+    return np.array(pings, np.int64).reshape(-1, 3)
 
 
 class Stretch(NamedTuple):
@@ -64,7 +63,7 @@ class HostTime:
 
 
 def one_axis(
-    pings: Iterable[ClockSample] | Samples,
+    pings: Samples,
     boots_ns: Sequence[int] = (),
     breaks: Sequence[HostBreak] = (),
 ) -> HostTime:
@@ -79,7 +78,7 @@ def one_axis(
     breaks
         When the host slept or its clock was set.
     """
-    columns = samples(pings).copy()
+    columns = pings.copy()
     befores, afters = columns[:-1, RECV].copy(), columns[1:, SEND].copy()
     odd = afters < befores
     for pause in breaks:

@@ -1,39 +1,34 @@
 """``rig analyze``."""
 
-from __future__ import annotations
+from argparse import Namespace
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
-from rig.analysis.video import VideoFall, video_fall
+from rig.analysis.result import Measured
+from rig.analysis.video import video_fall
 from rig.cache.entry import recall
-from rig.commands.output import print_results, progress, show
-from rig.measurands import ACCELERATION, acceleration_in
-from rig.report.numbers import with_unit
+from rig.commands.output import print_results, progress, show, tell_damage
+from rig.measurands import acceleration_in
 from rig.report.parts import scatter_parts, tables
+from rig.report.templates import lines
 from rig.results import SessionResults, complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator
-
-    from rig.analysis.result import Measured
 
 
 def main(arguments: Namespace) -> int:
     """Compute the results of a session, or of several together."""
     if arguments.further:
-        from rig.commands.compare import analyze_together  # noqa: PLC0415 - likewise
+        from rig.commands.compare import analyze_together  # noqa: PLC0415 - only for several
 
         return analyze_together(arguments)
-    if arguments.budget is not None:
-        from rig.commands import budget  # noqa: PLC0415 - only when it is asked for
-
-        return budget.main(arguments)
     track = None if arguments.video is None else read_video(arguments.video)
     with Session.open(arguments.session, readonly=True) as session:
         outcome = results(session, progress, fresh=arguments.fresh)
+        if arguments.budget is not None:
+            from rig.commands.budget import print_budget  # noqa: PLC0415 - only when it is asked for
+
+            print_budget(session, outcome, arguments)
+            return tell_damage(outcome.analysis)
         members: dict[str, Any] = {}
         if arguments.priors:
             members["prior_sensitivity"] = _sensitivity(session, outcome, fresh=arguments.fresh)
@@ -51,7 +46,7 @@ def main(arguments: Namespace) -> int:
         for part in asked:
             show(["", part.heading, *part.table])
         if video is not None:
-            show(["", *_video_lines(video, gates)])
+            show(["", *lines("video", video, gates)])
     return code
 
 
@@ -72,17 +67,3 @@ def _by_gates(outcome: SessionResults) -> Measured | None:
         if row is not None:
             return line.means[row.name]
     return None if outcome.gravity is None else outcome.gravity.measured
-
-
-def _video_lines(video: VideoFall, gates: Measured | None) -> Iterator[str]:
-    acceleration = with_unit(video.acceleration, ACCELERATION)
-    yield f"acceleration by {video.frames} frames of a video: {acceleration}"
-    if gates is not None:
-        error = video.beside(gates)
-        word = (
-            "they agree" if abs(error) <= 1.0 else "they disagree: the video's scale, or its frames"
-        )
-        yield f"by the gates: {with_unit(gates, ACCELERATION)}; Eₙ {error:+.2f}, {word}"
-    if video.bent:
-        yield "the frames follow no parabola: cut those before the release and after the end"
-    yield "± is what the frames' scatter allows, without how well the video's lengths are scaled"

@@ -1,7 +1,5 @@
 """``rig attach``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from pathlib import Path
 

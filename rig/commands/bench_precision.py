@@ -1,9 +1,10 @@
 """``rig bench precision``: error against processor time of every method on every problem."""
 
-from __future__ import annotations
-
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.bench.figures import choice_figure, work_figure
 from rig.bench.findings import Findings
@@ -14,30 +15,11 @@ from rig.commands.output import say
 from rig.commands.study import carry_out
 from rig.text_table import text_table
 
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator, Sequence
-
-_HEAD = """\
-# Error against run time
-
-`rig bench precision`: relative error against a reference in 50 digits, and processor time, of every
-method at every setting. Times are of one machine: compare them with each other. `(rig)` is what
-this program does. Every point is in `precision.csv`.
-
-![What to choose](precision.svg)
-
-The line of each problem is the method to choose there. All methods:
-
-"""
+_HEAD = Path(__file__).with_suffix(".md").read_text("utf-8") + "\n"
 
 
-def main(arguments: Namespace) -> int:
-    """Measure problem after problem; keep what there is so far, print it at the end."""
-    return carry_out("precision", _measure, arguments)
-
-
-def _measure(arguments: Namespace) -> Iterator[Findings]:
+def run(arguments: Namespace) -> Iterator[Findings]:
+    """Measure problem after problem; yield what there is so far."""
     study = Study()
     for problem in problems(quick=arguments.quick):
         say(f"{problem.title} …")
@@ -96,21 +78,15 @@ class Study:
             rows.append([problem.title, best[0], *again])
         return text_table(rows, left=range(5), rule=True)
 
-    def points_table(self) -> list[str]:
-        """Return every point, for problems whose errors are far from `TARGETS`."""
-        rows = [["method", "setting", "error", "ms"]]
-        rows += [
-            [point.method, point.setting, f"{point.error:.1e}", f"{1e3 * point.cpu_s:.4g}"]
-            for point in self.points
-        ]
-        return text_table(rows, left={0, 1}, rule=True)
-
     def remarks(self) -> Iterator[str]:
         """Say how well references are known, and what was left out."""
         known = max(own_error(one.exact, one.inputs) for one in self.problems)
         routes = dict.fromkeys(one.route for one in self.problems)
         yield f"references, known to {max(1e-50, known):.0e}: {'; '.join(routes)}"
         yield from (f"left out: {setting}" for setting in self.left_out)
+
+
+main = partial(carry_out, "precision", run)
 
 
 def _words(point: Point | None) -> str:

@@ -1,11 +1,8 @@
 """``rig bench scenes``."""
 
-from argparse import Namespace
+from functools import partial
 
 from rig.bench import scenes
 from rig.commands.study import carry_out
 
-
-def main(arguments: Namespace) -> int:
-    """Carry the study out; keep and print what it finds."""
-    return carry_out("scenes", scenes.run, arguments)
+main = partial(carry_out, "scenes", scenes.run)

@@ -1,34 +1,26 @@
 """``rig bench stability``."""
 
-from __future__ import annotations
-
 import math
+from argparse import Namespace
+from collections.abc import Iterable, Iterator
+from functools import partial
 from itertools import groupby
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rig.analysis.plain_data import plain
 from rig.bench.figures import conditioning_figure
 from rig.bench.findings import Findings
-from rig.bench.stability import VERDICTS, stability
+from rig.bench.stability import VERDICTS, StabilityRow, stability
 from rig.bench.work import EPSILON
 from rig.commands.study import carry_out
 from rig.text_table import text_table
 
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterable, Iterator
-
-    from rig.bench.stability import StabilityRow
-
+_HEAD = Path(__file__).with_suffix(".md").read_text("utf-8").rstrip()
 _NAMES = {"alpha": "α", "gamma": "γ", "separation": "Δz", "speed": "V", "time": "t", "gravity": "g"}
 
 
-def main(arguments: Namespace) -> int:
+def run(arguments: Namespace) -> Iterator[Findings]:
     """Examine every case; an error that the condition does not explain is a failure."""
-    return carry_out("stability", _examine, arguments)
-
-
-def _examine(arguments: Namespace) -> Iterator[Findings]:
     rows = stability(quick=arguments.quick)
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in VERDICTS}
     records = plain([row._asdict() for row in rows])
@@ -40,6 +32,9 @@ def _examine(arguments: Namespace) -> Iterator[Findings]:
         {"rows": records, "counts": counts}, lines, _HEAD, records, conditioning_figure(rows),
         failed=counts["FAILED"] > 0,
     )  # fmt: skip
+
+
+main = partial(carry_out, "stability", run)
 
 
 def _lost(error: float | None) -> float:
@@ -71,17 +66,3 @@ def _table(rows: Iterable[StabilityRow]) -> list[str]:
             numbers = (f"{x or 0.0:.0e}" for x in (row.error, row.expected, row.backward))
             table.append([case, _NAMES.get(row.quantity, ""), *numbers, row.naive, row.verdict])
     return text_table(table, left={0, 1, 6}, rule=True)
-
-
-_HEAD = """\
-# Stability
-
-`rig bench stability`: each quantity at its ends, and every two together, against 50 digits.
-
-![Errors against condition](stability.svg)
-
-κ is the condition: how many times relative errors of the inputs grow. κ·ε is what their rounding
-alone may cost. *Printed*: the paper's equations with the digits and the range of a float. *Noted*:
-outside the model's domain, with a note. *Refused*: ends with an error. An error beyond κ·ε, but
-for the roundings of a sum over all rods, fails. Listed are ends where printed equations
-lose four digits more than that; all rows are in `stability.csv`."""

@@ -1,45 +1,36 @@
 """``rig analyze --budget``: what the uncertainties of a run are made of."""
 
-from __future__ import annotations
-
+from argparse import Namespace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import DropCase
+from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
 from rig.cache.entry import recall
-from rig.commands.output import print_data, tell_damage
+from rig.commands.output import print_data
 from rig.errors import InputError
+from rig.measurands import Measurand
 from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.report.numbers import decimals_for, fixed, ranges
 from rig.report.templates import sentence
-from rig.results import SessionResults, calibration, check_open, protocol_of, results
-from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.analysis.result import Measured
-    from rig.measurands import Measurand
-    from rig.session.reading import Reader
+from rig.results import SessionResults, calibration, check_open, protocol_of
+from rig.session.reading import Reader
 
 SEED = 1
 _LEAST = 0.001  # in the finer unit: less is none
 
 
-def main(arguments: Namespace) -> int:
+def print_budget(session: Reader, outcome: SessionResults, arguments: Namespace) -> None:
     """Print a run's budget in the session's light, and by itself."""
-    with Session.open(arguments.session, readonly=True) as session:
-        asked, fresh = (arguments.budget, arguments.trials, SEED), arguments.fresh
-        outcome = results(session, fresh=fresh)
-        make = partial(budget, session, outcome, *asked)
-        account = recall(dict, make, "budget", outcome.digest, asked, fresh=fresh)
+    asked = arguments.budget, arguments.trials, SEED
+    make = partial(budget, session, outcome, *asked)
+    account = recall(dict, make, "budget", outcome.digest, asked, fresh=arguments.fresh)
     words = sentence("budget", account, _in_fine).split("\n")
     print_data(account, words, as_json=arguments.json)
-    return tell_damage(outcome.analysis)
 
 
 def budget(

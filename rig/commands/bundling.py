@@ -1,11 +1,11 @@
 """Making the files of a bundle from its session file, for ``rig export`` and ``rig verify``."""
 
-from __future__ import annotations
-
+from argparse import Namespace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from rig.analysis.session import Analysis
 from rig.bundle.archive import pack
 from rig.bundle.contents import SESSION, bundle_files, copy_session
 from rig.commands.output import progress, say, tell_damage
@@ -14,16 +14,11 @@ from rig.files import write_atomic
 from rig.recover.examine import ExaminedFile, examine
 from rig.report.canvas import figure_file
 from rig.report.finding import deviations
+from rig.report.templates import lines
 from rig.results import protocol_of, results
 from rig.session.hashes import protocol_first
+from rig.session.reading import Reader
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator
-
-    from rig.analysis.session import Analysis
-    from rig.session.reading import Reader
 
 _FIXED = {True: "yes", False: "no", None: "unknown"}
 
@@ -72,12 +67,12 @@ def derive_bundle(data: bytes) -> DerivedBundle:
                 f"figures/figure-{number}.svg": figure_file(figure, "svg")
                 for number, figure in enumerate(report.figures, 1)
             }
-            history = [*describe_history(session, examined, outcome.analysis)]
+            history = describe_history(session, examined, outcome.analysis)
             files = bundle_files(session, data, outcome, drawn, history)
     return DerivedBundle(files, outcome.analysis, examined)
 
 
-def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis) -> Iterator[str]:
+def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis) -> list[str]:
     """List what was fixed beforehand, deviations from the plan, unblinding and attached files."""
     protocol = protocol_of(session)
     links = examined.rows.in_order("hash")
@@ -88,11 +83,5 @@ def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis
     else:
         broken = any("table protocol" in line or "table hash" in line for line in examined.damage)
         first = "no" if broken else _FIXED[protocol_first(links)]
-    yield f"limits were fixed before the first run: {first}"
-    yield f"plan and limits: SHA-256 {session.meta['protocol_sha256']}, {session.meta['created']}"
-    yield from deviations(protocol, analysis, session.states())
-    if protocol.blind:
-        when = f"unblinded {session.unblinded}" if session.unblinded else "still blind"
-        yield f"blind session: {when}"
-    for file in session.attached_files():
-        yield f"attached {file.added}: {file.name}, {len(file.data)} bytes"
+    changes = deviations(protocol, analysis, session.states())
+    return lines("history", session, first, changes, protocol.blind)

@@ -1,8 +1,6 @@
 """``rig check``."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 from rig.boards import BOARDS
 from rig.commands.output import print_data
@@ -10,11 +8,7 @@ from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.measurable import check_gates, check_recordable, unmeasurable
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.protocol.protocol import Protocol
+from rig.protocol.protocol import Protocol
 
 
 def main(arguments: Namespace) -> None:

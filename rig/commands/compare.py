@@ -1,7 +1,5 @@
 """``rig compare``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from contextlib import ExitStack
 

@@ -1,7 +1,5 @@
 """``rig completion``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 
 from argcomplete.shell_integration import shellcode

@@ -1,7 +1,5 @@
 """``rig daemon``."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os

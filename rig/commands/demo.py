@@ -1,16 +1,15 @@
 """``rig demo``: a small simulated session, and its results beside the hidden truth."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys
 from argparse import Namespace
 from datetime import UTC, datetime
+from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
 
 from rig.analysis.result import GOOD
+from rig.analysis.session import Analysis
 from rig.commands import report
 from rig.commands.output import exit_code, goes_on, say
 from rig.files import make_folder, write_atomic
@@ -21,11 +20,6 @@ from rig.protocol.reader import parse
 from rig.ready import ready_protocol
 from rig.report.columns import table_parts
 from rig.runner import Operator, run_protocol
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rig.analysis.session import Analysis
 
 _PROTOCOL = "inclined-uniform"
 _REPEATS = "repeats: 12 "

@@ -1,9 +1,9 @@
 """``rig design``."""
 
-from __future__ import annotations
-
+from argparse import Namespace
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.components import Components, priors
 from rig.commands.output import print_data, say
@@ -17,16 +17,12 @@ from rig.files import write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
+from rig.report.templates import lines
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Mapping
-
-    from rig.protocol.protocol import Protocol
 
 SPACING_M = 0.01
 
@@ -75,17 +71,14 @@ def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
     """Return what a layout measures, and how well, as JSON has it."""
     expected = forecast(protocol, GateLayout.of(cases(protocol, components)))
     outcome = trials(protocol)
+    words = trials_text(outcome, protocol.vocabulary)
     return {
         "gates": [
             {"channel": gate.channel, "side": gate.side, "height_m": gate.height}
             for gate in check_gates(protocol).gates
         ],
         "readable": readable(protocol),
-        "trials": {
-            "drops": outcome.drops,
-            "read": outcome.read,
-            "text": trials_text(outcome, protocol.vocabulary),
-        },
+        "trials": {"drops": outcome.drops, "read": outcome.read, "text": words},
         "measurands": [
             {
                 "name": name,
@@ -109,26 +102,15 @@ def design_lines(design: Mapping[str, Any]) -> list[str]:
     layouts = {name: design[name] for name in ("current", "proposed") if name in design}
     cells = {name: _uncertainties(layout) for name, layout in layouts.items()}
     rows = [[name, *(column[name] for column in cells.values())] for name in cells["current"]]
-    lines = [
+    text = [
         f"expected standard uncertainties of {design['runs']} runs, with the {design['scatter']} "
         "scatter",
         "",
         *text_table([["quantity", *layouts], *rows], left={0}, rule=True),
     ]
     for name, layout in layouts.items():
-        lines.append("")
-        sides = dict.fromkeys(gate["side"] for gate in layout["gates"])
-        for side in sides:
-            where = f", {side} side" if len(sides) > 1 else ""
-            heights = (gate["height_m"] for gate in layout["gates"] if gate["side"] == side)
-            lines.append(f"{name}{where} (mm): {', '.join(f'{1e3 * z:g}' for z in heights)}")
-        lines.append(f"{name}: {layout['trials']['text']}")
-        if not layout["readable"]:
-            lines.append(
-                f"{name}: drops may be void, because edges are ambiguous; "
-                "add a beam above the drop height"
-            )
-    return lines
+        text += ["", *lines("layout", name, layout)]
+    return text
 
 
 def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:

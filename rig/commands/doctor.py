@@ -1,7 +1,5 @@
 """``rig doctor``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import closing
@@ -13,7 +11,7 @@ from rig.doctor import computer
 from rig.doctor.board import BOARD_CHECKS
 from rig.doctor.session import check_session
 from rig.errors import DeviceError
-from rig.link.port import open_port, port_clock
+from rig.link.port import open_port
 from rig.selftest.board import BoardUnderTest, SelftestOptions
 from rig.selftest.findings import Finding, Verdict, explain, make_check
 from rig.selftest.run import run_checks
@@ -56,7 +54,7 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
 def _board(url: str) -> Iterator[Finding]:
     try:
         with closing(open_port(url)) as port:
-            board = BoardUnderTest(port, port_clock(port), SelftestOptions())
+            board = BoardUnderTest(port, SelftestOptions())
             yield from run_checks(BOARD_CHECKS, board)
     except DeviceError as error:
         yield explain("board", error)

@@ -1,13 +1,12 @@
 """``rig estimate``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from dataclasses import replace
 from typing import Any
 
 from rig.commands.output import print_json, progress, say, tell_damage
 from rig.files import make_folder
+from rig.report.canvas import write_figure
 from rig.report.estimate import estimate_text
 from rig.report.estimate_figures import estimate_pictures
 from rig.results import check_open, protocol_of, results
@@ -35,8 +34,6 @@ def main(arguments: Namespace) -> int:
             print(likeness.sentence)
         print(estimate_text(estimate, sections, simulated=simulated))
     if folder is not None:
-        from rig.report.canvas import write_figure  # noqa: PLC0415 - likewise
-
         for name, figure in estimate_pictures(estimate, sections).items():
             write_figure(folder / f"{name}.svg", replace(figure, simulated=simulated))
             say(f"{folder / name}.svg")

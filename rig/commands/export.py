@@ -1,7 +1,5 @@
 """``rig export``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 
 from rig.bundle.tables import csv_files

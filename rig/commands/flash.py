@@ -1,7 +1,5 @@
 """``rig flash``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 
 from rig.commands.output import goes_on, say

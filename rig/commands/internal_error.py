@@ -1,7 +1,5 @@
 """Internal errors, which nobody foresaw: a short message, and a log to report it with."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shlex

@@ -1,7 +1,5 @@
 """Kinds of values that `rig.command_help` names, as argparse takes them."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import re

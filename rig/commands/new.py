@@ -1,7 +1,5 @@
 """``rig new``: a protocol from a few answers, with drawings and four simulated drops."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from argparse import Namespace

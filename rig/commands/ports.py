@@ -1,7 +1,5 @@
 """``rig ports``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Mapping

@@ -1,29 +1,23 @@
 """``rig predict``."""
 
-from __future__ import annotations
-
+from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import print_data, say
 from rig.files import write_atomic
-from rig.measurands import SEPARATION, SPEED
+from rig.measurands import SEPARATION, SPEED, Measurand
+from rig.model.prediction import PredictedIncline
 from rig.predictions import group_notes, predictions
 from rig.protocol import reader
+from rig.protocol.protocol import Protocol
 from rig.report.columns import table_parts
 from rig.report.numbers import degrees, fixed
 from rig.text_table import csv_text
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from rig.measurands import Measurand
-    from rig.model.prediction import PredictedIncline
-    from rig.protocol.protocol import Protocol
 
 
 def main(arguments: Namespace) -> None:

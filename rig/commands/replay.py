@@ -1,7 +1,5 @@
 """``rig replay``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 
 from rig.commands.output import progress

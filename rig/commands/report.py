@@ -1,27 +1,23 @@
 """``rig report``."""
 
-from __future__ import annotations
-
+from argparse import Namespace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cache.entry import recall
 from rig.commands.output import progress, say, stage, tell_damage
+from rig.estimate.session import SessionEstimate
 from rig.files import write_atomic
+from rig.report.canvas import write_figures
+from rig.report.figure import Chart
+from rig.report.parts import Bars
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
 from rig.results import SessionResults, protocol_of, results
 from rig.results.estimated import session_estimate
 from rig.sections import Sections
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.estimate.session import SessionEstimate
-    from rig.report.figure import Chart
-    from rig.report.parts import Bars
 
 
 class Report(NamedTuple):
@@ -43,17 +39,11 @@ def main(arguments: Namespace) -> int:
         make = partial(
             make_report, session, outcome, arguments.bars, estimate=estimate, fresh=fresh
         )
-        report = recall(
-            Report,
-            make,
-            # The page has the file's name.
-            *(outcome.digest, session.path.name, arguments.bars, estimate),
-            fresh=fresh,
-        )
+        # The page has the file's name.
+        content = outcome.digest, session.path.name, arguments.bars, estimate
+        report = recall(Report, make, *content, fresh=fresh)
     write_atomic(arguments.output, report.html)
     if arguments.figures is not None:
-        from rig.report.canvas import write_figures  # noqa: PLC0415 - it needs matplotlib
-
         stage("drawing figures")
         write_figures(arguments.figures, report.figures)
         stage("")

@@ -1,7 +1,5 @@
 """``rig run``."""
 
-from __future__ import annotations
-
 import sys
 from argparse import Namespace
 

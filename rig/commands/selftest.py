@@ -1,14 +1,12 @@
 """``rig selftest``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from contextlib import closing, nullcontext
 from pathlib import Path
 
 from rig.commands.output import print_findings, say
 from rig.errors import DeviceError
-from rig.link.port import open_port, port_clock
+from rig.link.port import open_port
 from rig.ports import add_settings
 from rig.protocol import reader
 from rig.selftest.board import SelftestOptions
@@ -28,7 +26,7 @@ def main(arguments: Namespace) -> int:
         say("releases will be driven: keep clear of them")
     judge_port = closing(open_port(arguments.judge)) if arguments.judge else nullcontext()
     with closing(open_port(url)) as port, judge_port as judge:
-        checks = selftest(port, port_clock(port), options, judge)
+        checks = selftest(port, options, judge)
         failures = print_findings("checks", checks, as_json=arguments.json)
     if failures:
         say(f"{failures} check{'s' * (failures > 1)} failed")

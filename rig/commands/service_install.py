@@ -1,7 +1,5 @@
 """``rig service install``."""
 
-from __future__ import annotations
-
 import sys
 from argparse import Namespace
 from pathlib import Path

@@ -1,20 +1,14 @@
 """Carry a study out: what it finds is kept and printed in one way."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
+from rig.bench.findings import Findings
 from rig.commands.output import print_data
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from rig.bench.findings import Findings
 
 
 def carry_out(

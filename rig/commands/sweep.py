@@ -1,28 +1,23 @@
 """``rig sweep``."""
 
-from __future__ import annotations
-
 import sys
 import time
+from argparse import Namespace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.commands.output import goes_on, say, stage
 from rig.errors import InputError
 from rig.files import replacing
 from rig.protocol import reader
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
 from rig.report.canvas import ENDINGS, write_figure
+from rig.report.sweep import sweep_figure
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
 from rig.sweep.tables import provenance, write_csv, write_npz
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from rig.protocol.protocol import Protocol
 
 
 def main(arguments: Namespace) -> None:
@@ -66,8 +61,6 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
     facts = provenance(protocol, layout)
     if output.suffix in ENDINGS:
-        from rig.report.sweep import sweep_figure  # noqa: PLC0415 - it needs matplotlib
-
         write_figure(output, sweep_figure(facts, layout, swept))
         return
     with replacing(output) as stream:

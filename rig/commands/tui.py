@@ -1,7 +1,5 @@
 """``rig tui``."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import os

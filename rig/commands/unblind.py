@@ -1,7 +1,5 @@
 """``rig unblind``."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 
 from rig.errors import SessionError

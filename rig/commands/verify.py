@@ -1,7 +1,5 @@
 """``rig verify``."""
 
-from __future__ import annotations
-
 import json
 from argparse import Namespace
 from collections.abc import Iterator, Mapping

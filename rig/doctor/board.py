@@ -71,7 +71,7 @@ def _record(board: BoardUnderTest) -> RecordedDrop:
     A board fires only when all its gates are clear and keep still. One that flickers with the
     mains does so for some milliseconds between two pulses, so a few tries in a row get there.
     """
-    clear = ((1 << board.identity.gates) - 1) & ~board.gates.stuck
+    clear = ((1 << board.identity.gates) - 1) & ~board.gates.always
     need(clear, "a gate that is clear")
     board.settle()
     order = board.order(gates=clear, record_ms=round(_WATCH_S * 1000))

@@ -58,18 +58,13 @@ def check_restarts(restarts: Iterable[Restart], drops: Iterable[Drop]) -> str:
     times: Counter[str] = Counter()
     for restart in restarts:
         job = "" if restart.label is None else f"{Job(*unpack_label(restart.label))}: "
-        times[job + restart.when + _because(restart.cause)] += 1
+        times[job + restart.when + causes(restart.cause)] += 1
     for drop in drops:
         if drop.certificate and drop.certificate.restarts:
-            times[f"{drop.job}: before it, unseen{_because(drop.certificate.restarts)}"] += 1
+            times[f"{drop.job}: before it, unseen{causes(drop.certificate.restarts)}"] += 1
     text = "; ".join(f"{when}, {n} times" if n > 1 else when for when, n in times.items())
     fail_if(text, "board_restarts", text=text)
     return "none"
-
-
-def _because(mask: int) -> str:
-    words = causes(mask)
-    return f" ({words})" if words else ""
 
 
 def describe_supply(drops: Iterable[Drop]) -> str:

@@ -69,22 +69,21 @@ class Device(Exchange):
             Protocol versions differ, or nobody answers.
         """
         self.expect_boot = True
-        tries = min(self.tries, _IDENTIFY_TRIES)
         try:
             self.write(DELIMITER)  # ends whatever junk the line has seen so far
             self.wait_for(boot_wait_s, _is_boot)
             with suppress(DeviceTimeoutError):
-                return self._identify(tries)
+                return self._identify()
             self._leave_loader()
             with suppress(DeviceTimeoutError):
-                return self._identify(tries)
+                return self._identify()
             self.wait_for(LOADER_WAIT_S, _is_boot)
-            return self._identify(tries)
+            return self._identify()
         finally:
             self.expect_boot = False
 
-    def _identify(self, tries: int) -> wire.Identity:
-        identity = self.request(wire.Identify(), wire.Identity, tries)
+    def _identify(self) -> wire.Identity:
+        identity = self.request(wire.Identify(), wire.Identity, min(self.tries, _IDENTIFY_TRIES))
         if identity.protocol_version != wire.PROTOCOL_VERSION:
             raise DeviceRefusedError(wire.RefusalReason.VERSION, identity.protocol_version)
         return identity

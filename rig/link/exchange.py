@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
 import serial
@@ -48,6 +49,7 @@ def _line() -> Iterator[None]:
         raise make_error(DeviceError, "connection_lost", text=text) from error
 
 
+@dataclass(eq=False, repr=False)
 class Exchange:
     """One port, and the conversation over it.
 
@@ -77,28 +79,21 @@ class Exchange:
         How much went over the line.
     """
 
-    def __init__(
-        self,
-        port: Port,
-        clock: Clock,
-        tap: Callable[[Direction, int, bytes], None] = lambda *_: None,
-        on_record: Callable[[Record], None] = lambda _: None,
-        tries: int = 8,
-        give_way: Callable[[], None] = lambda: None,
-    ) -> None:
-        self.transcript = Transcript()
-        self.clock = clock
-        self.tries = tries
-        self.expect_boot = False
-        self.requests = self.repeats = 0
-        self.rx_bytes = self.tx_bytes = 0
-        self.give_way = give_way
-        self._port = port
-        self._tap = tap
-        self._on_record = on_record
-        self._seq = 0
-        self._part = b""  # of a frame that has not ended yet
-        self._past: deque[tuple[int, bytes]] = deque()  # what `abort_past` sent, for the tap
+    port: Port
+    clock: Clock
+    tap: Callable[[Direction, int, bytes], object] = lambda *_: None
+    on_record: Callable[[Record], object] = lambda _: None
+    tries: int = 8
+    give_way: Callable[[], object] = lambda: None
+    transcript: Transcript = field(default_factory=Transcript)
+    expect_boot: bool = False
+    requests: int = 0
+    repeats: int = 0
+    rx_bytes: int = 0
+    tx_bytes: int = 0
+    _seq: int = 0
+    _part: bytes = b""  # of a frame that has not ended yet
+    _past: deque[tuple[int, bytes]] = field(default_factory=deque)  # what `abort_past` sent
 
     def request(
         self,
@@ -190,7 +185,7 @@ class Exchange:
             The board restarted, or the connection broke.
         """
         with _line():
-            data = self._port.read(min(max(1, self._port.in_waiting), _AT_ONCE))
+            data = self.port.read(min(max(1, self.port.in_waiting), _AT_ONCE))
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
             lacking = (
@@ -226,7 +221,7 @@ class Exchange:
         self.tx_bytes += len(data)
         self._log("tx", data)
         with _line():
-            self._port.write(data)
+            self.port.write(data)
 
     @_line()
     def set_rate(self, baudrate: int) -> None:
@@ -237,7 +232,7 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        self._port.baudrate = baudrate
+        self.port.baudrate = baudrate
 
     def abort_past(self) -> None:
         """Send ABORT at once, from any thread, past a request that is under way.
@@ -250,7 +245,7 @@ class Exchange:
             The connection broke.
         """
         self._past.append((self.clock.now_ns(), _ABORT))
-        self._port.write(_ABORT)
+        self.port.write(_ABORT)
 
     @_line()
     def waiting(self) -> int:
@@ -261,7 +256,7 @@ class Exchange:
         DeviceError
             The connection broke.
         """
-        return self._port.in_waiting
+        return self.port.in_waiting
 
     def _log_part(self) -> list[Record]:
         part, self._part = self._part, b""
@@ -277,8 +272,8 @@ class Exchange:
         return self._feed(direction, self.clock.now_ns(), data)
 
     def _feed(self, direction: Direction, now_ns: int, data: bytes) -> list[Record]:
-        self._tap(direction, now_ns, data)
+        self.tap(direction, now_ns, data)
         records = self.transcript.feed(direction, now_ns, data)
         for record in records:
-            self._on_record(record)
+            self.on_record(record)
         return records

@@ -12,9 +12,8 @@ from typing import NamedTuple
 
 FRAME_LIMIT = 255
 """Bytes of a whole frame with its delimiter: an 8-bit length suffices in firmware."""
-OVERHEAD = 7
-"""type, seq, ack, CRC (2), the COBS code byte and the delimiter."""
-PAYLOAD_LIMIT = FRAME_LIMIT - OVERHEAD
+PAYLOAD_LIMIT = FRAME_LIMIT - 7
+"""Without type, seq, ack, CRC (2), the COBS code byte and the delimiter."""
 DELIMITER = b"\0"
 
 
@@ -167,10 +166,8 @@ class Decoder:
         How many frames were read, and how many stretches between delimiters were not a frame.
     """
 
-    def __init__(self) -> None:
-        self.good = 0
-        self.bad = 0
-        self._partial = b""
+    good = bad = 0
+    _partial = b""
 
     def feed(self, data: bytes) -> list[Frame]:
         """Take the next bytes of the stream.

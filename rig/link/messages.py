@@ -115,10 +115,8 @@ _BYTE = UnsignedInt(1)
 U8: TypeAlias = Annotated[int, _BYTE]
 U16: TypeAlias = Annotated[int, UnsignedInt(2)]
 U32: TypeAlias = Annotated[int, UnsignedInt(4)]
-UniqueId: TypeAlias = Annotated[bytes, Raw(8)]
 Name: TypeAlias = Annotated[str, Chars(24)]
 Line: TypeAlias = Annotated[str, Chars(96)]
-EventRecords: TypeAlias = Annotated[bytes, Raw(EVENT.size, tail=True)]
 
 
 class Field(NamedTuple):
@@ -288,7 +286,7 @@ class Identity(DeviceMessage, code=0x81):
     protocol_version: U8
     board: Name
     firmware: Name
-    unique_id: UniqueId
+    unique_id: Annotated[bytes, Raw(8)]
     tick_hz: U32
     gates: U8
     releases: U8
@@ -361,7 +359,7 @@ class EventsFrame(DeviceMessage, code=0x88):
 
     label: U32
     first: U16
-    events: EventRecords
+    events: Annotated[bytes, Raw(EVENT.size, tail=True)]
 
     @property
     def snapshots(self) -> tuple[Event, ...]:

@@ -62,8 +62,12 @@ class Restart(NamedTuple):
 
 
 def causes(mask: int) -> str:
-    """Name the causes in a mask as BOOT has it; empty where a boot loader has cleared it."""
-    return ", ".join(word for bit, word in _CAUSES.items() if mask & bit)
+    """Name the causes in a mask as BOOT has it, to go behind a moment; empty if none is known.
+
+    A boot loader may have cleared it.
+    """
+    words = ", ".join(word for bit, word in _CAUSES.items() if mask & bit)
+    return f" ({words})" if words else ""
 
 
 Record: TypeAlias = Incoming | ClockSample | Pulse | Drop | Restart

@@ -7,17 +7,17 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from rig.boards import GATES
 from rig.errors import DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.frames import Frame, encode
-from rig.link.gatewatch import GateStates, watch_gates
 from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
+from rig.link.port import port_clock
 from rig.reasons import make_error
 from rig.selftest.findings import NotPossibleError, fail_if, insist, need, wrong_answer
 
 if TYPE_CHECKING:
-    from rig.clock.host import Clock
     from rig.link.exchange import Answer
     from rig.link.port import Port
     from rig.link.transcript import Record
@@ -31,6 +31,7 @@ _TRIES = 3
 _ANSWER_S = 0.3
 _RECORD_S = 2.0  # at most, from FIRE or ABORT to the certificate
 _WATCH_S = 0.4
+_LOOK_S = 0.0017  # in step with neither a USB frame nor the mains
 _QUIET = (
     "a gate that is clear and steady; on a bare board a wire from one gate input to ground, and "
     "for the sync output a wire to another one (--loopback GATE)"
@@ -63,6 +64,19 @@ class SelftestOptions(NamedTuple):
     gates: int | None = None
 
 
+class GateStates(NamedTuple):
+    """Masks of the gates that were blocked at every look, and at any look."""
+
+    always: int
+    sometimes: int
+
+
+def name_gates(mask: int) -> str:
+    """Name the gates of a mask, as in ``gates 1, 8``."""
+    numbers = [str(n) for n in range(GATES) if mask >> n & 1]
+    return f"gate{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
+
+
 class RecordedDrop(NamedTuple):
     """A drop as the board sent it of its own accord."""
 
@@ -78,8 +92,8 @@ class BoardUnderTest(Device):
 
     Parameters
     ----------
-    port, clock
-        The open port and its time.
+    port
+        Open.
     options
         What may be done.
 
@@ -89,8 +103,8 @@ class BoardUnderTest(Device):
         Longest round trip of the pings; the slack that time limits get.
     """
 
-    def __init__(self, port: Port, clock: Clock, options: SelftestOptions) -> None:
-        super().__init__(port, clock)
+    def __init__(self, port: Port, options: SelftestOptions) -> None:
+        super().__init__(port, port_clock(port))
         self.options = options
         self.slowest_s = 0.0
 
@@ -217,7 +231,13 @@ class BoardUnderTest(Device):
     @cached_property
     def gates(self) -> GateStates:
         """All gates, watched for a moment, once."""
-        return watch_gates(lambda: self.state().gates, self.clock, _WATCH_S)
+        always = sometimes = self.state().gates
+        end_ns = self.clock.now_ns() + round(_WATCH_S * 1e9)
+        while self.clock.now_ns() < end_ns:
+            blocked = self.state().gates
+            always, sometimes = always & blocked, sometimes | blocked
+            self.clock.sleep(_LOOK_S)
+        return GateStates(always, sometimes)
 
     def quiet_gate(self) -> int:
         """Mask of one gate that is clear and steady, and not at the end of the loop-back wire.
@@ -227,8 +247,7 @@ class BoardUnderTest(Device):
         NotPossibleError
             There is none.
         """
-        states = self.gates
-        restless = states.stuck | states.flickering
+        restless = self.gates.sometimes
         if self.options.loopback is not None:
             restless |= 1 << self.options.loopback
         quiet = ~restless & ((1 << self.identity.gates) - 1)

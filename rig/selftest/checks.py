@@ -10,9 +10,8 @@ from statistics import fmean, stdev
 
 from rig.boards import GATES, RELEASES
 from rig.link import messages as wire
-from rig.link.gatewatch import name_gates
 from rig.link.messages import PROTOCOL_VERSION, TEST_RUN, Phase, RefusalReason
-from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US, BoardUnderTest
+from rig.selftest.board import LABEL, OTHER_LABEL, PULSE_US, BoardUnderTest, name_gates
 from rig.selftest.findings import fail_if, insist, need, wrong_answer
 
 _CLOSE_S = 0.3
@@ -63,22 +62,22 @@ def look_at_gates(board: BoardUnderTest) -> str:
     counted = fitted if in_use is None else in_use
     faults = {
         "gates_not_fitted": counted & ~fitted,
-        "gates_flicker": states.flickering & counted,
-        "gates_blocked": states.stuck & (in_use or 0),
+        "gates_flicker": states.sometimes & ~states.always & counted,
+        "gates_blocked": states.always & (in_use or 0),
     }
     for code, mask in faults.items():
         fail_if(mask, code, gates_listed=name_gates(mask))
-    stuck = name_gates(states.stuck)
+    stuck = name_gates(states.always)
     which = "the gates in use, by --protocol FILE or --gates 0,1,8,9"
-    need(in_use is not None or not states.stuck, f"{which}: {stuck} blocked all the time")
-    unused = f"; not in use and blocked: {stuck}" if states.stuck else ""
+    need(in_use is not None or not states.always, f"{which}: {stuck} blocked all the time")
+    unused = f"; not in use and blocked: {stuck}" if states.always else ""
     return f"{counted.bit_count()} gates clear{unused}"
 
 
 def arm_blocked_gate(board: BoardUnderTest) -> str:
     """See that a gate that is blocked forbids arming."""
     board.settle()
-    stuck = board.gates.stuck
+    stuck = board.gates.always
     need(stuck, "a gate that is blocked by hand")
     gate = stuck & -stuck
     board.refuse(board.order(gates=gate), RefusalReason.GATE_BLOCKED, gate)
@@ -181,7 +180,7 @@ def measure_sync_edges(board: BoardUnderTest) -> str:
     gate = loopback or 0
     last = identity.gates - 1
     need(gate <= last, f"gate {gate}, and this board has gates 0 to {last}")
-    restless = board.gates.stuck | board.gates.flickering
+    restless = board.gates.sometimes
     fail_if(restless >> gate & 1, "sync_blocked", gate=gate)
     late = []
     for _ in range(board.options.drops):

@@ -66,8 +66,7 @@ def make_check(name: str, check: Callable[..., str | None], *facts: object) -> F
 
 def explain(name: str, error: RigError, verdict: Verdict = Verdict.FAILED) -> Finding:
     """Return what a check found where all is not well."""
-    plain = make_reason("failed", text=error.message, hint=error.hint)
-    reason = next(iter(error.reasons), plain)
+    reason = next(iter(error.reasons), make_reason("failed", text=error.message, hint=error.hint))
     return Finding(name, reason.text, verdict, reason)
 
 

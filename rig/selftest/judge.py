@@ -10,9 +10,8 @@ from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
-from rig.link.gatewatch import name_gates
 from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
-from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
+from rig.selftest.board import BoardUnderTest, Check, RecordedDrop, name_gates
 from rig.selftest.checks import identify
 from rig.selftest.findings import fail_if, insist
 

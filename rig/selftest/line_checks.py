@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rig.clock.epochs import RESONATOR_TOLERANCE, epochs
 from rig.clock.rate import ping_rate
+from rig.clock.samples import samples
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
@@ -43,7 +44,7 @@ def measure_round_trips(board: BoardUnderTest) -> str:
     late = sum(trip > limit_s for trip in trips)
     fail_if(late > _LATE, "slow_answers", slowest_s=trips[-1])
     nominal_hz = board.identity.tick_hz
-    rate = ping_rate(epochs(pings, nominal_hz))
+    rate = ping_rate(epochs(samples(pings), nominal_hz))
     fail_if(not rate.n, "clock_unknown", pings=len(pings))
     ppm, u95 = 1e6 * (rate.hz / nominal_hz - 1), 2e6 * rate.u_hz / nominal_hz
     fail_if(abs(ppm) > 1e6 * RESONATOR_TOLERANCE + u95, "clock_off", ppm=ppm, U95=u95)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason
-from rig.link.port import port_clock
 from rig.selftest import checks, line_checks
 from rig.selftest.board import BoardUnderTest, Check, SelftestOptions
 from rig.selftest.findings import Finding, make_check, need
@@ -18,7 +17,6 @@ from rig.selftest.line_checks import TIMEOUT_MS, await_disarming
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from rig.clock.host import Clock
     from rig.link.port import Port
 
 
@@ -47,14 +45,14 @@ CHECKS: dict[str, Check] = {
 
 
 def selftest(
-    port: Port, clock: Clock, options: SelftestOptions, judge_port: Port | None = None
+    port: Port, options: SelftestOptions, judge_port: Port | None = None
 ) -> Iterator[Finding]:
     """Make every check, one after the other.
 
     Parameters
     ----------
-    port, clock
-        The open port and its time.
+    port
+        Open.
     options
         What may be done.
     judge_port
@@ -65,10 +63,10 @@ def selftest(
     Finding
         As soon as it is known. When the board is silent the rest is not possible.
     """
-    judges = [JudgeBoard(each, port_clock(each), options) for each in [judge_port] if each]
+    judges = [JudgeBoard(each, options) for each in [judge_port] if each]
     by_judge = judges[0].checks() if judges else {}
     table = {name: check for name, check in CHECKS.items() if name not in by_judge} | by_judge
-    yield from run_checks(table, BoardUnderTest(port, clock, options), *judges)
+    yield from run_checks(table, BoardUnderTest(port, options), *judges)
 
 
 def run_checks(

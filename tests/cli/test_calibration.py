@@ -116,9 +116,8 @@ def test_a_drifting_clock_gives_each_run_its_own_rate(measure, tmp_path, fence):
     with Session.open(session, readonly=True) as opened:
         clock = calibration(opened)
         *_, last = drops = list(opened.drops())
-    fired = [clock.fired.when(drop) for drop in drops]
-    for run, when in zip(found["runs"], fired, strict=True):
-        true = -1300.0 + 600.0 * when / 3600.0
+    for run, drop in zip(found["runs"], drops, strict=True):
+        true = -1300.0 + 600.0 * clock.fired.when(drop, clock.device.hz) / 3600.0
         used = run["calibration"]
         assert abs(used["rate_ppm"] - true) < 4.0 * used["u_ppm"] < 16.0
     lost = clock.describe(replace(last, attempt=7))  # nobody logged when

@@ -43,16 +43,13 @@ def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, m
 
 
 def test_a_session_is_identical_to_its_own_bytes(call, finished):
-    before = finished.session.read_bytes()
     done = call("replay", finished.session)
     assert done.code == 0
     drops, clock, results, last = done.out.splitlines()
     assert drops == "drops: 4 identical"
-    assert clock.startswith("clock samples: ")
-    assert clock.endswith(" identical")
+    assert clock == f"clock samples: {clock.split()[2]} identical"
     assert int(clock.split()[2]) > 4
     assert (results, last) == ("results: 4 identical", "identical")
-    assert finished.session.read_bytes() == before
 
 
 def test_what_is_recorded_meanwhile_is_no_difference(fenced, monkeypatch):

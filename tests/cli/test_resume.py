@@ -236,10 +236,6 @@ def test_a_signal_comes_where_it_is_let_through_or_at_the_end():
     interrupts.check()
     with pytest.raises(KeyboardInterrupt), interrupts.caught():
         signal.raise_signal(signal.SIGTERM)
-
-
-def test_where_it_is_let_through_a_signal_comes_at_once():
-    interrupts = Interrupts()
     with interrupts.caught(), pytest.raises(KeyboardInterrupt), interrupts.let_through():
         signal.raise_signal(signal.SIGINT)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from rig.clock.epochs import epochs
 from rig.clock.rate import TickRate, ping_rate
+from rig.clock.samples import samples
 from rig.records import ClockSample, Pulse
 
 HZ = 16_000_000
@@ -17,7 +18,7 @@ Delay = Callable[[random.Random], float]
 
 def tick_rate(pings, nominal_hz, cuts_ns=()) -> TickRate:
     """Return the rate from clock samples in any order."""
-    return ping_rate(epochs(pings, nominal_hz, cuts_ns))
+    return ping_rate(epochs(samples(pings), nominal_hz, cuts_ns))
 
 
 def exponential(mean: float = 1e-3) -> Delay:

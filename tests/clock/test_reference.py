@@ -7,6 +7,7 @@ import pytest
 from rig.clock.calibration import Calibrator
 from rig.clock.epochs import epochs
 from rig.clock.rate import ping_rate, pulse_rate
+from rig.clock.samples import samples
 from rig.link import messages as wire
 from rig.link.frames import Frame, encode
 from rig.link.transcript import Transcript
@@ -15,8 +16,8 @@ from tests.clock.clocks import HZ, Clock, compared, moved, ppm, seconds
 
 
 def measured(clock, pulses, pings=None):
-    samples = epochs(pings or compared(clock, 1, 120.0), HZ)
-    return pulse_rate(samples, pulses, ping_rate(samples))
+    split = epochs(samples(pings or compared(clock, 1, 120.0)), HZ)
+    return pulse_rate(split, pulses, ping_rate(split))
 
 
 @pytest.mark.parametrize("every", [1, 7, 10])

@@ -89,7 +89,8 @@ def axis_one_by_one(pings, breaks):
 def test_epochs_are_those_of_one_sample_after_the_other(drawn):
     pings, cuts, _ = drawn
     found = [
-        [ClockSample(*row) for row in piece.tolist()] for piece in epochs(pings, HZ, cuts).pings
+        [ClockSample(*row) for row in piece.tolist()]
+        for piece in epochs(samples(pings), HZ, cuts).pings
     ]
     assert found == epochs_one_by_one(pings, cuts)
 

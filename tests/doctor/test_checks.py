@@ -24,7 +24,7 @@ HZ = 16_000_000
 def findings(board=None, port=None):
     """What the doctor finds on a board, or at a port."""
     port = port or port_of(board)
-    checked = run_checks(BOARD_CHECKS, BoardUnderTest(port, port.clock, SelftestOptions()))
+    checked = run_checks(BOARD_CHECKS, BoardUnderTest(port, SelftestOptions()))
     return {finding.name: finding for finding in checked}
 
 

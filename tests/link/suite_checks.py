@@ -10,6 +10,6 @@ NEEDS_HANDS = {"GATE_BLOCKED", "sync output to gate", "GATE_UNSTEADY", "STOPPED"
 
 class CheckSuite(Suite):
     def test_it_passes_the_self_test(self, bench):
-        findings = list(selftest(bench.port(), bench.clock(), SelftestOptions(release=True)))
+        findings = list(selftest(bench.port(), SelftestOptions(release=True)))
         assert [str(one) for one in findings if one.verdict is Verdict.FAILED] == []
         assert {one.name for one in findings if one.verdict is not Verdict.OK} == NEEDS_HANDS

@@ -42,7 +42,7 @@ class LoopedBoard(VirtualBoard):
 
 def outcomes(port, loopback=GATE, drops=5, release=True, gates=None):
     """Test a board; give its findings by the name of the check."""
-    findings = list(selftest(port, port.clock, SelftestOptions(loopback, drops, release, gates)))
+    findings = list(selftest(port, SelftestOptions(loopback, drops, release, gates)))
     assert len({finding.name for finding in findings}) == len(findings)
     for finding in findings:
         assert (finding.reason is None) is (finding.verdict is Verdict.OK)

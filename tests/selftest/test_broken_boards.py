@@ -106,7 +106,7 @@ def test_what_is_no_message_is_a_failure():
 
 def test_a_cable_that_is_pulled_is_said(monkeypatch):
     port = port_of(LoopedBoard(Wire()))
-    tests = selftest(port, port.clock, SelftestOptions())
+    tests = selftest(port, SelftestOptions())
     next(tests)
 
     def gone(*_):

@@ -44,7 +44,7 @@ class Pair:
 
     def findings(self, drops=DROPS):
         options = SelftestOptions(drops=drops, release=True)
-        return selftest(self.port, self.port.clock, options, self.judge_port)
+        return selftest(self.port, options, self.judge_port)
 
 
 @pytest.fixture(scope="module")
