@@ -185,18 +185,6 @@ def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port
 # ------------------------------------------------- where the output goes
 
 
-def test_a_reader_that_leaves_in_the_middle_is_no_error(finished, tmp_path):
-    """As in ``rig analyze --json | head -1``."""
-    arguments = command("analyze", finished.copy(tmp_path), "--json")
-    with subprocess.Popen(
-        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as process:
-        assert process.stdout.read(1) == b"{"
-        process.stdout.close()
-        assert process.stderr.read() == b""
-    assert process.returncode == 0
-
-
 @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
 def test_sentences_are_broken_on_terminals_only(stream, monkeypatch):
     lines = ["  a   row that is wider than the terminal   " + "x" * 60, "  run 3: " + "why " * 30]

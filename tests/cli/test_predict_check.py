@@ -5,6 +5,8 @@ import json
 import pytest
 
 from rig.design.trials import Trials
+from rig.predictions import predictions
+from rig.protocol.reader import read
 from tests.cli.lab import PROTOCOLS, short, without
 
 FIELDS = {
@@ -19,17 +21,6 @@ FIELDS = {
     "in_domain",
     "notes",
 }
-# Discrete model, β 0.5, μ 0.2, ξ 1/3, 25 rods over 1.165 m, h 0.18 m, g 9.81 m/s²; computed
-# elsewhere with 60 digits.
-REFERENCE = {
-    0: (0.105, 0.080175519527158543, 6.2857634799081311, None),  # the pile
-    30: (0.19834747713266998, 0.14455777135466808, 7.5511640917900483, 0.49471049795616742),
-    40: (0.15506060950816171, 0.11546810526538031, 6.9327596650855757, 0.50066864460340956),
-    60: (0.068911961660286844, 0.053585554933341692, 5.8609487859073973, 0.51311334995443199),
-    80: (0.01226400922538273, 0.0098142050953198042, 5.2579813110300101, 0.52173665052246976),
-}
-
-
 PILE = "  pile: {below: 30 deg, restitution: -0.37}\n"
 SINGULAR = (
     without("gates", short("[5 deg, 60 deg]"))
@@ -39,38 +30,15 @@ SINGULAR = (
 )
 
 
-@pytest.fixture
-def predict(call, tmp_path):
-    def ask(text):
-        path = tmp_path / "p.yaml"
-        path.write_text(text, "utf-8")
-        done = call("predict", path, "--json")
-        assert done.code == 0, done.err
-        assert done.err == ""
-        return {line["incline_deg"]: line for line in json.loads(done.out)["predictions"]}
-
-    return ask
-
-
-def numbers(line):
-    return tuple(line[key] for key in ("alpha", "separation_m", "speed_m_s", "fall_time_s"))
-
-
-def test_predictions_are_those_of_the_reference(call):
-    done = call("predict", PROTOCOLS / "inclined-uniform.yaml", "--json")
+def test_json_has_every_field_of_every_incline(call):
+    """That the numbers are right is for tests/model and tests/test_predictions.py."""
+    path = PROTOCOLS / "inclined-uniform.yaml"
+    done = call("predict", path, "--json")
     assert done.code == 0
     lines = json.loads(done.out)["predictions"]
+    assert lines == [one.json() for one in predictions(read(path))]
     assert [line["incline_deg"] for line in lines] == list(range(0, 90, 10))
-    for line in lines:
-        assert line.keys() >= FIELDS
-        assert line["in_domain"] is True
-        assert line["gamma"] == pytest.approx(4 / 3, rel=1e-14)
-        # A free chain's top rod at the contact point: √(2 g (h + L)).
-        assert line["free_fall_speed_m_s"] == pytest.approx((2 * 9.81 * 1.345) ** 0.5, rel=1e-14)
-        for found, known in zip(
-            numbers(line), REFERENCE.get(line["incline_deg"], ()), strict=False
-        ):
-            assert known is None or found == pytest.approx(known, rel=1e-13)
+    assert all(line.keys() >= FIELDS for line in lines)
 
 
 def test_the_table_says_the_same(call, tmp_path):

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rig.bundle.tables import csv_files, flatten
+from rig.bundle.tables import csv_files
 from rig.files import make_folder, write_atomic
 from rig.reasons import plain_reason
 from rig.records import ClockSample, Drop, Edge
@@ -89,32 +89,14 @@ def test_all_files(tmp_path: Path, session: Session) -> None:
     }  # fmt: skip
 
 
-def test_columns_of_absent_things_are_absent(tmp_path: Path, session: Session) -> None:
-    export_csv(tmp_path / "out", session, {"runs": [{"run": 1, "verdict": "void"}], "summary": []})
-    assert rows(tmp_path / "out" / "runs.csv") == [{"run": "1", "verdict": "void"}]
-
-
-def test_flatten_leaves_objects_in_lists_out() -> None:
-    assert flatten({"a": {"b": [1, 2], "c": [{"d": 1}]}}) == {"a_b": "1; 2"}
-
-
-def test_a_fence_has_no_columns_of_an_impact(session, tmp_path):
-    run = {
-        "run": 1, "attempt": 1, "incline_deg": 0.0, "impact_chain": None,
-        "gravity_m_s2": {"value": 9.81, "u": 0.01, "U95": 0.02}, "causes": [],
-        "verdict": "accepted",
-    }  # fmt: skip
-    summary = {"incline_deg": 0.0, "n": 1, "gravity_m_s2": run["gravity_m_s2"]}
-    export_csv(tmp_path, session, {"runs": [run], "summary": [summary]})
-    heads = [
-        (tmp_path / name).read_text("utf-8").split("\n")[0] for name in ("runs.csv", "summary.csv")
-    ]
-    quantity = "gravity_m_s2,gravity_m_s2_u,gravity_m_s2_U95"
-    assert heads == [f"run,attempt,{quantity},verdict", f"n,{quantity}"]
-    struck = {**run, "impact_chain": "A", "causes": [{"edge": 1}]}
-    export_csv(tmp_path, session, {"runs": [struck], "summary": []})
-    assert (
-        (tmp_path / "runs.csv")
-        .read_text("utf-8")
-        .startswith("run,attempt,incline_deg,impact_chain,gr")
-    )
+@pytest.mark.parametrize("scene", ["fences", "finished"])
+def test_a_table_has_the_columns_of_its_scene(scene, request, call, tmp_path):
+    session = request.getfixturevalue(scene)
+    assert call("export", getattr(session, "session", session), "--csv", tmp_path).code == 0
+    struck = {"incline_deg", "impact_chain", "separation_m"}
+    for table in ("runs", "summary"):
+        columns = set(rows(tmp_path / f"{table}.csv")[0])
+        assert columns & struck == (struck if scene == "finished" else set()) - (
+            {"impact_chain"} if table == "summary" else set()
+        )
+        assert ("gravity_m_s2_U95" in columns) == (scene == "fences")

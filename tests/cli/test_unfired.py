@@ -98,23 +98,6 @@ def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_a
     assert_whole(tmp_path / "s", 2)
 
 
-@pytest.mark.parametrize(("looks", "code"), [(3, 0), (9, 4)])
-def test_an_open_stop_is_waited_for_a_little(run, tmp_path, monkeypatch, looks, code):
-    wait, number = Recorder.wait, count(1)
-
-    def waited(recorder, seconds, *more):
-        wait(recorder, seconds, *more)
-        step = next(number)
-        if step in {1, looks}:
-            recorder._port.board.stop(step == 1)
-
-    monkeypatch.setattr(Recorder, "wait", waited)
-    done = run()
-    assert done.code == code
-    assert ("the emergency stop is open" in done.err) == (code == 4)
-    assert len(drops_of(tmp_path / "s")) == (2 if code == 0 else 0)
-
-
 def test_whoever_is_there_is_asked_to_close_the_stop(monkeypatch, tmp_path, fence):
     asked = []
 

@@ -70,12 +70,6 @@ IDENTITY = wire.Identity(
 )
 
 
-def test_the_first_byte_is_a_delimiter(clock):
-    port = FakePort(clock, {wire.Identify: [IDENTITY]})
-    assert Device(port, clock).connect() == IDENTITY
-    assert port.written[0] == b"\0"
-
-
 class Captive(FakePort):
     """A board whose boot loader goes on 5 s after the last byte that it heard."""
 
@@ -108,24 +102,18 @@ def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
 
 
 def test_repeats_have_the_same_seq_and_back_off(clock):
-    port = FakePort(clock, {})
+    port = FakePort(clock, {wire.Status: [wire.State(wire.Phase.IDLE, 0, 0, 0)]})
+    one = Device(port, clock, tries=6)
     with pytest.raises(DeviceTimeoutError, match="did not answer Ping"):
-        Device(port, clock, tries=6).ping()
+        one.ping()
     assert len(port.written) == 6
     assert len(set(port.written)) == 1
     assert 1.5 < clock.now_ns() * 1e-9 < 3
-
-
-def test_what_is_asked_and_asked_again_is_counted(clock):
-    port = FakePort(clock, {wire.Ping: [wire.Pong(1)]})
-    one = Device(port, clock, tries=3)
-    one.ping()
-    with pytest.raises(DeviceTimeoutError):
-        one.status()
+    one.status()
     counted = one.statistics()
-    assert (counted["requests"], counted["repeats"]) == (2, 2)
+    assert (counted["requests"], counted["repeats"]) == (2, 5)
     assert counted["tx_bytes"] == sum(map(len, port.written))
-    assert counted["rx_bytes"] == len(encode(Frame(wire.CODES[wire.Pong], 1, 1, bytes(4))))
+    assert counted["rx_bytes"] > 8  # a frame
 
 
 @pytest.mark.parametrize(
@@ -245,6 +233,7 @@ def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
     board.connect(boot_wait_s=0)
     drop = board.fetch(1)
     assert drop.faults == (make_reason("events_overwritten", missing=3, events=5, first=0),)
+    assert port.written[0] == b"\0"
     assert len(port.written) == 2 + 4  # delimiter and IDENTIFY; certificate, 0, 3, 4
     for chunk in chunks:
         offline.feed(*chunk)

@@ -8,17 +8,17 @@ from serial import SerialException
 from rig.errors import DeviceError
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
-from sim.board import VirtualBoard
+from tests.daemon.far_port import FarPort
+from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.talk import arm
-from tests.link.tcp_bridge import TcpBridge
 from tests.waiting import until
 
 
 @pytest.fixture
 def bridge():
-    board = VirtualBoard(ScriptedLab(changes=falling_rods()), seed=1)
-    with TcpBridge(board) as bridge:
+    lab = ScriptedLab(changes=falling_rods())
+    with PtyBoard(lab) as board, FarPort(board.path, "socket") as bridge:
         yield bridge
 
 
@@ -46,7 +46,7 @@ def test_a_drop_comes_whole_over_tcp_and_outlives_a_reconnect(bridge):
 
 def test_a_connection_that_ends_is_said(bridge):
     port, device = connected(bridge.url)
-    bridge.end()
+    bridge.hang_up()
     with pytest.raises(DeviceError, match=r"the port is gone|reset by peer|Broken pipe"):
         device.status()
     port.close()
