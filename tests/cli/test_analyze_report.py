@@ -6,9 +6,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from rig.measurands import SEPARATION
-from rig.report.parts import LABELS, Mean
-from rig.results import complete_analysis
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS
 
@@ -90,19 +87,6 @@ def test_what_cannot_be_written_is_not_begun(
     assert done.err.startswith("cannot ")
     assert str(tmp_path / place) in done.err
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
-
-
-def test_bars_are_as_long_as_the_analysis_says(finished):
-    with Session.open(finished.session, readonly=True) as session:
-        drawn = complete_analysis(session).summary[0]
-    line = drawn.json()
-    sd = line["separation_sd_m"]
-    expected = {"U95": line["separation_m"]["U95"], "u": line["separation_m"]["u"],
-                "SE": sd / line["n"] ** 0.5, "SD": sd, "half-SD": sd / 2}  # fmt: skip
-    words = {"U95": "U (95 %)", "SD": "SD of one run", "half-SD": "SD/2 of one run"}
-    for bars, label in LABELS.items():
-        assert label == words.get(bars, bars)
-        assert Mean(drawn, SEPARATION).bars[bars] == pytest.approx(expected[bars], rel=1e-9), bars
 
 
 def test_scatter_is_told_beside_uncertainty(call, finished, analysis):

@@ -89,32 +89,6 @@ def test_an_empty_port_is_refused(call, words):
     assert "accepted: a device path, or a URL" in done.err
 
 
-def test_every_problem_of_a_protocol_has_its_line_and_column(call, tmp_path):
-    protocol = tmp_path / "bad.yaml"
-    text = short().replace("drop: 180 mm", "drop: 180 kg").replace("repeats: 2", "repeat: 2")
-    protocol.write_text(text + "gravity: 9.8 m/s^2\n", "utf-8")
-    for arguments in (
-        ("check",),
-        ("predict",),
-        ("run", "--port", "sim://", "--session", tmp_path / "s"),
-    ):
-        done = call(*arguments, protocol)
-        assert_told(done)
-        places = [
-            re.fullmatch(rf"{re.escape(str(protocol))}:(\d+):(\d+): (\S+): .+", line)
-            for line in done.err.splitlines()
-        ]
-        assert all(places), done.err
-        lines = text.splitlines()
-        found = {(int(place[1]), place[3]) for place in places}
-        assert {
-            (1 + lines.index("drop: 180 kg ± 2 mm"), "drop"),
-            (len(lines) + 1, "gravity"),
-        } <= found
-        assert any(key == "plan.repeat" for _, key in found)
-    assert not (tmp_path / "s").exists()
-
-
 def test_a_protocol_without_gates_points_to_predict(call, tmp_path):
     beads = PROTOCOLS / "bead-chain.yaml"
     done = call("run", beads, "--port", "sim://", "--session", tmp_path / "s")

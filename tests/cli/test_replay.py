@@ -6,7 +6,6 @@ import pytest
 
 from rig.link import messages as wire
 from rig.link.frames import Decoder
-from rig.recorder.recorder import Recorder
 from rig.records import ClockSample
 from rig.replay import replay
 from rig.session.store import Session
@@ -24,22 +23,6 @@ def tamper(session, sql, *values):
     """Change a session behind its back, guards taken away first."""
     with unguarded(session) as connection:
         assert connection.execute(sql, values).rowcount == 1
-
-
-def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, monkeypatch):
-    connect = Recorder.__init__
-
-    def wired(recorder, *what):
-        connect(recorder, *what)
-        recorder._port.board.sense(0.0125)
-
-    monkeypatch.setattr(Recorder, "__init__", wired)
-    assert call("run", fence, "--port", "sim://", "--session", tmp_path / "s").code == 0
-    with Session.open(tmp_path / "s", readonly=True) as session:
-        senses = [drop.certificate.release_sense for drop in session.drops()]
-    assert senses == [pytest.approx(200_000, rel=0.005)] * 2
-    done = call("replay", tmp_path / "s")
-    assert done.out.splitlines()[0] == "drops: 2 identical"
 
 
 def test_a_session_is_identical_to_its_own_bytes(call, finished):

@@ -83,29 +83,6 @@ def test_any_line_is_a_request_or_is_refused_with_a_code(line):
 
 
 @pytest.mark.parametrize(
-    ("line", "code"),
-    [
-        (b"{", rpc.PARSE),
-        (b"[" * 5000, rpc.PARSE),
-        (b"[]", rpc.INVALID),
-        (b'{"jsonrpc":"1.0","id":1,"method":"a"}', rpc.INVALID),
-        (b'{"jsonrpc":"2.0","id":true,"method":"a"}', rpc.INVALID),
-        (b'{"jsonrpc":"2.0","id":1,"method":2}', rpc.INVALID),
-        (b'{"jsonrpc":"2.0","id":[1],"method":"a"}', rpc.INVALID),
-    ],
-)
-def test_what_is_no_request_gets_its_code(line, code):
-    assert rpc.read_line(line).code == code
-
-
-def test_a_request_is_read_as_it_was_written():
-    job = {"run": 1, "attempt": 2}
-    assert rpc.read_line(rpc.request("arm", job, 5)) == rpc.Request(
-        jsonrpc="2.0", method="arm", params=job, id=5
-    )
-
-
-@pytest.mark.parametrize(
     ("told", "why"),
     [
         (b"HTTP/1.1 400 Bad Request\n", "not a daemon of this rig"),

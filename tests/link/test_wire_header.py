@@ -3,12 +3,9 @@
 import re
 from pathlib import Path
 
-from hypothesis import given
-
 from rig.link import frames
 from rig.link import messages as wire
-from rig.link.messages import Chars, Raw, UnsignedInt
-from tests.link.strategies import MESSAGES, name_in_c
+from tests.link.strategies import name_in_c
 
 HEADER = Path(__file__).parents[2] / "firmware/core/wire.h"
 
@@ -51,31 +48,3 @@ def test_every_name_is_there_with_its_value():
         )
     }
     assert set(C) <= set(expected) | places
-
-
-@given(MESSAGES)
-def test_fields_are_where_the_header_says(message):
-    code, payload = wire.pack(message)
-    name = name_in_c(type(message))
-    assert C[f"MSG_{name}"] == code
-    fixed, varying = True, 0
-    for field in wire.FIELDS[type(message)]:
-        value, key = getattr(message, field.name), f"{name}_{field.name.upper()}"
-        assert (key in C) == fixed
-        at = C.get(key, 0)
-        match field.wire:
-            case UnsignedInt(size=size) if fixed:
-                assert int.from_bytes(payload[at : at + size], "little") == value
-            case Raw(size=size, tail=False) if fixed:
-                assert payload[at : at + size] == value
-            case Chars(limit=limit):
-                assert C[f"{key}_LIMIT"] == limit
-                text = value.encode()
-                if fixed:
-                    assert payload[at : at + 1 + len(text)] == bytes([len(text)]) + text
-                fixed, varying = False, varying + 1 + len(text)
-            case Raw(tail=True):
-                assert payload[at:] == value
-                assert len(value) % C[f"{name}_RECORD"] == 0
-                fixed, varying = False, varying + len(value)
-    assert len(payload) == C[f"{name}_SIZE"] + varying

@@ -111,12 +111,3 @@ def test_impacts_are_those_of_one_surface(rows, own_z, piled):
         assert close(found.alpha[k], impact.alpha, 2e-15 * weight) or weight > 1e14
         if abs(row[0] - math.degrees(math.atan(row[2]))) > 1e-12:
             assert found.sliding[k] == ("does not slide" not in "".join(impact.notes))
-
-
-def test_beyond_the_domain_there_are_answers():
-    # Sliding; not sliding; level; α above ½; α below 0.
-    found = surface_impacts([40, 5, 0, 0, 0], [0.5, 0.5, 0.5, 1.0, -1.5], 0.2, [1/3, 1/3, 1/3, 0.1,
-                            1/3], gamma=1.0)  # fmt: skip
-    assert found.sliding.tolist() == [True, False, True, True, True]
-    end = falls([1.0, 1.0], [0.0, 1.0], found, 0.1, 9.81)
-    assert np.isfinite(end).all()

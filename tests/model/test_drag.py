@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from mpmath import mp
 
 from rig.errors import DomainError
-from rig.model.chain import Chain
 from rig.model.drag import air_legs, drag_fall, drag_leg, fallen, falling_speed, leg_drags
 from rig.model.fall import fall, hits, kicks
 from tests.examples import examples
@@ -99,24 +98,6 @@ def test_like_drag_keeps_every_digit_of_the_separation(
             assert end.separation_m == 0.0
         assert close(end.speed_m_s, wanted[1], many)
         assert close(end.time_s, wanted[2], many)
-
-
-@examples(100)
-@given(DISTANCES, DROPS, SPEEDS, decades(-2, 2), AIR, decades(-12, 2), st.booleans())
-def test_unlike_drag_loses_no_more_than_the_difference_of_drags(
-    gap, drop, speed, gravity, kappa, change, less
-):
-    kappas = [kappa, kappa / (1 + change) if less else kappa * (1 + change)]
-    assume(kappas[0] != kappas[1])
-    chain = Chain((1.0, 1.0), (0.0, gap))
-    end = drag_fall(chain, [0.0, 0.0], kappas, drop, gravity, speed)
-    with mp.workdps(200):
-        wanted = exact_fall(chain.heights, [0.0, 0.0], kappas, drop, gravity, speed)
-        condition = max(kappas) / abs(kappas[1] - kappas[0])
-        way = 1.0 + max(kappas) * (drop + gap)
-        assert close(end.separation_m, wanted[0], 1e-14 * way * way * condition)
-        assert close(end.speed_m_s, wanted[1], TIGHT * way)
-        assert close(end.time_s, wanted[2], TIGHT * way)
 
 
 @examples(80)

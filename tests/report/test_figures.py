@@ -90,12 +90,6 @@ def test_every_number_of_a_figure_is_in_its_table(tmp_path):
         assert (tmp_path / f"figure-1.{kind}").read_bytes() == figure_file(figure, kind)
 
 
-def test_points_stand_at_the_incline_at_which_they_were_measured():
-    figure = result_figure(TWO, CURVES)
-    points = [series for series in figure.panels[0].series if series.role in {"points", "mean"}]
-    assert {x for series in points for x in series.x} == set(fake_analysis.MODEL)
-
-
 def test_residuals_are_normalized_errors():
     figure = result_figure(TWO, CURVES)
     points = figure.panels[1].series[-1]
@@ -111,8 +105,6 @@ def test_without_any_uncertainty_there_are_no_residuals():
 
 
 def test_figures_follow_the_scene():
-    single = result_figure(fake_analysis.single_chain(), {})
-    assert "eparation" not in single.title
     assert runs_figure(fake_analysis.gravity()) is None
     gravity = result_figure(fake_analysis.gravity(), {})
     assert [panel.x.label for panel in gravity.panels] == ["run"]

@@ -13,7 +13,7 @@ from rig.cli import main
 from rig.errors import InputError
 from rig.estimate.posterior import Posterior
 from rig.estimate.session import Coefficient
-from rig.report.estimate import estimate_text, page_parts
+from rig.report.estimate import page_parts
 from rig.report.estimate_figures import estimate_pictures
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
@@ -47,17 +47,6 @@ def found(single):
 
     with Session.open(single, readonly=True) as session:
         return estimate(protocol_of(session), complete_analysis(session))
-
-
-def test_a_single_chain_s_estimate_speaks_of_no_other(found):
-    sections = Sections()
-    text = estimate_text(found, sections, simulated=True)
-    assert "Best single α" in text
-    for word in ("free chain", "Δz"):
-        assert word not in text
-    drawn = estimate_pictures(found, sections)
-    assert "Δz" not in drawn["curves"].title + drawn["curves"].caption
-    assert not sections.failed
 
 
 def changed(found, **gain):

@@ -6,13 +6,11 @@ import socket
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
 import pytest
 
 from rig.protocol import reader
 from rig.sweep import executor as module
 from rig.sweep.compute import compute
-from rig.sweep.executor import executor
 from rig.sweep.layout import lay_out
 from tests.cli.lab import PROTOCOLS, ROOT, command
 from tests.sweep.conftest import SCENE, VARY
@@ -55,14 +53,6 @@ def assert_same(found, wanted):
 @pytest.mark.parametrize("length", [1, 7, 64, 10**6])
 def test_how_a_grid_is_cut_does_not_show(layout, wanted, length):
     assert_same(computed(layout, length), wanted)
-
-
-def test_threads_and_a_cluster_give_the_same_bits(layout, wanted, local):
-    assert np.isfinite(wanted.speed_m_s).any()
-    assert_same(computed(layout, 11, threads=3), wanted)
-    with executor(None, local.scheduler_address) as (pool, count):
-        assert count == 2
-        assert_same(compute(layout, pool, 4, 23), wanted)
 
 
 def test_the_command_on_a_cluster_writes_the_same_file(sweep, local, tmp_path):

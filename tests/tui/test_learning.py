@@ -13,7 +13,7 @@ from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from rig.tui.drop_words import number_table, past_runs, sentence
-from rig.tui.plots import drop_pictures, session_pictures
+from rig.tui.plots import drop_pictures
 from rig.tui.survey import session_list
 from rig.wordings import NOTE
 from tests.cli.lab import short
@@ -24,18 +24,6 @@ from tests.tui.lab import KEYS, Operator, run
 def recorded(finished, tmp_path) -> Path:
     """Four drops of two chains, at two inclines."""
     return finished.copy(tmp_path).rename(tmp_path / "abba.session")
-
-
-def test_results_and_what_drifts_are_drawn(recorded):
-    view = LiveAnalysis(recorded).read()
-    pictures = [picture for picture, _ in session_pictures(view)]
-    labels = " | ".join(picture.panel.y.label for picture in pictures)
-    assert "separation" in labels
-    assert "skew" in labels
-    assert all(caption for _, caption in session_pictures(view))
-    for picture in pictures:
-        points = [x for one in picture.panel.series if one.role in {"mean", "ring"} for x in one.x]
-        assert sorted(points) == [1.0, 2.0, 3.0, 4.0]
 
 
 def test_a_drop_is_said_in_a_sentence_and_a_table(recorded):
@@ -112,18 +100,5 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
             await op.press(*"broken")
             await op.until(enter)
             await op.sees("✗", "drop 4 of 4")
-
-    run(work())
-
-
-def test_the_session_page_says_how_many_taught_each_other(recorded):
-    async def work():
-        app = RigApp(Options(session=recorded, offline=True), KEYS)
-        async with app.run_test(size=(120, 36)) as pilot:
-            op = Operator(app, pilot)
-            await op.press("5")
-            await op.sees("joint fit of 4 runs", "separation")
-            await op.press("y", "y")
-            await op.sees("skew")
 
     run(work())

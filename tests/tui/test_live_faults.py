@@ -8,8 +8,6 @@ from rig.campaign.machine import Stage
 from rig.session.store import Session
 from tests.tui.lab import run
 
-PULLED = ("✗ the port is lost", "reconnecting")
-
 
 def pull(processes, lab):
     processes.hand("pull 3600")
@@ -23,42 +21,11 @@ def kill(processes, lab):
     lab.kill()
 
 
-async def mended(op):
-    await op.until(lambda: op.app.follower.state.link == "up" and op.app.client.driving)
-    await op.until(lambda: op.app.follower.state.section("session"))
-
-
 async def session_on(op):
     await op.until(lambda: op.app.client.driving and op.app.follower.state.link == "up")
     await op.press("enter")
     await op.at(Stage.DEVICE)
     await op.until(lambda: op.app.view and op.app.indicators.known)
-
-
-def test_a_pulled_cable_is_said_on_every_screen(cabled):
-    processes, lab = cabled
-
-    async def work():
-        async with lab.operator(countdown_s=0.1) as op:
-            await op.until(lambda: op.app.follower.state.link == "up")
-            pull(processes, lab)  # before there is a session
-            await op.sees(*PULLED, "HOME")
-            plug(processes)
-            await session_on(op)
-            pull(processes, lab)
-            for page in "123456":
-                await op.press(page)
-                await op.sees(*PULLED)
-            plug(processes)
-            await mended(op)
-            await op.sees("the port was lost and is back")
-            await op.press("enter")
-            await op.arms(Stage.RESULT)
-            pull(processes, lab)
-            await op.sees(*PULLED, "RESULT")
-            assert op.app.flow.verdict == "accepted"  # stays until it is acknowledged
-
-    run(work())
 
 
 @pytest.mark.parametrize("fault", [pull, kill])
