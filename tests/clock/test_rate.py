@@ -84,3 +84,19 @@ def test_neither_hour_nor_count_nor_order_matters(shift, offset, order):
     assert (rate.n, rate.outliers) == (RATE.n, RATE.outliers)
     assert abs(rate.hz - RATE.hz) < 1e-3 * RATE.u_hz
     assert rate.u_hz == pytest.approx(RATE.u_hz, rel=1e-3)
+
+
+@pytest.mark.parametrize("n", [2, 3, 5, 10])
+def test_uncertainty_is_honest_with_few_samples(n):
+    inside = 0
+    for seed in range(200):
+        rate = tick_rate(compared(Clock(seed, last=60), seed, 50.0, every=3.0)[:n], HZ)
+        inside += abs(ppm(rate.hz, -1300e-6)) < 2 * rate.u_hz / HZ * 1e6
+    assert inside >= 180
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_too_few_samples_give_the_nominal_rate(count):
+    rate = tick_rate(compared(Clock(0, last=9), 0, 1.0)[:count], HZ)
+    assert (rate.hz, rate.n, rate.span_s) == (HZ, 0, 0.0)
+    assert rate.u_hz == pytest.approx(HZ * 0.005 / 3**0.5)

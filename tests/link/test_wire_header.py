@@ -1,10 +1,12 @@
 """The firmware's header has the values of `rig.link.messages`, and the places of `pack`."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from rig.link import frames
 from rig.link import messages as wire
+from rig.link.messages import Chars, Raw, UnsignedInt
 from tests.link.strategies import name_in_c
 
 HEADER = Path(__file__).parents[2] / "firmware/core/wire.h"
@@ -37,14 +39,24 @@ def test_every_name_is_there_with_its_value():
         for value in kind
     }
     codes = {f"MSG_{name_in_c(kind)}": code for code, kind in wire.TABLE.items()}
-    expected = limits | enums | codes
-    assert {name: C[name] for name in expected} == expected
-    places = {
-        f"{name_in_c(kind)}_{place}"
-        for kind, fields in wire.FIELDS.items()
-        for place in (
-            *("SIZE", "RECORD"),
-            *(f"{one.name.upper()}{end}" for one in fields for end in ("", "_LIMIT")),
-        )
-    }
-    assert set(C) <= set(expected) | places
+    places = {name: at for kind in wire.FIELDS for name, at in places_of(kind)}
+    assert limits | enums | codes | places == C
+
+
+def places_of(kind: type) -> Iterator[tuple[str, int]]:
+    """Tell where each field begins, up to the first of varying size, and what varies."""
+    name, at, fixed = name_in_c(kind), 0, True
+    for field in wire.FIELDS[kind]:
+        key = f"{name}_{field.name.upper()}"
+        if fixed:
+            yield key, at
+        match field.wire:
+            case Chars(limit=limit):
+                yield f"{key}_LIMIT", limit
+                fixed = False
+            case Raw(size=size, tail=True):
+                yield f"{name}_RECORD", size
+                fixed = False
+            case UnsignedInt(size=size) | Raw(size=size):
+                at += size
+    yield f"{name}_SIZE", at

@@ -43,17 +43,6 @@ def test_one_chain_falls_as_it_does_alone(chain, rows):
     assert ends(found) == [end(chain, *row) for row in rows]
 
 
-def test_arguments_broadcast():
-    chain = even_chain(5)
-    alpha, drop, gravity = [[0.1], [0.2], [0.3]], [0.0, 0.1], [[[9.81]], [[1.62]]]
-    found = falls(chain.masses, chain.heights, given_impacts(alpha, 1.5), drop, gravity, 0.5)
-    assert found.shape == (3, 2, 3, 2)
-    wanted = [
-        end(chain, a, 1.5, h, g, 0.5) for g in (9.81, 1.62) for a in (0.1, 0.2, 0.3) for h in drop
-    ]
-    assert ends(found) == wanted
-
-
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 23])
 def test_blocks_do_not_show(monkeypatch, count):
     source = np.random.default_rng(5)

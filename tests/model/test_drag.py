@@ -12,13 +12,11 @@ from rig.errors import DomainError
 from rig.model.drag import air_legs, drag_fall, drag_leg, fallen, falling_speed, leg_drags
 from rig.model.fall import fall, hits, kicks
 from tests.examples import examples
-from tests.model.air_reference import exact_fall, exact_leg, exact_way
+from tests.model.air_reference import exact_leg, exact_way
 from tests.model.chains import ALPHAS, DROPS, GAMMAS, GRAVITIES, SPEEDS, chains, close, decades
 
-TIGHT = 1e-13
 DISTANCES = decades(-4, 2)
 KAPPAS = decades(-15, 2)  # 1/m
-AIR = decades(-6, 1)  # of κ for whole falls
 
 
 # In e^(−κd) the rounding of κd counts κd times.
@@ -77,27 +75,6 @@ def test_without_drag_it_is_the_plain_fall_to_the_last_bit(
     assert hits(chain, gains, drop, gravity, speed, air_legs(still)) == hits(
         chain, gains, drop, gravity, speed
     )
-
-
-@examples(100)
-@given(chains(most=8), ALPHAS, GAMMAS, DROPS, decades(-2, 2), SPEEDS, AIR)
-def test_like_drag_keeps_every_digit_of_the_separation(
-    chain, alpha, gamma, drop, gravity, speed, kappa
-):
-    gains = kicks(chain, [alpha] * chain.rods, gamma)
-    kappas = [kappa] * chain.rods
-    length = drop + chain.length
-    # In much air what was gained dies away as e^(−2κ × way), with that number's relative error.
-    many = TIGHT * (1.0 + kappa * length)
-    end = drag_fall(chain, gains, kappas, drop, gravity, speed)
-    with mp.workdps(max(200, 60 + round(2 * kappa * length))):
-        wanted = exact_fall(chain.heights, gains, kappas, drop, gravity, speed)
-        if chain.rods > 2 or drop or speed:
-            assert close(end.separation_m, wanted[0], many)
-        else:  # one rod is struck, and at rest
-            assert end.separation_m == 0.0
-        assert close(end.speed_m_s, wanted[1], many)
-        assert close(end.time_s, wanted[2], many)
 
 
 @examples(80)

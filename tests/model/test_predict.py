@@ -83,22 +83,6 @@ def test_uncertainty_at_the_edge_of_what_friction_can_be_is_not_halved(mu):
     assert found.separation_u_m == pytest.approx(slope * u, rel=1e-3)
 
 
-def test_uncertainty_of_a_given_alpha():
-    u = 1e-5
-    chain = replace(CHAIN, alpha=Quantity(0.12, u), gamma=0.5)
-    found = predict(chain, Surface(Quantity(0.5, 0.1), Quantity(0.2, 0.1)), 40.0, DROP, GRAVITY)
-    with mp.workdps(50):
-        step = mp.mpf(10) ** -12
-        low, high = (
-            reference_fall(chain.masses, chain.heights, mp.mpf(0.12) + s * step, 0.5, 0.18, 9.81,
-                           digits=50)
-            for s in (-1, 1)
-        )  # fmt: skip
-        slope = (high.separation - low.separation) / (2 * step)
-    assert found.separation_u_m == pytest.approx(float(slope) * u, rel=1e-6)
-    assert (found.model, found.in_domain) == ("discrete, given", True)
-
-
 def test_a_pile_has_its_own_restitution_and_no_friction():
     surface = Surface(Quantity(0.5, 0.3), Quantity(0.2, 0.1), Pile(30.0, Quantity(-0.37, 1e-5)))
     found = predict(CHAIN, surface, 10.0, DROP, GRAVITY)

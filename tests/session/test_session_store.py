@@ -1,5 +1,6 @@
 """The session keeps what it is given, in order, and lets nobody alter it."""
 
+import json
 import os
 import sqlite3
 import subprocess
@@ -15,7 +16,7 @@ from rig.errors import SessionError
 from rig.reasons import make_reason, plain_reason
 from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.recover.examine import examine
-from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
+from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState, read_reasons
 from rig.session.store import Session
 from tests.session.altering import unguarded
 
@@ -426,3 +427,12 @@ def test_what_is_no_session(path, prepare, words: str, readonly: bool):
     assert caught.value.exit_code == 2
     assert (path.read_bytes() if path.is_file() else None) == before
     assert not path.with_name(path.name + ".lock").exists()
+
+
+@pytest.mark.parametrize(
+    ("sentence", "code"),
+    [("note: the lamp flickered", "note"), ("69 of 202 edges unexplained (34.2%)", "sentence")],
+)
+def test_a_sentence_of_an_old_file_is_read_as_it_stands(sentence, code):
+    (reason,) = read_reasons(json.dumps([sentence]))
+    assert (reason.code, reason.values["text"]) == (code, sentence.removeprefix("note: "))
