@@ -101,26 +101,6 @@ def test_check_for_one_board_is_its_refusal(call):
     assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in err
 
 
-@pytest.mark.usefixtures("untried")
-def test_check_says_what_predict_notes(call, tmp_path):
-    path = tmp_path / "p.yaml"
-    path.write_text(SINGULAR, "utf-8")
-    done = call("check", path)
-    assert (done.code, done.err) == (0, "")
-    assert "  note: 5°: Eq. 13 is singular: g(θ) ≤ 0 at incline 5°" in done.out
-    path.write_text(SINGULAR.replace("friction: 1", "friction: 0.45 ± 0.2"), "utf-8")
-    assert "  note: 5°: no uncertainty: within that of μ, Eq. 13 is sing" in call("check", path).out
-    path.write_text(short("[0 deg, 20 deg, 40 deg]"), "utf-8")
-    (note,) = [line for line in call("check", path).out.splitlines() if "°: " in line]
-    assert note.startswith("  note: 0°, 20°: rods gather on a pile")
-    unlike = short("[0 deg]").replace("{like: A}", "{like: A, rods: 20}")
-    path.write_text(unlike, "utf-8")
-    assert "  note: 0° A, 0° B: rods gather on a pile" in call("check", path).out
-    path.write_text(short("[0 deg, 20 deg, 40 deg]"), "utf-8")
-    noted = {one.partition(": ")[2] for one in call("predict", path).out.splitlines()[6:]}
-    assert noted == {note.partition("°: ")[2]}
-
-
 def test_check_counts_runs_and_trial_drops(call, finished):
     done = call("check", finished.protocol)
     assert "  4 runs: 2 at each incline (40, 60 deg)" in done.out.splitlines()

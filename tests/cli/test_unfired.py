@@ -85,19 +85,6 @@ def test_a_drop_that_is_not_let_go_is_prepared_again(run, tmp_path, once_armed, 
     assert_whole(tmp_path / "s", 2)
 
 
-@pytest.mark.parametrize(("happen", "why"), [HAPPENINGS[0], HAPPENINGS[3]])
-def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_armed, happen, why):
-    once_armed(happen, times=5)
-    done = run()
-    assert done.code == 4
-    assert why in done.err
-    assert "hint" in done.err
-    assert [n for n, state in log_of(tmp_path / "s")[1] if state == INTERRUPTED] == [1, 2, 3, 4, 5]
-    assert log_of(tmp_path / "s")[1][-1] == (5, INTERRUPTED)
-    assert run().code == 0
-    assert_whole(tmp_path / "s", 2)
-
-
 def test_whoever_is_there_is_asked_to_close_the_stop(monkeypatch, tmp_path, fence):
     asked = []
 

@@ -222,16 +222,6 @@ def test_a_torn_log_counts_up_to_its_last_whole_commit(part, killed):
         assert connection.execute('SELECT count(*) FROM "drop"').fetchone() == (len(runs),)
 
 
-def test_a_damaged_log_counts_up_to_the_damage(killed):
-    path, log = killed
-    data = bytearray(log.read_bytes())
-    data[len(data) // 2] ^= 1
-    log.write_bytes(data)
-    before = path.read_bytes(), log.read_bytes()
-    assert 0 < len(examine(path).drops) < 29
-    assert (path.read_bytes(), log.read_bytes()) == before
-
-
 def test_a_log_is_read_though_the_files_first_page_is_lost(killed):
     path, _ = killed
     path.write_bytes(bytes(4096) + path.read_bytes()[4096:])
@@ -249,11 +239,6 @@ def test_a_session_that_is_being_written(tmp_path):
     assert found.whole
     assert len(found.drops) == 29
     assert any(f"being written by process {writer.pid}" in line for line in said)
-
-
-def test_a_lock_that_a_dead_process_left_says_nothing(copy):
-    copy.with_name(copy.name + ".lock").write_text("4711\n")
-    assert examine(copy).snapshot.writer == ""
 
 
 # -- what is no session
