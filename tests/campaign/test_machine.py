@@ -41,15 +41,6 @@ TO_RESULT = (
 )  # fmt: skip
 
 
-def test_a_run_goes_from_the_protocol_to_its_verdict():
-    flow, effects = through(Flow(), *TO_RESULT)
-    assert flow.stage is Stage.RESULT
-    assert effects == [
-        on.Wait(5.0), on.ArmRelease(JOB), on.FireRelease(99), on.Collect(JOB), on.Judge(JOB),
-        on.Log(JOB, "accepted", ()),
-    ]  # fmt: skip
-
-
 def test_a_verdict_stays_until_it_is_in_the_file_and_acknowledged():
     flow, _ = through(Flow(), *TO_RESULT)
     assert step(flow, on.GoOn(NEXT))[0].stage is Stage.RESULT
@@ -95,16 +86,6 @@ def test_stop_is_carried_out_at_every_stage(stage):
     flow, effects = step(Flow(stage=stage, job=JOB), on.StopRequest())
     assert effects == (on.Stop(),)
     assert flow.stage is (Stage.PREPARE if stage in BEFORE_RELEASE else stage)
-
-
-@pytest.mark.parametrize("stage", [Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.LIVE])
-def test_what_fails_says_why_and_can_be_tried_again(stage):
-    flow, _ = through(
-        Flow(stage=stage, job=JOB), on.EffectFailure(-1, "a gate is blocked\nclear it")
-    )
-    assert (flow.stage, flow.trouble) == (Stage.PREPARE, "a gate is blocked\nclear it")
-    flow, _ = through(flow, on.GoOn(JOB))
-    assert flow.trouble == ""
 
 
 def test_a_drop_that_nobody_judged_is_judged():
@@ -153,13 +134,6 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
             assert on.Stop() in effects
             assert flow.stage not in BEFORE_RELEASE
         assert flow.ticket >= before.ticket
-
-
-def test_the_countdown_is_as_long_as_it_was_set():
-    flow = replace(Flow(stage=Stage.ARMING, job=JOB), countdown_s=0.5)
-    flow, effects = through(flow, on.EffectDone(0, 7), on.Tick(0.4))
-    assert effects == []
-    assert step(flow, on.Tick(0.11))[1] == (on.FireRelease(7),)
 
 
 PASSING = (RefusalReason.COOLING, RefusalReason.GATE_BLOCKED, RefusalReason.STOPPED)
@@ -253,13 +227,6 @@ def test_three_voids_of_a_kind_halt_it(attended):
 def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
     flow, effects = through(voids(SKEW, SKEW, SKEW), onward)
     assert (flow.stage, effects) == (Stage.HALTED, [])
-
-
-def test_two_of_a_kind_or_three_of_others_do_not():
-    for reasons in ((SKEW, SKEW), (SKEW, "late_stamps", SKEW)):
-        assert through(voids(*reasons), on.GoOn(NEXT))[0].stage is Stage.PREPARE
-    flow, _ = through(voids(SKEW, SKEW, SKEW), on.Reject("I moved a gate"), DONE, on.GoOn(NEXT))
-    assert flow.stage is Stage.PREPARE, "the operator knows why"
 
 
 def test_voids_that_others_logged_count_too():

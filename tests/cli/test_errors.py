@@ -3,7 +3,6 @@
 import io
 import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,8 +10,7 @@ import pytest
 
 from rig.commands import output
 from rig.session.store import Session
-from tests.cli.lab import PROTOCOLS, ROOT, Terminal, command, rig, short
-from tests.waiting import PATIENCE_S
+from tests.cli.lab import PROTOCOLS, Terminal, rig, short
 
 
 def assert_told(done, code=2):
@@ -179,22 +177,6 @@ def test_a_full_disk_behind_stdout_is_told(finished):
         done = rig("predict", finished.protocol, stdout=full)
     assert done.returncode == 2
     assert done.stderr == "rig: [Errno 28] No space left on device\n"
-
-
-@pytest.mark.parametrize("closed", ["1", "2"])
-def test_streams_may_be_closed(call, finished, closed):
-    words = "predict", finished.protocol
-    done = subprocess.run(
-        ["sh", "-c", f'exec "$@" {closed}>&-', "sh", *command(*words)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-    assert done.returncode == 0
-    assert done.stderr == ""
-    assert done.stdout == ("" if closed == "1" else call(*words).out)
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,6 @@ import shutil
 
 import pytest
 
-from rig.link import messages as wire
-from rig.link.frames import Decoder
-from rig.records import ClockSample
-from rig.replay import replay
-from rig.session.store import Session
-from sim.board import VirtualBoard
 from tests.session.altering import unguarded
 
 
@@ -23,33 +17,6 @@ def tamper(session, sql, *values):
     """Change a session behind its back, guards taken away first."""
     with unguarded(session) as connection:
         assert connection.execute(sql, values).rowcount == 1
-
-
-def test_a_session_is_identical_to_its_own_bytes(call, finished):
-    before = finished.session.read_bytes()
-    done = call("replay", finished.session)
-    assert done.code == 0
-    drops, clock, results, last = done.out.splitlines()
-    assert drops == "drops: 4 identical"
-    assert clock.startswith("clock samples: ")
-    assert clock.endswith(" identical")
-    assert int(clock.split()[2]) > 4
-    assert (results, last) == ("results: 4 identical", "identical")
-    assert finished.session.read_bytes() == before
-
-
-def test_what_is_recorded_meanwhile_is_no_difference(fenced, monkeypatch):
-    read = Session.byte_log
-    with Session.open(fenced) as writer, Session.open(fenced, readonly=True) as reader:
-
-        def late(self, after=0):
-            yield from read(self, after)
-            writer.add_timing(ClockSample(1, 2, 3))
-            writer.commit()
-
-        monkeypatch.setattr(Session, "byte_log", late)
-        assert replay(reader).lines[-1] == "identical"
-        assert reader.pings()[-1] == ClockSample(1, 2, 3)
 
 
 @pytest.mark.parametrize(
@@ -78,24 +45,3 @@ def test_what_was_tampered_with_is_called_different(call, fenced, sql, found):
         if different
         else "identical"
     )
-
-
-def test_a_drop_whose_acknowledgement_was_lost_is_replayed_once(call, tmp_path, fence, monkeypatch):
-    """The host stored it and said so into a dead cable: the next connection says it again."""
-    receive, lost = VirtualBoard.receive, []
-
-    def losing(board, start_ns, data):
-        frames = Decoder().feed(data)
-        if len(lost) < 8 and frames and frames[0].type == wire.CODES[wire.Acknowledge]:
-            lost.append(data)
-        else:
-            receive(board, start_ns, data)
-
-    monkeypatch.setattr(VirtualBoard, "receive", losing)
-    command = ("run", fence, "--port", "sim://", "--session", tmp_path / "s")
-    assert call(*command).code == 4
-    assert len(lost) == 8
-    assert call(*command).code == 0
-    with Session.open(tmp_path / "s", readonly=True) as session:
-        assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1), (2, 1)]
-    assert call("replay", tmp_path / "s").out.splitlines()[0] == "drops: 2 identical"

@@ -159,26 +159,6 @@ def test_whoever_stops_before_the_release_sees_nothing_fall(
     assert (1, 1) not in drops_of(tmp_path / "s")
 
 
-@pytest.mark.parametrize("state", [RunState.RECORDED, RunState.ACCEPTED])
-def test_a_drop_that_is_recorded_when_the_signal_comes_is_not_made_again(
-    run, tmp_path, monkeypatch, state
-):
-    add_state = Session.add_state
-
-    def add(session, run, attempt, new, *more):
-        add_state(session, run, attempt, new, *more)
-        if new == state:
-            signal.raise_signal(signal.SIGTERM)
-
-    monkeypatch.setattr(Session, "add_state", add)
-    assert run().code == 130
-    monkeypatch.undo()
-    assert drops_of(tmp_path / "s") == [(1, 1)]
-    assert run().code == 0
-    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-    assert_whole(tmp_path / "s", 2)
-
-
 # ------------------------------------------------- what keeps the signals waiting
 
 

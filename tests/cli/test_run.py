@@ -8,8 +8,6 @@ from html import unescape
 import pytest
 
 from rig.analysis import identify as reading
-from rig.reasons import Reason
-from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import (
     assert_whole,
@@ -100,18 +98,6 @@ def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, call, tmp_
     assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
-def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_path, fence):
-    path, reasons = tmp_path / "s", ("edges_lost", "edges_missed", "crc_mismatch")
-    Session.create(path, fence.read_text("utf-8"), fence.name, simulated=True,
-                   origin="sim://?seed=1").close()  # fmt: skip
-    with Session.open(path) as session:
-        for attempt, reason in enumerate(reasons, start=1):
-            session.add_state(1, attempt, RunState.VOID, 0, (Reason(reason),))
-        session.commit()
-    assert run("s", protocol=fence).code == 0
-    assert [(run, len(entries)) for run, entries in log_of(path).items()] == [(1, 3), (2, 4)]
-
-
 def test_a_finished_session_is_not_made_again(call, finished, tmp_path):
     session = finished.copy(tmp_path)
     log = log_of(session)
@@ -121,20 +107,6 @@ def test_a_finished_session_is_not_made_again(call, finished, tmp_path):
     assert "run " not in first.err
     assert log_of(session) == log
     assert [r["attempt"] for r in json.loads(second.out)["runs"]] == [1, 1, 1, 1]
-
-
-def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(
-    run, call, tmp_path, fence
-):
-    done = run(port="sim://?lose=0.9", protocol=fence)
-    assert done.code == 4
-    assert "did not answer" in done.err
-    assert "Traceback" not in done.err
-    assert done.out == ""
-    assert call("analyze", tmp_path / "s").code == 0
-    assert run(protocol=fence).code == 0
-    assert_whole(tmp_path / "s", 2)
-    assert run(protocol=fence).code == 0, "the line that never worked is forgotten"
 
 
 def connected(session):

@@ -7,11 +7,10 @@ import resource
 import socket
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from rig.daemon import connection, rpc, service
+from rig.daemon import rpc, service
 from rig.daemon.client import AsyncClient, Client, Line
 from tests.waiting import PATIENCE_S
 
@@ -50,23 +49,6 @@ def test_a_silent_crowd_keeps_nobody_out(daemon):
         client = Client(Line(path, "the one that means it"))
         client.stop("enough")
         client.close()
-
-
-def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
-    path, started = daemon
-    with contextlib.ExitStack() as crowd:
-
-        def come(number):
-            try:
-                crowd.callback(Client(Line(path, f"client {number}")).close)
-            except rpc.BusyError:
-                return 0
-            return 1
-
-        with ThreadPoolExecutor(160) as pool:
-            let_in = sum(pool.map(come, range(160)))
-        assert let_in + sum(map(come, range(let_in, connection.CLIENTS))) >= connection.CLIENTS
-    assert started.poll() is None
 
 
 def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, monkeypatch):

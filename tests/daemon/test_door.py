@@ -3,7 +3,6 @@
 import os
 import shutil
 import socket
-import time
 from itertools import product
 
 import pytest
@@ -12,7 +11,7 @@ from bench.process_fixture import ProcessFixture
 from rig.errors import RigError
 from rig.session.store import Session
 from tests.daemon.at_work import working
-from tests.waiting import PATIENCE_S, until
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture
@@ -76,19 +75,6 @@ def test_without_its_socket_it_ends(processes, state, lose, option):
     assert "was deleted, moved or replaced" in ended(processes, 2)
     assert "was deleted, moved or replaced" in (state / "daemon.log").read_text("utf-8")
     assert place.exists() == (lose is replace), "another daemon's is not taken away"
-
-
-def test_it_stays_for_the_clients_that_it_has(processes):
-    processes.start_daemon()
-    client = processes.client()
-    until(lambda: client.call("subscribe")["state"]["link"]["state"] == "up")
-    delete(processes.socket)
-    time.sleep(1.0)  # it looks ten times a second
-    lease = client.call("subscribe")["state"]["daemon"]
-    assert client.call("renew") == {"disk_s": 0.0}
-    assert lease["pid"] == processes.daemon.pid
-    client.close()
-    ended(processes, 2)
 
 
 def test_where_all_was_deleted_under_it_it_saves_what_it_has_and_ends(processes, state):

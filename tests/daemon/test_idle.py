@@ -1,7 +1,5 @@
 """A daemon that nobody asked for by name ends when nobody needs it, and never with a drop."""
 
-import subprocess
-import sys
 import time
 
 import pytest
@@ -61,18 +59,6 @@ def test_it_stays_while_a_client_is_there_and_ends_after_it(processes, client):
     assert one.call("renew") == {"disk_s": 0.0}
     one.close()
     assert any(ALONE in line for line in ended(processes))
-
-
-def test_one_that_was_started_by_hand_stays(tmp_path):
-    with ProcessFixture(runs=1) as processes:
-        processes.start_daemon()
-        other = subprocess.run(
-            [sys.executable, "-m", "rig", "daemon", "--port", "sim://", "--socket",
-             str(processes.folder / "other" / "rig.sock"), "--idle-timeout", str(IDLE_S)],
-            capture_output=True, text=True, timeout=PATIENCE_S, check=True,
-        )  # fmt: skip
-        assert ALONE in other.stderr
-        processes.client().close()
 
 
 def test_what_was_armed_is_disarmed_before_it_ends(processes, driver):

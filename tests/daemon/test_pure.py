@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.client import Client, Line
 from rig.daemon.lease import LEASE_S, ControlError, Lease
@@ -29,7 +28,6 @@ from rig.errors import (
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
-from rig.recorder.controller import Controller
 from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from tests.waiting import PATIENCE_S
@@ -247,14 +245,3 @@ def test_a_signal_waits_only_while_something_falls():
         assert client.call("collect") == {}
         with pytest.raises(KeyboardInterrupt):
             client.call(method)
-
-
-def test_a_session_that_is_closed_is_shown_to_nobody_any_more(tmp_path):
-    protocol = tmp_path / "fence.yaml"
-    protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
-    rig = Controller("sim://", PublishedState())
-    rig.open_session(str(protocol), str(tmp_path / "session"))
-    assert rig.published.get("session")["path"] == str(tmp_path / "session")
-    rig.close()
-    assert rig.published.get("session") is None
-    assert rig.published.get("link")["state"] == "closed"

@@ -250,21 +250,6 @@ def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(
     assert caught.value.reason is wire.RefusalReason.NOT_KEPT
 
 
-def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(clock):
-    """Events that do not match the CRC are read again, as far as they are kept."""
-    port = Forgetful(clock, {wire.Identify: [replace(IDENTITY, streams=1, capacity=2)]})
-    one = Device(port, clock)
-    one.connect(boot_wait_s=0)
-    for n in range(5):
-        code, payload = wire.pack(events_frame(n, (100 + n, n % 2)))
-        port.out += encode(Frame(code, 1, 0, payload))
-    while port.out:
-        one.receive()
-    drop = one.fetch(1)
-    assert drop.faults == (make_reason("crc_mismatch"),)
-    assert [edge.tick for edge in drop.edges] == [1, 2, 3]  # event 4 as it was read: no change
-
-
 @pytest.mark.parametrize("reason", wire.DisarmReason)
 def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
     port = FakePort(
@@ -325,16 +310,6 @@ def events_frame(first, *events) -> wire.EventsFrame:
     return wire.EventsFrame(1, first, wire.pack_events(events))
 
 
-def test_a_gap_in_the_events_invents_no_edge():
-    transcript = heard(
-        IDENTITY, events_frame(0, (110, 1)), events_frame(3, (140, 2), (150, 3)), certificate(1, 5)
-    )
-    drop = transcript.pending(1)
-    assert drop.edges == ((10, 0, True), (50, 0, True))
-    assert drop.faults == (make_reason("events_missing", missing=2, events=5, first=1),)
-    assert transcript.assembly(1).missing() == [1, 2]
-
-
 def test_a_drop_is_given_out_once_when_acknowledged():
     transcript = heard(IDENTITY, certificate(1, 0))
     pending = transcript.pending(1)
@@ -381,11 +356,6 @@ def test_the_release_sense_counts_from_the_fire_stamp(tick, sense):
     for sensed, expected in ((1, sense), (0, None)):
         transcript = heard(replace(certificate(1, 0), sensed=sensed, sense_tick=tick))
         assert transcript.pending(1).certificate.release_sense == expected
-
-
-def test_without_identity_or_certificate_the_drop_says_so():
-    drop = heard(events_frame(0, (110, 1))).pending(1)
-    assert (drop.edges, len(drop.faults)) == ((), 2)
 
 
 def test_what_is_no_message_is_counted():

@@ -116,13 +116,6 @@ def test_edges_that_are_lost_come_again_from_the_bytes(copy, truth, tmp_path):
         assert replay(session).lines[-1] == "identical"
 
 
-def test_a_drop_that_is_lost_whole_comes_again_from_the_bytes(copy, truth, tmp_path):
-    alter(copy, 'DELETE FROM edge WHERE "drop" = 5', 'DELETE FROM "drop" WHERE id = 5')
-    assert "1 drops" in examine(copy).lost
-    again, _ = saved(copy, tmp_path)
-    assert by_job(again["drops"]) == by_job(truth["drops"])
-
-
 @pytest.mark.parametrize(
     "seed", [*range(10), *(pytest.param(n, marks=pytest.mark.slow) for n in range(10, 100))]
 )

@@ -97,13 +97,6 @@ def test_every_number_of_a_figure_is_in_its_table(tmp_path):
         assert (tmp_path / f"figure-1.{kind}").read_bytes() == figure_file(figure, kind)
 
 
-def test_residuals_are_normalized_errors():
-    figure = result_figure(TWO, CURVES)
-    points = figure.panels[1].series[-1]
-    assert list(points.y) == [line.normalized_error("separation_m") for line in TWO.summary]
-    assert figure.panels[1].series[0].y == [-1.0, 1.0]
-
-
 def test_without_any_uncertainty_there_are_no_residuals():
     """A protocol may state heights as exact."""
     axis, none = PlotAxis("time (s)"), [(0.1, float("inf")), (0.2, float("nan"))]
@@ -134,13 +127,6 @@ def test_a_void_run_does_not_set_the_scale():
     assert numbers(runs) == numbers(TWO.runs)
 
 
-def test_shares_of_a_variance_add_up_to_the_whole():
-    (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
-    mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
-    line = replace(line, means={"separation_m": mean}, causes={"separation_m": {"datum": 4e-3}})
-    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})
-
-
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monkeypatch) -> None:
     """From matplotlib's C++ an exception would end the process, without a word."""
@@ -165,16 +151,6 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
     with pytest.raises(KeyboardInterrupt):
         drawing_file(drawing, kind)
     assert len(drawings) > 1
-
-
-def test_sources_beyond_the_colours_are_among_the_others():
-    colors: dict[str, int] = {}
-    for names in ("abcdefgh", "abc", "hgfedcba"):
-        bars = [*_stack_bar(dict.fromkeys(names, 100.0 / len(names)), colors)]
-        shares = [end - begin for bar in bars for end, _, begin in bar["points"]]
-        assert sum(shares) == pytest.approx(100.0)
-        assert len({bar["color"] for bar in bars}) == len(bars)
-    assert len(colors) == len(PARTS)
 
 
 AIR = reader.parse(f"{UNIFORM.text}drag: {{terminal_speed: 15 m/s}}\n")
@@ -219,3 +195,20 @@ def test_a_figure_its_numbers_and_its_caption(number, own, other, tmp_path):
         rows = list(csv.DictReader(stream))
     assert len(rows) > 20
     assert all(float(value) == float(value) for row in rows for value in row.values())
+
+
+def test_shares_of_a_variance_add_up_to_the_whole():
+    (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
+    mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
+    line = replace(line, means={"separation_m": mean}, causes={"separation_m": {"datum": 4e-3}})
+    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})
+
+
+def test_sources_beyond_the_colours_are_among_the_others():
+    colors: dict[str, int] = {}
+    for names in ("abcdefgh", "abc", "hgfedcba"):
+        bars = [*_stack_bar(dict.fromkeys(names, 100.0 / len(names)), colors)]
+        shares = [end - begin for bar in bars for end, _, begin in bar["points"]]
+        assert sum(shares) == pytest.approx(100.0)
+        assert len({bar["color"] for bar in bars}) == len(bars)
+    assert len(colors) == len(PARTS)

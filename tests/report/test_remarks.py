@@ -10,7 +10,6 @@ from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.report.finding import void_lines
 from rig.report.templates import lines
-from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
 
 
 def void(run, attempt, *reasons, verdict="void"):
@@ -36,17 +35,6 @@ def test_void_drops_of_one_reason_share_a_line_above_what_to_do():
     assert again[1] == "  run 2 (attempts 1–2): release skew"
     assert [line.strip() for line in lines[5:]] == remedies([SKEW, MISSED])
     assert void_lines(Analysis((void(1, 1, verdict="marginal"),), (), ())) == []
-
-
-def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_known():
-    known = {code: row.remedy for code, row in WORDINGS.items() if row.severity is Severity.VOID}
-    without = [code for code, remedy in known.items() if not remedy]
-    assert without == [OPERATOR]
-    assert [code for code, remedy in known.items() if remedy == WORDINGS["scatter"].remedy] == [
-        SENTENCE
-    ]
-    (general,) = remedies([MOTHS, plain_reason("a lorry")])
-    assert remedies([MOTHS, SKEW, SKEW]) == remedies([SKEW]) != [general]
 
 
 def test_air_that_may_be_none_is_not_mentioned():

@@ -74,29 +74,6 @@ def test_a_part_that_fails_takes_no_other_along(found):
     )
 
 
-@pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
-def test_a_posterior_without_spread_has_no_picture(found, what):
-    nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
-    names = ("restitution", "friction")
-    told = Measured(0.5, 0.1)
-    narrow = found.coefficients._replace(
-        parameters=tuple(
-            Coefficient(name, True, told, Quantity(0.5), {"u": 0.1, "low": 0.3, "high": 0.7})
-            for name in names
-        ),
-        posterior=Posterior(
-            names,
-            np.full(len(nodes), 1.0 / len(nodes)),
-            np.array(nodes),
-            np.array([[0.05, 1e-9] if "weights" in what else [1e-300, 1e-9]] * len(nodes)),
-        ),
-    )
-    sections = Sections()
-    drawn = estimate_pictures(replace(found, coefficients=narrow), sections)
-    assert "posterior" not in drawn
-    assert not sections.failed
-
-
 def test_a_page_says_what_it_lacks(single, monkeypatch):
     def fail(*_, **__):
         raise TypeError("must be real number, not str")
@@ -142,3 +119,26 @@ def test_what_an_estimate_lacks_is_said_in_the_report_and_on_stderr(
     assert last == f"report: {tmp_path / 'r.html'}"
     html = (tmp_path / "r.html").read_text("utf-8")
     assert all(words in html for words in (sentence, "sortable", "Height against time"))
+
+
+@pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
+def test_a_posterior_without_spread_has_no_picture(found, what):
+    nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
+    names = ("restitution", "friction")
+    told = Measured(0.5, 0.1)
+    narrow = found.coefficients._replace(
+        parameters=tuple(
+            Coefficient(name, True, told, Quantity(0.5), {"u": 0.1, "low": 0.3, "high": 0.7})
+            for name in names
+        ),
+        posterior=Posterior(
+            names,
+            np.full(len(nodes), 1.0 / len(nodes)),
+            np.array(nodes),
+            np.array([[0.05, 1e-9] if "weights" in what else [1e-300, 1e-9]] * len(nodes)),
+        ),
+    )
+    sections = Sections()
+    drawn = estimate_pictures(replace(found, coefficients=narrow), sections)
+    assert "posterior" not in drawn
+    assert not sections.failed

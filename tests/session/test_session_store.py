@@ -268,22 +268,6 @@ def test_readers_beside_a_writer_see_what_is_committed(path):
             reader.commit()
 
 
-def test_a_snapshot_does_not_move_while_another_writes(path):
-    with make(path) as writer, Session.open(path, readonly=True) as reader:
-        writer.log_bytes("rx", 1, b"x")
-        writer.commit()
-        with reader.snapshot():
-            with reader.snapshot():  # one in another is the same
-                assert len(list(reader.byte_log())) == 1
-            writer.log_bytes("rx", 2, b"y")
-            writer.commit()
-            assert len(list(reader.byte_log())) == 1
-        assert len(list(reader.byte_log())) == 2
-        with writer.snapshot():  # who writes sees its own records
-            writer.log_bytes("rx", 3, b"z")
-            assert len(list(writer.byte_log())) == 3
-
-
 @pytest.mark.parametrize("closed", ["file", "folder"])
 def test_where_either_cannot_be_written_nothing_is_put_beside_a_session(
     path: Path, closed: str, monkeypatch: pytest.MonkeyPatch
@@ -337,16 +321,6 @@ for count in range(10**9):
         stamps = [chunk.host_ns for chunk in session.byte_log()]
     # The row after the last announced one may have been committed before the kill.
     assert stamps in (list(range(last + 1)), list(range(last + 2)))
-    assert examine(path).rows.chain_faults() == []
-
-
-def test_sigkill_before_the_commit_leaves_a_whole_session(path):
-    code = 'session.log_bytes("rx", 1, b"x"); print("ready", flush=True); sys.stdin.read()'
-    with killed(code, path) as child:
-        assert child.stdout.readline() == "ready\n"
-    with Session.open(path) as session:
-        assert list(session.byte_log()) == []
-        session.log_bytes("rx", 1, b"goes on")
     assert examine(path).rows.chain_faults() == []
 
 

@@ -1,6 +1,5 @@
 """The simulated lab with nothing disturbed is the model, edge by edge; and it is reproducible."""
 
-import math
 import random
 
 import pytest
@@ -68,20 +67,6 @@ def test_a_single_chain_has_a_speed_and_no_separation():
     assert truth.speed_m_s == exactly(by_hand.before[-1])
     assert truth.impact_chain == "A"
     assert truth.separation_m is truth.separation_raw_m is truth.release_skew_s is None
-
-
-def test_a_picket_fence_falls_freely():
-    edges, truth = drop(reader.read(PROTOCOLS / "picket-fence.yaml"))
-    for channel, gate in ((0, 0.050), (1, 0.350)):
-        expected = []
-        for bar in range(8):
-            above = 0.400 + 0.050 * bar - gate  # the lowest bar hangs at 400 mm
-            if above > 0:
-                for half, blocked in ((-0.0125, True), (0.0125, False)):
-                    expected.append((math.sqrt(2 * (above + half) / 9.81), blocked, bar))
-        assert_same_edges(on(edges, channel), expected)
-    assert truth.speed_m_s is truth.separation_m is truth.release_skew_s is None
-    assert (truth.impact_chain, truth.gravity_m_s2) == (None, 9.81)
 
 
 def test_hanging_chains_leave_the_beams_free_unless_hung_too_low():

@@ -8,11 +8,9 @@ import pytest
 
 from bench.studies.published_falls import folded_time
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
-from sim.resolved.contact_law import damping
-from sim.resolved.fall import AFTER, fall
-from sim.resolved.foresight import duration, impossible
+from sim.resolved.fall import fall
+from sim.resolved.foresight import impossible
 from sim.resolved.hanging import stable_step
-from sim.resolved.motion import push
 from sim.resolved.scene import Board, Bounce, Chain, Fall, Rods, Strings
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
@@ -58,19 +56,6 @@ SCENES = [struck(0.0), struck(40.0, seed=9), struck(60.0, seed=8)]
 def falls() -> dict[float, list[Fall]]:
     """The same three falls with two steps."""
     return {step: [fall(one, step=step, after=1e-3) for one in SCENES] for step in (1e-5, 5e-6)}
-
-
-@pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9, 1.0])
-@pytest.mark.parametrize(("mass", "speed"), [(1e-3, 3.0), (0.1, 0.5)])
-def test_a_bounce_by_itself_has_the_restitution_asked_for(restitution, mass, speed):
-    stiffness, d = 4e5, damping(restitution)
-    step = 1e-3 * math.pi * math.sqrt(mass / stiffness)
-    overlap, rate, fastest = 1e-12, speed, 0.0
-    while overlap > 0.0:
-        force, fastest = push(overlap, rate, fastest, stiffness, d)
-        rate = rate - step * force / mass
-        overlap = overlap + step * rate
-    assert -rate / speed == pytest.approx(restitution, abs=6e-3)  # Euler's error at this step
 
 
 @pytest.mark.parametrize("spin", [0.0, 1e-9])  # by formula, and by steps
@@ -162,21 +147,6 @@ def test_the_step_converges_before_rods_strike_rods():
     assert math.log2(errors[0] / errors[1]) > 1.5
 
 
-def test_rods_that_brush_each_other_on_the_way_down_have_not_landed():
-    """They begin 1 mm apart, and one is driven into the other far above the board."""
-    low, high = 0.0, DIAMETER + 1e-3
-    two = rods(2, tilt=0.0, heights=np.array([low, high]), aside=np.array([0.0, 2e-3]))
-    chain = Chain(two, Strings(), DROP, GRAVITY, board(0.0), WOOD, swing=np.array([0.0, -1.0]),
-                  drag=np.array([2.0, 0.0]))  # fmt: skip
-    found = fall(chain, after=0.0)
-    assert found.lost["rods"] > 0.0
-    apart = np.linalg.norm(found.places[:, :, 1] - found.places[:, :, 0], axis=1)
-    early = found.frames_s < 0.4
-    assert apart[early].min() < DIAMETER  # they met in the air
-    assert found.touched_s.min() > math.sqrt(2 * DROP / GRAVITY)
-    assert np.nanmin(found.touched_height) < 5e-3
-
-
 def test_a_folded_chain_falls_as_calkin_and_march_found():
     """Their T/T_ff = 0.8472 is of a smooth chain; many rods come near, as one over their number."""
     assert 2 * folded_time(80) - folded_time(40) == pytest.approx(0.8472, rel=0.01)
@@ -190,15 +160,6 @@ def test_a_shorter_touch_needs_a_shorter_step_and_gives_no_energy(touching):
     kept, lost = (fall(chain, step=s).energy for s in (step, 1e-5))
     assert np.diff(kept).max() < 1e-6 * kept[0]
     assert np.diff(lost).max() > 1e-2 * kept[0]  # what the step is for
-
-
-@pytest.mark.parametrize("kappa", [0.0, 0.5, 3.0])
-def test_how_long_a_fall_takes_is_known_before(kappa):
-    """What strikes nothing and sinks through the board's place, with its air."""
-    chain = Chain(rods(2), Strings(), 0.3, GRAVITY, drag=np.full(2, kappa))
-    found = fall(chain)
-    there = float(np.interp(0.0, -found.heights[:, -1], found.times))
-    assert duration(chain) == pytest.approx(there + AFTER, abs=1e-6)
 
 
 def test_a_chain_that_cannot_hang_is_refused_beforehand():

@@ -1,9 +1,6 @@
 """Whoever computes: the same bits, an end in time, and nobody left behind."""
 
-import os
-import signal
 import socket
-import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -12,9 +9,7 @@ from rig.protocol import reader
 from rig.sweep import executor as module
 from rig.sweep.compute import compute
 from rig.sweep.layout import lay_out
-from tests.cli.lab import PROTOCOLS, ROOT, command
 from tests.sweep.conftest import SCENE, VARY
-from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -81,21 +76,3 @@ def test_an_address_where_no_cluster_is(sweep, tmp_path, address, monkeypatch):
     assert done.err.startswith(f"--cluster {where}: cannot be reached")
     assert len(done.err.splitlines()) == 2
     assert not (tmp_path / "x.csv").exists()
-
-
-def test_ctrl_c_ends_a_sweep_and_writes_nothing(tmp_path):
-    vary = ("--vary", "drop=0m..1m:2500", "--vary", "friction=0..1:2500", "--vary", "incline=40deg")
-    arguments = ("sweep", PROTOCOLS / "single-chain.yaml", *vary, "--jobs", 2)
-    with subprocess.Popen(
-        command(*arguments, "-o", tmp_path / "x.csv"),
-        cwd=ROOT,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        line = process.stderr.readline()  # the first quarter is done
-        assert "points" in line
-        os.killpg(process.pid, signal.SIGINT)
-        assert process.wait(PATIENCE_S) == 130
-        assert process.stderr.read().endswith("rig: interrupted; nothing was written\n")
-    assert list(tmp_path.iterdir()) == []

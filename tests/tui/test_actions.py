@@ -8,7 +8,7 @@ from rig.campaign.machine import Stage
 from rig.errors import InputError
 from rig.tui.actions import ACTIONS, BY_NAME, help_text, possible, shown_key
 from rig.tui.keys import merge_keys, read_keys
-from rig.tui.widgets.text import LONGEST, plain
+from rig.tui.widgets.text import LONGEST, duration, plain
 
 
 def test_every_key_has_one_meaning():
@@ -89,3 +89,13 @@ def test_text_from_outside_is_one_harmless_line():
     assert plain(nasty) == "a�[31m[/red] �b�c�"
     assert len(plain("x" * 10**6)) == LONGEST
     assert plain("x" * LONGEST) == "x" * LONGEST
+
+
+def test_durations():
+    assert [duration(s) for s in (3, 61, 3660)] == ["3 s", "1 min 01 s", "1 h 01 min"]
+
+
+def test_keys_are_written_as_they_stand_on_a_keyboard():
+    assert [shown_key(keys) for keys in ("f9", "ctrl+p", "x", "question_mark,f1", "enter")] == [
+        "F9", "Ctrl-P", "x", "?", "Enter"
+    ]  # fmt: skip

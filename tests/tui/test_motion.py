@@ -62,14 +62,6 @@ def test_points_lie_on_the_models_curve(scene):
         assert one.measured_height(last) == pytest.approx(one.model_height(last), abs=3e-3)
 
 
-def test_a_missed_shadow_shifts_nothing(scene):
-    run = runs(scene)[0]
-    kept = [pair for number, pair in enumerate(edges_of(scene, run)) if number % 40 > 1]
-    for one in motions(scene, run, recorded(run, kept)):
-        there = one.model.heights(one.times - one.delay_s)[0]
-        assert np.abs(there - one.heights).max() < 0.02
-
-
 def test_a_ball_is_shown_until_it_has_passed_its_last_gate():
     ball = reader.read(ready_protocol("falling-ball"))
     (fall,) = motions(ball, runs(ball)[0])

@@ -1,10 +1,6 @@
 """What the screens are told: typed, and not changed under them."""
 
-import copy
 from pathlib import Path
-
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rig.campaign.machine import Flow, Stage
 from rig.daemon.replica import Replica
@@ -22,31 +18,6 @@ STATE = {
     "drop": None, "session": None, "control": None, "error": None,
     "runs": [RUN, RUN | {"run": 2, "impact": "B", "free": "A"}], "edges": [[1, 2, 1]],
 }  # fmt: skip
-
-changes = st.fixed_dictionaries(
-    {},
-    optional={
-        "set": st.fixed_dictionaries(
-            {}, optional={"phase": st.sampled_from(["idle", "armed"]),
-                          "gates": st.none() | st.just({"blocked": 9})}
-        ),
-        "runs": st.lists(st.builds(lambda n, s: RUN | {"run": n, "state": s}, st.integers(1, 2),
-                                   st.sampled_from(["armed", "void"])), max_size=2),
-        "edges": st.lists(st.just([1, 2, 1])),
-    },
-)  # fmt: skip
-
-
-@given(st.lists(changes, max_size=8))
-def test_a_state_once_taken_never_changes(steps):
-    replica = Replica()
-    replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
-    taken = []
-    for n, change in enumerate(steps, start=8):
-        state = read_state(replica.n, replica.state)
-        taken.append((state, copy.deepcopy(state)))
-        replica.follow("change", {"n": n} | change)
-    assert all(state == as_it_was for state, as_it_was in taken)
 
 
 def test_what_the_daemon_does_not_know_is_not_known():
