@@ -108,3 +108,28 @@ def test_nothing_asks_for_the_time_from_arming_to_the_certificate(finished):
     assert during.count(FIRE) == 4
     assert set(during) <= {ARM, FIRE, STATUS}
     assert {PING, REFERENCE} <= set(idle)
+
+
+def test_a_long_session_stands_on_its_reference_and_on_what_the_protocol_says_of_it(
+    measure, call, tmp_path, fence
+):
+    text = fence.read_text("utf-8").replace("settle: 1 s", "settle: 30 s")
+    for name, stated in (("gps", ""), ("poor", "reference: 3 ppm\n")):
+        protocol = tmp_path / f"{name}.yaml"
+        protocol.write_text(text + stated, "utf-8")
+        session, found = measure("?reference=0.05ppm", name, protocol)
+        said = found["calibration"]
+        with Session.open(session, readonly=True) as opened:
+            pulses = len(opened.pulses())
+        assert said["source"] == ("reference" if name == "gps" else "pings"), "the better known"
+        assert said["pulses"] == pulses >= 5
+        assert all(run["calibration"]["source"] == said["source"] for run in found["runs"])
+        if name == "gps":
+            assert said["rate_ppm"] == pytest.approx(-1300.05, abs=0.02)
+            assert said["u_ppm"] == pytest.approx(0.1, rel=0.1)
+            assert said["clock_u_ppm"] == pytest.approx(0.1)
+        assert f"reference pulses: {pulses} identical" in call("replay", session).out
+        changed = session.with_name("changed")
+        changed.write_bytes(session.read_bytes())
+        tamper(changed, "UPDATE reference SET tick = tick + 9 WHERE id = 1")
+        assert "reference pulses" in call("replay", changed).out.splitlines()[-1]

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.client import Client, Line
 from rig.daemon.lease import LEASE_S, ControlError, Lease
@@ -28,6 +29,7 @@ from rig.errors import (
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
+from rig.recorder.controller import Controller
 from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from tests.waiting import PATIENCE_S
@@ -245,3 +247,12 @@ def test_a_signal_waits_only_while_something_falls():
         assert client.call("collect") == {}
         with pytest.raises(KeyboardInterrupt):
             client.call(method)
+
+
+def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
+    protocol, session = tmp_path / "g.yaml", tmp_path / "session"
+    before, _, after = FENCE.partition("gates:")
+    protocol.write_text(before + after[after.index("release:") :].replace("RUNS", "1"), "utf-8")
+    with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
+        Controller("sim://", PublishedState()).open_session(str(protocol), str(session))
+    assert not session.exists()

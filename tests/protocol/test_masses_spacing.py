@@ -138,3 +138,11 @@ def test_one_object_has_no_profile():
         )
     (problem,) = caught.value.problems
     assert str(problem).startswith("f:2:32: chains.A.masses.exponential: one object has one mass")
+
+
+@pytest.mark.parametrize("rods", [2, 8, 15, 29, 57])
+def test_a_table_may_end_where_the_chain_does(rods):
+    """Whatever rounding the height of the top rod has."""
+    table = "[{height: 0 mm, mass: 10 g}, {height: 1165 mm, mass: 3 g}]"
+    found = chains(f"rods: {rods}, length: 1165 mm, masses: {{table: {table}}}")["A"]
+    assert found.chain.masses[-1] == pytest.approx(0.003, rel=1e-12)

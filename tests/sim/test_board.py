@@ -3,14 +3,17 @@
 from itertools import pairwise
 
 import pytest
+import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.link.client import Device
 from rig.link.messages import Phase
+from rig.link.port import port_clock
 from rig.link.refusals import DeviceRefusedError
 from sim.board import POWER_ON, VirtualBoard
 from sim.clock import VirtualClock
+from sim.dials import Dials
 from sim.serial_port import SimulatedSerial
 from sim.snapshots import take_snapshots
 from tests.link.bench import ScriptedLab
@@ -90,3 +93,19 @@ def test_snapshots_account_for_every_change(toggles):
     glitches = sum(a == b for a, b in pairwise(states))
     assert edges + 2 * glitches <= len(changes)
     assert bool(snapshots) == bool(changes)
+
+
+def test_a_url_handler_only_says_which_board():
+    class Serial(SimulatedSerial):
+        def make_board(self):
+            assert self.port == "sim://rig?seed=3"
+            self.disturb(3, Dials.quiet())
+            return VirtualBoard(ScriptedLab(), seed=3)
+
+    port = Serial(None, baudrate=500_000, timeout=0.02, exclusive=True)
+    port.port = "sim://rig?seed=3"
+    port.open()
+    assert Device(port, port_clock(port)).connect().unique_id == port.board.identity.unique_id
+    port.close()
+    with pytest.raises(serial.PortNotOpenError):
+        port.read(1)

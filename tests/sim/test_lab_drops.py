@@ -13,7 +13,7 @@ from tests.sim.chance import (
     attempts,
     with_dials,
 )
-from tests.sim.falls import DELAY, RODS, WITHOUT_GATES, ByHand, alpha
+from tests.sim.falls import DELAY, RODS, UNIFORM, WITHOUT_GATES, ByHand, alpha
 
 G = 9.81
 
@@ -94,3 +94,19 @@ def test_rods_bounce_through_the_lowest_beam_of_the_impact_side_alone():
     assert min(t for t, *_ in bounces) > hits[0] + 4e-3
     assert max(t for t, *_ in bounces) < hits[-1] + 40e-3
     assert {edge[1] for edge in truth.edges if edge[0] > hits[-1] + 1e-3 and edge[1] < 8} == {0}
+
+
+def test_the_string_flickers_in_gaps_between_rods():
+    quiet = attempts(with_dials(), 1)[0]
+    truth = attempts(with_dials(string=1.0), 1)[0]
+    flickers = [edge for edge in truth.edges if edge[3] == NOT_A_ROD]
+    for channel in (gate.channel for gate in UNIFORM.gates.gates):
+        rods = {rod for _, at, _, rod in quiet.edges if at == channel}
+        begun = [edge for edge in flickers if edge[1] == channel and edge[2]]
+        # A flicker that runs into the next rod ends with it; it still begins by itself.
+        assert len(begun) == len(rods) - 1
+        gaps = [edge for edge in quiet.edges if edge[1] == channel][1:-1]
+        for (time, *_), (last, *_), (following, *_) in zip(
+            begun, gaps[::2], gaps[1::2], strict=True
+        ):
+            assert last < time < following

@@ -81,3 +81,16 @@ def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded
             await op.sees("✗", "drop 4 of 4")
 
     run(work())
+
+
+def test_the_session_page_says_how_many_taught_each_other(recorded):
+    async def work():
+        app = RigApp(Options(session=recorded, offline=True), KEYS)
+        async with app.run_test(size=(120, 36)) as pilot:
+            op = Operator(app, pilot)
+            await op.press("5")
+            await op.sees("joint fit of 4 runs", "separation")
+            await op.press("y", "y")
+            await op.sees("skew")
+
+    run(work())
