@@ -5,22 +5,12 @@ import pytest
 from rig.text_table import text_table
 
 
-def test_numbers_end_and_words_begin_under_each_other():
-    rows = [["what", "n"], ["a", "10"], ["longer", "1"]]
-    assert text_table(rows, left={0}) == ["what     n", "a       10", "longer   1"]
-    assert text_table(rows)[1] == "     a  10"
-
-
 def test_signs_stand_under_each_other_whatever_stands_behind():
     heading, rule, *lines = text_table([["Δz ± U"], ["1.5 ± 0.12"], ["−0.25 ± 3"], [""]], rule=True)
     assert heading.endswith("Δz ± U")
     assert set(rule) == {"─"}
     assert lines[0].index("±") == lines[1].index("±")
     assert lines[2] == ""
-
-
-def test_headings_alone_are_a_table():
-    assert text_table([["a", "b"]], rule=True) == ["a  b", "─  ─"]
 
 
 def test_rows_of_other_lengths_are_refused():

@@ -96,14 +96,6 @@ def test_it_is_bounded_and_begun_anew_where_it_is_full(tmp_path):
     assert cache.get("small") == "text"
 
 
-def test_to_read_is_not_to_write(cache):
-    cache.put("a", "1")
-    path = cache.folder / "results.sqlite"
-    before = path.read_bytes()
-    assert (cache.get("a"), cache.get("b"), cache.size().entries) == ("1", None, 1)
-    assert path.read_bytes() == before
-
-
 def test_several_processes_write_at_once(cache):
     writers = [writer(cache, name, 20) for name in "abc"]
     assert [one.wait() for one in writers] == [0, 0, 0]

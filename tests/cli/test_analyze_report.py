@@ -1,4 +1,4 @@
-"""``rig analyze`` and ``rig report`` of a session on the disk."""
+"""``rig analyze``, its budget, and ``rig report`` of a session on the disk."""
 
 import json
 import re
@@ -6,9 +6,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from rig.measurands import SEPARATION
-from rig.report.parts import LABELS, Mean
-from rig.results import complete_analysis
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS
 
@@ -92,19 +89,6 @@ def test_what_cannot_be_written_is_not_begun(
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
-def test_bars_are_as_long_as_the_analysis_says(finished):
-    with Session.open(finished.session, readonly=True) as session:
-        drawn = complete_analysis(session).summary[0]
-    line = drawn.json()
-    sd = line["separation_sd_m"]
-    expected = {"U95": line["separation_m"]["U95"], "u": line["separation_m"]["u"],
-                "SE": sd / line["n"] ** 0.5, "SD": sd, "half-SD": sd / 2}  # fmt: skip
-    words = {"U95": "U (95 %)", "SD": "SD of one run", "half-SD": "SD/2 of one run"}
-    for bars, label in LABELS.items():
-        assert label == words.get(bars, bars)
-        assert Mean(drawn, SEPARATION).bars[bars] == pytest.approx(expected[bars], rel=1e-9), bars
-
-
 def test_scatter_is_told_beside_uncertainty(call, finished, analysis):
     done = call("analyze", finished.session, "--scatter")
     assert done.code == 0, done.err
@@ -119,3 +103,37 @@ def test_scatter_is_told_beside_uncertainty(call, finished, analysis):
         assert (se, half) == pytest.approx((sd / line["n"] ** 0.5, sd / 2), abs=1e-3)
         assert u == pytest.approx(1e3 * line["separation_m"]["u"], abs=1e-3)
         assert expanded == pytest.approx(1e3 * line["separation_m"]["U95"], abs=1e-3)
+
+
+@pytest.mark.usefixtures("analysed_once")
+def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
+    done = call("analyze", finished.session, "--budget", 1, "--trials", 40, "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert (found["simulated"], found["run"], found["monte_carlo"]["trials"]) == (True, 1, 40)
+    for name, one in found["budget"].items():
+        assert sum(line["share"] for line in one["lines"]) == pytest.approx(1.0)
+        assert one["U95"] == pytest.approx(one["k"] * one["u"])
+        trial = found["monte_carlo"]["quantities"][name]
+        # χ² of 39, once in 10⁴ each side.
+        assert 0.6 < trial["u"] / found["by_itself"][name]["u"] < 1.45
+    table = call("analyze", finished.session, "--budget", 1, "--trials", 2).out
+    assert re.match("SIMULATED DATA\n(?s:.*)beam heights", table)
+    assert re.search(r"^Δz = [0-9.]+ ± [0-9.]+ cm", table, re.MULTILINE)
+    assert "by itself u" in call("analyze", finished.session, "--budget", 1).out
+    assert "_m" not in table  # symbols, not names of JSON members
+    assert max(map(len, table.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((1, "--trials", "many"), "found 'many'; accepted: a whole number from 2"),
+        ((1, "--trials", "1"), "found '1'; accepted: a whole number from 2"),
+        ((99,), "there are: runs 1–4"),
+    ],
+)
+def test_what_is_no_run_or_no_number_of_trials_is_bad_input(call, finished, words, said):
+    done = call("analyze", finished.session, "--budget", *words)
+    assert (done.code, done.out) == (2, "")
+    assert said in done.err

@@ -49,15 +49,6 @@ def test_pictures_of_an_estimate_are_stamped(estimated):
     assert all("SIMULATED" in path.read_text("utf-8") for path in estimated.iterdir())
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_a_report_may_have_the_impacts_too(call, finished, tmp_path):
-    page = tmp_path / "r.html"
-    assert call("report", finished.session, "-o", page, "--estimate").code == 0
-    html = page.read_text("utf-8")
-    for heading in ("Best single α", "End correction", "Single impulses"):
-        assert f"<h3>{heading}</h3>" in html
-
-
 def test_a_design_of_what_is_there(call, tmp_path):
     done = call("design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json")
     found = json.loads(done.out)

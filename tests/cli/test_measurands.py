@@ -2,7 +2,6 @@
 
 import csv
 import json
-from dataclasses import replace
 
 import pytest
 
@@ -46,16 +45,6 @@ def test_every_row_is_computed_and_speaks_of_itself(name):
     assert row.symbol
     assert row.meaning
     assert row.unit
-
-
-@pytest.mark.parametrize(
-    ("stem", "unit"),
-    [("fall_time", "_s"), ("gravity", "_m_s2"), ("separation_raw", "_m"), ("blow", "_J"),
-     ("spin", "_kg_m2_s"), ("friction", "")],
-)  # fmt: skip
-def test_keys_of_any_name_and_unit(stem, unit):
-    row = replace(BLOW, name=stem + unit)
-    assert (row.stem, row.key("sd")) == (stem, f"{stem}_sd{unit}")
 
 
 @pytest.mark.usefixtures("added", "analysed_once", "undrawn")

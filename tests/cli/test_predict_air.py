@@ -7,7 +7,6 @@ from mpmath import mp
 
 from rig.errors import InputError
 from rig.predictions import predictions
-from rig.protocol.describe import describe
 from rig.protocol.reader import parse, read
 from sim.dials import Dials
 from sim.lab import ChainLab
@@ -145,9 +144,3 @@ def test_what_cannot_be_measured_is_said_and_refused(call, tmp_path):
         assert not session.exists()
     with pytest.raises(InputError, match="prediction only"):
         ChainLab(parse(path.read_text("utf-8")), Dials(), 1)
-
-
-def test_a_start_from_rest_may_be_said_aloud():
-    out = describe(parse(f"{short()}initial_speed: 0 m/s\n"))
-    assert "prediction only" not in out
-    assert "  no drag: predictions ignore air" in out

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-import rig
 from rig.cli import main
 from rig.ready import find_protocol, ready_protocols
 
@@ -51,25 +50,6 @@ def test_a_file_in_the_folder_wins(folder):
     assert find_protocol("glider") == "glider"
     for other in ("nothing", "/dev/fd/63", "x" * 300, "a\0b", ""):
         assert find_protocol(other) == other
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("check", "falling-ball"),
-        ("predict", "falling-ball"),
-        ("check", "my-ball"),
-        ("design", "falling-ball", "--no-search"),
-    ],
-)
-def test_commands_find_protocols_by_name(folder, words, capsys):
-    (folder / "my-ball.yaml").write_bytes((READY / "falling-ball.yaml").read_bytes())
-    assert main([*words]) == 0
-    assert capsys.readouterr().out
-
-
-def test_the_python_door_finds_them_too(folder):
-    assert rig.read_protocol("falling-ball").title == "A ball past four gates"
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,12 @@
 """simavr with its defects mended, against what the data sheets say of the silicon."""
 
-import random
-import subprocess
 from pathlib import Path
 
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
-from rig.errors import InputError
 from rig_emulator.avr import Avr
-from rig_emulator.controller import EmulatorError, Stop
-from rig_emulator.image import read_image
+from rig_emulator.controller import Stop
 from tests.firmware.emulated import MCUS
 
 BYTE = 320  # cycles at 500 kbaud
@@ -59,26 +55,6 @@ def test_a_pulse_within_one_instruction_is_still_an_interrupt(compiled, mcu):
     avr.edge(4001, "PB3", False)
     avr.run(4100)
     assert (avr.number("count_b"), avr.number("level_b")) == (1, 0)
-
-
-@each_mcu
-def test_the_log_does_not_depend_on_how_the_time_is_cut(compiled, mcu):
-    def work(slices) -> tuple:
-        avr = Avr(compiled("tests/stamps.c", mcu), mcu)
-        rng = random.Random(5)
-        for _ in range(300):
-            port = rng.choice(["PB", OTHER[mcu]])
-            avr.edge(rng.randrange(60_000), f"{port}{rng.randrange(8)}", rng.random() < 0.5)
-        until = 0
-        while until < 70_000:
-            until = min(70_000, until + slices(rng))
-            avr.run(until)
-        return avr.cycle, avr.peek(0x100, 0x700), avr.take_changes()
-
-    whole = work(lambda rng: 70_000)
-    assert whole == work(lambda rng: 1)
-    assert whole == work(lambda rng: 997)
-    assert whole == work(lambda rng: rng.randrange(1, 40))
 
 
 # -- the UART
@@ -139,45 +115,3 @@ def test_the_watchdog_bites(compiled, mcu):
     assert 0 < rise.cycle - fall.cycle < 1000
     avr.run(2_000_000)  # kicked again
     assert avr.watchdog_resets == 1
-
-
-@each_mcu
-@pytest.mark.parametrize(("how", "what"), [(2, "sleeps"), (3, "Invalid write address")])
-def test_a_crash_is_an_error_until_the_next_reset(compiled, mcu, how, what):
-    avr = Avr(compiled("tests/restart.c", mcu), mcu)
-    avr.run(100_000)
-    avr.poke("hang", bytes([how]))
-    for _ in range(2):
-        with pytest.raises(EmulatorError, match=what) as caught:
-            avr.run(200_000)
-    assert "\x1b" not in str(caught.value)
-    avr.reset()
-    avr.run(300_000)
-    assert avr.number("boots") == 2
-
-
-# -- programs
-
-
-def test_hex_and_elf_are_the_same_program(compiled, tmp_path):
-    elf = compiled("tests/restart.c", "atmega2560")
-    hexed = tmp_path / "it.hex"
-    subprocess.run(["avr-objcopy", "-O", "ihex", "-R", ".eeprom", elf, hexed], check=True)
-
-    def flash(path: Path) -> dict[int, int]:
-        return {at + n: byte for at, data in read_image(path).flash for n, byte in enumerate(data)}
-
-    assert flash(hexed) == flash(elf)
-    avr = Avr(hexed, "atmega2560")
-    avr.run(1000)
-    assert [change.pin for change in avr.take_changes()] == ["PA0"]
-    with pytest.raises(ValueError, match="without symbols"):
-        avr.stack_free()
-    text = hexed.read_text()
-    for damaged in (text.replace("0C94", "0C95", 1), text[: len(text) // 2], "", ":zz"):
-        hexed.write_text(damaged)
-        with pytest.raises(InputError, match="is no AVR firmware"):
-            read_image(hexed)
-
-
-# -- the rivals of the benchmark

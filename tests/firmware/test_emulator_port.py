@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from itertools import pairwise
 from pathlib import Path
 from urllib.parse import quote
 
@@ -14,7 +13,6 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.frames import Decoder
 from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
 from rig_emulator.wiring import BOARDS, firmware_for
@@ -76,40 +74,6 @@ def test_a_drop_is_the_truth_to_the_cycle(tmp_path, board):
     assert abs(off - on - 80e-3 * HZ) <= 1
     assert abs(low - high - 600e-3 * HZ) < 10e-3 * HZ
     assert (port.board.avr.overruns, port.board.avr.watchdog_resets) == (0, 0)
-
-
-def test_the_firmware_stamps_a_wired_reference_each_second():
-    port = open_port(url(clock="-1300 ppm", reference="0"))
-    device = Device(port, port_clock(port))
-    device.connect()
-    found = []
-    for _ in range(4):
-        port_clock(port).sleep(2.0)
-        found.append(device.reference())
-    counts = [pulse.count for pulse in found]
-    assert counts[1] > counts[0] > 0
-    for one, two in pairwise(found):
-        passed = (two.tick - one.tick) % 2**32
-        assert abs(passed - (two.count - one.count) * HZ * (1 - 1300e-6)) <= 2
-
-
-def test_a_clock_that_the_emulator_has_not_is_refused():
-    with pytest.raises(InputError, match="steady"):
-        open_port(url(wander="5 ppm"))
-
-
-def test_opening_resets_the_board():
-    port = open_port(url(latency="0 s"))
-    for _ in range(2):
-        port.timeout = None
-        start = port.read(1)
-        port.timeout = 0.1
-        (frame,) = Decoder().feed(start + port.read(64))
-        boot = wire.unpack(frame.type, frame.payload)
-        assert isinstance(boot, wire.Boot)
-        assert boot.cause & 2
-        port.close()
-        port.open()
 
 
 @pytest.mark.parametrize(
@@ -176,18 +140,3 @@ def test_the_pty_is_a_board_to_any_program(tmp_path):
         terminal.stdin.close()
         assert terminal.wait(PATIENCE_S) == 0
     assert not link.is_symlink()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        (["--elf", "nothing.elf"], "cannot read"),
-        (["skew=1"], "unknown dial 'skew'"),
-        (["quiet"], "NAME=VALUE"),
-    ],
-)
-def test_the_pty_says_what_is_wrong(arguments, complaint):
-    command = [*HANDS, "--protocol", str(FENCE), *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert complaint in done.stderr

@@ -10,11 +10,10 @@ from rig.link.client import Device
 from rig.link.messages import Arm, Phase, pack_label
 from rig.link.port import open_port, port_clock
 from rig_emulator import boards_bench
-from rig_emulator.controller import EmulatorError
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
 from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import PICO
-from tests.firmware.pico import build, programs, symbol
+from tests.firmware.pico import build, symbol
 from tests.firmware.toolchain import FIRMWARE
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.conformance import DeviceConformance
@@ -88,17 +87,6 @@ def test_without_its_emulator_it_says_what_to_install(monkeypatch, tmp_path, pat
     with pytest.raises(InputError, match=named) as caught:
         open_port("emu://?board=pico")
     assert hint in caught.value.hint
-
-
-def test_a_program_that_does_what_is_not_modelled_is_named(tmp_path):
-    """Its first word of PIO is a WAIT: an error with the reason, and no silence."""
-    image = bytearray(build().read_bytes())
-    words = b"".join(word.to_bytes(2, "little") for word in programs())
-    at = image.index(words[:16])
-    image[at : at + 2] = (0x2000).to_bytes(2, "little")
-    (file := tmp_path / "odd.uf2").write_bytes(image)
-    with pytest.raises(EmulatorError, match="WAIT"):
-        EmulatedPico(PICO, file, baudrate=USB_RATE)
 
 
 @pytest.mark.slow

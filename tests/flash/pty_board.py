@@ -21,8 +21,8 @@ class PtyBoard:
     once, at the beginning.
     """
 
-    def __init__(self, **names: object) -> None:
-        self._board = VirtualBoard(ScriptedLab(), seed=1)
+    def __init__(self, lab: ScriptedLab | None = None, **names: object) -> None:
+        self._board = VirtualBoard(lab or ScriptedLab(), seed=1)
         self._board.identity = replace(self._board.identity, **names)
         self._board.reset(0)
         self._terminal = Terminal()

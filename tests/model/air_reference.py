@@ -49,7 +49,7 @@ def exact_leg(distance, speed, gravity, kappa):
     d, v, g, k = map(mp.mpf, (distance, speed, gravity, kappa))
     if not k:
         arrival = mp.sqrt(v * v + 2 * g * d)
-        return arrival, (arrival - v) / g
+        return arrival, 2 * d / (arrival + v)  # without gravity, too
     left, u = mp.exp(-2 * k * d), mp.sqrt(g / k)
     arrival = mp.sqrt(g / k - (g / k - v * v) * left)
     # artanh v₁/u − artanh v₀/u, with the zeros at v = u cancelled

@@ -28,15 +28,6 @@ FRICTIONS = st.one_of(st.just(0.0), st.floats(1e-6, 1.0))
 INERTIAS = st.floats(0.02, 0.98)
 
 
-def test_level_alpha_is_the_papers():
-    assert alpha_level(0.5) == pytest.approx(0.25, rel=1e-15)
-    assert alpha_level(0.0) == pytest.approx(1 / 6, rel=1e-15)
-    assert alpha_level(-1.0, 0.4) == 0.0  # no collision
-    assert alpha_level(0.5, 1.0) == 0.0  # the centre of percussion is where the rod strikes
-    assert gamma_finite(1 / 3) == pytest.approx(4 / 3, rel=1e-15)
-    assert gamma_finite(1 / 3, 1.0) == pytest.approx(2 / 3, rel=1e-15)
-
-
 @examples(80)
 @given(RESTITUTIONS, FRICTIONS, INERTIAS)
 def test_no_incline_is_level(beta, mu, xi):
@@ -120,16 +111,6 @@ def test_notes_say_when_and_only_when_the_domain_is_left(beta, mu, incline):
     assert ("above ½" in notes) == (impact.alpha > 0.5)
     assert ("negative" in notes) == (impact.alpha < 0.0)
     assert len(impact.notes) == sticks + (impact.alpha > 0.5) + (impact.alpha < 0.0)
-
-
-def test_a_given_alpha_is_held_to_the_domain_too():
-    def noted(alpha):
-        chain = Chain(RODS.masses, RODS.heights, alpha=Quantity(alpha))
-        return impact_on(SURFACE, chain, 40.0).notes
-
-    assert noted(0.5) == noted(0.0) == ()
-    assert "above ½" in noted(0.51)[0]
-    assert "negative" in noted(-0.01)[0]
 
 
 def test_a_surface_of_which_no_friction_is_said_has_none():

@@ -62,23 +62,6 @@ def test_uncertainties_add_in_quadrature():
     assert whole.speed_u_m_s == pytest.approx(math.hypot(*(p.speed_u_m_s for p in parts)))
 
 
-def test_a_small_uncertain_speed_and_little_air_count():
-    given = {key: Quantity(number, 0.0) for key, number in CENTRE.items()}
-    scene = CHAIN, Surface(given["beta"], given["mu"]), 40.0, given["drop"], given["gravity"]
-
-    def pushed(value, u=0.0):
-        return predict(*scene, initial_speed=Quantity(value, u))
-
-    def held(share, u=0.0):
-        return predict(*scene, kappas=[0.01 * share] * len(CHAIN.masses), drag_u=u)
-
-    for found, value in ((pushed, 0.1), (held, 1.0)):
-        u = 0.5 * value
-        moved = abs(found(value + u).speed_m_s - found(value - u).speed_m_s) / 2
-        assert moved > 0.0
-        assert found(value, u).speed_u_m_s == pytest.approx(moved, rel=1e-9)
-
-
 def test_gravity_that_may_be_nearly_nothing_is_halved_and_no_less():
     g, u = CENTRE["gravity"], 0.9 * CENTRE["gravity"]
     found = with_u(gravity=u)
@@ -98,22 +81,6 @@ def test_uncertainty_at_the_edge_of_what_friction_can_be_is_not_halved(mu):
     ]
     slope = (ends[1].separation_m - ends[0].separation_m) / 1e-4
     assert found.separation_u_m == pytest.approx(slope * u, rel=1e-3)
-
-
-def test_uncertainty_of_a_given_alpha():
-    u = 1e-5
-    chain = replace(CHAIN, alpha=Quantity(0.12, u), gamma=0.5)
-    found = predict(chain, Surface(Quantity(0.5, 0.1), Quantity(0.2, 0.1)), 40.0, DROP, GRAVITY)
-    with mp.workdps(50):
-        step = mp.mpf(10) ** -12
-        low, high = (
-            reference_fall(chain.masses, chain.heights, mp.mpf(0.12) + s * step, 0.5, 0.18, 9.81,
-                           digits=50)
-            for s in (-1, 1)
-        )  # fmt: skip
-        slope = (high.separation - low.separation) / (2 * step)
-    assert found.separation_u_m == pytest.approx(float(slope) * u, rel=1e-6)
-    assert (found.model, found.in_domain) == ("discrete, given", True)
 
 
 def test_a_pile_has_its_own_restitution_and_no_friction():
@@ -154,13 +121,3 @@ def test_friction_that_may_be_singular_still_allows_a_prediction():
     """g(θ) > 0 at μ = 0.4 but not at 0.4 + 0.05."""
     found = predict(LIGHT_ENDED, Surface(Quantity(0.5), Quantity(0.4, 0.05)), 15.0, DROP, GRAVITY)
     assert found.separation_m > 0.0
-
-
-@pytest.mark.parametrize("incline", [0.0, 40.0, 80.0])
-def test_free_fall_speed_is_that_of_a_stone(incline):
-    found = predict(CHAIN, SURFACE, incline, DROP, GRAVITY)
-    assert found.free_fall_speed_m_s == pytest.approx(
-        math.sqrt(2 * 9.81 * (0.18 + 1.165)), rel=1e-15
-    )
-    assert found.speed_m_s > found.free_fall_speed_m_s
-    assert found.incline_deg == incline

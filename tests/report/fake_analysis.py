@@ -2,7 +2,6 @@
 
 import random
 from dataclasses import replace
-from typing import Any
 
 from rig.analysis.comparison import Difference
 from rig.analysis.result import Audit, DropResult, Measured
@@ -81,28 +80,6 @@ def compared(line: Incline) -> Incline:
 def measured(one: DropResult, **quantities: Measured) -> DropResult:
     """Let a drop have measured something else."""
     return replace(one, quantities={**one.quantities, **quantities})
-
-
-def without(found: Analysis, *names: str) -> Analysis:
-    """Let a session have measured less."""
-
-    def rest(some: Any) -> dict[str, Any]:
-        return {name: value for name, value in some.items() if name not in names}
-
-    return analysis(
-        [replace(one, quantities=rest(one.quantities)) for one in found.runs],
-        [
-            compared(replace(line, means=rest(line.means), predicted=rest(line.predicted)))
-            for line in found.summary
-        ],
-    )
-
-
-def single_chain() -> Analysis:
-    """One chain that strikes."""
-    found = without(two_chains(repeats=4), "separation_m", "separation_raw_m", "release_skew_s")
-    runs = [replace(one, run=replace(one.run, impact="A", free=None)) for one in found.runs]
-    return replace(found, runs=tuple(runs))
 
 
 def gravity(seed: int = 3) -> Analysis:

@@ -5,17 +5,22 @@ from __future__ import annotations
 import csv
 import io
 import signal
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import combinations
 from xml.etree import ElementTree
 
 import pytest
 
+from rig import cli
 from rig.analysis.curves import model_curves
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.measurands import SEPARATION
+from rig.predictions import predict_incline
+from rig.protocol import reader
 from rig.protocol.protocol import Run
 from rig.report.canvas import KINDS, drawing_file, figure_file, style, write_figures
+from rig.report.falls import fall_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
 from rig.report.figures import (
     _stack_bar,
@@ -26,8 +31,10 @@ from rig.report.figures import (
 )
 from rig.report.looks import COLORS, PARTS
 from rig.report.plot import page_svg, plot
+from sim.dials import Dials
+from tests.analysis.drops import PROTOCOLS, UNIFORM, case
+from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.report import fake_analysis
-from tests.sim.falls import UNIFORM
 
 TWO = fake_analysis.two_chains()
 CURVES = model_curves(UNIFORM)
@@ -90,19 +97,6 @@ def test_every_number_of_a_figure_is_in_its_table(tmp_path):
         assert (tmp_path / f"figure-1.{kind}").read_bytes() == figure_file(figure, kind)
 
 
-def test_points_stand_at_the_incline_at_which_they_were_measured():
-    figure = result_figure(TWO, CURVES)
-    points = [series for series in figure.panels[0].series if series.role in {"points", "mean"}]
-    assert {x for series in points for x in series.x} == set(fake_analysis.MODEL)
-
-
-def test_residuals_are_normalized_errors():
-    figure = result_figure(TWO, CURVES)
-    points = figure.panels[1].series[-1]
-    assert list(points.y) == [line.normalized_error("separation_m") for line in TWO.summary]
-    assert figure.panels[1].series[0].y == [-1.0, 1.0]
-
-
 def test_without_any_uncertainty_there_are_no_residuals():
     """A protocol may state heights as exact."""
     axis, none = PlotAxis("time (s)"), [(0.1, float("inf")), (0.2, float("nan"))]
@@ -111,8 +105,6 @@ def test_without_any_uncertainty_there_are_no_residuals():
 
 
 def test_figures_follow_the_scene():
-    single = result_figure(fake_analysis.single_chain(), {})
-    assert "eparation" not in single.title
     assert runs_figure(fake_analysis.gravity()) is None
     gravity = result_figure(fake_analysis.gravity(), {})
     assert [panel.x.label for panel in gravity.panels] == ["run"]
@@ -133,13 +125,6 @@ def test_a_void_run_does_not_set_the_scale():
         return [axes.get_ylim() for axes in drawing.axes]
 
     assert numbers(runs) == numbers(TWO.runs)
-
-
-def test_shares_of_a_variance_add_up_to_the_whole():
-    (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
-    mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
-    line = replace(line, means={"separation_m": mean}, causes={"separation_m": {"datum": 4e-3}})
-    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})
 
 
 @pytest.mark.parametrize("kind", ["svg", "png"])
@@ -166,6 +151,57 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
     with pytest.raises(KeyboardInterrupt):
         drawing_file(drawing, kind)
     assert len(drawings) > 1
+
+
+AIR = reader.parse(f"{UNIFORM.text}drag: {{terminal_speed: 15 m/s}}\n")
+
+
+@pytest.mark.parametrize("name", ["falling-ball", "glider", "picket-fence"])
+def test_points_of_a_perfect_fall_lie_on_its_line(name):
+    """A glider's card is in a beam for a third of a second, and speeds up meanwhile."""
+    drop = case(reader.read(PROTOCOLS / f"{name}.yaml"), Dials.quiet(), run=1)
+    (figure,) = fall_figures(drop.protocol, drop.drop, drop.scale.hz, drop.analyze())
+    panels = [panel for panel in figure.panels if panel.y.label.startswith("residual")]
+    assert [len(panel.series[-1].y) >= 4 for panel in panels] == [True, True]
+    assert all(abs(ratio) < 0.2 for panel in panels for ratio in panel.series[-1].y)
+
+
+@pytest.mark.parametrize(("protocol", "run"), [(AIR, 25), (BOARD_GRADED, 1)], ids=["air", "board"])
+def test_points_of_a_perfect_separation_lie_on_the_models_line(protocol, run):
+    """The line falls in the stated air, and heights count from where the top rod touches."""
+    drop = case(protocol, Dials.quiet(), run=run)
+    figure, speeds = fall_figures(drop.protocol, drop.drop, drop.scale.hz, drop.analyze())
+    residuals = figure.panels[-1].series[-1].y
+    assert len(residuals) > 100
+    assert max(map(abs, residuals)) < 0.2
+    free_fall, model, *_ = speeds.panels[0].series
+    assert free_fall.y[-1] == model.y[-1] == 0.0
+    stated = predict_incline(protocol, drop.run.incline_deg, "A")
+    assert model.x[-1] == pytest.approx(stated.speed_m_s**2)
+    assert free_fall.x[-1] == pytest.approx(stated.free_fall_speed_m_s**2)
+
+
+@pytest.mark.parametrize(("number", "own", "other"), [
+    (3, "friction raises", "Eq. 15 within"), (6, "Eq. 15 within", "friction raises"),
+    (4, "graded chain", "Eq. 15 within"),
+])  # fmt: skip
+def test_a_figure_its_numbers_and_its_caption(number, own, other, tmp_path):
+    target = tmp_path / "figure.svg"
+    assert cli.main(["predict", "--figure", str(number), "-o", str(target)]) == 0
+    caption = " ".join("".join(ET.parse(target).getroot().itertext()).split())
+    assert own in caption
+    assert other not in caption
+    with target.with_suffix(".csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) > 20
+    assert all(float(value) == float(value) for row in rows for value in row.values())
+
+
+def test_shares_of_a_variance_add_up_to_the_whole():
+    (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
+    mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
+    line = replace(line, means={"separation_m": mean}, causes={"separation_m": {"datum": 4e-3}})
+    assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})
 
 
 def test_sources_beyond_the_colours_are_among_the_others():

@@ -126,10 +126,3 @@ def test_imported_edges_begin_where_they_begin():
     drawn = timeline(lanes(GATES, [drop]), *drop)
     assert drawn.bars.startswith("M0 15m0 0h320m")  # 100 of 400 ms
     assert not drawn.odd  # nothing was fitted, so nothing is odd
-
-
-def test_a_drop_that_lasts_long_does_not_squeeze_the_others():
-    short = Drop(1, 1, 1000, EDGES, fire_tick=0)
-    long = Drop(2, 1, 1000, (*EDGES, Edge(90_000, 0, False)), fire_tick=0)
-    drops = [(drop, 1000, None) for drop in (short, short, long)]
-    assert lanes(GATES, drops).span_ms == 1000.0

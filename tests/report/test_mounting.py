@@ -53,16 +53,3 @@ def test_from_the_board_heights_are_those_above_its_face():
     svg = drawn(protocol)
     assert "mm above the board" in svg
     assert "contact point" not in svg
-
-
-def test_a_track_is_drawn_as_it_lies():
-    protocol = read(PROTOCOLS / "glider.yaml")
-    (side,) = mounting_figure(protocol, protocol.gates).panels
-    assert "track" in side.x.label
-    mark, start = (next(trace for trace in side.series if trace.role == role)
-                   for role in ("cross", "mean"))  # fmt: skip
-    low, far, height = mark.x[0], start.x[0], start.y[0]
-    assert mark.y[0] == 0.0
-    slope = math.degrees(math.atan2(height, low - far))
-    assert slope == pytest.approx(protocol.track.incline_deg.value)
-    assert math.hypot(height, low - far) == pytest.approx(1e3 * protocol.drop.value)

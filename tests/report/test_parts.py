@@ -6,29 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from rig.analysis.pairs import Effects
-from rig.analysis.result import Measured
 from rig.measurands import SEPARATION
 from rig.report.columns import table_parts, value_at
 from rig.report.parts import tables
-
-
-def test_effects_have_the_digits_that_they_deserve():
-    one = Effects(
-        42.5, "A", "B", 3,
-        {"separation_m": Measured(1.234e-3, 0.05e-3), "speed_m_s": Measured(-4e-3, 3e-3)},
-        {"release_skew_s": Measured(0.2e-3, 0.4e-3)},
-    )  # fmt: skip
-    (part,) = tables("effects", [one])
-    assert part.heading.startswith("Differences: chain A − chain B")
-    text = "\n".join(part.table)
-    assert "\n       42.5 " in text
-    assert "1.234 ± 0.098" in text
-    assert "−4.0 ± 5.9" in text
-    assert "0.20 ± 0.78" in text
-    assert "Δz ± U (mm)" in text
-    assert "skew ± U (ms)" in text.replace("sides' skew ± U (ms)", "skew ± U (ms)")
-    assert not list(tables("effects", []))
 
 
 def test_a_column_is_never_left_out_because_its_value_has_another_name():

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from types import SimpleNamespace
-
-import pytest
 
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
-from rig.cli import main
 from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.report.finding import void_lines
 from rig.report.templates import lines
-from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
-from tests.cli.lab import short
 
 
 def void(run, attempt, *reasons, verdict="void"):
@@ -43,28 +37,6 @@ def test_void_drops_of_one_reason_share_a_line_above_what_to_do():
     assert void_lines(Analysis((void(1, 1, verdict="marginal"),), (), ())) == []
 
 
-def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_known():
-    known = {code: row.remedy for code, row in WORDINGS.items() if row.severity is Severity.VOID}
-    without = [code for code, remedy in known.items() if not remedy]
-    assert without == [OPERATOR]
-    assert [code for code, remedy in known.items() if remedy == WORDINGS["scatter"].remedy] == [
-        SENTENCE
-    ]
-    (general,) = remedies([MOTHS, plain_reason("a lorry")])
-    assert remedies([MOTHS, SKEW, SKEW]) == remedies([SKEW]) != [general]
-
-
-@pytest.fixture
-def rig(capsys):
-    """Call a command; return its code and what it said."""
-
-    def call(*words):
-        code = main([*map(str, words)])
-        return code, capsys.readouterr().out
-
-    return call
-
-
 def test_air_that_may_be_none_is_not_mentioned():
     for nothing in (None, Measured(3e-6, 1e-6), Measured(-3e-6, 1e-6)):
         assert lines("air", SimpleNamespace(rig=nothing and SimpleNamespace(drag=nothing))) == []
@@ -73,18 +45,3 @@ def test_air_that_may_be_none_is_not_mentioned():
 def test_air_is_said_with_its_uncertainty():
     (line,) = lines("air", SimpleNamespace(rig=SimpleNamespace(drag=Measured(0.0312345, 1e-5))))
     assert "κ = 0.031234 ± 0.000020 per m" in line
-
-
-def test_a_run_in_air_tells_of_it(rig, tmp_path):
-    protocol, session = tmp_path / "air.yaml", tmp_path / "air.session"
-    protocol.write_text(short(), "utf-8")
-    code, told = rig("run", protocol, "--port", "sim://?seed=2&drag=0.03&skew_sd=1ms",
-                     "--session", session, "--yes")  # fmt: skip
-    assert code == 0
-    assert "Air drag: κ = 0.0" in told
-    (one,) = [
-        one
-        for one in json.loads(rig("analyze", session, "--json")[1])["learned"]["unknowns"]
-        if one["name"] == "drag"
-    ]
-    assert one["value"][0] == pytest.approx(0.03, abs=4 * one["u"][0])

@@ -13,7 +13,7 @@ from rig.cli import main
 from rig.errors import InputError
 from rig.estimate.posterior import Posterior
 from rig.estimate.session import Coefficient
-from rig.report.estimate import estimate_text, page_parts
+from rig.report.estimate import page_parts
 from rig.report.estimate_figures import estimate_pictures
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
@@ -49,17 +49,6 @@ def found(single):
         return estimate(protocol_of(session), complete_analysis(session))
 
 
-def test_a_single_chain_s_estimate_speaks_of_no_other(found):
-    sections = Sections()
-    text = estimate_text(found, sections, simulated=True)
-    assert "Best single α" in text
-    for word in ("free chain", "Δz"):
-        assert word not in text
-    drawn = estimate_pictures(found, sections)
-    assert "Δz" not in drawn["curves"].title + drawn["curves"].caption
-    assert not sections.failed
-
-
 def changed(found, **gain):
     """Have other speeds gained from the rods of each incline."""
     return replace(
@@ -83,29 +72,6 @@ def test_a_part_that_fails_takes_no_other_along(found):
     assert sections.failed["The picture of the impulses"].startswith(
         "The picture of the impulses could not be made: ValueError: "
     )
-
-
-@pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
-def test_a_posterior_without_spread_has_no_picture(found, what):
-    nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
-    names = ("restitution", "friction")
-    told = Measured(0.5, 0.1)
-    narrow = found.coefficients._replace(
-        parameters=tuple(
-            Coefficient(name, True, told, Quantity(0.5), {"u": 0.1, "low": 0.3, "high": 0.7})
-            for name in names
-        ),
-        posterior=Posterior(
-            names,
-            np.full(len(nodes), 1.0 / len(nodes)),
-            np.array(nodes),
-            np.array([[0.05, 1e-9] if "weights" in what else [1e-300, 1e-9]] * len(nodes)),
-        ),
-    )
-    sections = Sections()
-    drawn = estimate_pictures(replace(found, coefficients=narrow), sections)
-    assert "posterior" not in drawn
-    assert not sections.failed
 
 
 def test_a_page_says_what_it_lacks(single, monkeypatch):
@@ -153,3 +119,26 @@ def test_what_an_estimate_lacks_is_said_in_the_report_and_on_stderr(
     assert last == f"report: {tmp_path / 'r.html'}"
     html = (tmp_path / "r.html").read_text("utf-8")
     assert all(words in html for words in (sentence, "sortable", "Height against time"))
+
+
+@pytest.mark.parametrize("what", [{"weights": [1.0]}, {"sds": 0.0}])
+def test_a_posterior_without_spread_has_no_picture(found, what):
+    nodes = [[0.5, 0.2], [0.5, 0.21]][: len(what.get("weights", (1, 1)))]
+    names = ("restitution", "friction")
+    told = Measured(0.5, 0.1)
+    narrow = found.coefficients._replace(
+        parameters=tuple(
+            Coefficient(name, True, told, Quantity(0.5), {"u": 0.1, "low": 0.3, "high": 0.7})
+            for name in names
+        ),
+        posterior=Posterior(
+            names,
+            np.full(len(nodes), 1.0 / len(nodes)),
+            np.array(nodes),
+            np.array([[0.05, 1e-9] if "weights" in what else [1e-300, 1e-9]] * len(nodes)),
+        ),
+    )
+    sections = Sections()
+    drawn = estimate_pictures(replace(found, coefficients=narrow), sections)
+    assert "posterior" not in drawn
+    assert not sections.failed

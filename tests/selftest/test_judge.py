@@ -18,7 +18,7 @@ from tests.firmware.pico import build
 from tests.firmware.toolchain import FIRMWARE
 
 PPM = 30.0, -12.0
-DROPS = 8
+DROPS = 4
 
 
 class Pair:

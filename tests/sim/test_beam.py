@@ -45,30 +45,6 @@ def test_union_covers_the_same_instants(given_shadows):
     assert all(a.end < b.start for a, b in pairwise(merged))
 
 
-def test_a_bounce_behind_a_rod_prolongs_its_shadow():
-    merged = union([Shadow(1.5, 3.0, NOT_A_ROD), Shadow(1.0, 2.0, 7), Shadow(4.0, 5.0, 8)])
-    assert merged == [(Shadow(1.0, 3.0, 7), NOT_A_ROD), (Shadow(4.0, 5.0, 8), 8)]
-
-
-@given(
-    st.lists(st.tuples(st.floats(0, 0.5), st.floats(0, 0.05), st.integers(-1, 30)), max_size=40),
-    st.integers(0, 2**32),
-    st.builds(
-        with_dials,
-        missed=st.floats(0, 1),
-        chatter=st.floats(0, 1),
-        jitter_sd=st.sampled_from([0.0, 2e-6, 1e-3, 0.1]),
-    ),
-)
-def test_levels_alternate_and_time_runs_forward(things, seed, dials):
-    given_shadows = [Shadow(start, start + width, rod) for start, width, rod in things]
-    edges = receive(given_shadows, 3, dials, np.random.default_rng(seed))
-    assert [e.blocked for e in edges] == [i % 2 == 0 for i in range(len(edges))]
-    assert len(edges) % 2 == 0  # it is clear again in the end
-    assert all(a.time_s <= b.time_s for a, b in pairwise(edges))
-    assert all(e.channel == 3 for e in edges)
-
-
 @pytest.mark.parametrize("missed", [0.01, 0.1, 0.5])
 def test_the_share_of_missed_edges_is_the_dial(missed):
     lost_pairs, odd = divmod(2 * N - len(seen(missed=missed)), 2)
@@ -103,3 +79,27 @@ def test_jitter_scatters_by_its_standard_deviation_without_bias():
     )
     assert abs(errors.mean()) < SIGMAS * sd / math.sqrt(2 * N)
     assert abs(errors.std() / sd - 1) < SIGMAS / math.sqrt(4 * N)
+
+
+def test_a_bounce_behind_a_rod_prolongs_its_shadow():
+    merged = union([Shadow(1.5, 3.0, NOT_A_ROD), Shadow(1.0, 2.0, 7), Shadow(4.0, 5.0, 8)])
+    assert merged == [(Shadow(1.0, 3.0, 7), NOT_A_ROD), (Shadow(4.0, 5.0, 8), 8)]
+
+
+@given(
+    st.lists(st.tuples(st.floats(0, 0.5), st.floats(0, 0.05), st.integers(-1, 30)), max_size=40),
+    st.integers(0, 2**32),
+    st.builds(
+        with_dials,
+        missed=st.floats(0, 1),
+        chatter=st.floats(0, 1),
+        jitter_sd=st.sampled_from([0.0, 2e-6, 1e-3, 0.1]),
+    ),
+)
+def test_levels_alternate_and_time_runs_forward(things, seed, dials):
+    given_shadows = [Shadow(start, start + width, rod) for start, width, rod in things]
+    edges = receive(given_shadows, 3, dials, np.random.default_rng(seed))
+    assert [e.blocked for e in edges] == [i % 2 == 0 for i in range(len(edges))]
+    assert len(edges) % 2 == 0  # it is clear again in the end
+    assert all(a.time_s <= b.time_s for a, b in pairwise(edges))
+    assert all(e.channel == 3 for e in edges)

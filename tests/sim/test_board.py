@@ -68,15 +68,6 @@ def test_a_board_of_another_version_is_refused_with_advice():
     assert "rig flash" in caught.value.hint
 
 
-def test_a_read_waits_in_virtual_time_only():
-    port = SimulatedSerial("test", board=VirtualBoard(ScriptedLab()), timeout=0.2)
-    assert port.read(1) == b""
-    assert port.clock.now_ns() == pytest.approx(0.2e9, rel=1e-3)
-    port.timeout = 1
-    assert len(port.read(8)) == 8  # BOOT begins to arrive
-    assert 0.3e9 < port.clock.now_ns() < 0.32e9
-
-
 def test_a_paced_clock_takes_real_time(monkeypatch):
     slept: list[float] = []
     monkeypatch.setattr("sim.clock.time.sleep", slept.append)
@@ -85,16 +76,6 @@ def test_a_paced_clock_takes_real_time(monkeypatch):
     clock.advance_to(1_000)
     assert slept == [1.0]
     assert clock.now_ns() == 2_000_000_000
-
-
-def test_changes_within_a_tick_are_one_snapshot():
-    changes = [(1e-3, 0, True), (1e-3 + 1e-9, 1, True), (2e-3, 0, False)]
-    assert take_snapshots(changes, 3, 16e6) == [(16000, 3), (32000, 2)]
-
-
-def test_a_pulse_too_short_to_be_seen_leaves_one_snapshot_of_nothing_new():
-    changes = [(1e-3, 0, True), (1e-3 + 1e-6, 0, False), (2e-3, 1, True)]
-    assert take_snapshots(changes, 3, 16e6) == [(16000, 0), (32000, 2)]
 
 
 @given(st.lists(st.tuples(st.floats(0, 0.01), st.integers(0, 3)), max_size=60).map(sorted))

@@ -62,22 +62,6 @@ def common(values: Residuals, *key: int) -> dict:
     return {where: group[0] for where, group in groups.items()}
 
 
-def test_rods_off_their_places_belong_to_the_chain():
-    dials = with_dials(rod_sd=0.5e-3)
-    b_free, a_free, a_again, b_again = truths(
-        dials, 7, (A_STRIKES, 1), (B_STRIKES, 1), (B_STRIKES + 1, 4), (A_STRIKES + 3, 1)
-    )
-    maps = [common(residuals(t), 1) for t in (b_free, a_free, a_again, b_again)]
-    assert maps[0] == pytest.approx(maps[3], abs=1e-12)
-    assert maps[1] == pytest.approx(maps[2], abs=1e-12)
-    assert all(abs(maps[0][rod] - maps[1][rod]) > 1e-7 for rod in maps[0])
-    # On the impact side the same chain has the same map; until its first hit it falls freely too.
-    striking = common(residuals(b_free, free=False, until=DELAY + 0.19), 1)
-    assert len(striking) > 3
-    for rod, off in striking.items():
-        assert off == pytest.approx(maps[1][rod], abs=1e-12)
-
-
 def test_a_chain_strikes_with_its_own_rods():
     dials = with_dials(rod_sd=0.5e-3)
     a_strikes, b_strikes = truths(dials, 7, (A_STRIKES, 1), (B_STRIKES, 1))
@@ -109,24 +93,6 @@ def test_gate_errors_belong_to_the_gate_in_every_run():
     assert_normal([x for s in range(30) for x in common(one(dials, s), 0).values()], 0.2e-3)
 
 
-def test_a_beam_off_the_middle_shifts_rods_up_and_down_in_turn():
-    dials = with_dials(beam_sd=0.5e-3)
-    signed = {where: x * (-1) ** where[1] for where, x in one(dials).items()}
-    shifts = common(signed, 0)
-    assert shifts == pytest.approx(
-        common({w: x * (-1) ** w[1] for w, x in one(dials, run=B_STRIKES, attempt=2).items()}, 0),
-        abs=1e-12,
-    )
-    # Not only about: exactly tan(tilt) times the beam's place, 0.21 mm per mm.
-    lab = ChainLab(UNIFORM, dials, 1)
-    for (channel,), shift in shifts.items():
-        wanted = lab.beams[channel] * math.tan(math.radians(12))
-        assert shift == pytest.approx(-wanted, abs=1e-11)
-    assert_normal(
-        [x for s in range(20) for x in ChainLab(UNIFORM, dials, s).beams.values()], 0.5e-3
-    )
-
-
 def test_a_wider_rod_blocks_earlier_and_frees_later():
     dials = with_dials(width_sd=0.1e-3)
     off = common(one(dials), 2)
@@ -137,15 +103,6 @@ def test_a_wider_rod_blocks_earlier_and_frees_later():
     assert off[True,] == pytest.approx(wider[0][1][0] / 2, abs=1e-12)  # B falls freely
     assert np.ptp(wider, axis=2).max() < 1e-12  # all rods of a chain alike
     assert_normal(np.array(wider)[:, :, 0].ravel(), 0.1e-3)
-
-
-def test_the_drop_is_wrong_by_the_same_in_every_run():
-    dials = with_dials(drop_error=0.5)
-    first, second = (common(one(dials, 2, run))[()] for run in (A_STRIKES, B_STRIKES))
-    assert first == pytest.approx(second, abs=1e-12)
-    errors = [ChainLab(UNIFORM, dials, seed).hang_height - 0.18 for seed in range(300)]
-    assert first == pytest.approx(-errors[2], abs=1e-12)
-    assert_normal(errors, 0.5 * 2e-3)  # the protocol's drop is ± 2 mm
 
 
 def test_hanging_heights_scatter_from_drop_to_drop_and_side_to_side():

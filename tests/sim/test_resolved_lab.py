@@ -57,20 +57,6 @@ def dropped(scene) -> tuple[ResolvedLab, list, list]:
     return lab, truths, edges
 
 
-def test_free_chain_darkens_beams_as_free_fall_does(dropped):
-    lab, truths, _ = dropped
-    half = 12.7e-3 / 2 / math.cos(math.radians(12))
-    for truth in truths:
-        let_go = lab.dials.delay + truth.release_skew_s
-        seen = {(ch, dark, rod): t for t, ch, dark, rod in truth.edges if ch >= 8}
-        for gate in lab.protocol.gates.on("free"):
-            for rod in range(4):
-                middle = 0.6 + rod * 0.145 / 3 - gate.height
-                for dark, way in ((True, middle - half), (False, middle + half)):
-                    wanted = let_go + math.sqrt(2 * way / GRAVITY)
-                    assert seen[gate.channel, dark, rod] == pytest.approx(wanted, abs=0.2e-6)
-
-
 def test_truth_at_level_and_at_strike(dropped):
     _, truths, _ = dropped
     for truth in truths:
@@ -141,29 +127,3 @@ def test_a_top_rod_that_never_lands_is_said(dropped):
     struck = replace(fall(lab.chains(pack_label(1, 1))["impact"]), touched_s=np.full(4, np.inf))
     with pytest.raises(InputError, match="strikes nothing"):
         at_level(struck, GRAVITY)
-
-
-def test_air_takes_from_a_chain_what_the_dial_says_and_less_from_thicker_rods(scene):
-    protocol = reader.read(scene)
-    thin = next(iter(protocol.chains.values()))
-    thick = replace(thin, name="B", diameters=tuple(2.0 * d for d in thin.diameters))
-    both = replace(protocol, chains={thin.name: thin, thick.name: thick})
-    chains = ResolvedLab(both, ResolvedDials(drag=0.05), 3).chains(pack_label(1, 1)).values()
-    means = {
-        round(float((chain.drag * chain.rods.masses).sum() / chain.rods.masses.sum()), 12)
-        for chain in chains
-    }
-    assert means == {0.05, 0.025}
-
-
-def test_a_free_chain_swings_too(scene):
-    still, swinging = (
-        ResolvedLab(reader.read(scene), replace(ResolvedDials.quiet(), swing_sd=speed), 3).chains(
-            pack_label(1, 1)
-        )
-        for speed in (0.0, 0.1)
-    )
-    for side in ("impact", "free"):
-        assert not still[side].swing.any()
-        speeds = np.abs(swinging[side].swing)
-        assert speeds[0] > speeds[1] > speeds[2] > speeds[3] == 0.0  # it hangs by its top

@@ -1,4 +1,4 @@
-"""``sim://`` as the rest of the program meets it: a port by URL, a device on it, drops."""
+"""``sim://`` as the rest of the program meets it: a port by URL, its line, a device, drops."""
 
 import json
 from dataclasses import dataclass, field
@@ -11,6 +11,7 @@ from rig.link.client import Device
 from rig.link.messages import Arm, pack_label
 from rig.link.port import open_port, port_clock
 from rig.records import ClockSample, Drop
+from sim.line import BadLine
 from tests.sim.falls import PROTOCOLS
 
 FENCE = PROTOCOLS / "picket-fence.yaml"
@@ -101,3 +102,12 @@ def test_a_percent_sign_need_not_be_escaped():
     plain = url(seed=1) + "&missed=20%&skew_sd=4 ms&clock=-1300 ppm"
     escaped = url(seed=1, missed="20 %", skew_sd="4ms", clock="-1300ppm")
     assert talk(plain) == talk(escaped) != talk(url(seed=1))
+
+
+def test_a_busy_line_changes_only_what_goes_both_ways_at_once():
+    line = BadLine(0.0, 0.0, 1.0, seed=1)
+    data = bytes(range(100))
+    assert line.transfer(data, b"") == (data, b"")
+    assert line.transfer(b"", data) == (b"", data)
+    changed = line.transfer(data, data)
+    assert all(a != b for way in changed for a, b in zip(way, data, strict=True))

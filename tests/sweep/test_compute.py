@@ -69,18 +69,6 @@ def test_points_are_single_falls_with_the_notes_of_single_impacts():
     assert seen == NOT_SLIDING | ABOVE_HALF | NO_ANSWER | PILE
 
 
-def test_a_stated_alpha_gives_the_single_falls_to_the_bit():
-    protocol = reader.read(PROTOCOLS / "bead-chain.yaml")
-    chain = protocol.chains["beads"].chain
-    vary = ("alpha=0..0.6:4", "gamma=0..2:3", "drop=0mm..200mm:3", "gravity=1m/s^2..10m/s^2:2")
-    found = list(points(protocol, vary))
-    assert len(found) == 72
-    for at, *ends, in_domain, notes in found:
-        alone = fall(chain, at["alpha"], at["gamma"], at["drop"], at["gravity"])
-        assert ends == [alone.separation_m, alone.speed_m_s]
-        assert in_domain == (at["alpha"] <= 0.5) == (notes == 0)
-
-
 def test_a_value_holds_a_parameter_and_the_inclines_are_layers():
     protocol = reader.parse(SCENE)
     layout = lay_out(protocol, ["friction=0..1:3", "drop=90mm"])

@@ -7,21 +7,10 @@ import pytest
 
 from bench.process_fixture import ProcessFixture
 from tests.cli.conftest import finished  # noqa: F401 - a fixture
+from tests.cli.lab import short_fence
 from tests.tui.lab import Lab, short_folder, unseen
 
-_FENCE = """\
-protocol: 1
-title: TITLE
-chains:
-  fence: {rods: 8, length: 350 mm, diameter: 25 mm, position_uncertainty: 0.1 mm}
-drop: 400 mm ± 2 mm
-gravity: 9.81 m/s^2
-gates:
-  free: [{channel: 0, height: 50 mm}, {channel: 1, height: 350 mm}]
-  height_uncertainty: 0.3 mm
-plan: {repeats: 3, settle: 1 s}
-accept: {missed_edges: 15 %}
-"""
+_FENCE = short_fence(3).replace("Free fall of a picket fence", "TITLE")
 
 
 @pytest.fixture(autouse=True)

@@ -84,12 +84,6 @@ def test_without_a_file_the_keys_are_the_tables(tmp_path, monkeypatch):
     assert read_keys() == {action.name: action.keys for action in ACTIONS}
 
 
-def test_keys_are_written_as_they_stand_on_a_keyboard():
-    assert [shown_key(keys) for keys in ("f9", "ctrl+p", "x", "question_mark,f1", "enter")] == [
-        "F9", "Ctrl-P", "x", "?", "Enter"
-    ]  # fmt: skip
-
-
 def test_text_from_outside_is_one_harmless_line():
     nasty = "a\x1b[31m[/red]\n\x07b\u202ec\ud800"
     assert plain(nasty) == "a�[31m[/red] �b�c�"
@@ -99,3 +93,9 @@ def test_text_from_outside_is_one_harmless_line():
 
 def test_durations():
     assert [duration(s) for s in (3, 61, 3660)] == ["3 s", "1 min 01 s", "1 h 01 min"]
+
+
+def test_keys_are_written_as_they_stand_on_a_keyboard():
+    assert [shown_key(keys) for keys in ("f9", "ctrl+p", "x", "question_mark,f1", "enter")] == [
+        "F9", "Ctrl-P", "x", "?", "Enter"
+    ]  # fmt: skip

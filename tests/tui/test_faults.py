@@ -52,12 +52,12 @@ def test_a_disk_that_takes_nothing_is_said(lab):
 
 def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab, fence):
     good = fence.replace("TITLE", "mended")
-    lab.protocol.write_text(good.replace("8, length", "many, length"), "utf-8")
+    lab.protocol.write_text(good.replace("rods: 8 ", "rods: many "), "utf-8")
 
     async def work():
         async with lab.operator() as op:
             await op.until(lambda: op.app.client.driving)
-            await op.sees("fence.yaml:4:17:", "found 'many'")
+            await op.sees("fence.yaml:8:11:", "found 'many'")
             await op.press("enter")
             lab.protocol.write_text(good, "utf-8")
             await op.sees("mended")

@@ -1,13 +1,14 @@
-"""From an empty folder, without a daemon, to a first result; and nothing is wrong before it is."""
+"""From an empty folder to a first result, and what becomes of the daemon that a screen began."""
 
+import asyncio
 import shutil
 
 from rig.campaign.machine import Stage
 from rig.cli import _parser
-from rig.tui import commands
+from rig.tui import client, commands
 from rig.tui.app import RigApp
 from rig.tui.context import Options
-from tests.tui.lab import KEYS, Operator, flat, run, short_folder
+from tests.tui.lab import KEYS, PATIENCE_S, Operator, flat, run, short_folder
 
 KEYS_AT_MOST = 4
 
@@ -78,3 +79,25 @@ def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tm
 
     run(work())
     assert asked == [("flash", "pico")]
+
+
+def test_a_daemon_that_a_screen_started_ends_by_itself(monkeypatch):
+    monkeypatch.setattr(client, "_IDLE_S", 1.0)
+    folder = short_folder()
+
+    async def work():
+        there = asyncio.Event()
+
+        async def connected():
+            there.set()
+
+        line = client.ReconnectingClient("sim://", folder / "rig.sock", connected)
+        keeping = asyncio.get_running_loop().create_task(line.keep())
+        await asyncio.wait_for(there.wait(), PATIENCE_S)
+        keeping.cancel()
+        assert line.daemon.poll() is None
+        assert await asyncio.to_thread(line.daemon.wait, PATIENCE_S) == 0
+        assert "no client for 1 s" in (folder / "rig.log").read_text()
+
+    run(work())
+    shutil.rmtree(folder)

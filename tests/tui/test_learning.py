@@ -6,14 +6,11 @@ import pytest
 
 from rig.reasons import plain_reason
 from rig.records import Job
-from rig.results.live import LiveAnalysis
 from rig.results.whole import notes
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.app import RigApp
 from rig.tui.context import Options
-from rig.tui.drop_words import number_table, past_runs, sentence
-from rig.tui.plots import drop_pictures, session_pictures
 from rig.tui.survey import session_list
 from rig.wordings import NOTE
 from tests.cli.lab import short
@@ -24,36 +21,6 @@ from tests.tui.lab import KEYS, Operator, run
 def recorded(finished, tmp_path) -> Path:
     """Four drops of two chains, at two inclines."""
     return finished.copy(tmp_path).rename(tmp_path / "abba.session")
-
-
-def test_results_and_what_drifts_are_drawn(recorded):
-    view = LiveAnalysis(recorded).read()
-    pictures = [picture for picture, _ in session_pictures(view)]
-    labels = " | ".join(picture.panel.y.label for picture in pictures)
-    assert "separation" in labels
-    assert "skew" in labels
-    assert all(caption for _, caption in session_pictures(view))
-    for picture in pictures:
-        points = [x for one in picture.panel.series if one.role in {"mean", "ring"} for x in one.x]
-        assert sorted(points) == [1.0, 2.0, 3.0, 4.0]
-
-
-def test_a_drop_is_said_in_a_sentence_and_a_table(recorded):
-    live = LiveAnalysis(recorded)
-    view = live.read()
-    job = view.jobs[0]
-    measured, chain = view.results[job].quantities, view.plan[job.run].impact
-    apart = measured["separation_m"].value
-    said = sentence(view, job)
-    assert said.startswith(f"{chain} wins by {apart * 100:.2f} ± ")
-    assert "; model 1" in said
-    assert "together" not in number_table(view, job)
-    live.fit_jointly(view)
-    both = number_table(live.read(), job)
-    assert both.split("\n")[0].split() == ["alone", "together"]
-    assert past_runs(view, view.jobs[1]).startswith(f"past runs (cm)  1 ✓ {apart * 100:.4g} · 2 ✓ ")
-    labels = [picture.panel.y.label for picture in drop_pictures(view, job)]
-    assert labels[0].startswith("separation")
 
 
 def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path):

@@ -51,7 +51,7 @@ def looks(tmp_path, monkeypatch):
     return path
 
 
-@pytest.mark.parametrize("moment", ["device", "trouble", "help", "note"])
+@pytest.mark.parametrize("moment", ["trouble", "help", "note"])
 def test_a_screen_looks_as_it_did(moment, looks):
     # Help is broken into lines when it is opened.
     screens = [[size] for size in SIZES] if moment == "help" else [SIZES]

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rig.predictions import predicted_run
 from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.ready import ready_protocol
@@ -61,32 +60,6 @@ def test_points_lie_on_the_models_curve(scene):
         assert one.measured_height(0.0) is None
         last = float(one.times[-1])
         assert one.measured_height(last) == pytest.approx(one.model_height(last), abs=3e-3)
-
-
-def test_a_curve_ends_when_the_top_rod_strikes(scene):
-    """What comes after is no fall: Δz is what the model says at that moment, and no more."""
-    run = runs(scene)[0]
-    impact, free = motions(scene, run)
-    length = scene.chains[run.impact].chain.length
-    when, heights = impact.curve(5.0)
-    assert heights[-1] == pytest.approx(-length, abs=1e-9)
-    assert when[-1] < 1.0
-    apart = free.model.heights(when[-1:])[0][0] - heights[-1]
-    assert apart == pytest.approx(predicted_run(scene, run)["separation_m"].value, abs=1e-9)
-
-
-def test_a_missed_shadow_shifts_nothing(scene):
-    run = runs(scene)[0]
-    kept = [pair for number, pair in enumerate(edges_of(scene, run)) if number % 40 > 1]
-    for one in motions(scene, run, recorded(run, kept)):
-        there = one.model.heights(one.times - one.delay_s)[0]
-        assert np.abs(there - one.heights).max() < 0.02
-
-
-def test_a_drop_without_edges_has_curves_only(scene):
-    for one in motions(scene, runs(scene)[0]):
-        assert one.times.size == 0
-        assert one.curve(0.5)[1][0] == pytest.approx(scene.drop.value)
 
 
 def test_a_ball_is_shown_until_it_has_passed_its_last_gate():

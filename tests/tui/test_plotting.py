@@ -15,14 +15,9 @@ _LINE = Trace("model", [0.0, 4.0, 10.0], [0.0, 1.0, 3.0], "line", MODEL)
 WIDTH, HEIGHT = 44, 20
 
 
-def drawn(*traces, moment=None, residuals=None, limits=None):
-    panel = Panel(PlotAxis("time (s)", limits=limits), PlotAxis("z\n(cm)"), traces)
-    below = residuals and Panel(PlotAxis("time (s)"), PlotAxis("residual\n/ U"), residuals)
-    return draw_picture(Picture(panel, below), WIDTH, HEIGHT, moment)
-
-
-def texts(plot):
-    return ["".join(span.text for span in row) for row in plot]
+def drawn(*traces):
+    panel = Panel(PlotAxis("time (s)"), PlotAxis("z\n(cm)"), traces)
+    return draw_picture(Picture(panel, None), WIDTH, HEIGHT, None)
 
 
 def drawn_dots(plot, color=None):
@@ -49,35 +44,6 @@ def test_a_mark_lies_on_the_very_dot_of_the_curve_it_belongs_to(at):
     assert min(abs(x - middle[0]) + abs(y - middle[1]) for x, y in curve) <= 2
     bars = drawn_dots(drawn(_LINE, Trace("", [at], [height], "mean", 0, [0.5])), "primary")
     assert max(y for _, y in bars) - min(y for _, y in bars) > 8
-
-
-@pytest.mark.parametrize("level", [0.0, 1.0, 2.0, 3.0])
-def test_a_level_lies_in_the_row_whose_number_names_it(level):
-    plot = drawn(_LINE, Trace("", (), (level,), "level"), limits=(0.0, 10.0))
-    rows = {y // 4 for _, y in drawn_dots(plot, "primary")}
-    named = [n for n, row in enumerate(texts(plot)) if row.strip().startswith(f"{level:g}┤")]
-    assert named
-    assert rows == set(named)
-
-
-def test_all_that_is_drawn_is_named_above():
-    legend, *_ = texts(drawn(_LINE, Trace("rods", [4.0], [1.0], "points")))
-    assert legend == "z (cm)  ⠒ model  + rods"
-
-
-def test_a_moment_is_an_upright_line():
-    with_line, without = (drawn_dots(drawn(_LINE, moment=at)) for at in (5.0, None))
-    columns = {x for x, _ in with_line - without}
-    assert len(columns) == 1
-
-
-def test_residuals_stand_in_a_strip_of_their_own_below():
-    off = Trace("", [4.0], [-0.3], "points")
-    text = texts(drawn(_LINE, residuals=[off]))
-    at = next(n for n, row in enumerate(text) if "residual / U" in row)
-    assert len(text) == HEIGHT
-    assert at < HEIGHT - 4
-    assert "time (s)" in text[-2]
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.integers(12, 180), st.integers(1, 9))

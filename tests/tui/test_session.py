@@ -3,31 +3,13 @@
 from dataclasses import replace
 
 from rig.campaign.machine import Stage
-from rig.predictions import notes
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.commands import REASONS
-from rig.tui.pages import home as screen
 from rig.tui.widgets.dialogs import Ask
-from tests.cli.lab import log_of, short
+from tests.cli.lab import log_of
 from tests.tui.lab import flat, run
 from tests.tui.screen import text_of
-
-
-def test_a_chosen_protocol_is_described_once_with_what_the_model_notes(lab, monkeypatch):
-    lab.protocol.write_text(short("[0 deg, 40 deg]"), "utf-8")
-    asked = []
-    monkeypatch.setattr(screen, "notes", lambda protocol: asked.append(protocol) or notes(protocol))
-
-    async def work():
-        async with lab.operator(size=(160, 120)) as op:
-            await op.at(Stage.PROTOCOL)
-            await op.sees("note: 0°: rods gather on a pile", "recording: 1.5 s")
-            for _ in range(3):
-                op.app.draw()
-
-    run(work())
-    assert len(asked) == 1
 
 
 def test_any_key_before_the_release_stops_and_nothing_falls(lab):

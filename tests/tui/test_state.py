@@ -1,17 +1,13 @@
 """What the screens are told: typed, and not changed under them."""
 
-import copy
 from pathlib import Path
-
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rig.campaign.machine import Flow, Stage
 from rig.daemon.replica import Replica
 from rig.tui.client import ReconnectingClient
 from rig.tui.follow import _back
 from rig.tui.indicators import Indicators
-from rig.tui.model import Model, alarm
+from rig.tui.model import Model
 from rig.tui.state import DaemonState, read_state
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
@@ -22,31 +18,6 @@ STATE = {
     "drop": None, "session": None, "control": None, "error": None,
     "runs": [RUN, RUN | {"run": 2, "impact": "B", "free": "A"}], "edges": [[1, 2, 1]],
 }  # fmt: skip
-
-changes = st.fixed_dictionaries(
-    {},
-    optional={
-        "set": st.fixed_dictionaries(
-            {}, optional={"phase": st.sampled_from(["idle", "armed"]),
-                          "gates": st.none() | st.just({"blocked": 9})}
-        ),
-        "runs": st.lists(st.builds(lambda n, s: RUN | {"run": n, "state": s}, st.integers(1, 2),
-                                   st.sampled_from(["armed", "void"])), max_size=2),
-        "edges": st.lists(st.just([1, 2, 1])),
-    },
-)  # fmt: skip
-
-
-@given(st.lists(changes, max_size=8))
-def test_a_state_once_taken_never_changes(steps):
-    replica = Replica()
-    replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
-    taken = []
-    for n, change in enumerate(steps, start=8):
-        state = read_state(replica.n, replica.state)
-        taken.append((state, copy.deepcopy(state)))
-        replica.follow("change", {"n": n} | change)
-    assert all(state == as_it_was for state, as_it_was in taken)
 
 
 def test_what_the_daemon_does_not_know_is_not_known():
@@ -77,21 +48,6 @@ def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
 
 def _model(state=None, **more):
     return Model(read_state(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
-
-
-def test_what_is_wrong_is_said_with_what_to_do():
-    assert alarm(_model()) is None
-    for stage, begun in ((Stage.PROTOCOL, False), (Stage.PREPARE, True)):
-        gone = alarm(Model(DaemonState(), Flow(stage), Indicators(), silence="it is gone"))
-        assert "it is gone" in gone.message
-        assert ("supply" in gone.hint) == begun, "nothing of ours can fall before that"
-    lost = alarm(
-        _model({"link": {"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}})
-    )
-    assert "[unplugged" in lost.message
-    assert "cable" in lost.hint
-    failed = alarm(_model({"error": {"message": "disk full", "hint": "make room"}}))
-    assert failed == ("disk full", "make room")
 
 
 def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
