@@ -56,8 +56,6 @@ class TimerColumn:
         What its heading, or a row of units, says; see `vocabulary.unit_of`.
     power
         Of times: decimal power from seconds, `None` where the file does not say their unit.
-    assumed
-        That in which these are read: of nanoseconds for counts, of seconds for others.
     gate, run
         Which input and which run all its values are of; empty where the heading does not say.
     state
@@ -73,7 +71,6 @@ class TimerColumn:
     role: str = ""
     unit: str = ""
     power: int | None = 0
-    assumed: int = 0
     gate: str = ""
     run: str = ""
     state: str = ""
@@ -240,8 +237,7 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = bool({"moment", "listed"} & facts)
         if "counted" in facts and column.power not in {0, 9}:
-            column.assumed = 0 if column.power else POWERS["ns"]
-            column.wrap = 2**32 * 10 ** (12 - (column.power or column.assumed))
+            column.wrap = 2**32 * 10 ** (12 - (column.power or 0))
     return column
 
 

@@ -67,8 +67,8 @@ class TimerFile:
         Whether it has samples: a level that changes may be of an input that is no gate.
     is_wide
         Whether a row has several times, so that it may be a run.
-    begins_late
-        Whether its first row is taken for a change; loggers write the state at the beginning.
+    first
+        Of a log of changes: that which its first row is, unless it says the state at the beginning.
     rows
         How many lines of data there are.
     unread
@@ -90,7 +90,7 @@ class TimerFile:
     has_unit: bool = True
     is_sampled: bool = False
     is_wide: bool = False
-    begins_late: bool = False
+    first: TimerEvent | None = None
     rows: int = 0
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)

@@ -171,7 +171,7 @@ def _choose(
     matches = [(fit(reading.drops, True), reading) for reading in near]
     ranked = [(match, reading) for match, reading in matches if match.share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
-    usual_first = [row for row in ranked if not row[1].file.begins_late]
+    usual_first = [row for row in ranked if row[1].layout.first == "state"]
     if usual_first and ranked[0][0].evidence - usual_first[0][0].evidence < _DECISIVE:
         ranked = usual_first
     if not ranked:
@@ -253,6 +253,9 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
         yield make_reason("gates_absent", channels=", ".join(absent))
     if opposite := {"high": "low", "low": "high"}.get(layout.dark):
         yield make_reason("blocked_level", level=layout.dark, other=opposite)
+    if file.first:
+        code = "first_row" if layout.first == "change" else "first_unknown"
+        yield make_reason(code, input=file.first.label)
     idle = [label for label in file.labels if label not in channels]
     if idle and layout.groups != "passing":
         yield make_reason("inputs_unused", inputs=", ".join(idle))

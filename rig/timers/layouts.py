@@ -26,7 +26,7 @@ _LONGEST_S = 60
 _CLEAR_PAUSE = 3.0
 _MOST_MAPS = 200
 
-SETTINGS = ("unit", "dark", "groups", "pause_s")
+SETTINGS = ("unit", "dark", "groups", "first", "pause_s")
 """What a layout has beside its inputs; `forms.txt` says what each may be."""
 
 
@@ -45,6 +45,8 @@ class FileLayout:
     groups
         Whether parts of the file are ``runs``, or its ``rows`` are, or in each run all gates stand
         in the order of the way (``passing``).
+    first
+        Whether the first row of a log of changes is the ``state`` at the beginning or a ``change``.
     pause_s
         Beyond which a pause parts two runs; 0 for none.
     channels
@@ -54,6 +56,7 @@ class FileLayout:
     unit: str = ""
     dark: str = "states"
     groups: str = "runs"
+    first: str = "state"
     pause_s: float = 0.0
     channels: Mapping[str, int] = field(default_factory=dict)
 
@@ -67,7 +70,7 @@ class FileLayout:
     def text(self) -> str:
         """What ``--map`` accepts."""
         stated = asdict(self) | {x or "input": channel for x, channel in self.channels.items()}
-        usual = "", 0.0, "states", "runs", self.channels
+        usual = "", 0.0, "states", "runs", "state", self.channels
         pairs = ((x, y) for x, y in stated.items() if x not in SETTINGS or y not in usual)
         return ",".join(f"{name}={value}" for name, value in pairs if name != "channels")
 
@@ -126,7 +129,8 @@ def _group_events(file: TimerFile, layout: FileLayout) -> Iterator[tuple[int, li
     limit = round(layout.pause_s * TICK_HZ)
     by_row = file.is_wide and layout.groups != "runs"
     groups: dict[tuple[bool, int, int], list[TimerEvent]] = defaultdict(list)
-    for event in file.events:
+    first = [file.first] if file.first and layout.first == "change" else []
+    for event in [*first, *file.events]:
         number = number_of(event.run) or 0
         groups[not number, event.line if by_row else event.part, number].append(event)
     for (_, _, number), events in sorted(groups.items()):
@@ -166,6 +170,7 @@ def find_layouts(
     choices: dict[str, Sequence[Any]] = {} if file.has_unit else {"unit": list(POWERS)}
     choices["dark"] = levels if states - {""} else times
     choices["groups"] = _groupings(file, gates, bars)
+    choices["first"] = ["state", "change"] if file.first else ["state"]
     choices |= {name: [value] for name, value in stated.items() if name in choices}
     for values in itertools.product(*choices.values()):
         layout = FileLayout(**dict(zip(choices, values, strict=True)))
@@ -211,7 +216,7 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if len(set(by_number.values())) == len(labels):
         return [by_number]
-    first = {event.label: event.tick for event in reversed(file.events)}
+    first = {event.label: event.tick for event in sorted(file.events, reverse=True)}
     passed = sorted(labels, key=lambda label: first.get(label, 0))
     # In order of their numbers, or as they are passed first; and the reverse.
     maps = [

@@ -66,7 +66,7 @@ def _read_block(
         sample = list(itertools.islice(rows, _SAMPLE))
         columns = columns_of(file, block, sample)
         file.columns |= {column.name: column.meaning for column in columns}
-        readers[key], rows = SignalReader(file, columns), itertools.chain(sample, rows)
+        readers[key], rows = SignalReader(file, columns, sample), itertools.chain(sample, rows)
         unused = readers[key].unused
         file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
     reader = readers[key]
