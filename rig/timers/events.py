@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, field
-from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
 from rig.reasons import Reason, make_reason
 from rig.timers.problems import ProblemList
-from rig.timers.vocabulary import POWERS, number_of
+from rig.timers.vocabulary import number_of
 
 
 class TimerEvent(NamedTuple):
@@ -39,7 +37,7 @@ class TimerEvent(NamedTuple):
     part: int = 0
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, slots=True)
 class TimerFile:
     """What was understood of a file.
 
@@ -49,10 +47,8 @@ class TimerFile:
         Where it is.
     way, ways
         In which way, from 0, its columns are understood, and how many there are.
-    kind
-        In words.
-    columns
-        What each column was taken for, by its heading.
+    lines
+        In words: what kind of file, and what each column was taken for.
     events
         All of them.
     open_parts
@@ -82,8 +78,7 @@ class TimerFile:
     path: str | Path
     way: int = 0
     ways: int = 1
-    kind: str = ""
-    columns: dict[str, str] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
     events: list[TimerEvent] = field(default_factory=list)
     open_parts: dict[tuple[str, int], tuple[int, dict[str, int]]] = field(default_factory=dict)
     period: int | None = None
@@ -105,13 +100,3 @@ class TimerFile:
         """What the file calls its inputs, in order; none where it does not say."""
         labels = {event.label for event in self.events} - {""}
         return tuple(sorted(labels, key=lambda label: (number_of(label) or 0, label)))
-
-    def tick_in(self, unit: str, tick: int) -> int:
-        """Return a time, ps, if those that the file writes without their unit are of this one."""
-        return int(tick // 10 ** POWERS[unit or "s"])
-
-    def parts(self, start: int = 0) -> list[list[TimerEvent]]:
-        """Return the events of each part that begins there or later."""
-        events = sorted(self.events[start:], key=attrgetter("part"))
-        groups = itertools.groupby(events, attrgetter("part"))
-        return [list(part) for begin, part in groups if begin >= start]

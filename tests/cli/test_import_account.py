@@ -68,6 +68,12 @@ def test_more_edges_than_the_object_makes_are_refused(look):
     assert look(content, "--as-read").code == 0
 
 
+def test_a_run_that_is_no_fall_is_named_with_its_line(look):
+    done = look("Run 1\n" + HEAD + rows(RUNS[0]) + "Run 2\n" + HEAD + "0,0.4,1\n0,0.9,0\n")
+    assert done.code == 2
+    assert "file.txt:13:1: run 2: at most 0 % of its edges" in done.err
+
+
 def test_two_wires_at_one_stamp_of_a_dump_are_refused(look):
     first, second = (f"#{round(time * 1e6)}\n" for time, _, _ in RUNS[0][1:3])
     content = shapes()["VCD"].content.decode()

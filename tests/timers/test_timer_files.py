@@ -89,7 +89,6 @@ faults = partial(faults_of, read)
         ("Time,State\n0.1,x\n0.2,0\n", (2, 5, "state")),
         ("0.1,x\n0.2,0\n", (1, 5, "edge")),
         ("Time,Blocked\n0.1,low\n0.2,0\n0.3,1\n", (2, 5, "state")),
-        ("Time,State\n0.2,1\n0.1,0\n", (3, 1, "time")),
         ("Time (s),State\n0.2,1\n  1e9 ,0\n", (3, 3, "time")),
         ("Time,State\n0.2,1\n0.3\n", (3, 1, "state")),
         ("Time (fortnights),State\n0.2,1\n", (1, 1, "time")),
@@ -182,7 +181,6 @@ def test_a_column_a_gate(tmp_path):
     [
         ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "regular_samples",
          "samples at regular times"),
-        ("1.35\n2.05\n1.68\n1.87\n1.76\n1.78\n", "durations", "they are durations"),
         ("Time (s),colour,mood\n" + "".join(f"0.{n},{n % 3},{n % 2}\n" for n in range(9)),
          "ambiguous", "'colour' may be which gate or run"),
         ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "durations", "are durations"),
