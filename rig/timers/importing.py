@@ -34,7 +34,6 @@ Fit = Callable[[Sequence[Drop], bool], "FallMatch"]
 
 _GOOD = 0.75
 """Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
-_CLOSE = 0.1
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
@@ -56,21 +55,21 @@ class FallMatch(NamedTuple):
     ----------
     share
         Edges near a fall's, of all that came or were due, from 0 to 1, in the worst run.
+    run
+        That run.
     evidence
         Logarithm of the marginal likelihood; 0 if not asked for.
     text
         What a user can check.
     doubts
         What falls of the protocol do not do.
-    run
-        The worst one.
     """
 
     share: float
+    run: int = 0
     evidence: float = 0.0
     text: str = ""
     doubts: Sequence[Reason] = ()
-    run: int = 0
 
 
 class Import(NamedTuple):
@@ -173,30 +172,26 @@ def _choose(
     taken.
     """
     distinct = [*{tuple(x.drops): x for x in reversed(readings)}.values()][::-1]
-    is_doubted = "channels" not in stated or (
-        distinct[0].layout.dark == "states" and "dark" not in stated
-    )
-    if len(distinct) == 1 and not is_doubted:
+    is_said = distinct[0].layout.dark == "states" and "dark" not in stated
+    if len(distinct) == 1 and "channels" in stated and not is_said:
         return distinct[0], fit(distinct[0].drops, True)
     rough = [(fit(x.drops, False), x) for x in distinct]
     rough.sort(key=lambda row: -row[0].share)
-    best = rough[0][0].share
-    near = [x for match, x in rough if match.share >= best - _CLOSE][:_FINALISTS]
-    ranked = [(fit(x.drops, True), x) for x in near]
+    likely = [x for match, x in rough if match.share >= _GOOD]
+    ranked = [(fit(x.drops, True), x) for x in likely[:_FINALISTS]]
     ranked = [row for row in ranked if row[0].share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
     usual_first = [row for row in ranked if row[1].layout.first == "state"]
     if usual_first and ranked[0][0].evidence - usual_first[0][0].evidence < _DECISIVE:
         ranked = usual_first
     if not ranked:
-        proposed = [x for match, x in rough if match.share >= _GOOD or x.layout.dark != "states"]
-        contrary = (read_drops(x.file, replace(x.layout, dark="inverted")) for x in near)
-        proposed += [x for x in contrary if fit(x.drops, False).share >= _GOOD]
-        options = "; ".join([*(str(x.layout) for x in proposed[:3]), "--as-read"])
-        match, x = rough[0]
-        line = min(x.lines[match.run])
+        match, best = rough[0]
+        contrary = read_drops(best.file, replace(best.layout, dark="inverted"))
+        likely += [x for _, x in rough if x not in likely and x.layout.dark != "states"]
+        likely += [contrary] if fit(contrary.drops, False).share >= _GOOD else []
+        options = "; ".join([*(str(x.layout) for x in likely[:3]), "--as-read"])
         values = {"share": 100 * match.share, "run": match.run, "options": options}
-        raise refusal(f"{place}:{line}:1", "no_reading_fits", **values)
+        raise refusal(f"{place}:{min(best.lines[match.run])}:1", "no_reading_fits", **values)
     (match, reading), *rest = ranked
     if rest and match.evidence - rest[0][0].evidence < _DECISIVE:
         options = " or ".join(str(reading.layout) for _, reading in ranked[:2])

@@ -73,7 +73,8 @@ def _read_block(
         lacks = "a column of times or a rate"
         file.problems.refuse(next(rows).line, 1, "no_rate", lacks=lacks)
     reader.read(rows, base or (0.0, 1.0), is_gate=block.is_gate)
-    if reader.unused and not {"edge", "state", "cleared", "gate"} & reader.places.keys():
+    is_told = {"edge", "state", "cleared", "gate"} & reader.places.keys()
+    if reader.unused and reader.is_stacked and not is_told:
         steps = [b.tick - a.tick for a, b in itertools.pairwise(file.events[start:])]
         if len(steps) > 3 and max(steps) < 1.5 * min(steps):
             line = file.events[start].line
