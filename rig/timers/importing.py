@@ -6,6 +6,7 @@ decides is asked, and rows of which no edge is made are refused.
 
 from __future__ import annotations
 
+import gc
 import itertools
 import math
 from collections import Counter
@@ -121,7 +122,11 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
         with closing(read_lines(place)) as rows:
             drops = read_edges(enumerate(rows, 1), ProblemList(place))
         return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
-    readings, stated = _find_readings(options, gates, bars)
+    gc.disable()  # Records make no cycles: to look for some would take a third of the time.
+    try:
+        readings, stated = _find_readings(options, gates, bars)
+    finally:
+        gc.enable()
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings

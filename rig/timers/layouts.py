@@ -104,9 +104,8 @@ def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
     runs, lines, last = dict[int, list[Edge]](), dict[int, set[int]](), 0
     inputs, is_passing = [*layout.channels], layout.groups == "passing"
-    for number, events in _group_events(
-        file, layout.unit, layout.groups, layout.first, layout.pause_s
-    ):
+    grouping = layout.unit, layout.groups, layout.first, layout.pause_s
+    for number, events in _group_events(file, *grouping):
         edges, rows, counts = list[Edge](), set[int](), Counter[str]()
         share = max(1, len(events) // max(1, len(inputs)))
         for k, event in enumerate(events):

@@ -18,9 +18,9 @@ from typing import NamedTuple
 from rig.timers import vocabulary
 from rig.timers.vocabulary import (
     LONGEST,
-    MEASURED,
     find_label,
     form,
+    is_measured,
     is_number,
     is_remark,
     kinds_of,
@@ -48,7 +48,7 @@ class Row(NamedTuple):
     def cell(self, at: int) -> str:
         """Return what a column, from 0, has; nothing where the row ends before it."""
         text = self.texts[at] if at < len(self.texts) else ""
-        if text[:1].isdigit():  # most are numbers
+        if not text or text[0].isdigit():  # as most
             return text
         return "" if text[:5].casefold() in vocabulary.words()["missing"] else text
 
@@ -133,7 +133,7 @@ class RowBlock:
             and not row.is_mark
             and (len(row.texts) > 1 or len(filled) == 1)
             and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
-            and not any(MEASURED & kinds_of(text) for text in row.texts[:width])
+            and not any(map(is_measured, row.texts[:width]))
         ]
         return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
 
@@ -213,10 +213,11 @@ class Table:
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
+        is_plain = form("plain row").fullmatch
         for number, line in self._lines:
             if not line.strip():
                 continue
-            if block.width and form("plain row").fullmatch(line):
+            if block.width and is_plain(line):
                 yield block, Row(number, self.split(line), line)
                 continue
             mark = form("remark").match(line[:LONGEST])
@@ -274,7 +275,7 @@ def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
 
 def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
-    if not form("list").match(line):
+    if line[:1].isdigit() or not form("list").match(line):
         return [(number, line)]
     pieces = form("between lists").split(line)
     return [(number, form("list").sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
@@ -321,9 +322,9 @@ def find_separator(lines: Sequence[str]) -> str:
 def _is_data(texts: Sequence[str]) -> bool:
     """Whether cells hold values only, and at least one number or date."""
     kinds = [kinds_of(text) for text in texts if text]
-    return all(kinds) and any(MEASURED & kind for kind in kinds)
+    return all(kinds) and any(is_measured(text) for text in texts)
 
 
 def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
     """Return which cells are filled, and numbers; of most rows of data it is the same."""
-    return tuple((text != "", bool(MEASURED & kinds_of(text))) for text in texts)
+    return tuple((text != "", is_measured(text)) for text in texts)
