@@ -183,14 +183,14 @@ def _choose(
     rough = [(fit(x.drops, False), x) for x in distinct]
     rough.sort(key=lambda row: -row[0].share)
     likely = [x for match, x in rough if match.share >= _GOOD]
-    ranked = [(fit(x.drops, True), x) for x in likely[:_FINALISTS]]
-    ranked = [row for row in ranked if row[0].share >= _GOOD]
+    exact = [(fit(x.drops, True), x) for x in likely[:_FINALISTS]]
+    ranked = [row for row in exact if row[0].share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
     usual_first = [row for row in ranked if row[1].layout.first == "state"]
     if usual_first and ranked[0][0].evidence - usual_first[0][0].evidence < _DECISIVE:
         ranked = usual_first
     if not ranked:
-        match, best = rough[0]
+        match, best = (exact or rough)[0]
         contrary = read_drops(best.file, replace(best.layout, dark="inverted"))
         likely += [x for _, x in rough if x not in likely and x.layout.dark != "states"]
         likely += [contrary] if fit(contrary.drops, False).share >= _GOOD else []
@@ -258,8 +258,7 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
     """Yield what is taken to be so, and what the file lacks."""
     file, layout, channels = reading.file, reading.layout, reading.layout.channels
     if layout.pause_s:
-        drops = len(reading.drops)
-        yield make_reason("several_drops", drops=drops, pause_s=layout.pause_s)
+        yield make_reason("several_drops", drops=len(reading.drops), pause_s=layout.pause_s)
     if file.period:
         period_us = file.period / 10 ** POWERS[layout.unit or "s"] / 1e6
         yield make_reason("samples", period_us=period_us, u_us=period_us / math.sqrt(12.0))

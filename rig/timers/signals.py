@@ -47,9 +47,7 @@ class SignalReader:
         Whether runs may stand one below the other; they part where times begin anew.
     """
 
-    def __init__(
-        self, file: TimerFile, columns: Sequence[TimerColumn], sample: Sequence[Row]
-    ) -> None:
+    def __init__(self, file: TimerFile, columns: list[TimerColumn], sample: list[Row]) -> None:
         self.file, self.pairs = file, pair_columns(columns)
         self.clocks = list(dict.fromkeys(pair.clock for pair in self.pairs))
         self.places = {column.role: column.at for column in reversed(columns)}

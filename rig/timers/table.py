@@ -16,16 +16,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rig.timers import vocabulary
-from rig.timers.vocabulary import (
-    LONGEST,
-    find_label,
-    form,
-    is_measured,
-    is_number,
-    is_remark,
-    kinds_of,
-    roles_in,
-)
+from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_of, roles_in
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
@@ -111,12 +102,16 @@ class RowBlock:
     @property
     def is_gate(self) -> bool:
         """Whether a gate stands above it, so that it is of the run of the block before."""
-        return any(row.is_mark and find_label(row.raw, "gate") for row in self.headings)
+        return any(row.is_mark and vocabulary.find_label(row.raw, "gate") for row in self.headings)
 
     @property
     def key(self) -> object:
         """What is the same for blocks whose columns are: all above but the run's name."""
-        rows = [row for row in self.headings if not row.is_mark or find_label(row.raw, "gate")]
+        rows = [
+            row
+            for row in self.headings
+            if not row.is_mark or vocabulary.find_label(row.raw, "gate")
+        ]
         return self.width, *(tuple(row.texts) for row in rows)
 
     def find_heading(self, filled: Collection[int], width: int) -> Row | None:
@@ -157,7 +152,7 @@ class RowBlock:
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
         for row in [*self.remarks, *self.headings]:
-            labels = [find_label(text.rpartition(":")[2], "gate") for text in row.texts]
+            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
             if len(names := [label for label in labels if label]) == count:
                 return names
         return []
@@ -186,7 +181,7 @@ class Table:
         unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
-        plain = [line for _, line in sample if line.strip() and not is_remark(line)]
+        plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names = _find_names(plain)
         self.separator = "" if self._names else find_separator(plain)
         self._usual: tuple[tuple[bool, bool], ...] = ()

@@ -70,9 +70,9 @@ def test_more_edges_than_the_object_makes_are_refused(look):
 
 
 def test_a_run_that_is_no_fall_is_named_with_its_line(look):
-    done = look("Run 1\n" + HEAD + rows(RUNS[0]) + "Run 2\n" + HEAD + "0,0.4,1\n0,0.9,0\n")
+    done = look(HEAD + 5 * ("Run\n" + rows(RUNS[0])) + "Run\n0,0.4,1\n0,0.9,0\n")
     assert done.code == 2
-    assert "file.txt:13:1: run 2: at most 12 % of its edges" in done.err
+    assert "file.txt:48:1: run 6: at most 12 % of its edges" in done.err
 
 
 def test_two_wires_at_one_stamp_of_a_dump_are_refused(look):
