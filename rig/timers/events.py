@@ -52,8 +52,8 @@ class TimerFile:
     events
         All of them.
     open_parts
-        Which part the next row may continue, and the latest time there of each input, by the run
-        and the column of times.
+        Which part the next row may continue, and the latest time there of each input and of all,
+        by the run and the column of times.
     period
         Of samples that are all as far apart, so that a row may have several changes: no edge is
         known better than that, ps; `None` for others.
@@ -80,7 +80,7 @@ class TimerFile:
     ways: int = 1
     lines: list[str] = field(default_factory=list)
     events: list[TimerEvent] = field(default_factory=list)
-    open_parts: dict[tuple[str, int], tuple[int, dict[str, int]]] = field(default_factory=dict)
+    open_parts: dict[tuple[str, int], tuple[int, dict[str, int], int]] = field(default_factory=dict)
     period: int | None = None
     has_unit: bool = True
     is_sampled: bool = False

@@ -192,13 +192,13 @@ class SignalReader:
         run, label = key[1] or pair.run, key[2] or pair.label
         is_one = self.is_single or pair.clock.numbered or run or label
         place = run, 0 if is_one else pair.clock.at
-        part, latest = parts.get(place, (count, dict[str, int]()))
+        part, latest, newest = parts.get(place, (count, dict[str, int](), tick))
         # Where each row has a single time, one before any above it begins anew.
-        since = max(latest.values(), default=0) if self.is_single else latest.get(label, 0)
+        since = newest if self.is_single else latest.get(label, tick)
         if self.is_stacked and label in latest and tick < since:
-            part, latest = count, {}
+            part, latest, newest = count, {}, tick
         latest[label] = tick
-        parts[place] = part, latest
+        parts[place] = part, latest, max(newest, tick)
         return TimerEvent(tick, label, state, line, run, part)
 
     def _reject(self, row: Row, column: TimerColumn) -> None:

@@ -56,6 +56,11 @@ class Row(NamedTuple):
         return form("mark").fullmatch(text) is not None
 
     @property
+    def is_gate(self) -> bool:
+        """Whether it is such a mark of a gate."""
+        return self.is_mark and vocabulary.find_label(self.raw, "gate") != ""
+
+    @property
     def has_units(self) -> bool:
         """Whether it has units only, perhaps behind their name: ``Y_Unit_Label``."""
         texts = [vocabulary.normal(text.strip("()[]- ")) for text in self.texts]
@@ -102,16 +107,12 @@ class RowBlock:
     @property
     def is_gate(self) -> bool:
         """Whether a gate stands above it, so that it is of the run of the block before."""
-        return any(row.is_mark and vocabulary.find_label(row.raw, "gate") for row in self.headings)
+        return any(row.is_gate for row in self.headings)
 
     @property
     def key(self) -> object:
         """What is the same for blocks whose columns are: all above but the run's name."""
-        rows = [
-            row
-            for row in self.headings
-            if not row.is_mark or vocabulary.find_label(row.raw, "gate")
-        ]
+        rows = (row for row in self.headings if row.is_gate or not row.is_mark)
         return self.width, *(tuple(row.texts) for row in rows)
 
     def find_heading(self, filled: Collection[int], width: int) -> Row | None:
