@@ -118,7 +118,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     Raises
     ------
     InputError
-        Columns of which none has times, or units that are none.
+        Columns of which none has times, or that are called as a setting is.
     """
     width = max(len(row.texts) for row in rows)
     if width > _MOST_COLUMNS:
@@ -154,10 +154,16 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         for column, name in zip(inputs, block.find_inputs(len(inputs)) or count, strict=False):
             column.gate = column.name = name
     _settle_roles(file, columns)
+    above = heading or rows[0]
+    for column in columns:
+        if column.role == "setting":
+            accepted = "a heading that is understood: call it channel, run or state, or leave it out"
+            file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
+    file.problems.raise_if_any()
     if {column.role for column in columns}.isdisjoint({"time", *SAMPLED}):
         durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
         code = "durations" if durations else "no_time_column"
-        file.problems.refuse((heading or rows[0]).line, 1, code, numbers=durations)
+        file.problems.refuse(above.line, 1, code, numbers=durations)
     return columns
 
 
@@ -172,7 +178,7 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
     file.ways = max(file.ways, len(readings) * is_open)
     for n, column in enumerate(unclear):
-        column.role = readings[(file.way + n) % len(readings)] if is_open else "other"
+        column.role = readings[(file.way + n) % len(readings)] if is_open else "setting"
     for column in columns:
         column.role = meant.get(column.role, column.role)
         file.has_unit &= column.role != "time" or column.power is not None

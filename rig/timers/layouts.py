@@ -85,7 +85,7 @@ class FileReading(NamedTuple):
     file: TimerFile
     layout: FileLayout
     drops: list[Drop]
-    lines: dict[int, set[int]]
+    lines: dict[int, list[int]]
 
     @property
     def is_whole(self) -> bool:
@@ -102,11 +102,11 @@ class FileReading(NamedTuple):
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    runs, lines, last = dict[int, list[Edge]](), dict[int, set[int]](), 0
+    runs, lines, last = dict[int, list[Edge]](), dict[int, list[int]](), 0
     inputs, is_passing = [*layout.channels], layout.groups == "passing"
     grouping = layout.unit, layout.groups, layout.first, layout.pause_s
     for number, events in _group_events(file, *grouping):
-        edges, rows, counts = list[Edge](), set[int](), Counter[str]()
+        edges, rows, counts = list[Edge](), list[int](), Counter[str]()
         share = max(1, len(events) // max(1, len(inputs)))
         for k, event in enumerate(events):
             # Of gates that are passed one after the other, each has as many.
@@ -114,7 +114,7 @@ def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
             channel = layout.channels.get(label)
             if channel is not None:
                 edges.append(Edge(event.tick, channel, layout.is_dark(event, counts[label])))
-                rows.add(event.line)
+                rows.append(event.line)
                 counts[label] += 1
         if edges:
             run = number if number and number not in runs else last + 1

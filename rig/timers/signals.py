@@ -94,7 +94,7 @@ class SignalReader:
             lasting = self.latest.get(at, 0) - self.starts.get(at, 0)
             self.file.period = lasting // max(1, count - 1)
         for key, samples in self.volts.items():
-            self._add_crossings(key, np.array(samples).reshape(-1, 3))
+            self._add_crossings(key, np.frombuffer(samples).reshape(-1, 3))
         if "level" in self.places and silent < 2:
             self._add_firsts()
 

@@ -153,7 +153,7 @@ NOT_READ = {
     "Rows out of order", "Newest first", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
     "Thousands by points", "Microseconds as if they were seconds",
-    "The last row cut", "A row twice",
+    "The last row cut", "A row twice", "An unknown column in a unit of time",
 }  # fmt: skip
 """Refused with what to do: the file leaves open, or contradicts, what is in it."""
 
