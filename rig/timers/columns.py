@@ -157,7 +157,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     above = heading or rows[0]
     for column in columns:
         if column.role == "setting":
-            accepted = "a heading that is understood: call it channel, run or state, or leave it out"
+            accepted = "a heading that is understood: call it gate, run or state, or leave it out"
             file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
     file.problems.raise_if_any()
     if {column.role for column in columns}.isdisjoint({"time", *SAMPLED}):
