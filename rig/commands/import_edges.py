@@ -87,7 +87,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
     protocol = with_gates(protocol, {edge.channel for drop in drops for edge in drop.edges})
-    shares, near, expected = [1.0], 0, 0
+    shares, near, expected = [(1.0, drops[0].run)], 0, 0
     evidence, gravity = 0.0, list[float]()
     results: list[DropResult] = []
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
@@ -97,7 +97,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         records = chain_records(protocol, run, drop, TICK_HZ)
         votes = sum(most_votes(protocol, record, rate.u, priors(protocol)) for record in records)
         due = sum(record.edge_count for record in records)
-        shares.append(votes / max(1, len(drop.edges), due))
+        shares.append((votes / max(1, len(drop.edges), due), drop.run))
         near, expected = near + votes, expected + due
         if exact and len(results) < _COMPARED:
             result, fit = DropCase(protocol, run, drop, rate).read(explain=False)
@@ -108,7 +108,7 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     if gravity:
         text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)
-    return FallMatch(min(shares), evidence, text, check.doubts if check else ())
+    return FallMatch(*min(shares), evidence, text, check.doubts if check else ())
 
 
 def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:
@@ -129,7 +129,6 @@ def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     if strangers:
         values = {"run": strangers[0], "protocol": protocol.source, "planned": planned}
         raise refusal(source, "run_unplanned", **values)
-    seen = {edge.channel for drop in drops for edge in drop.edges}
-    idle = sorted(channel for channel in seen if not gates.mask >> channel & 1)
-    if idle:
+    edges = (edge for drop in drops for edge in drop.edges)
+    if idle := sorted({edge.channel for edge in edges if not gates.mask >> edge.channel & 1}):
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

@@ -20,7 +20,6 @@ from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, form, is_number, 
 
 if TYPE_CHECKING:
     from rig.timers.events import TimerFile
-    from rig.timers.problems import ProblemList
     from rig.timers.table import Row, RowBlock
 
 SAMPLED = ("level", "volts")
@@ -52,12 +51,8 @@ class TimerColumn:
         Its heading.
     role
         A key of `roles`.
-    unit
-        What its heading, or a row of units, says; see `vocabulary.unit_of`.
     power
         Of times: decimal power from seconds, `None` where the file does not say their unit.
-    assumed
-        That in which these are read: of nanoseconds for counts, of seconds for others.
     gate, run
         Which input and which run all its values are of; empty where the heading does not say.
     state
@@ -71,9 +66,7 @@ class TimerColumn:
     at: int
     name: str
     role: str = ""
-    unit: str = ""
     power: int | None = 0
-    assumed: int = 0
     gate: str = ""
     run: str = ""
     state: str = ""
@@ -125,21 +118,21 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     Raises
     ------
     InputError
-        Columns that may be several things, that are no times, or units that are none.
+        Columns of which none has times, or that are called as a setting is.
     """
     width = max(len(row.texts) for row in rows)
     if width > _MOST_COLUMNS:
         limits = {"columns": width, "limit": _MOST_COLUMNS}
         file.problems.refuse(rows[0].line, 1, "too_many_columns", **limits)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
-    facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
-    heading = block.find_heading(facts, width)
+    heading = block.find_heading({n for n, texts in cells.items() if texts}, width)
     if heading is None:  # settings may stand beside samples
-        beside = {n for n in facts if len(cells[n]) < _BESIDE * len(rows)}
+        beside = {n for n, texts in cells.items() if len(texts) < _BESIDE * len(rows)}
         block.headings += [
             row._replace(texts=[t * (n in beside) for n, t in enumerate(row.texts)]) for row in rows
         ]
-        facts = {n: fact for n, fact in facts.items() if n not in beside}
+        cells |= {n: [] for n in beside}
+    facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     filled = [len(cells[n]) for n, fact in facts.items() if "levels" in fact]
     table = {
         "single": len(facts) == 1,
@@ -158,18 +151,34 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     if heading is None:
         inputs = [column for column in columns if column.role in SAMPLED]
         count = [f"D{n}" for n, column in enumerate(inputs) if column.role == "level"]
-        names = block.find_inputs(len(inputs)) or count
-        for column, name in zip(inputs, names, strict=False):
+        for column, name in zip(inputs, block.find_inputs(len(inputs)) or count, strict=False):
             column.gate = column.name = name
-        others = [column.at for column in columns if column.role == "other"]
-        # A row that names more columns than there are has a name with a separator in it.
-        others += [0 for row in block.headings if len(row.texts) > width and row.known > 2]
-        if others:
-            place = rows[0].place(others[0])
-            file.problems.add(*place, "", "no_heading", columns=len(columns))
+    _settle_roles(file, columns)
+    above = heading or rows[0]
+    for column in columns:
+        if column.role == "setting":
+            accepted = "a heading that is understood: call it gate, run or state, or leave it out"
+            file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
+    file.problems.raise_if_any()
+    if {column.role for column in columns}.isdisjoint({"time", *SAMPLED}):
+        durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
+        code = "durations" if durations else "no_time_column"
+        file.problems.refuse(above.line, 1, code, numbers=durations)
+    return columns
+
+
+def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
+    """Decide between roles that columns may have by those that others have."""
     there = {column.role for column in columns}
     meant = {"elapsed": "duration" if "time" in there else "time"}
     meant |= {"level": "volts"} if "volts" in there else {}  # those that are 0 at first
+    # Two that may be the same two are one each; of others, falls cannot decide.
+    unclear = [column for column in columns if "|" in column.role]
+    readings = unclear[0].role.split("|") if unclear else []
+    is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
+    file.ways = max(file.ways, len(readings) * is_open)
+    for n, column in enumerate(unclear):
+        column.role = readings[(file.way + n) % len(readings)] if is_open else "setting"
     for column in columns:
         column.role = meant.get(column.role, column.role)
         file.has_unit &= column.role != "time" or column.power is not None
@@ -179,31 +188,6 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     for column in times:
         if column.power != finest[column.gate, column.run, column.state]:
             column.role = "coarse"
-    unclear = [column for column in columns if "|" in column.role]
-    readings = unclear[0].role.split("|") if unclear else []
-    # Two that may be the same two are one each; of others, falls cannot decide.
-    is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
-    for n, column in enumerate(unclear if is_open else ()):
-        file.ways, column.role = len(readings), readings[(file.way + n) % len(readings)]
-    _check_columns(columns, heading or rows[0], file.problems)
-    return columns
-
-
-def _check_columns(columns: Sequence[TimerColumn], above: Row, problems: ProblemList) -> None:
-    """Refuse columns that may be something else, and units that are none."""
-    roles_there = {column.role for column in columns}
-    for column in columns:
-        place, unit = above.place(column.at), column.unit
-        if column.role == "setting" or "|" in column.role:
-            values = {"column": column.name, "readings": column.meaning}
-            problems.add(*place, column.name, "ambiguous", **values)
-        elif column.role == "time" and unit not in {*POWERS, ""} and not find_label(unit, "gate"):
-            problems.reject(*place, "time", unit, "a unit of time: s, ms, µs or ns")
-    if not roles_there & {"time", *SAMPLED}:
-        durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
-        code = "durations" if durations else "no_time_column"
-        problems.add(above.line, 1, "", code, numbers=durations)
-    problems.raise_if_any()
 
 
 def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str]) -> TimerColumn:
@@ -216,7 +200,7 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     bare = vocabulary.without_accents(name).replace(column.run, "")
     texts = (bare, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
     units = list(map(vocabulary.unit_of, texts))
-    column.unit = unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
+    unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
     rows = (row for row in block.headings if form("row of numbers").fullmatch(row.raw))
     column.gate = next(filter(None, (*labels, *(row.cell(n) for row in rows))), "")
@@ -224,6 +208,7 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
     named |= {
         "unitless": not unit,
+        "strange": unit not in {*POWERS, "v", ""} and not find_label(unit, "gate"),
         "bare": not name,
         "first": not n,
         "labelled": column.gate,
@@ -240,8 +225,7 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = bool({"moment", "listed"} & facts)
         if "counted" in facts and column.power not in {0, 9}:
-            column.assumed = 0 if column.power else POWERS["ns"]
-            column.wrap = 2**32 * 10 ** (12 - (column.power or column.assumed))
+            column.wrap = 2**32 * 10 ** (12 - (column.power or 0))
     return column
 
 

@@ -24,8 +24,8 @@ _CELLS: tuple[tuple[str, Callable[[str], Any], str], ...] = (
     (r"[01]", int, "a state: 1 is blocked, 0 is clear"),
 )
 """Of each column: form, how it is read, and what is accepted."""
-_LONGEST_RUN_S = 3600
-"""More in a run means a wrong unit or a wrong run."""
+_LONGEST_RUN = 3600 * TICK_HZ
+"""Picoseconds: more in a run means a wrong unit or a wrong run."""
 
 
 def is_own(head: Iterable[str]) -> bool:
@@ -37,37 +37,32 @@ def is_own(head: Iterable[str]) -> bool:
 
 def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[Drop]:
     """Read drops in the import format, and note faults at their places."""
-    runs: dict[int, list[Edge]] = {}
-    last: dict[tuple[int, int], int] = {}
-    plain = (
+    rows = (
         Row(number, split_cells(line, ","), line)
         for number, line in lines
         if line.strip() and not is_remark(line)
     )
-    heading, header = next(plain, Row(1, [])), ",".join(HEADER)
+    heading, header = next(rows, Row(1, [])), ",".join(HEADER)
     if ",".join(heading.texts).lower() != header:
         problems.refuse(heading.line, 1, "wrong_header", header=header)
-    for row in plain:
-        if row.raw.count('"') % 2:
-            problems.add(row.line, 1, "", "open_quote")
-        elif len(row.texts) != len(HEADER):
+    runs: dict[int, list[Edge]] = {}
+    last: dict[tuple[int, int], int] = {}
+    for row in rows:
+        if len(row.texts) != len(HEADER):
             values = {"values": len(row.texts), "needed": len(HEADER), "header": header}
             problems.add(row.line, 1, "", "wrong_width", **values)
         elif None not in (cells := _read_cells(row, problems)):
             run, channel, tick, state = cells
             edges = runs.setdefault(run, [])
-            edge, place = Edge(tick, channel, bool(state)), (*row.place(2), HEADER[2])
-            lasting_s = abs(tick - (edges or [edge])[0].tick) / TICK_HZ
-            before = last.get((run, channel), tick)
-            if lasting_s > _LONGEST_RUN_S:
-                limit = {"lasting_s": lasting_s, "limit_s": _LONGEST_RUN_S}
-                problems.add(*place, "too_long", recording=f"run {run}", **limit)
-            elif tick < before:
-                times = {"last": seconds(before, Fraction(TICK_HZ)), "text": row.texts[2]}
-                problems.add(*place, "before_last", channel=str(channel), run=run, **times)
-            else:
+            first = edges[0].tick if edges else tick
+            bounds = last.get((run, channel), first - _LONGEST_RUN), first + _LONGEST_RUN
+            if bounds[0] <= tick <= bounds[1]:
                 last[run, channel] = tick
-                edges.append(edge)
+                edges.append(Edge(tick, channel, bool(state)))
+            else:
+                begin, end = (seconds(bound, Fraction(TICK_HZ)) for bound in bounds)
+                accepted = f"a time from {begin} s (the last of channel {channel}) to {end} s"
+                problems.reject(*row.place(2), HEADER[2], row.texts[2], accepted)
     problems.raise_if_any()
     if not runs:
         problems.refuse(1, 1, "no_edges")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, field
-from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
 from rig.reasons import Reason, make_reason
 from rig.timers.problems import ProblemList
-from rig.timers.vocabulary import POWERS, number_of
+from rig.timers.vocabulary import number_of
 
 
 class TimerEvent(NamedTuple):
@@ -39,7 +37,7 @@ class TimerEvent(NamedTuple):
     part: int = 0
 
 
-@dataclass(slots=True)
+@dataclass(eq=False, slots=True)
 class TimerFile:
     """What was understood of a file.
 
@@ -49,15 +47,13 @@ class TimerFile:
         Where it is.
     way, ways
         In which way, from 0, its columns are understood, and how many there are.
-    kind
-        In words.
-    columns
-        What each column was taken for, by its heading.
+    lines
+        In words: what kind of file, and what each column was taken for.
     events
         All of them.
     open_parts
-        Which part the next row may continue, and the latest time there of each input, by the run
-        and the column of times.
+        Which part the next row may continue, and the latest time there of each input and of all,
+        by the run and the column of times.
     period
         Of samples that are all as far apart, so that a row may have several changes: no edge is
         known better than that, ps; `None` for others.
@@ -67,8 +63,8 @@ class TimerFile:
         Whether it has samples: a level that changes may be of an input that is no gate.
     is_wide
         Whether a row has several times, so that it may be a run.
-    begins_late
-        Whether its first row is taken for a change; loggers write the state at the beginning.
+    first
+        Of a log of changes: that which its first row is, unless it says the state at the beginning.
     rows
         How many lines of data there are.
     unread
@@ -82,15 +78,14 @@ class TimerFile:
     path: str | Path
     way: int = 0
     ways: int = 1
-    kind: str = ""
-    columns: dict[str, str] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
     events: list[TimerEvent] = field(default_factory=list)
-    open_parts: dict[tuple[str, int], tuple[int, dict[str, int]]] = field(default_factory=dict)
+    open_parts: dict[tuple[str, int], tuple[int, dict[str, int], int]] = field(default_factory=dict)
     period: int | None = None
     has_unit: bool = True
     is_sampled: bool = False
     is_wide: bool = False
-    begins_late: bool = False
+    first: TimerEvent | None = None
     rows: int = 0
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
@@ -105,13 +100,3 @@ class TimerFile:
         """What the file calls its inputs, in order; none where it does not say."""
         labels = {event.label for event in self.events} - {""}
         return tuple(sorted(labels, key=lambda label: (number_of(label) or 0, label)))
-
-    def tick_in(self, unit: str, tick: int) -> int:
-        """Return a time, ps, if those that the file writes without their unit are of this one."""
-        return int(tick // 10 ** POWERS[unit or "s"])
-
-    def parts(self, start: int = 0) -> list[list[TimerEvent]]:
-        """Return the events of each part that begins there or later."""
-        events = sorted(self.events[start:], key=attrgetter("part"))
-        groups = itertools.groupby(events, attrgetter("part"))
-        return [list(part) for begin, part in groups if begin >= start]

@@ -6,6 +6,7 @@ decides is asked, and rows of which no edge is made are refused.
 
 from __future__ import annotations
 
+import gc
 import itertools
 import math
 from collections import Counter
@@ -25,7 +26,7 @@ from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names,
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList, refusal
 from rig.timers.timer_file import read_file
-from rig.timers.vocabulary import form
+from rig.timers.vocabulary import POWERS, form
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -34,7 +35,6 @@ Fit = Callable[[Sequence[Drop], bool], "FallMatch"]
 
 _GOOD = 0.75
 """Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
-_CLOSE = 0.1
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
@@ -55,7 +55,9 @@ class FallMatch(NamedTuple):
     Attributes
     ----------
     share
-        Edges near a fall's, of all that came or were due, from 0 to 1.
+        Edges near a fall's, of all that came or were due, from 0 to 1, in the worst run.
+    run
+        That run.
     evidence
         Logarithm of the marginal likelihood; 0 if not asked for.
     text
@@ -65,6 +67,7 @@ class FallMatch(NamedTuple):
     """
 
     share: float
+    run: int = 0
     evidence: float = 0.0
     text: str = ""
     doubts: Sequence[Reason] = ()
@@ -119,26 +122,17 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
         with closing(read_lines(place)) as rows:
             drops = read_edges(enumerate(rows, 1), ProblemList(place))
         return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
-    readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
-    for way in itertools.count():
-        file = TimerFile(place, way)
-        try:
-            read_file(file)
-            stated = _read_stated(options, file, gates)
-            readings += [read_drops(file, way) for way in find_layouts(file, gates, bars, stated)]
-        except InputError as error:
-            faults.append(error)
-        if way + 1 >= file.ways:
-            break
-    if not any(reading.drops for reading in readings):
-        pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
-        values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
-        raise faults[0] if faults else refusal(place, "inputs_unclear", **values, pairs=pairs)
+    collects = gc.isenabled()
+    gc.disable()  # Records make no cycles: to look for some would take a third of the time.
+    try:
+        readings, stated = _find_readings(options, gates, bars)
+    finally:
+        if collects:
+            gc.enable()
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings
-        is_stated = "channels" in stated and (reading.layout.dark != "states" or "dark" in stated)
-        reading, match = _choose(readings, place, fit, is_stated=is_stated)
+        reading, match = _choose(readings, place, fit, stated)
         _refuse_excess(reading, bars, place, is_stated="groups" in stated)
     notes = [*reading.file.notes, _account(reading, options)]
     if len(readings) > 1 or (match.share < _GOOD and not options.as_read):
@@ -146,15 +140,37 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     notes += [*match.doubts, *_assumptions(reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
-    channels, columns = reading.layout.channels, reading.file.columns.items()
-    lines = [reading.file.kind, *(f"  {name}: {meaning}" for name, meaning in columns)]
-    lines += [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
-    lines += filter(None, [str(reading.layout), match.text])
+    channels = reading.layout.channels
+    inputs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
+    lines = [*reading.file.lines, *inputs, str(reading.layout), *filter(None, [match.text])]
     return Import(reading.drops, channels, lines, notes)
 
 
+def _find_readings(
+    options: Namespace, gates: Sequence[int], bars: int
+) -> tuple[list[FileReading], dict[str, Any]]:
+    """Return every reading of a file that has drops, and what options decide."""
+    readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
+    way, ways = 0, 1
+    while way < ways:
+        file = TimerFile(options.events, way)
+        try:
+            read_file(file)
+            stated = _read_stated(options, file, gates)
+            layouts = find_layouts(file, gates, bars, stated)
+            readings += [x for x in (read_drops(file, layout) for layout in layouts) if x.drops]
+        except InputError as error:
+            faults.append(error)
+        way, ways = way + 1, file.ways
+    if not readings:
+        pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
+        values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
+        raise (*faults, refusal(options.events, "inputs_unclear", **values, pairs=pairs))[0]
+    return readings, stated
+
+
 def _choose(
-    readings: Sequence[FileReading], place: str, fit: Fit, *, is_stated: bool
+    readings: Sequence[FileReading], place: str, fit: Fit, stated: Mapping[str, Any]
 ) -> tuple[FileReading, FallMatch]:
     """Return the reading that a fall of the protocol bears out, and how well.
 
@@ -162,27 +178,27 @@ def _choose(
     whatever falls say. The contrary of what the file says of beams may be proposed, and is never
     taken.
     """
-    distinct = [*{tuple(x.drops): x for x in reversed(readings) if x.drops}.values()]
-    if is_stated and len(distinct) == 1:
+    distinct = [*{tuple(x.drops): x for x in reversed(readings)}.values()][::-1]
+    is_said = distinct[0].layout.dark == "states" and "dark" not in stated
+    if len(distinct) == 1 and "channels" in stated and not is_said:
         return distinct[0], fit(distinct[0].drops, True)
-    rough = [(fit(x.drops, False).share, x) for x in reversed(distinct)]
-    rough.sort(key=lambda row: -row[0])
-    near = [reading for share, reading in rough if share >= rough[0][0] - _CLOSE][:_FINALISTS]
-    matches = [(fit(reading.drops, True), reading) for reading in near]
-    ranked = [(match, reading) for match, reading in matches if match.share >= _GOOD]
+    rough = [(fit(x.drops, False), x) for x in distinct]
+    rough.sort(key=lambda row: -row[0].share)
+    likely = [x for match, x in rough if match.share >= _GOOD]
+    exact = [(fit(x.drops, True), x) for x in likely[:_FINALISTS]]
+    ranked = [row for row in exact if row[0].share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
-    usual_first = [row for row in ranked if not row[1].file.begins_late]
+    usual_first = [row for row in ranked if row[1].layout.first == "state"]
     if usual_first and ranked[0][0].evidence - usual_first[0][0].evidence < _DECISIVE:
         ranked = usual_first
     if not ranked:
-        credible = [x.layout for share, x in rough if share >= _GOOD or x.layout.dark != "states"]
-        for reading in near:
-            contrary = replace(reading.layout, dark="inverted")
-            inverted = read_drops(reading.file, contrary).drops
-            is_said = reading.layout.dark == "states"
-            credible += [contrary] if is_said and fit(inverted, False).share >= _GOOD else []
-        options = "; ".join(map(str, [*credible[:3], "--as-read"]))
-        raise refusal(place, "no_reading_fits", share=100 * rough[0][0], options=options)
+        match, best = (exact or rough)[0]
+        contrary = read_drops(best.file, replace(best.layout, dark="inverted"))
+        likely += [x for _, x in rough if x not in likely and x.layout.dark != "states"]
+        likely += [contrary] if fit(contrary.drops, False).share >= _GOOD else []
+        options = "; ".join([*(str(x.layout) for x in likely[:3]), "--as-read"])
+        values = {"share": 100 * match.share, "run": match.run, "options": options}
+        raise refusal(f"{place}:{min(best.lines[match.run])}:1", "no_reading_fits", **values)
     (match, reading), *rest = ranked
     if rest and match.evidence - rest[0][0].evidence < _DECISIVE:
         options = " or ".join(str(reading.layout) for _, reading in ranked[:2])
@@ -209,10 +225,10 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
         run, count = max(same.items(), key=itemgetter(1), default=(0, 0))
         if count and count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
             raise refusal(place, "same_twice", run=drop.run, other=run)
-        for channel, count in Counter(edge.channel for edge in drop.edges).items():
-            if count > _EXCESS * bars:
-                excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
-                raise refusal(place, "more_edges", **excess)
+        channel, count = Counter(edge.channel for edge in drop.edges).most_common(1)[0]
+        if count > _EXCESS * bars:
+            excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
+            raise refusal(place, "more_edges", **excess)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter((event.line, event.tick) for event in file.events)
     lines = [line for (line, _), count in changes.items() if count > 1]
@@ -222,14 +238,14 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
-    file = reading.file
-    lines = {event.line for event in file.events}
+    file, used = reading.file, set().union(*reading.lines.values())
     # A level that changes may be of an input that is no gate.
-    unused = sorted({*file.unread, *(() if file.is_sampled else lines - reading.lines)})
+    left = set() if file.is_sampled else {event.line for event in file.events} - used
+    unused = sorted({*file.unread, *left})
     edges = sum(len(drop.edges) for drop in reading.drops)
     counts = {"runs": len(reading.drops), "rows": file.rows, "edges": edges}
     if not unused:
-        return make_reason("rows_used", silent=file.rows - len(reading.lines), **counts)
+        return make_reason("rows_used", silent=file.rows - len(used), **counts)
     rest = {"unused": len(unused), "lines": _some(unused)}
     if not options.allow_unused:
         raise refusal(options.events, "rows_unused", **counts, **rest)
@@ -244,54 +260,51 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
     """Yield what is taken to be so, and what the file lacks."""
     file, layout, channels = reading.file, reading.layout, reading.layout.channels
     if layout.pause_s:
-        drops = len(reading.drops)
-        yield make_reason("several_drops", drops=drops, pause_s=layout.pause_s)
+        yield make_reason("several_drops", drops=len(reading.drops), pause_s=layout.pause_s)
     if file.period:
-        period_us = file.tick_in(layout.unit, file.period) / 1e6
+        period_us = file.period / 10 ** POWERS[layout.unit or "s"] / 1e6
         yield make_reason("samples", period_us=period_us, u_us=period_us / math.sqrt(12.0))
     if absent := [str(n) for n in gates if n not in channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))
     if opposite := {"high": "low", "low": "high"}.get(layout.dark):
         yield make_reason("blocked_level", level=layout.dark, other=opposite)
+    if file.first:
+        code = "first_row" if layout.first == "change" else "first_unknown"
+        yield make_reason(code, input=file.first.label)
     idle = [label for label in file.labels if label not in channels]
     if idle and layout.groups != "passing":
         yield make_reason("inputs_unused", inputs=", ".join(idle))
 
 
 def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
-    """Return what is decided: by a saved layout, and by options, which come after it."""
+    """Return what is decided: by a saved layout, and by options, which come after it.
+
+    Each is what a dry run prints: settings, and the gate's channel of each input.
+    """
     saved, texts = Path(options.map_file or ""), dict[str, str]()
     if saved.is_file():
         texts[options.map_file] = next(read_lines(saved), "")
-    for name in "dark", "unit":
-        if value := getattr(options, name):
-            texts[f"--{name}"] = f"{name}={value}"
-    if options.channel is not None and len(file.labels) < 2:
-        texts["--channel"] = f"{next(iter(file.labels), 'input')}={options.channel}"
+    named = {f"--{name}": (name, getattr(options, name)) for name in ("dark", "unit")}
+    if len(file.labels) < 2:
+        named["--channel"] = next(iter(file.labels), "input"), options.channel
+    texts |= {place: f"{x}={value}" for place, (x, value) in named.items() if value is not None}
     if options.map is not None:
         texts["--map"] = options.map
     stated = dict[str, Any]()
     for place, text in texts.items():
-        stated |= _read_map(text, place, file, gates, stated.get("groups"))
+        channels, pairs = dict[str, int](), dict(form("assigned").findall(text) or [(text, "")])
+        settings = [name for name in pairs if name in SETTINGS and name not in file.labels]
+        for name in settings:
+            stated[name] = pairs.pop(name)
+            if not form(f"setting {name}").fullmatch(stated[name]):
+                raise refusal(place, "layout_unclear", text=f"{name}={stated[name]:.40}")
+        inputs = {x or "input": x for x in input_names(file, stated.get("groups"), gates)}
+        for label, channel in pairs.items():
+            if label not in inputs:
+                raise refusal(place, "input_unknown", text=label, inputs=", ".join(inputs))
+            if channel not in map(str, gates):
+                accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
+                raise refusal(place, "not_accepted", text=f"{label}={channel}", accepted=accepted)
+            channels[inputs[label]] = int(channel)
+        stated |= {"channels": channels} if channels else {}
     return stated
-
-
-def _read_map(
-    text: str, place: str, file: TimerFile, gates: Sequence[int], groups: str | None
-) -> dict[str, Any]:
-    """Read what a dry run prints: settings, and the gate's channel of each input."""
-    pairs = form("assigned").findall(text) or [(text, "")]
-    channels, stated = dict(pairs), dict[str, Any]()
-    for name in [name for name in channels if name in SETTINGS and name not in file.labels]:
-        stated[name] = channels.pop(name)
-        if not form(f"setting {name}").fullmatch(stated[name]):
-            raise refusal(place, "layout_unclear", text=f"{name}={stated[name]:.40}")
-    inputs = {x or "input": x for x in input_names(file, stated.get("groups", groups), gates)}
-    for label, channel in channels.items():
-        if label not in inputs:
-            raise refusal(place, "input_unknown", text=label, inputs=", ".join(inputs))
-        if channel not in map(str, gates):
-            accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
-            raise refusal(place, "not_accepted", text=f"{label}={channel}", accepted=accepted)
-    numbers = {inputs[label]: int(channel) for label, channel in channels.items()}
-    return stated | ({"channels": numbers} if numbers else {})

@@ -10,6 +10,7 @@ import itertools
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,7 +27,7 @@ _LONGEST_S = 60
 _CLEAR_PAUSE = 3.0
 _MOST_MAPS = 200
 
-SETTINGS = ("unit", "dark", "groups", "pause_s")
+SETTINGS = ("unit", "dark", "groups", "first", "pause_s")
 """What a layout has beside its inputs; `forms.txt` says what each may be."""
 
 
@@ -45,6 +46,8 @@ class FileLayout:
     groups
         Whether parts of the file are ``runs``, or its ``rows`` are, or in each run all gates stand
         in the order of the way (``passing``).
+    first
+        Whether the first row of a log of changes is the ``state`` at the beginning or a ``change``.
     pause_s
         Beyond which a pause parts two runs; 0 for none.
     channels
@@ -54,6 +57,7 @@ class FileLayout:
     unit: str = ""
     dark: str = "states"
     groups: str = "runs"
+    first: str = "state"
     pause_s: float = 0.0
     channels: Mapping[str, int] = field(default_factory=dict)
 
@@ -67,7 +71,7 @@ class FileLayout:
     def text(self) -> str:
         """What ``--map`` accepts."""
         stated = asdict(self) | {x or "input": channel for x, channel in self.channels.items()}
-        usual = "", 0.0, "states", "runs", self.channels
+        usual = "", 0.0, "states", "runs", "state", self.channels
         pairs = ((x, y) for x, y in stated.items() if x not in SETTINGS or y not in usual)
         return ",".join(f"{name}={value}" for name, value in pairs if name != "channels")
 
@@ -76,12 +80,12 @@ class FileLayout:
 
 
 class FileReading(NamedTuple):
-    """Drops as a layout of a file gives them, and the lines that they come from."""
+    """Drops as a layout of a file gives them, and the lines that each run comes from."""
 
     file: TimerFile
     layout: FileLayout
     drops: list[Drop]
-    lines: set[int]
+    lines: dict[int, list[int]]
 
     @property
     def is_whole(self) -> bool:
@@ -98,46 +102,54 @@ class FileReading(NamedTuple):
 
 def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
     """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
-    runs, lines, last, inputs = dict[int, list[Edge]](), set[int](), 0, [*layout.channels]
-    for number, drop in _group_events(file, layout):
-        edges, counts = list[Edge](), Counter[str]()
-        share = max(1, len(drop) // max(1, len(inputs)))
-        for k, event in enumerate(drop):
-            label = event.label
-            if layout.groups == "passing":  # one gate after the other, as many at each
-                label = inputs[min(k // share, len(inputs) - 1)]
-            if label in layout.channels:
-                dark = layout.is_dark(event, counts[label])
-                tick = file.tick_in(layout.unit, event.tick)
-                edges.append(Edge(tick, layout.channels[label], dark))
-                lines.add(event.line)
+    runs, lines, last = dict[int, list[Edge]](), dict[int, list[int]](), 0
+    inputs, is_passing = [*layout.channels], layout.groups == "passing"
+    grouping = layout.unit, layout.groups, layout.first, layout.pause_s
+    for number, events in _group_events(file, *grouping):
+        edges, rows, counts = list[Edge](), list[int](), Counter[str]()
+        share = max(1, len(events) // max(1, len(inputs)))
+        for k, event in enumerate(events):
+            # Of gates that are passed one after the other, each has as many.
+            label = inputs[min(k // share, len(inputs) - 1)] if is_passing else event.label
+            channel = layout.channels.get(label)
+            if channel is not None:
+                edges.append(Edge(event.tick, channel, layout.is_dark(event, counts[label])))
+                rows.append(event.line)
                 counts[label] += 1
         if edges:
             run = number if number and number not in runs else last + 1
-            runs[run], last = edges, max(last, run)
+            runs[run], lines[run], last = edges, rows, max(last, run)
     drops = [make_drop(run, runs[run]) for run in sorted(runs)]
     if any(drop.edges[-1].tick > LONGEST_S * TICK_HZ for drop in drops):
-        drops, lines = [], set()
+        drops, lines = [], {}
     return FileReading(file, layout, drops, lines)
 
 
-def _group_events(file: TimerFile, layout: FileLayout) -> Iterator[tuple[int, list[TimerEvent]]]:
-    """Yield the events of each drop, with its number in the file; those without one come last."""
-    limit = round(layout.pause_s * TICK_HZ)
-    by_row = file.is_wide and layout.groups != "runs"
-    groups: dict[tuple[bool, int, int], list[TimerEvent]] = defaultdict(list)
-    for event in file.events:
-        number = number_of(event.run) or 0
-        groups[not number, event.line if by_row else event.part, number].append(event)
-    for (_, _, number), events in sorted(groups.items()):
-        drops: list[list[TimerEvent]] = [[]]
+@lru_cache(1)
+def _group_events(
+    file: TimerFile, unit: str, groups: str, first: str, pause_s: float
+) -> list[tuple[int, list[TimerEvent]]]:
+    """Return the events of each drop, with its number in the file; those without one come last."""
+    limit, scale = round(pause_s * TICK_HZ), 10 ** POWERS[unit or "s"]
+    by_row = file.is_wide and groups != "runs"
+    parts: dict[tuple[str, int], list[TimerEvent]] = defaultdict(list)
+    for event in [file.first, *file.events] if file.first and first == "change" else file.events:
+        parts[event.run, event.line if by_row else event.part].append(event)
+    numbers = {run: number_of(run) or 0 for run, _ in parts}
+    drops = []
+    for run, part in sorted(parts, key=lambda x: (not numbers[x[0]], x[1], numbers[x[0]])):
+        pieces: list[list[TimerEvent]] = [[]]
+        events = parts[run, part]
+        if scale > 1:
+            events = [event._replace(tick=event.tick // scale) for event in events]
         for event in sorted(events, key=attrgetter("tick")):  # equal ones stay in order
-            last = drops[-1][-1] if drops[-1] else event
-            if 0 < limit <= file.tick_in(layout.unit, event.tick - last.tick):
-                drops.append([])
+            last = pieces[-1][-1] if pieces[-1] else event
+            if 0 < limit <= event.tick - last.tick:
+                pieces.append([])
             if last is event or event[:3] != last[:3]:  # nothing does the same twice at once
-                drops[-1].append(event)
-        yield from ((number if len(drops) == 1 else 0, drop) for drop in drops)
+                pieces[-1].append(event)
+        drops += [(numbers[run] if len(pieces) == 1 else 0, piece) for piece in pieces]
+    return drops
 
 
 def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> list[str]:
@@ -166,6 +178,7 @@ def find_layouts(
     choices: dict[str, Sequence[Any]] = {} if file.has_unit else {"unit": list(POWERS)}
     choices["dark"] = levels if states - {""} else times
     choices["groups"] = _groupings(file, gates, bars)
+    choices["first"] = ["state", "change"] if file.first else ["state"]
     choices |= {name: [value] for name, value in stated.items() if name in choices}
     for values in itertools.product(*choices.values()):
         layout = FileLayout(**dict(zip(choices, values, strict=True)))
@@ -192,14 +205,12 @@ def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
     Between drops nothing passes for far longer than within one: of the pauses in order, the first
     of half a second or more that is three times as long as the one before.
     """
-    parts = file.parts()
-    is_parted = file.is_wide or (len(parts) > 1 and layout.groups == "runs")
-    for part in [] if is_parted else parts:
-        ticks = sorted(file.tick_in(layout.unit, event.tick) for event in part)
-        pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
-        for before, pause in itertools.pairwise(pauses):
-            if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
-                return [0.0, pause / TICK_HZ][ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ :]
+    drops = _group_events(file, layout.unit, layout.groups, "state", 0.0)
+    ticks = [event.tick for event in drops[0][1]] if len(drops) == 1 and not file.is_wide else []
+    pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
+    for before, pause in itertools.pairwise(pauses):
+        if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
+            return [0.0, pause / TICK_HZ][ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ :]
     return [0.0]
 
 
@@ -211,7 +222,7 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if len(set(by_number.values())) == len(labels):
         return [by_number]
-    first = {event.label: event.tick for event in reversed(file.events)}
+    first = {event.label: event.tick for event in sorted(file.events, reverse=True)}
     passed = sorted(labels, key=lambda label: first.get(label, 0))
     # In order of their numbers, or as they are passed first; and the reverse.
     maps = [

@@ -16,16 +16,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rig.timers import vocabulary
-from rig.timers.vocabulary import (
-    LONGEST,
-    MEASURED,
-    find_label,
-    form,
-    is_number,
-    is_remark,
-    kinds_of,
-    roles_in,
-)
+from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_of, roles_in
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
@@ -48,7 +39,7 @@ class Row(NamedTuple):
     def cell(self, at: int) -> str:
         """Return what a column, from 0, has; nothing where the row ends before it."""
         text = self.texts[at] if at < len(self.texts) else ""
-        if text[:1].isdigit():  # most are numbers
+        if not text or text[0].isdigit():  # as most
             return text
         return "" if text[:5].casefold() in vocabulary.words()["missing"] else text
 
@@ -63,6 +54,11 @@ class Row(NamedTuple):
         """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
         text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
         return form("mark").fullmatch(text) is not None
+
+    @property
+    def is_gate(self) -> bool:
+        """Whether it is such a mark of a gate."""
+        return self.is_mark and vocabulary.find_label(self.raw, "gate") != ""
 
     @property
     def has_units(self) -> bool:
@@ -111,12 +107,12 @@ class RowBlock:
     @property
     def is_gate(self) -> bool:
         """Whether a gate stands above it, so that it is of the run of the block before."""
-        return any(row.is_mark and find_label(row.raw, "gate") for row in self.headings)
+        return any(row.is_gate for row in self.headings)
 
     @property
     def key(self) -> object:
         """What is the same for blocks whose columns are: all above but the run's name."""
-        rows = [row for row in self.headings if not row.is_mark or find_label(row.raw, "gate")]
+        rows = (row for row in self.headings if row.is_gate or not row.is_mark)
         return self.width, *(tuple(row.texts) for row in rows)
 
     def find_heading(self, filled: Collection[int], width: int) -> Row | None:
@@ -133,7 +129,7 @@ class RowBlock:
             and not row.is_mark
             and (len(row.texts) > 1 or len(filled) == 1)
             and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
-            and not any(MEASURED & kinds_of(text) for text in row.texts[:width])
+            and not any(map(is_measured, row.texts[:width]))
         ]
         return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
 
@@ -157,7 +153,7 @@ class RowBlock:
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
         for row in [*self.remarks, *self.headings]:
-            labels = [find_label(text.rpartition(":")[2], "gate") for text in row.texts]
+            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
             if len(names := [label for label in labels if label]) == count:
                 return names
         return []
@@ -186,7 +182,7 @@ class Table:
         unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
-        plain = [line for _, line in sample if line.strip() and not is_remark(line)]
+        plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names = _find_names(plain)
         self.separator = "" if self._names else find_separator(plain)
         self._usual: tuple[tuple[bool, bool], ...] = ()
@@ -213,10 +209,11 @@ class Table:
     def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
         """Yield each row of data with its block."""
         block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
+        is_plain = form("plain row").fullmatch
         for number, line in self._lines:
             if not line.strip():
                 continue
-            if block.width and form("plain row").fullmatch(line):
+            if block.width and is_plain(line):
                 yield block, Row(number, self.split(line), line)
                 continue
             mark = form("remark").match(line[:LONGEST])
@@ -274,7 +271,7 @@ def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
 
 def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
-    if not form("list").match(line):
+    if line[:1].isdigit() or not form("list").match(line):
         return [(number, line)]
     pieces = form("between lists").split(line)
     return [(number, form("list").sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
@@ -321,9 +318,9 @@ def find_separator(lines: Sequence[str]) -> str:
 def _is_data(texts: Sequence[str]) -> bool:
     """Whether cells hold values only, and at least one number or date."""
     kinds = [kinds_of(text) for text in texts if text]
-    return all(kinds) and any(MEASURED & kind for kind in kinds)
+    return all(kinds) and any(is_measured(text) for text in texts)
 
 
 def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
     """Return which cells are filled, and numbers; of most rows of data it is the same."""
-    return tuple((text != "", bool(MEASURED & kinds_of(text))) for text in texts)
+    return tuple((text != "", is_measured(text)) for text in texts)

@@ -8,21 +8,19 @@ file does not say (which gate, which level is dark, which unit) is left to `rig.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing
 from typing import TYPE_CHECKING
 
 from rig.reasons import make_reason
 from rig.timers.columns import columns_of
 from rig.timers.lines import is_cut, read_lines
-from rig.timers.moments import TICK_HZ
 from rig.timers.signals import SignalReader
 from rig.timers.table import Row, RowBlock, Table
 from rig.timers.vcd import BEGINNINGS, vcd_rows
 
 if TYPE_CHECKING:
-    from rig.timers.events import TimerEvent, TimerFile
-    from rig.timers.problems import ProblemList
+    from rig.timers.events import TimerFile
 
 _SAMPLE = 200
 """Rows that show what columns are."""
@@ -43,7 +41,7 @@ def read_file(file: TimerFile) -> TimerFile:
         numbered = enumerate(itertools.chain(head, lines), 1)
         is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
         table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
-        file.kind = f"a table, its cells {_SEPARATORS[table.separator]}"
+        file.lines.append(f"a table, its cells {_SEPARATORS[table.separator]}")
         readers: dict[object, SignalReader] = {}
         for block, rows in table.blocks():
             _read_block(file, block, rows, readers)
@@ -65,8 +63,8 @@ def _read_block(
     if key not in readers:
         sample = list(itertools.islice(rows, _SAMPLE))
         columns = columns_of(file, block, sample)
-        file.columns |= {column.name: column.meaning for column in columns}
-        readers[key], rows = SignalReader(file, columns), itertools.chain(sample, rows)
+        file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
+        readers[key], rows = SignalReader(file, columns, sample), itertools.chain(sample, rows)
         unused = readers[key].unused
         file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
     reader = readers[key]
@@ -75,24 +73,9 @@ def _read_block(
         lacks = "a column of times or a rate"
         file.problems.refuse(next(rows).line, 1, "no_rate", lacks=lacks)
     reader.read(rows, base or (0.0, 1.0), is_gate=block.is_gate)
-    if reader.is_stacked:
-        parts = sorted(file.parts(start), key=lambda part: part[0].run)
-        if not {"edge", "state", "cleared", "gate"} & reader.places.keys():
-            _check_moments(parts, reader.unused, file.problems)
-        for before, part in itertools.pairwise(parts):
-            if before[0].run == part[0].run and min(len(before), len(part)) == 1:
-                text = f"{part[0].tick / TICK_HZ:.9g}"
-                file.problems.add(part[0].line, 1, "time", "backwards", text=text)
-
-
-def _check_moments(
-    parts: Sequence[Sequence[TimerEvent]], unused: str, problems: ProblemList
-) -> None:
-    """Refuse numbers that are no moments of a passage: durations, or samples of something else."""
-    if len(parts) > 2 and 4 * (len(parts) - 1) > sum(map(len, parts)):
-        numbers = "these numbers go up and down: they"
-        problems.refuse(parts[0][0].line, 1, "durations", numbers=numbers)
-    for part in parts if unused else ():
-        steps = [b.tick - a.tick for a, b in itertools.pairwise(part)]
+    is_told = {"edge", "state", "cleared", "gate"} & reader.places.keys()
+    if reader.unused and reader.is_stacked and not is_told:
+        steps = [b.tick - a.tick for a, b in itertools.pairwise(file.events[start:])]
         if len(steps) > 3 and max(steps) < 1.5 * min(steps):
-            problems.refuse(part[0].line, 1, "regular_samples", columns=unused)
+            line = file.events[start].line
+            file.problems.refuse(line, 1, "regular_samples", columns=reader.unused)

@@ -10,16 +10,18 @@ import numpy as np
 from rig.reasons import make_reason
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
-from rig.timers.table import Row, RowBlock, Table
+from rig.timers.table import RowBlock, Table
 from rig.timers.vocabulary import form, is_number
 
 if TYPE_CHECKING:
     from rig.arrays import Array
+    from rig.timers.table import Row
 
 FEWEST = 6
 """Frames that tell an acceleration and how much they scatter."""
 _LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _SCALES = {"t": {"": 1.0, "s": 1.0, "ms": 1e-3}, "x": _LENGTHS, "y": _LENGTHS}
+"""Of each axis: what one of each unit is in s, or in m."""
 
 
 class VideoTrack(NamedTuple):
@@ -40,23 +42,23 @@ def read_video(path: str | Path) -> VideoTrack:
     """
     problems = ProblemList(str(path), make_reason("video_files").text)
     block, rows = next(Table(enumerate(read_lines(path), 1)).blocks(), (RowBlock(), iter(())))
-    axes = ((row, _find_axes(row)) for row in reversed(block.headings))
-    heading, columns = next((row for row in axes if len(row[1]) == len(_SCALES)), (Row(1, []), {}))
-    if not columns:
+    headings = [row for row in block.headings if len(_find_axes(row)) == len(_SCALES)]
+    if not headings:
         problems.refuse(1, 1, "no_track")
-    for name, (n, unit) in columns.items():
+    heading, axes = headings[-1], _find_axes(headings[-1])
+    for name, (n, unit) in axes.items():
         if unit not in _SCALES[name]:
-            accepted = "a unit of this column: s, ms; m, cm, mm"
+            accepted = f"a unit of this column: {', '.join(filter(None, _SCALES[name]))}"
             problems.reject(*heading.place(n), heading.cell(n), unit, accepted)
     frames = []
     for row in rows:
-        texts = [row.cell(columns[name][0]) for name in _SCALES]
-        for name, text in zip(_SCALES, texts, strict=True):
+        cells = {name: row.cell(n) for name, (n, _) in axes.items()}
+        for name, text in cells.items():
             if text and not is_number(text):
-                problems.reject(*row.place(columns[name][0]), name, text, "a number")
-        frames += [texts] if all(texts) else []
+                problems.reject(*row.place(axes[name][0]), name, text, "a number")
+        frames += [[cells[name] for name in _SCALES]] if all(cells.values()) else []
     problems.raise_if_any()
-    scales = [_SCALES[name][columns[name][1]] for name in _SCALES]
+    scales = [_SCALES[name][axes[name][1]] for name in _SCALES]
     track = VideoTrack(*(np.array(frames, dtype=float).reshape(-1, 3) * scales).T)
     if track.times.size < FEWEST or not np.all(np.diff(track.times) > 0):
         problems.refuse(1, 1, "few_frames", frames=track.times.size, needed=FEWEST)
@@ -65,9 +67,9 @@ def read_video(path: str | Path) -> VideoTrack:
 
 def _find_axes(row: Row) -> dict[str, tuple[int, str]]:
     """Return where t, x and y stand in a heading, the first of each, and their units."""
-    axes = {}
-    for n, text in reversed(list(enumerate(row.texts))):
+    axes: dict[str, tuple[int, str]] = {}
+    for n, text in enumerate(row.texts):
         if name := form("axis").match(text):
             unit = form("axis unit").search(text)
-            axes[name[1].lower()] = n, unit[1] if unit else ""
+            axes.setdefault(name[1].lower(), (n, unit[1] if unit else ""))
     return axes

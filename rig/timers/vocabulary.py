@@ -12,8 +12,6 @@ POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
 SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns", None: "an unknown unit"}
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
-MEASURED = frozenset({"number", "clock"})
-"""Kinds of a cell that no heading has."""
 
 
 @cache
@@ -119,6 +117,11 @@ def state_of(text: str) -> str:
 def is_number(text: str) -> bool:
     """Whether a text is a number with a decimal point."""
     return len(text) <= LONGEST and form("number").fullmatch(text) is not None
+
+
+def is_measured(text: str) -> bool:
+    """Whether a text is a number or a time of day, as no heading is."""
+    return is_number(text) or (":" in text and form("clock").fullmatch(text[:LONGEST]) is not None)
 
 
 @lru_cache(10_000)

@@ -157,7 +157,9 @@ NOT_READ = {
 }  # fmt: skip
 """Refused with what to do: the file leaves open, or contradicts, what is in it."""
 
-REFUSED = {"a fault in the first row": b"gate,time (s),state\n0,0.4O0305,1\n0,0.420600,0\n"
+REFUSED = {"durations": b"1.35\n2.05\n1.68\n1.87\n1.76\n1.78\n",
+           "a time before that above it": b"gate,time,state\n0,0.2,1\n0,0.1,0\n",
+           "a fault in the first row": b"gate,time (s),state\n0,0.4O0305,1\n0,0.420600,0\n"
            b"1,0.553153,1\n1,0.561398,0\n2,0.641801,1\n2,0.647889,0\n",
            "counts of years": b"gate,time,state\n0,1,1\n0,9999999999,0\n1,999999999900,1\n",
            "empty": b"", "blank": b" \n\n", "binary": bytes(range(256)) * 40,

@@ -94,9 +94,15 @@ def read_mutants(path, name: str, seeds) -> dict[str, list[str]]:
     return outcomes
 
 
-@pytest.mark.parametrize("name", [name for name, shape in SHAPES.items() if not shape.sampled])
-def test_no_mutant_is_read_as_another_truth(tmp_path, name):
-    assert read_mutants(tmp_path / "file", name, range(4))["wrong"] == []
+@pytest.mark.parametrize(
+    ("name", "seeds"),
+    [
+        *((name, range(4)) for name, shape in SHAPES.items() if not shape.sampled),
+        *(pytest.param(name, range(4, 100), marks=pytest.mark.slow) for name in SHAPES),
+    ],
+)
+def test_no_mutant_is_read_as_another_truth(tmp_path, name, seeds):
+    assert read_mutants(tmp_path / "file", name, seeds)["wrong"] == []
 
 
 def test_a_row_with_a_single_time_is_no_drop(tmp_path):
@@ -114,12 +120,6 @@ def test_a_copy_that_lacks_a_row_is_a_copy(tmp_path, gone):
                                STRANGERS["Twice the same"])  # fmt: skip
     assert runs is None
     assert "copy" in advice
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SHAPES)
-def test_none_of_many_mutants_is_read_as_another_truth(tmp_path, name):
-    assert read_mutants(tmp_path / "file", name, range(100))["wrong"] == []
 
 
 @pytest.mark.parametrize("name", STRANGERS)
