@@ -145,7 +145,9 @@ class ExpectedEdges(NamedTuple):
         to_strike = np.full(rods.size, np.inf)  # distance of each rod to its strike, m
         if record.ratios is not None:
             if strikes.size > 1:
-                u = np.hypot(u, protocol.priors.swing * strike_shifts(record, protocol)[rods])
+                # Along a vertical board it has no end, but a rod strikes no lower than it fell.
+                lower = protocol.priors.swing * strike_shifts(record, protocol)
+                u = np.hypot(u, np.minimum(lower, protocol.drop.value + strikes)[rods])
             to_strike = levels + strikes[rods] - protocol.contact.strike.value
         return cls(
             rods,

@@ -58,9 +58,7 @@ def strike_shifts(record: ChainRecord, protocol: Protocol) -> Array:
     share = (chain.heights[-1] - np.array(chain.heights)) / chain.length
     fallen = np.maximum(protocol.drop.value + record.strikes, 0.0)
     carried = share * np.sqrt(2.0 * fallen / protocol.gravity.value)
-    # No rod strikes lower than it has fallen: along a vertical board this would have no end.
-    lower: Array = np.minimum(carried * math.tan(math.radians(record.incline_deg)), fallen)
-    return lower
+    return np.asarray(carried * math.tan(math.radians(record.incline_deg)))
 
 
 def swing_sd(chain: Chain, protocol: Protocol) -> float:

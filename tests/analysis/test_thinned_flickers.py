@@ -62,8 +62,8 @@ def test_of_each_long_flicker_both_ends_are_left_and_every_edge_is_counted(gaps)
     assert len(thin(drop, HZ).edges) == edges.numbers.size
 
 
-@pytest.mark.parametrize("count", [1_000, 100_000])
-def test_a_gate_that_chatters_all_the_time_is_named_and_others_are_read(count):
+def test_a_gate_that_chatters_all_the_time_is_named_and_others_are_read():
+    count = 100_000
     one = case(UNIFORM, Dials.quiet(), incline=40.0)
     clean = one.analyze()
     channel = UNIFORM.gates.on("impact")[3].channel
@@ -80,11 +80,10 @@ def test_a_gate_that_chatters_all_the_time_is_named_and_others_are_read(count):
     surplus = [edge for edge in result.unmatched if edge.edge is not None]
     assert len(surplus) + audit.thinned == audit.spurious
     assert audit.json().get("thinned", 0) == audit.thinned
-    assert (audit.thinned > 0) == (count > 5_000)
+    assert audit.thinned > 0
     for number, rod in result.matches.items():
         if noisy.drop.edges[number].channel != channel:
             at = one.drop.edges.index(noisy.drop.edges[number])
             assert clean.matches.get(at, rod) == rod
-    if audit.thinned:
-        assert result.verdict == "void"
-        assert any(f"channel {channel}" in reason.text for reason in result.reasons)
+    assert result.verdict == "void"
+    assert any(f"channel {channel}" in reason.text for reason in result.reasons)

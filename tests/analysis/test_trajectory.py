@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
 from rig.model.chain import Chain
 from rig.model.fall import kicks
-from tests.model.air_reference import exact_leg, exact_way
+from tests.model.air_reference import exact_hits, exact_way
 
 MASSES = (3.0, 1.0, 2.0, 0.4, 1.5)
 PLACES = (0.0004, 0.0493, 0.0967, 0.1461, 0.1939)  # above the reference point; rod 0 is off it
@@ -41,14 +41,13 @@ class Exact:
 
     def __init__(self, parameters) -> None:
         release, start, self.g, self.kappa, *rest = map(mpf, parameters)
-        gains, places = rest[:RODS], rest[RODS:]
-        self.time, self.height, self.speed = [release], [start], [mpf(0)]
-        for gain, ratio, place in zip(gains, RATIOS, places, strict=True):
-            fallen = self.height[-1] + place
-            self.arrival, lasted = exact_leg(fallen, self.speed[-1], self.g, self.kappa)
-            self.time.append(self.time[-1] + lasted)
-            self.height.append(-place)
-            self.speed.append(self.arrival + gain * ratio * self.arrival)
+        gains = [gain * ratio for gain, ratio in zip(rest[:RODS], RATIOS, strict=True)]
+        places, kappas = rest[RODS:], [self.kappa] * RODS
+        hits = exact_hits(places, gains, kappas, start, self.g, mpf(0))
+        self.time = [release, *(release + time for time, _, _ in hits)]
+        self.height = [start, *(-place for place in places)]
+        self.speed = [mpf(0), *(after for _, _, after in hits)]
+        self.arrival = hits[-1][1]
 
     def at(self, when) -> mpf:
         leg = max([k for k, begin in enumerate(self.time) if begin <= when], default=0)
@@ -74,24 +73,32 @@ def close(found, expected) -> None:
 
 
 @pytest.mark.parametrize("kappa", KAPPAS)
-def test_values_are_those_of_60_digits(kappa):
+def test_legs_and_their_derivatives_are_those_of_60_digits(kappa):
+    there = in_air(kappa)
+    path = struck(there)
     with mp.workdps(60):
-        exact = Exact(in_air(kappa))
-    path = struck(in_air(kappa))
-    close(path.time, [float(t) for t in exact.time])
-    close(path.height, [float(z) for z in exact.height])
-    close(path.speed, [float(v) for v in exact.speed])
+        exact = Exact(there)
+    for name in ("time", "height", "speed"):
+        close(getattr(path, name), [float(value) for value in getattr(exact, name)])
+        wanted = derivatives(lambda exact, name=name: getattr(exact, name), there)
+        near(getattr(path.slopes, name), wanted, kappa)
     assert path.arrival == pytest.approx(float(exact.arrival), rel=1e-14)
+    near(path.slopes.arrival, derivatives(lambda exact: [exact.arrival], there)[0], kappa)
 
 
 @pytest.mark.parametrize("kappa", KAPPAS)
-def test_derivatives_of_times_heights_speeds_and_arrival(kappa):
+def test_heights_at_fixed_times_and_their_derivatives_are_those_of_60_digits(kappa):
     there = in_air(kappa)
     path = struck(there)
-    near(path.slopes.time, derivatives(lambda exact: exact.time, there), kappa)
-    near(path.slopes.height, derivatives(lambda exact: exact.height, there), kappa)
-    near(path.slopes.speed, derivatives(lambda exact: exact.speed, there), kappa)
-    near(path.slopes.arrival, derivatives(lambda exact: [exact.arrival], there)[0], kappa)
+    times = moments(path)
+    expected = derivatives(lambda e: [e.at(mpf(t)) for t in times], there)
+    near(path.sights(times)[2], expected, kappa)
+    heights, speeds = path.heights(times)
+    with mp.workdps(60):
+        exact = Exact(there)
+        close(heights, [float(exact.at(mpf(t))) for t in times])
+        slopes = [-(exact.at(mpf(t) + STEP) - exact.at(mpf(t) - STEP)) / (2 * STEP) for t in times]
+    close(speeds, [float(slope) for slope in slopes])
 
 
 def near(found, expected, kappa) -> None:
@@ -106,21 +113,6 @@ def moments(path: Trajectory) -> np.ndarray:
     ends = np.append(path.time, path.time[-1] + 0.02)
     inside = ends[:-1, None] + np.diff(ends)[:, None] * np.array([0.1, 0.5, 0.9])
     return np.concatenate([[path.time[0] - 0.01], inside.ravel()])
-
-
-@pytest.mark.parametrize("kappa", KAPPAS)
-def test_derivatives_of_heights_at_fixed_times(kappa):
-    there = in_air(kappa)
-    path = struck(there)
-    times = moments(path)
-    expected = derivatives(lambda e: [e.at(mpf(t)) for t in times], there)
-    near(path.sights(times)[2], expected, kappa)
-    heights, speeds = path.heights(times)
-    with mp.workdps(60):
-        exact = Exact(there)
-        close(heights, [float(exact.at(mpf(t))) for t in times])
-        slopes = [-(exact.at(mpf(t) + STEP) - exact.at(mpf(t) - STEP)) / (2 * STEP) for t in times]
-    close(speeds, [float(slope) for slope in slopes])
 
 
 @pytest.mark.parametrize("before", [True, False])
@@ -139,18 +131,6 @@ def test_near_a_strike_both_legs_count_as_much_as_they_are_likely(sigmas, before
     jump = np.abs(legs[1] - legs[0]).max()
     np.testing.assert_allclose(found[0], own + other * (beyond - own), atol=0.03 * jump)
     assert np.array_equal(found, path.sights(times)[2]) == (sigmas == 10.0)
-
-
-@pytest.mark.parametrize("kappa", [0.0, 0.03])
-def test_without_gains_a_struck_chain_falls_freely(kappa):
-    struck_path = struck((*PARAMETERS[:3], kappa, *[0.0] * RODS, *PLACES))
-    free = free_trajectory(*PARAMETERS[:3], kappa)
-    times = moments(struck_path)
-    close(struck_path.heights(times), free.heights(times))
-    found = struck_path.sights(times)[2]
-    near(found[:, :4], free.sights(times)[2], kappa)
-    # Where a rod strikes does not matter to a chain that is not pulled.
-    close(found[:, 4 + RODS :], np.zeros((times.size, RODS)))
 
 
 kappas = st.one_of(st.just(0.0), st.floats(-0.05, 1.0))

@@ -23,7 +23,7 @@ def reference_air_fall(masses, heights, alpha, gamma, drags, drop, gravity, init
     with mp.workdps(DIGITS):
         masses, drags = ([mp.mpf(x) for x in each] for each in (masses, drags))
         kappas = [mp.fsum(drags[k:]) / mp.fsum(masses[k:]) for k in range(len(masses))]
-        gains = exact_gains(masses, alpha, gamma)
+        gains = exact_gains(masses, [alpha] * len(masses), gamma)
         return End(*(+x for x in exact_fall(heights, gains, kappas, drop, gravity, initial_speed)))
 
 
@@ -34,22 +34,24 @@ def reference_way(drags, masses, gravity, initial_speed, time):
         return exact_way(time, initial_speed, gravity, kappa)
 
 
-def exact_gains(masses, alpha, gamma) -> list[mpmath.mpf]:
+def exact_gains(masses, alphas, gamma) -> list[mpmath.mpf]:
     """ΔV/V of each impact: J = α m V / (1 + γ m/M), ΔV = J/M (Eq. 9); none of the last."""
     masses = [mp.mpf(mass) for mass in masses]
-    alpha, gamma, gains = mp.mpf(alpha), mp.mpf(gamma), []
+    gamma, gains = mp.mpf(gamma), []
     for k, mass in enumerate(masses[:-1]):
         rest = mp.fsum(masses[k + 1 :])
-        gains.append(alpha * mass / (1 + gamma * mass / rest) / rest)
+        gains.append(mp.mpf(alphas[k]) * mass / (1 + gamma * mass / rest) / rest)
     return [*gains, mp.mpf(0)]
 
 
 def exact_leg(distance, speed, gravity, kappa):
     """Speed and time at the end, as d(v²)/dz = 2(g − κv²) and dt = dv/(g − κv²) integrate."""
     d, v, g, k = map(mp.mpf, (distance, speed, gravity, kappa))
+    if not k and not g:
+        return v, d / v
     if not k:
         arrival = mp.sqrt(v * v + 2 * g * d)
-        return arrival, 2 * d / (arrival + v)  # without gravity, too
+        return arrival, (arrival - v) / g
     left, u = mp.exp(-2 * k * d), mp.sqrt(g / k)
     arrival = mp.sqrt(g / k - (g / k - v * v) * left)
     # artanh v₁/u − artanh v₀/u, with the zeros at v = u cancelled
@@ -65,16 +67,24 @@ def exact_way(time, speed, gravity, kappa):
     return mp.re(mp.log(mp.cosh(x) + v * mp.sqrt(k / g) * mp.sinh(x)) / k)
 
 
-def exact_fall(heights, gains, kappas, drop, gravity, speed) -> End:
-    """Δz as a difference of two heights, V and t, with the digits that are set."""
+def exact_hits(heights, gains, kappas, drop, gravity, speed) -> list[tuple]:
+    """Time of each impact, and speed before and after it, with the digits that are set."""
     now = mp.mpf(speed)
-    time, before = mp.mpf(0), -mp.mpf(drop)
+    time, before, hits = mp.mpf(0), -mp.mpf(drop), []
     for height, gain, kappa in zip(map(mp.mpf, heights), gains, kappas, strict=True):
         arrival = now
         if height != before:
             arrival, leg = exact_leg(height - before, now, gravity, kappa)
             time += leg
         now, before = arrival * (1 + mp.mpf(gain)), height
-    separation = mp.mpf(drop) + before - exact_way(time, speed, gravity, kappas[0])
+        hits.append((time, arrival, now))
+    return hits
+
+
+def exact_fall(heights, gains, kappas, drop, gravity, speed) -> End:
+    """Δz as a difference of two heights, V and t, with the digits that are set."""
+    time, arrival, _ = exact_hits(heights, gains, kappas, drop, gravity, speed)[-1]
+    top = mp.mpf(drop) + mp.mpf(heights[-1])
+    separation = top - exact_way(time, speed, gravity, kappas[0])
     # Two chains that end at one height differ by rounding: no digits are left to be taken for a Δz.
     return End(mp.chop(separation, tol=1e10 * mp.eps), arrival, time)

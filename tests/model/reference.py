@@ -17,7 +17,8 @@ def reference_fall(
 ) -> End:
     """Drop both chains, without air."""
     with mp.workdps(digits):
-        gains, still = exact_gains(masses, alpha, gamma), [0] * len(masses)
+        still = [0] * len(masses)
+        gains = exact_gains(masses, [alpha] * len(masses), gamma)
         return exact_fall(heights, gains, still, drop, gravity, initial_speed)
 
 

@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -43,16 +42,17 @@ def test_one_chain_falls_as_it_does_alone(chain, rows):
     assert ends(found) == [end(chain, *row) for row in rows]
 
 
-@pytest.mark.parametrize("count", [0, 1, 7, 8, 23])
-def test_blocks_do_not_show(monkeypatch, count):
-    source = np.random.default_rng(5)
-    chain = even_chain(4)
-    alpha, drop = source.uniform(0.0, 0.5, count), source.uniform(0.0, 0.3, count)
+def test_arguments_broadcast_and_blocks_do_not_show(monkeypatch):
     monkeypatch.setattr(batch, "_BLOCK", 8)
-    found = falls(chain.masses, chain.heights, given_impacts(alpha), drop, 9.81)
-    assert ends(found) == [
-        end(chain, a, 0.0, h, 9.81) for a, h in zip(alpha.tolist(), drop.tolist(), strict=True)
+    chain = even_chain(5)
+    assert falls(chain.masses, chain.heights, given_impacts([]), [], 9.81).shape == (3, 0)
+    alpha, drop, gravity = [[0.1], [0.2], [0.3]], [0.0, 0.1], [[[9.81]], [[1.62]]]
+    found = falls(chain.masses, chain.heights, given_impacts(alpha, 1.5), drop, gravity, 0.5)
+    assert found.shape == (3, 2, 3, 2)
+    wanted = [
+        end(chain, a, 1.5, h, g, 0.5) for g in (9.81, 1.62) for a in (0.1, 0.2, 0.3) for h in drop
     ]
+    assert ends(found) == wanted
 
 
 def test_where_there_is_no_answer_it_says_so_and_the_others_stay_right():

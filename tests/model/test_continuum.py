@@ -1,4 +1,4 @@
-"""The continuum fall against 50 digits and where it has closed forms: Eqs. 15 and S17."""
+"""The continuum fall against many digits, and limits with closed forms: Eqs. 15 and S17."""
 
 import math
 from dataclasses import replace
@@ -21,6 +21,7 @@ REACHES = st.one_of(st.just(0.0), decades(-15, 6))
 DROPS = st.one_of(st.just(0.0), decades(-15, 9))
 GRAVITIES = decades(-6, 3)
 SPEEDS = st.one_of(st.just(0.0), decades(-6, 4))
+RATIOS = decades(-15, 9)
 PAPER = UniformChain(1.165, 1.165 / 24, 0.15506060850816171, 4 / 3, 0.18, 9.81)
 
 
@@ -66,12 +67,9 @@ def test_above_the_surface_the_chain_falls_freely():
     ("change", "message"),
     [
         ({"length_m": 0.0}, "no chain"),
-        ({"length_m": -1.0}, "length_m"),
         ({"spacing_m": -1.0}, "spacing_m"),
-        ({"alpha": -0.1}, "alpha"),
         ({"gamma": math.nan}, "gamma"),
         ({"drop_m": math.inf}, "drop_m"),
-        ({"gravity": -9.81}, "gravity"),
         ({"initial_speed": -1.0}, "initial_speed"),
         ({"gravity": 0.0}, "never falls"),
     ],
@@ -79,13 +77,6 @@ def test_above_the_surface_the_chain_falls_freely():
 def test_says_what_is_wrong_with_a_chain(change, message):
     with pytest.raises(DomainError, match=message):
         replace(PAPER, **change)
-
-
-LENGTHS = decades(-3, 3)
-
-
-RATIOS = decades(-15, 9)
-GRAVITIES = decades(-6, 3)
 
 
 def printed_15(alpha, length, reach):
@@ -104,7 +95,7 @@ def printed_s17(alpha, length, reach):
 
 
 @examples(150)
-@given(ALPHAS, LENGTHS, RATIOS)
+@given(ALPHAS, decades(-3, 3), RATIOS)
 def test_equation_15_keeps_its_digits(alpha, length, ratio):
     reach = ratio * length
     found = separation_leading_order(alpha, length, reach)
@@ -112,7 +103,7 @@ def test_equation_15_keeps_its_digits(alpha, length, ratio):
 
 
 @examples(60)
-@given(LENGTHS, RATIOS, ALPHAS, decades(-3, 3), st.sampled_from([0.0, 0.18]))
+@given(decades(-3, 3), RATIOS, ALPHAS, decades(-3, 3), st.sampled_from([0.0, 0.18]))
 def test_without_gravity_it_is_equation_s17(length, ratio, alpha, start, drop):
     reach = ratio * length
     found = end(UniformChain(length, reach, alpha, 1.0, drop, 0.0, start))

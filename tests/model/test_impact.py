@@ -28,16 +28,13 @@ FRICTIONS = st.one_of(st.just(0.0), st.floats(1e-6, 1.0))
 INERTIAS = st.floats(0.02, 0.98)
 
 
-@examples(80)
-@given(RESTITUTIONS, FRICTIONS, INERTIAS)
-def test_no_incline_is_level(beta, mu, xi):
-    level = alpha_level(beta, xi)
-    assert alpha_inclined(beta, mu, 0.0, xi) == level
-    # Eq. 13 near 0°: g(θ) = 1 − γ μ θ + O(θ²).
-    theta = 1e-6
-    slope = gamma_finite(xi) * mu * theta
-    found = alpha_inclined(beta, mu, math.degrees(theta), xi) / level - 1.0
-    assert found == pytest.approx(slope, rel=1e-4, abs=100 * theta**2)
+def test_level_alpha_is_the_papers():
+    assert alpha_level(0.5) == pytest.approx(0.25, rel=1e-15)
+    assert alpha_level(0.0) == pytest.approx(1 / 6, rel=1e-15)
+    assert alpha_level(-1.0, 0.4) == 0.0  # no collision
+    assert alpha_level(0.5, 1.0) == 0.0  # the centre of percussion is where the rod strikes
+    assert gamma_finite(1 / 3) == pytest.approx(4 / 3, rel=1e-15)
+    assert gamma_finite(1 / 3, 1.0) == pytest.approx(2 / 3, rel=1e-15)
 
 
 @examples(80)

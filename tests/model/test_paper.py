@@ -7,6 +7,26 @@ import pytest
 from rig.model import paper
 
 
+def row(columns: dict[str, list[float]], **wanted: float) -> dict[str, float]:
+    """The one row in which some columns have given values."""
+    rows = [
+        dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)
+    ]
+    found = [r for r in rows if all(math.isclose(r[k], v) for k, v in wanted.items())]
+    assert len(found) == 1
+    return found[0]
+
+
+def test_figure_3_goes_through_the_reference_values():
+    columns = paper.figure_3()
+    at_40 = row(columns, incline_deg=40.0, pile=0.0)
+    assert at_40["separation_m"] == pytest.approx(0.11546810526538031, rel=1e-12)
+    assert at_40["speed_m_s"] == pytest.approx(6.9327596650855757, rel=1e-12)
+    assert row(columns, incline_deg=20.0, pile=1.0)["separation_m"] == pytest.approx(
+        0.080175519527158543, rel=1e-12
+    )
+
+
 def test_figure_3_leaves_out_what_does_not_slide():
     columns = paper.figure_3(0.5)
     surface = [i for i, p in zip(columns["incline_deg"], columns["pile"], strict=True) if not p]
@@ -31,23 +51,3 @@ def test_figure_6_vanishes_at_both_ends():
     assert max(separations) > 10 * separations[-1]
     peak = columns["inertia"][separations.index(max(separations))]
     assert 0.2 < peak < 1 / 3  # "close to the peaks", says the text
-
-
-def row(columns: dict[str, list[float]], **wanted: float) -> dict[str, float]:
-    """The one row in which some columns have given values."""
-    rows = [
-        dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)
-    ]
-    found = [r for r in rows if all(math.isclose(r[k], v) for k, v in wanted.items())]
-    assert len(found) == 1
-    return found[0]
-
-
-def test_figure_3_goes_through_the_reference_values():
-    columns = paper.figure_3()
-    at_40 = row(columns, incline_deg=40.0, pile=0.0)
-    assert at_40["separation_m"] == pytest.approx(0.11546810526538031, rel=1e-12)
-    assert at_40["speed_m_s"] == pytest.approx(6.9327596650855757, rel=1e-12)
-    assert row(columns, incline_deg=20.0, pile=1.0)["separation_m"] == pytest.approx(
-        0.080175519527158543, rel=1e-12
-    )

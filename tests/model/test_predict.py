@@ -18,11 +18,15 @@ from tests.model.reference import printed_alpha, reference_fall
 CHAIN = even_chain(25)
 SURFACE = Surface(Quantity(0.5), Quantity(0.2))
 DROP, GRAVITY = Quantity(0.18), Quantity(9.81)
+GIVEN = 0.12  # α
 CENTRE = {"beta": 0.5, "mu": 0.2, "drop": 0.18, "gravity": 9.81}
 
 
-def with_u(incline=40.0, chain=CHAIN, **u):
+def with_u(incline=40.0, **u):
     """Prediction whose inputs have the named standard uncertainties, and no others."""
+    chain = CHAIN
+    if "alpha" in u:  # which is given then
+        chain = replace(CHAIN, alpha=Quantity(GIVEN, u["alpha"]), gamma=gamma_finite(1 / 3))
     value = {name: Quantity(number, u.get(name, 0.0)) for name, number in CENTRE.items()}
     surface = Surface(value["beta"], value["mu"])
     return predict(chain, surface, incline, value["drop"], value["gravity"])
@@ -33,19 +37,19 @@ def slopes(name, incline):
 
     def end(x, which):
         v = CENTRE | {name: x}
-        alpha = printed_alpha(v["beta"], v["mu"], incline, mp.mpf(CHAIN.inertia))
+        alpha = v.get("alpha") or printed_alpha(v["beta"], v["mu"], incline, mp.mpf(CHAIN.inertia))
         gamma = (1 + mp.mpf(CHAIN.inertia)) ** 2 / (4 * mp.mpf(CHAIN.inertia))
         return reference_fall(CHAIN.masses, CHAIN.heights, alpha, gamma, v["drop"], v["gravity"],
                               digits=50)[which]  # fmt: skip
 
     with mp.workdps(50):
         step = mp.mpf(10) ** -12
-        x = mp.mpf(CENTRE[name])
+        x = mp.mpf(CENTRE.get(name, GIVEN))
         return [float((end(x + step, i) - end(x - step, i)) / (2 * step)) for i in (0, 1)]
 
 
 @pytest.mark.parametrize("incline", [15.0, 40.0, 80.0])
-@pytest.mark.parametrize("name", ["beta", "mu", "drop"])
+@pytest.mark.parametrize("name", ["beta", "mu", "drop", "alpha"])
 def test_each_uncertainty_is_slope_times_input(name, incline):
     u = 1e-5  # so small that curvature is below 1e-6 of the slope
     found = with_u(incline, **{name: u})
@@ -60,6 +64,23 @@ def test_uncertainties_add_in_quadrature():
     whole = with_u(**u)
     assert whole.separation_u_m == pytest.approx(math.hypot(*(p.separation_u_m for p in parts)))
     assert whole.speed_u_m_s == pytest.approx(math.hypot(*(p.speed_u_m_s for p in parts)))
+
+
+def test_a_small_uncertain_speed_and_little_air_count():
+    given = {key: Quantity(number, 0.0) for key, number in CENTRE.items()}
+    scene = CHAIN, Surface(given["beta"], given["mu"]), 40.0, given["drop"], given["gravity"]
+
+    def pushed(value, u=0.0):
+        return predict(*scene, initial_speed=Quantity(value, u))
+
+    def held(share, u=0.0):
+        return predict(*scene, kappas=[0.01 * share] * len(CHAIN.masses), drag_u=u)
+
+    for found, value in ((pushed, 0.1), (held, 1.0)):
+        u = 0.5 * value
+        moved = abs(found(value + u).speed_m_s - found(value - u).speed_m_s) / 2
+        assert moved > 0.0
+        assert found(value, u).speed_u_m_s == pytest.approx(moved, rel=1e-9)
 
 
 def test_gravity_that_may_be_nearly_nothing_is_halved_and_no_less():
@@ -95,11 +116,13 @@ def test_a_pile_has_its_own_restitution_and_no_friction():
     assert (found.model, level.model) == ("discrete, pile", "discrete")
 
 
-@pytest.mark.parametrize("alpha", [-0.05, 0.55])
-def test_outside_the_domain_a_prediction_says_so_and_is_still_given(alpha):
+@pytest.mark.parametrize(
+    ("alpha", "note"), [(-0.01, "negative"), (0.0, None), (0.5, None), (0.51, "above ½")]
+)
+def test_outside_the_domain_a_prediction_says_so_and_is_still_given(alpha, note):
     found = predict(replace(CHAIN, alpha=Quantity(alpha)), SURFACE, 40.0, DROP, GRAVITY)
-    assert not found.in_domain
-    assert len(found.notes) == 1
+    assert (found.in_domain, len(found.notes)) == (note is None, int(note is not None))
+    assert note is None or note in found.notes[0]
     assert math.copysign(1.0, found.separation_m) == math.copysign(1.0, alpha)
 
 

@@ -104,12 +104,13 @@ def refused(code, kind, *paths, work=together):
     assert [reason.code for reason in caught.value.reasons] == [code]
 
 
-def test_what_has_no_incline_in_common_is_refused(tmp_path):
+def test_another_scene_is_refused_and_what_has_no_incline_in_common(two, tmp_path):
     changes = (("", ""), ("incline: 40 deg", "incline: 50 deg"))
     first, other = (
         record(tmp_path, f"s{n}", "single-chain", series=n, change=change)
         for n, change in enumerate(changes, 1)
     )
+    refused("sessions_unlike", InputError, first, two[0])
     found = together(first, other)
     refused("nothing_to_compare", InputError, work=found.differences)
     assert [line.incline_deg for line in found.summary] == [40.0, 50.0]
@@ -119,10 +120,6 @@ def test_a_session_and_its_copy_are_one(two, tmp_path):
     copy = shutil.copy(two[0], tmp_path / "copy.session")
     refused("session_repeated", InputError, two[0], two[1], two[0])
     refused("session_repeated", InputError, two[0], copy)
-
-
-def test_another_scene_is_refused(two, tmp_path):
-    refused("sessions_unlike", InputError, two[0], record(tmp_path, "ball", "falling-ball"))
 
 
 def test_a_blind_session_is_refused(two, tmp_path, call):  # noqa: F811

@@ -93,4 +93,7 @@ def test_all_known_exactly_goes_through_every_command(kind, tmp_path):
     text = protocol(kind, ALL)
     scene = Scene(1, text, "sim://?quiet=1", parse(text, "zeros.yaml"))
     assert not faults(scene, tmp_path)
-    assert_sound(rig.open(tmp_path / "scene.session").analyze().runs)
+    found = rig.open(tmp_path / "scene.session").analyze().runs
+    assert_sound(found)
+    for measured in found[0].quantities.values():
+        assert set(measured.budget) <= {"clock", "edges", "gravity"}
