@@ -15,7 +15,7 @@ from rig.analysis.curves import model_curves
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.measurands import SEPARATION
 from rig.protocol.protocol import Run
-from rig.report.canvas import KINDS, drawing_file, figure_file, style, write_figures
+from rig.report.canvas import KINDS, figure_file, write_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
 from rig.report.figures import (
     _stack_bar,
@@ -25,7 +25,7 @@ from rig.report.figures import (
     variance_shares,
 )
 from rig.report.looks import COLORS, PARTS
-from rig.report.plot import page_svg, plot
+from rig.report.plot import drawing_file, page_svg, plot, style
 from tests.report import fake_analysis
 from tests.sim.falls import UNIFORM
 
