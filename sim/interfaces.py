@@ -14,15 +14,12 @@ class Line(Protocol):
     @property
     def byte_ns(self) -> int:
         """How long a byte takes, either way."""
-        ...
 
     def next_arrival_ns(self) -> int | None:
         """Say when the host gets the next byte, as far as is known."""
-        ...
 
     def read(self, now_ns: int) -> bytes:
         """Take what has reached the host by now."""
-        ...
 
 
 class Board(Protocol):
@@ -31,23 +28,18 @@ class Board(Protocol):
     @property
     def line(self) -> Line:
         """What it sends."""
-        ...
 
     def receive(self, start_ns: int, data: bytes) -> None:
         """Take bytes from the host; the first begins to arrive at `start_ns`."""
-        ...
 
     def reset(self, at_ns: int) -> None:
         """Restart, as opening the port does to a Mega."""
-        ...
 
     def advance(self, until_ns: int) -> None:
         """Let happen what happens until a moment."""
-        ...
 
     def next_ns(self) -> int | None:
         """Say when something will happen next, or `None` when nothing will."""
-        ...
 
 
 class Lab(Protocol):
@@ -66,7 +58,6 @@ class Lab(Protocol):
         int
             Gate mask, 1 = blocked.
         """
-        ...
 
     def drop(self, label: int) -> Sequence[tuple[float, int, bool]]:
         """Let go.
@@ -81,4 +72,3 @@ class Lab(Protocol):
         sequence of (seconds after the release fired, channel, blocked)
             Every change of every beam, in order of time.
         """
-        ...

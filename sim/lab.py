@@ -280,10 +280,8 @@ class ChainLab:
                 )
             else:
                 kappas = self.air[body.spec.name].on_legs()[:1]
-                paths[side] = Path(
-                    hung.release_s + hung.skew_s, start + hung.hang[1],
-                    self.protocol.gravity.value, kappas=kappas,
-                )  # fmt: skip
+                let_go_s, gravity = hung.release_s + hung.skew_s, self.protocol.gravity.value
+                paths[side] = Path(let_go_s, start + hung.hang[1], gravity, kappas=kappas)
         shadows = {
             gate.channel: self._shadows(gate, level, hanging[gate.side], paths[gate.side])
             for gate in self.gates

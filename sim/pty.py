@@ -43,21 +43,23 @@ _CHUNK = 4096
 class GlassBoard(Board, Protocol):
     """A board with hands around it, and one that can be looked into."""
 
-    def touch(self, gates: int) -> None: ...  # noqa: D102
+    def touch(self, gates: int) -> None:
+        """Block the beams of these gates, a bit each, and let all others through."""
 
-    def stop(self, opened: bool) -> None: ...  # noqa: D102
+    def stop(self, opened: bool) -> None:
+        """Open or close the emergency stop."""
 
-    def brown_out(self, at_ns: int) -> None: ...  # noqa: D102
+    def brown_out(self, at_ns: int) -> None:
+        """Restart by a dip of the supply at this time."""
 
-    def outputs(self) -> int: ...  # noqa: D102
+    def outputs(self) -> int:
+        """Return the outputs that are on, a bit each."""
 
     def phase(self) -> int:
         """Tell what it is doing, see `Phase`."""
-        ...
 
     def held(self) -> tuple[dict[str, int], list[tuple[int, int]]]:
         """Tell what it keeps of the drop it holds: the certificate's main fields, the events."""
-        ...
 
 
 class Bench:
@@ -207,10 +209,10 @@ def main(
     parser.add_argument(
         "--resets", action="store_true", help="restart the board whenever its terminal is opened"
     )
-    parser.add_argument(
-        "--busy", type=float, default=0.0, metavar="SHARE", help="of all bytes, changed where both "
-        "directions are under way at once: from 230,400 baud on some USB chips do that",
-    )  # fmt: skip
+    busy = (
+        "of bytes, changed while both directions are busy: some USB chips do so from 230,400 baud"
+    )
+    parser.add_argument("--busy", type=float, default=0.0, metavar="SHARE", help=busy)
     parser.add_argument(
         "dial", nargs="*", type=_dial, metavar="NAME=VALUE", help="as in a sim:// URL"
     )

@@ -142,12 +142,9 @@ class ResolvedLab(ChainLab):
         if not spec.weighed:
             masses = self.dials.density * math.pi / 4.0 * diameters**2 * length
         zero = np.zeros(diameters.size)
-        signs = (-1.0) ** np.arange(diameters.size)
-        return Rods(
-            masses, np.array(spec.chain.heights), diameters,
-            signs * math.radians(spec.tilt_deg), zero, zero, length, self.dials.roll > 0.0,
-            spec.chain.inertia / XI,
-        )  # fmt: skip
+        tilts = (-1.0) ** np.arange(diameters.size) * math.radians(spec.tilt_deg)
+        places = np.array(spec.chain.heights), diameters, tilts, zero, zero
+        return Rods(masses, *places, length, self.dials.roll > 0.0, spec.chain.inertia / XI)
 
     def _hang(self, side: Side, body: Body, run: Run, attempt: int, too_high: float) -> Chain:
         """Hang a chain with its rods as they are, and as they hang this time."""
@@ -172,12 +169,11 @@ class ResolvedLab(ChainLab):
             board = Board(math.radians(run.incline_deg), _bounce(surface, dials))
             if dials.rods_touch > 0.0:
                 touching = Bounce(dials.rod_restitution, dials.rod_time, dials.rod_friction)
-        return Chain(
-            rods, Strings(dials.string_restitution, dials.string_strain),
-            self.hang_height + too_high, self.protocol.gravity.value, board, touching,
-            np.array(self.air[body.spec.name].on_rods()), swing,
-            dials.spin_sd * float(draws.normal()),
-        )  # fmt: skip
+        strings = Strings(dials.string_restitution, dials.string_strain)
+        start, gravity = self.hang_height + too_high, self.protocol.gravity.value
+        drag = np.array(self.air[body.spec.name].on_rods())
+        spin = dials.spin_sd * float(draws.normal())
+        return Chain(rods, strings, start, gravity, board, touching, drag, swing, spin)
 
     def _resolved_shadows(
         self, run: Run, attempt: int, hung: Hung, falls: dict[Side, Fall]

@@ -7,11 +7,19 @@ predictions, checks and plans do not need it.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 COVERAGE_95 = 1.959963984540054
 """`coverage_factor` of the normal distribution, to save the import of scipy."""
 _ONCE_IN = 1e-3
 _MANY = 1e6  # beyond this the distribution is normal to all printed digits
+
+
+def special() -> Any:
+    """Return `scipy.special`, loaded on the first call."""
+    import scipy.special  # noqa: PLC0415 - see above
+
+    return scipy.special
 
 
 @lru_cache(maxsize=1024)
@@ -30,11 +38,9 @@ def coverage_factor(degrees: float, probability: float = 0.95) -> float:
     ValueError
         Fewer than one degree of freedom.
     """
-    from scipy.special import stdtrit  # noqa: PLC0415 - see above
-
     if not degrees >= 1.0:  # NaN too
         raise ValueError(f"{degrees} degrees of freedom; at least 1 is needed")
-    return float(stdtrit(min(degrees, _MANY), 0.5 * (1.0 + probability)))
+    return float(special().stdtrit(min(degrees, _MANY), 0.5 * (1.0 + probability)))
 
 
 def chi2_tail(x: float, degrees: int) -> float:
@@ -45,12 +51,10 @@ def chi2_tail(x: float, degrees: int) -> float:
     ValueError
         Fewer than one degree of freedom.
     """
-    from scipy.special import chdtrc  # noqa: PLC0415 - see above
-
     if not degrees >= 1:
         raise ValueError(f"{degrees} degrees of freedom; at least 1 is needed")
     # The difference of two equally good fits may be below zero by rounding.
-    return float(chdtrc(degrees, max(x, 0.0)))
+    return float(special().chdtrc(degrees, max(x, 0.0)))
 
 
 @lru_cache(maxsize=1024)
@@ -64,6 +68,4 @@ def most_by_chance(trials: int, share: float) -> int:
     share
         Probability that an edge is missed, independently: the number is binomial.
     """
-    from scipy.special import bdtrc  # noqa: PLC0415 - see above
-
-    return next(k for k in range(trials + 1) if bdtrc(k, trials, share) < _ONCE_IN)
+    return next(k for k in range(trials + 1) if special().bdtrc(k, trials, share) < _ONCE_IN)

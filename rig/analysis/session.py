@@ -50,8 +50,11 @@ rests on priors."""
 class SummaryByDrop(Interface):
     """Store of drop summaries, such as a dictionary."""
 
-    def get(self, drop: Drop, /) -> DropSummary | None: ...  # noqa: D102
-    def __setitem__(self, drop: Drop, summary: DropSummary, /) -> None: ...
+    def get(self, drop: Drop, /) -> DropSummary | None:
+        """Return what is kept of a drop, if anything is."""
+
+    def __setitem__(self, drop: Drop, summary: DropSummary, /) -> None:
+        """Keep what follows from a drop."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -123,9 +123,8 @@ how far μ is below where Eq. 13 is singular at 10°, relative."""
 TOGETHER: dict[str, tuple[float, float]] = {
     "rods": (2, 200), "mass decades": (-12, 12), "alpha": (1e-12, 0.5),
     "incline": (1e-9, 90 - 1e-9), "friction": (0.0, 0.839), "inertia": (1e-6, 1 - 1e-12),
-    "drop": (0.0, 1e9),
-    "gravity": (1e-6, 1e6), "speed": (1e-6, 1e6), "air": (1e-15, 10.0),
-    "unequal air": (1e-12, 0.06),
+    "drop": (0.0, 1e9), "gravity": (1e-6, 1e6), "speed": (1e-6, 1e6),
+    "air": (1e-15, 10.0), "unequal air": (1e-12, 0.06),
 }  # fmt: skip
 """Ends that are taken together by twos."""
 _APART = ({"alpha", "incline"}, {"alpha", "friction"}, {"air", "unequal air"})

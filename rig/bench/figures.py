@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
 
 from rig.report import looks
-from rig.report.canvas import drawing_file, style
+from rig.report.plot import drawing_file, style
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-
-    from matplotlib.figure import Figure
 
     from rig.bench.stability import StabilityRow
     from rig.bench.work import Point
@@ -23,9 +23,10 @@ INK, MODEL, SECOND, MUTED = (
 FLOOR = 3e-17
 """Where an error of 0 is drawn: no float is nearer."""
 _CEILING = 1.0
-_LOOKS = [
-    (marker, color, fill)
-    for fill in (True, False)
+_THIN = {"markersize": 5, "linewidth": 0.9, "elinewidth": 0.6}
+_LOOKS: list[dict[str, Any]] = [
+    {"marker": marker, "color": color, **line, **_THIN}
+    for line in ({"linestyle": "-"}, {"linestyle": "--", "markerfacecolor": "none"})
     for marker, color in zip("Dos^vP", (MODEL, SECOND, INK, MUTED, MODEL, SECOND), strict=True)
 ]
 
@@ -33,8 +34,6 @@ _LOOKS = [
 @contextmanager
 def canvas(*heights: float) -> Iterator[Figure]:
     """Set the style up, and hand out empty panels of so many inches above each other."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - half a second, only for figures
-
     with style():
         drawing = Figure(figsize=(7.0, sum(heights)), layout="constrained")
         drawing.subplots(len(heights), sharex=True, height_ratios=heights)
@@ -64,18 +63,12 @@ def choice_figure(lines: Mapping[str, Sequence[Point]]) -> str:
 def _picture(title: str, lines: Mapping[str, Sequence[Point]], columns: int) -> str:
     with canvas(4.4) as drawing:
         (panel,) = drawing.axes
-        for (label, points), (marker, color, fill) in zip(lines.items(), _LOOKS, strict=False):
+        for (label, points), look in zip(lines.items(), _LOOKS, strict=False):
             times = [point.cpu_s for point in points]
-            panel.errorbar(
-                times, [min(max(point.error, FLOOR), _CEILING) for point in points],
-                xerr=[
-                    [point.cpu_s - point.lower_s for point in points],
-                    [point.upper_s - point.cpu_s for point in points],
-                ],
-                label=label, color=color, marker=marker, markersize=5, linewidth=0.9,
-                elinewidth=0.6, markerfacecolor=color if fill else "none",
-                linestyle="-" if fill else "--",
-            )  # fmt: skip
+            errors = [min(max(point.error, FLOOR), _CEILING) for point in points]
+            below = [point.cpu_s - point.lower_s for point in points]
+            above = [point.upper_s - point.cpu_s for point in points]
+            panel.errorbar(times, errors, xerr=[below, above], label=label, **look)
         panel.set(xscale="log", yscale="log", ylim=(FLOOR / 2.0, _CEILING))
         panel.set_xlabel("processor time of one solution (s): median, quartiles")
         panel.set_ylabel("relative error")
@@ -94,11 +87,9 @@ def conditioning_figure(rows: Sequence[StabilityRow]) -> str:
             ("this program", "error", MODEL, "o"),
         ):
             numbers = [row for row in rows if getattr(row, field) is not None]
-            panel.plot(
-                [min(row.expected, 5.0) for row in numbers],
-                [min(max(getattr(row, field), FLOOR), 10.0) for row in numbers],
-                linestyle="none", marker=marker, color=color, markersize=3.5, label=label,
-            )  # fmt: skip
+            expected = [min(row.expected, 5.0) for row in numbers]
+            errors = [min(max(getattr(row, field), FLOOR), 10.0) for row in numbers]
+            panel.plot(expected, errors, marker, color=color, markersize=3.5, label=label)
         panel.axline((1e-16, 1e-16), (1.0, 1.0), color=INK, linewidth=0.8, label="error = κ·ε")
         panel.set(xscale="log", xlim=(1e-16, 10.0), yscale="log", ylim=(FLOOR / 2.0, 20.0))
         panel.set_xlabel("κ·ε: what rounding of the inputs alone may cost")

@@ -40,6 +40,7 @@ BANDS_M = (0.8, 0.02, 5e-4)
 _BEAMS = 12
 _IMPACT = impact_on(paper.BARE, paper.UNIFORM, paper.MIDDLE_INCLINE)
 _PLACE = paper.DROP, paper.GRAVITY
+_FREE_FALL = {"drop": paper.DROP, "gravity": paper.GRAVITY}
 _TOLERANCES = tuple(10.0**-n for n in range(2, 14))
 
 
@@ -59,14 +60,14 @@ def _by_solvers(legs: Legs, tolerances: tuple[float, ...] = _TOLERANCES) -> Iter
 
 def _air() -> WorkProblem:
     chain, rods = paper.UNIFORM, paper.RODS
-    gains, kappas = kicks(chain, [_IMPACT.alpha] * rods, _IMPACT.gamma), [KAPPA] * rods
+    alphas, gammas, kappas = ([x] * rods for x in (_IMPACT.alpha, _IMPACT.gamma, KAPPA))
+    gains = kicks(chain, alphas, _IMPACT.gamma)
     legs = in_air(chain.heights, gains, KAPPA, *_PLACE)
-    coefficients = [_IMPACT.alpha] * rods, [_IMPACT.gamma] * rods
     return WorkProblem(
         "air", f"{rods} rods in air",
-        {"drop": paper.DROP, "gravity": paper.GRAVITY},
+        _FREE_FALL,
         partial(
-            references.exact_fall, chain.masses, chain.heights, *coefficients, kappas=kappas
+            references.exact_fall, chain.masses, chain.heights, alphas, gammas, kappas=kappas
         ),
         "legs in closed form as textbooks have them, heights subtracted",
         [
@@ -79,22 +80,16 @@ def _air() -> WorkProblem:
 
 def _fold() -> WorkProblem:
     reach = _IMPACT.gamma * paper.PITCH
-    case = {"length": paper.LENGTH, "reach": reach, "alpha": _IMPACT.alpha,
-            "drop": paper.DROP, "gravity": paper.GRAVITY}  # fmt: skip
+    case = {"length": paper.LENGTH, "reach": reach, "alpha": _IMPACT.alpha} | _FREE_FALL
     chain = continuum.UniformChain(paper.LENGTH, reach, _IMPACT.alpha, 1.0, *_PLACE)
 
     def gauss(nodes: float) -> Answer:
         end = continuum.end(chain, nodes=int(nodes))
         return Answer(end_values(end), end.evaluations)
 
-    return WorkProblem(
-        "fold", "a continuous chain",
-        case, references.continuum, "S15 as a hypergeometric function",
-        [
-            Method("Gauss–Legendre (rig)", (2, 3, 4, 6, 8, 12, 16, 24), "{:.0f} nodes", gauss),
-            *_by_solvers(folding(**case)),
-        ],
-    )  # fmt: skip
+    ours = Method("Gauss–Legendre (rig)", (2, 3, 4, 6, 8, 12, 16, 24), "{:.0f} nodes", gauss)
+    methods, route = [ours, *_by_solvers(folding(**case))], "S15 as a hypergeometric function"
+    return WorkProblem("fold", "a continuous chain", case, references.continuum, route, methods)
 
 
 def contact(contact_s: float) -> WorkProblem:
@@ -128,7 +123,7 @@ def beam_fit(band: float) -> WorkProblem:
     beams = np.linspace(1.0 - band / 2, 1.0 + band / 2, _BEAMS)
     start = {"rise": 0.02, "speed": 0.3, "gravity": 9.81}
     times = _passages(beams, np.array([*start.values()]))[0]
-    times = times + 1e-9 * band * rng.normal(size=_BEAMS)
+    times += 1e-9 * band * rng.normal(size=_BEAMS)
     begin = np.array([0.0, 0.2, 9.0])
 
     def answer(p: Array, evaluations: int) -> Answer:
@@ -169,9 +164,14 @@ def beam_fit(band: float) -> WorkProblem:
 
     def by_scipy(tolerance: float) -> Answer:
         run = minimize(
-            lambda p: _passages(beams, p)[0] - times, begin, lambda p: _passages(beams, p)[1],
-            xtol=tolerance, ftol=tolerance, gtol=tolerance, x_scale="jac",
-        )  # fmt: skip
+            lambda p: _passages(beams, p)[0] - times,
+            begin,
+            lambda p: _passages(beams, p)[1],
+            xtol=tolerance,
+            ftol=tolerance,
+            gtol=tolerance,
+            x_scale="jac",
+        )
         return answer(run.x, run.nfev)
 
     return WorkProblem(
@@ -202,9 +202,13 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
     distance, gravity = paper.LENGTH + paper.DROP, paper.GRAVITY
     air, latest = (gravity, kappa), 2.0 * math.sqrt(2.0 * distance / gravity)
 
-    def by_scipy(finder: Any, *where: object, **accuracy: float) -> Answer:
-        run = finder(lambda t: fallen(t, *air) - distance, *where, full_output=True, **accuracy)[1]
-        return Answer({"time": run.root}, run.function_calls)
+    def by_scipy(finder: Any, accuracy: str, *where: object) -> Method:
+        def find(tolerance: float) -> Answer:
+            options = {"args": air, "full_output": True, accuracy: tolerance}
+            run = finder(lambda t, *air: fallen(t, *air) - distance, *where, **options)[1]
+            return Answer({"time": run.root}, run.function_calls)
+
+        return Method(finder.__name__, _TOLERANCES, accuracy + " {:.0e}", find)
 
     return WorkProblem(
         "fall-time", "the time to fall 1.345 m in air",
@@ -215,10 +219,8 @@ def fall_time(kappa: float = KAPPA) -> WorkProblem:
                    lambda: Answer({"time": drag_leg(distance, 0.0, gravity, kappa)[1]}, 1)),
             direct("as printed", lambda: Answer(
                 {"time": math.acosh(math.exp(kappa * distance)) / math.sqrt(kappa * gravity)}, 1)),
-            Method("brentq", _TOLERANCES, "xtol {:.0e}",
-                   lambda xtol: by_scipy(optimize.brentq, 0.0, latest, xtol=xtol, rtol=1e-15)),
-            Method("newton", _TOLERANCES, "tol {:.0e}", lambda tol: by_scipy(
-                optimize.newton, latest, lambda t: falling_speed(t, *air), tol=tol)),
+            by_scipy(optimize.brentq, "xtol", 0.0, latest),
+            by_scipy(optimize.newton, "tol", latest, falling_speed),
         ],
         "closed form (rig)", "as printed",
     )  # fmt: skip

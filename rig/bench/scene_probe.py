@@ -26,8 +26,8 @@ COUNTED = {
 
 def main() -> None:
     """Print what the scene of the command line costs, as JSON."""
-    import io  # noqa: PLC0415 - loaded by Python itself
-    import runpy  # noqa: PLC0415 - as by python -m
+    import io  # loaded by Python itself
+    import runpy  # as by python -m
 
     path = sys.argv[1]
     stdout, sys.stdout = sys.stdout, io.StringIO()
@@ -41,15 +41,15 @@ def main() -> None:
         sys.stdout = stdout
     seconds, modules = time.process_time(), sorted({*sys.modules} - {"rig.bench", __name__})
 
-    import gc  # noqa: PLC0415 - from here on nothing is counted as the scene's
-    import json  # noqa: PLC0415
-    import tracemalloc  # noqa: PLC0415
+    import gc  # from here on nothing is counted as the scene's
+    import json
+    import tracemalloc
 
     gc.collect()
     held = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    from rig.predictions import predictions  # noqa: PLC0415
-    from rig.protocol.reader import read  # noqa: PLC0415
+    from rig.predictions import predictions
+    from rig.protocol.reader import read
 
     protocol = read(path)
     calls = count(lambda: predictions(protocol))
@@ -58,8 +58,8 @@ def main() -> None:
 
 def count(work: Callable[[], object]) -> dict[str, int]:
     """Count all calls of functions, and those of what `COUNTED` names; the same on every run."""
-    from cProfile import Profile  # noqa: PLC0415 - only to count
-    from pathlib import Path  # noqa: PLC0415
+    from cProfile import Profile  # only to count
+    from pathlib import Path
 
     work()  # once unseen: what only a first call does is no part of it
     profile = Profile()

@@ -130,9 +130,12 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     table = text_table([[*rows[0]], *([*row.values()] for row in rows)], left={0}, rule=True)
     yield Findings(
         {"python": sys.version.split()[0], "scenes": [cost._asdict() for cost in costs]},
-        [*table, *_remarks(costs, whole)], _HEAD, rows, scenes_figure(names, panels),
+        [*table, *_remarks(costs, whole)],
+        _HEAD,
+        rows,
+        scenes_figure(names, panels),
         failed=any(cost.gained for cost in costs),
-    )  # fmt: skip
+    )
 
 
 def measure(texts: Mapping[str, str], rounds: int) -> list[Cost]:
@@ -164,12 +167,14 @@ def measure(texts: Mapping[str, str], rounds: int) -> list[Cost]:
         ]
     return [
         Cost(
-            name, **counted, command_s=median(turn[name] for turn in times),
+            name,
+            **counted,
+            command_s=median(turn[name] for turn in times),
             command_share=median(turn[name] / turn["whole"] for turn in times),
             gained=_unneeded_parts(protocols[name], counted),
         )
         for name, counted in counts.items()
-    ]  # fmt: skip
+    ]
 
 
 def _count(file: Path) -> dict[str, Any]:
@@ -184,9 +189,11 @@ def _probe(file: Path, *options: str) -> Any:
     """Have a fresh Python process look at a scene, and return what it says."""
     process = subprocess.run(
         [sys.executable, *options, "-c", _PROBE, str(file)],
-        capture_output=True, encoding="utf-8", check=False,
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
         env={**os.environ, "PYTHONHASHSEED": "0", "PYTHONUTF8": "1"},
-    )  # fmt: skip
+    )
     if process.returncode:
         raise RigError("a scene could not be measured", process.stderr.strip())
     return json.loads(process.stdout)
@@ -196,9 +203,11 @@ def _unneeded_parts(protocol: Protocol, counted: Mapping[str, Any]) -> tuple[str
     """List what was loaded or called for parts that the scene does not have."""
     from_surface = any(rods.chain.alpha is None for rods in protocol.chains.values())
     present: dict[str, object] = {
-        "surface": protocol.surface, "air": protocol.drag, "gates": protocol.gates,
+        "surface": protocol.surface,
+        "air": protocol.drag,
+        "gates": protocol.gates,
         "inclined surface": protocol.surface and from_surface and max(protocol.plan.inclines) > 0.0,
-    }  # fmt: skip
+    }
     used = {*counted["modules"], *(name for name, calls in counted["calls"].items() if calls)}
     absent = [part for part in PARTS if not present.get(part)]
     return tuple(f"{name} ({part})" for part in absent for name in sorted(PARTS[part] & used))
@@ -208,11 +217,14 @@ def _row(cost: Cost) -> dict[str, str]:
     """Return a line of the table, which is also that of the CSV file."""
     least, most = cost.bytes
     return {
-        "scene": cost.scene, "modules": f"{len(cost.modules)}", "of rig": f"{len(cost.rooms)}",
+        "scene": cost.scene,
+        "modules": f"{len(cost.modules)}",
+        "of rig": f"{len(cost.rooms)}",
         "MB held": f"{least / 1e6:.2f}–{most / 1e6:.2f}",
-        "command ms": f"{1e3 * cost.command_s:.1f}", "command ×": f"{cost.command_share:.2g}",
+        "command ms": f"{1e3 * cost.command_s:.1f}",
+        "command ×": f"{cost.command_share:.2g}",
         **{name: f"{calls}" for name, calls in cost.calls.items()},
-    }  # fmt: skip
+    }
 
 
 def _remarks(costs: Sequence[Cost], whole: Cost) -> Iterator[str]:

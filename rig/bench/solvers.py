@@ -63,7 +63,7 @@ class Legs(NamedTuple):
 
     def jacobian(self, _: float, y: Array) -> Array:
         """Return the slope's derivatives at a state, to a rounding: by tiny imaginary steps."""
-        steps = 1j * _TINY * np.eye(len(y))
+        steps = 1j * _TINY * np.eye(y.size)
         return np.column_stack([self.slope(y + step).imag for step in steps]) / _TINY
 
 
@@ -122,7 +122,8 @@ def solve(legs: Legs, solver: Solver, rtol: float) -> Answer:
     """
     state, time, arrival = np.array(legs.start), legs.begin_s, 0.0
     evaluations = 0
-    implicit: dict[str, Any] = {"jac": legs.jacobian} if solver in IMPLICIT else {}
+    options: dict[str, Any] = {"jac": legs.jacobian} if solver in IMPLICIT else {}
+    options |= {"method": solver, "rtol": rtol, "atol": ABSOLUTE * rtol}
 
     def slope(_: float, y: Array) -> Array:
         nonlocal evaluations
@@ -137,10 +138,7 @@ def solve(legs: Legs, solver: Solver, rtol: float) -> Answer:
             return float(y[HEIGHT] + height)
 
         landing.terminal, landing.direction = True, -1.0  # type: ignore[attr-defined]  # SciPy's
-        run = solve_ivp(
-            slope, (time, time + LONGEST_S), state, method=solver, events=landing,
-            rtol=rtol, atol=ABSOLUTE * rtol, **implicit,
-        )  # fmt: skip
+        run = solve_ivp(slope, (time, time + LONGEST_S), state, events=landing, **options)
         if run.status != 1:
             raise RigError(f"{solver}: {run.message}")
         state, time = run.y[:, -1].copy(), float(run.t[-1])
@@ -149,5 +147,5 @@ def solve(legs: Legs, solver: Solver, rtol: float) -> Answer:
             state[PULL] += gain
         else:
             state[[SPEED, GAINED]] += arrival * gain
-    values = {"separation": float(state[SEPARATION]), "speed": arrival, "time": time}
-    return Answer(values, evaluations)
+    separation = float(state[SEPARATION])
+    return Answer({"separation": separation, "speed": arrival, "time": time}, evaluations)

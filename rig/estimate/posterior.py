@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.distributions import special
 from rig.estimate.coefficients import CoefficientProblem, best
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter
 from rig.model.impact import MU
@@ -46,8 +47,6 @@ class Posterior(NamedTuple):
 
     def summary(self, name: str) -> dict[str, float]:
         """Moments, and the ends of the probabilistically symmetric interval of 95 %."""
-        from scipy.special import ndtr  # noqa: PLC0415 - only a summary needs it
-
         n = self.names.index(name)
         means, sds = self.means[:, n], self.sds[:, n]
         mean = float(self.weights @ means)
@@ -56,7 +55,7 @@ class Posterior(NamedTuple):
         for end, probability in (("low", 0.025), ("high", 0.975)):
             low, high = mean - 20.0 * sd, mean + 20.0 * sd
             while high - low > 1e-9 * sd and low < (middle := 0.5 * (low + high)) < high:
-                below = float(self.weights @ ndtr((middle - means) / sds))
+                below = float(self.weights @ special().ndtr((middle - means) / sds))
                 low, high = (middle, high) if below < probability else (low, middle)
             record[end] = 0.5 * (low + high)
         return record

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import io
 import re
 import textwrap
 import tomllib
+from contextlib import contextmanager
 from functools import partial
 from html import escape
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from rig.report.canvas import drawing_file, style
+from rig.ctrl_c import ctrl_c_waits
 from rig.report.looks import COLORS, INK, MODEL, PAPER, SECOND, SIZE
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from matplotlib.axes import Axes
 
     from rig.arrays import Array
+    from rig.report.canvas import Kind
     from rig.report.figure import Chart, Panel, Trace
 
 _LETTER, _TYPED = 0.57 * SIZE, 0.61 * SIZE
@@ -44,10 +50,22 @@ _PAGE = (
     (r">\s+<", "><"),
 )
 """What SVG has that a page with its own style sheet does not need."""
+_UNSAID: dict[Kind, tuple[str, ...]] = {
+    "svg": ("Date", "Creator", "Format", "Type"),
+    "png": ("Software",),
+    "pdf": ("Creator", "Producer", "CreationDate"),
+}
 _AREAS = ("bar", "band", "map", "levels")
 _LINES = ("line", "dash", "level", "limit")
 _LOOKS = tomllib.loads(Path(__file__).with_name("roles.toml").read_text("utf-8"))
 _LOOKS["ring"]["markerfacecolor"] = COLORS[PAPER][0]
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Apply the common style of figures inside the block, and defer Ctrl-C."""
+    with ctrl_c_waits(), mpl.rc_context(fname=Path(__file__).with_suffix(".mplstyle")):
+        yield
 
 
 def plot(chart: Chart, width: float | None = None) -> Figure:
@@ -92,6 +110,22 @@ def plot(chart: Chart, width: float | None = None) -> Figure:
         for panel, axes in zip(panels, figure.axes, strict=True):
             _name_series(axes, panel)
     return figure
+
+
+def drawing_file(drawing: Figure, kind: Kind, description: str = "") -> bytes:
+    """Return a matplotlib figure as a file; the same figure gives the same bytes.
+
+    Parameters
+    ----------
+    description
+        Description for the file's metadata.
+    """
+    written = io.BytesIO()
+    metadata: dict[str, Any] = dict.fromkeys(_UNSAID[kind])
+    metadata["Subject" if kind == "pdf" else "Description"] = description
+    with style():
+        drawing.savefig(written, format=kind, metadata=metadata)
+    return written.getvalue()
 
 
 def page_svg(chart: Chart, width: float, kind: str, mark: str = "f") -> str:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from rig.measurands import SEPARATION, SPEED
 from rig.report.figure import WIDE_PT, Trace, chart
@@ -79,8 +80,6 @@ def _map(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterat
     shown = inside[np.isfinite(inside)]
     shown = shown if shown.size else whole[np.isfinite(whole)]
     if shown.size:
-        from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - only for maps
-
         ends = np.quantile(shown, (1.0 - _SPAN, _SPAN))
         levels = [float(level) for level in MaxNLocator(_LEVELS).tick_values(*ends)]
         yield Trace("", across, up, "map", MUTED, levels, z=whole.ravel().tolist())

@@ -63,8 +63,8 @@ ACTIONS = tuple(_read_row(row) for row in _TABLE if not row.startswith("#"))
 BY_NAME = {action.name: action for action in ACTIONS}
 NEEDS_RIG = {"stop", "control", "wave"}
 """Actions that need a rig but no control."""
-_KEYS = {"question_mark": "?", "minus": "−", "plus": "+", "full_stop": ".", "enter": "Enter",
-         "left": "←", "right": "→", "up": "↑", "down": "↓", "tab": "Tab"}  # fmt: skip
+_SIGNS = "question_mark=? minus=− plus=+ full_stop=. left=← right=→ up=↑ down=↓ enter=Enter tab=Tab"
+_KEYS = dict(pair.split("=") for pair in _SIGNS.split())
 _HELP = """\
 STOP works on every screen: its key, Esc outside text fields, or the red bar.
 {table}

@@ -15,15 +15,16 @@ from textual.widgets import Input
 
 from rig.campaign import machine as campaign
 from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
+from rig.errors import RigError
 from rig.tui import commands
 from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, possible
+from rig.tui.ascii import AsciiFilter
 from rig.tui.client import ReconnectingClient
 from rig.tui.desk import Desk
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
 from rig.tui.model import Model
 from rig.tui.stillness import Stillness
-from rig.tui.survey import look_around
 from rig.tui.terminal import Terminal
 from rig.tui.widgets.bars import StatusBar, StopBar, StopLine
 from rig.tui.widgets.dialogs import Ask, Confirm, Dialog
@@ -56,9 +57,15 @@ _PAGE_OF = {
 }
 
 
-_MODULES = {"protocol": "home", "device": "device", "run": "drop", "result": "drop",
-            "session": "session", "history": "drop"}  # fmt: skip
-"""Module of each page."""
+_HEIGHTS = [(0, "-low"), (30, "-high")]
+"""Classes of a screen by its least number of lines."""
+_PAGES = {
+    "home": "protocol",
+    "device": "device",
+    "drop": "run result history",
+    "session": "session",
+}
+"""Pages by the module that draws them."""
 _WATCHING = "this screen only watches\npress c to take control when it is free"
 _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
@@ -110,7 +117,7 @@ class RigApp(App[None], inherit_bindings=False):
     TITLE = "chainrig"
     CSS_PATH = "rig.tcss"
     ENABLE_COMMAND_PALETTE = False  # our own palette lists only possible actions
-    VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # noqa: RUF012
+    VERTICAL_BREAKPOINTS = _HEIGHTS
 
     def __init__(
         self,
@@ -150,8 +157,6 @@ class RigApp(App[None], inherit_bindings=False):
         """Return the filters applied to every line drawn."""
         if not self.options.ascii:
             return super().get_line_filters()
-        from rig.tui.ascii import AsciiFilter  # noqa: PLC0415 - most terminals know more
-
         return (*super().get_line_filters(), AsciiFilter())
 
     # ------------------------------------------------------------------ life
@@ -175,9 +180,16 @@ class RigApp(App[None], inherit_bindings=False):
         if self.client is not None:
             self.client.end_trial()
 
-    def begin(self, work: Coroutine[Any, Any, None]) -> None:
-        """Run a coroutine in the background."""
-        self.run_worker(work, group="beside")
+    def begin(self, work: commands.Work) -> None:
+        """Run a coroutine, if any, in the background, and show its error if it fails."""
+        if work is not None:
+            self.run_worker(self._try(work), group="beside")
+
+    async def _try(self, work: Coroutine[Any, Any, object]) -> None:
+        try:
+            await work
+        except RigError as error:
+            self.driver.refuse(error)
 
     async def _tick(self) -> None:
         # Ten times a second, or down to five if that takes too much processor time for long.
@@ -293,7 +305,7 @@ class RigApp(App[None], inherit_bindings=False):
         """Continue after the daemon, or a new one, was reached."""
         assert self.client is not None
         if self.driver.asked and self.client.driving and not self.client.state.section("session"):
-            await self.driver.open_session(*self.driver.asked, self.options.seed)
+            await self._try(self.driver.open_session(*self.driver.asked, self.options.seed))
 
     def _follow(self) -> None:
         """Show the page of the stage when the stage has changed."""
@@ -309,9 +321,9 @@ class RigApp(App[None], inherit_bindings=False):
 
     async def _load_pages(self) -> None:
         """Load modules that were not needed for the first paint."""
-        for page, module in _MODULES.items():
+        for module, pages in _PAGES.items():
             loaded = await asyncio.to_thread(import_module, f"rig.tui.pages.{module}")
-            self._faces[page] = loaded.face
+            self._faces |= dict.fromkeys(pages.split(), loaded.face)
             self.draw()
         await asyncio.to_thread(import_module, "rig.results.live")
         if self._loaded is not None:
@@ -336,20 +348,23 @@ class RigApp(App[None], inherit_bindings=False):
 
     async def _look_around(self, client: ReconnectingClient) -> None:
         """Update the list of the home page: sessions, protocols and boards."""
+        survey = await asyncio.to_thread(import_module, "rig.tui.survey")
         port, other = client.port if not client.idle else "", client.in_the_way
-        rows = await asyncio.to_thread(look_around, self.options, port, other[0] if other else "")
+        rows = await asyncio.to_thread(
+            survey.look_around, self.options, port, other[0] if other else ""
+        )
         self.desk.begin_with(rows)
         self.draw()
         if self.desk.opens_first and self.page == "protocol":
             self.action_do("go_on")
         self.desk.opens_first = False
 
-    def ask(self, question: Dialog, act: Callable[[Any], object] | None = None) -> None:
+    def ask(self, question: Dialog, act: Callable[[Any], commands.Work] | None = None) -> None:
         """Open a dialog, and act on the answer; no dialog opens while a chain may fall."""
 
         def act_on_answer(answer: Any) -> None:
             if act is not None and answer is not None:
-                act(answer)
+                self.begin(act(answer))
 
         if not self.model.hot:
             self.push_screen(question, act_on_answer)

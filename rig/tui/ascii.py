@@ -14,11 +14,9 @@ if TYPE_CHECKING:
     from textual.color import Color
 
 _LIKE = str.maketrans(
-    "✓✗⊘…·↓■●○◌▲▸▶◀‖→←↑☞━─╌│┤├┴"
-    "└┃┏┓┗┛Δαβγκμσνχ±−–°×²³ₙ≤≥½",
-    '+x/~.v#*o:!>><|><^>=--|+++'
-    "+|++++dabgkusnX~--'x23n<>/",
-)  # fmt: skip
+    "✓✗⊘…·↓■●○◌▲▸▶◀‖→←↑☞━─╌│┤├┴└┃┏┓┗┛Δαβγκμσνχ±−–°×²³ₙ≤≥½",
+    "+x/~.v#*o:!>><|><^>=--|++++|++++dabgkusnX~--'x23n<>/",
+)
 """ASCII characters of the same width and meaning."""
 _MANY = 5  # least number of dots shown as a full character
 

@@ -42,7 +42,7 @@ class Sheet:
     def __init__(self, width: int, height: int, colors: Sequence[str]) -> None:
         self.width, self.height = width, height
         self._colors = colors
-        self._bits = np.zeros((height, width), dtype=np.int64)
+        self._bits = np.zeros((height, width), int)
         self._inks = np.full((height, width), -1)  # none
         self._letters: dict[tuple[int, int], Span] = {}
 
@@ -57,8 +57,8 @@ class Sheet:
         inks
             A single ink, or an ink for each line.
         """
-        inks = np.broadcast_to(np.asarray(inks), len(ends))
-        finite = np.isfinite(ends).all(axis=(1, 2))
+        inks = np.broadcast_to(inks, len(ends))
+        finite = np.isfinite(ends).all((1, 2))
         ends, inks = ends[finite], inks[finite]
         ways = ends[:, 1] - ends[:, 0]
         share = np.linspace(0.0, 1.0, 2 + math.ceil(np.abs(ways).max(initial=0.0)))
@@ -75,10 +75,10 @@ class Sheet:
         inks
             A single ink, or an ink for each dot.
         """
-        inks = np.broadcast_to(np.asarray(inks), len(places))
+        inks = np.broadcast_to(inks, len(places))
         spots = np.rint(places)
         inside = ((spots >= 0) & (spots < [self.width * COLUMNS, self.height * ROWS])).all(axis=1)
-        x, y = spots[inside].astype(np.intp).T
+        x, y = spots[inside].astype(int).T
         at = y // ROWS, x // COLUMNS
         np.bitwise_or.at(self._bits, at, _BITS[y % ROWS, x % COLUMNS])
         np.maximum.at(self._inks, at, inks[inside])
@@ -90,17 +90,17 @@ class Sheet:
 
     def rows(self) -> list[list[Span]]:
         """Return the drawing, a list of spans for each line of characters."""
-        return [self._row(number) for number in range(self.height)]
+        return list(map(self._row, range(self.height)))
 
     def _row(self, row: int) -> list[Span]:
         cells = zip(self._bits[row].tolist(), self._inks[row].tolist(), strict=True)
+        colors = *self._colors, ""
         # Every font has a blank.
-        letters = [Span(chr(BLANK + bits) if bits else " ", (*self._colors, "")[ink])
-                   for bits, ink in cells]  # fmt: skip
+        letters = [Span(chr(BLANK + bits) if bits else " ", colors[ink]) for bits, ink in cells]
         for (line, column), letter in self._letters.items():
             letters[column : column + (line == row)] = [letter] * (line == row)
-        return [Span("".join(letter.text for letter in run), *look)
-                for look, run in groupby(letters, key=itemgetter(1, 2))]  # fmt: skip
+        runs = groupby(letters, key=itemgetter(1, 2))
+        return [Span("".join(letter.text for letter in run), *look) for look, run in runs]
 
 
 def dots_of(letter: str) -> list[tuple[int, int]]:

@@ -6,20 +6,21 @@ import asyncio
 import os
 import signal
 import sys
+from asyncio.subprocess import DEVNULL, PIPE, STDOUT
 from contextlib import suppress
 from datetime import UTC, datetime
+from functools import partial
+from importlib import import_module
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
 from rig.campaign.machine import Again, GoOn, Note, Notice, Reject, Restore, Stage, StopRequest, Try
-from rig.errors import RigError
 from rig.reasons import notes_in
 from rig.tui.actions import ACTIONS, help_text, shown_key
 from rig.tui.follow import open_live
 from rig.tui.replay import Player
-from rig.tui.survey import session_list
 from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
 from rig.tui.widgets.text import plain
 
@@ -27,8 +28,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from rig.tui.app import RigApp
-    from rig.tui.survey import Beginning, SessionEntry
+    from rig.tui.beginnings import Beginning
+    from rig.tui.survey import SessionEntry
 
+    Work = Coroutine[Any, Any, object] | None
+    """What an action leaves to do in the background."""
 
 REASONS = (
     "touched, or not at rest, before the release",
@@ -38,49 +42,51 @@ REASONS = (
     "a trial that should not count",
 )
 """Frequent reasons to reject a drop within its limits; the operator may type another."""
+_ONLY_ENTER = "only the Enter key arms the release\npress it half a second after any other key"
 
 
 def do(app: RigApp, name: str) -> None:
     """Do an action of the table, which must be possible now.
 
     Actions run synchronously, as their effect depends on the state when the key is handled. Only
-    work that waits for the daemon or files runs in the background, and none of that arms.
+    work that waits for the daemon or files, which they return, runs in the background, and none of
+    that arms.
     """
     if name.startswith("page_"):
         app.turn(name.removeprefix("page_"))
     else:
-        _DO[name](app)
+        app.begin(_DO[name](app))
 
 
-def _go_on(app: RigApp) -> None:
+def _go_on(app: RigApp) -> Work:
     """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp._arm`."""
     stage = app.driver.flow.stage
     if stage is Stage.PREPARE and app.page == "run":
-        app.driver.take(Notice("only the Enter key arms the release\n"
-                               "press it half a second after any other key"))  # fmt: skip
+        app.driver.take(Notice(_ONLY_ENTER))
     elif stage is Stage.PREPARE:
         app.turn("run")
     elif stage is not Stage.PROTOCOL:
         app.driver.take(GoOn(app.model.next_job))
     elif app.page != "protocol":
         app.turn("protocol")
-    elif app.desk.chosen is None:
+    elif (row := app.desk.chosen) is None:
         app.desk.opens_first = True
     else:
-        _BEGIN[app.desk.chosen.kind](app, app.desk.chosen)
+        return _BEGIN[row.kind](app, row)
+    return None
 
 
 # ------------------------------------------------------------------ home
 
 
-def _open(app: RigApp, row: Beginning) -> None:
+def _open(app: RigApp, row: Beginning) -> Work:
     """Open an experiment with the connected rig, or in simulation without a rig."""
     client = app.client
     if client is None or row.file is None:
-        return
+        return None
     if app.desk.reading(row.file).problem:
         app.tell("mend the file in an editor; it is read again by itself")
-        return
+        return None
     session = row.session or app.options.session
     others = app.desk.opened not in {None, row.file}
     if session is None or (row.session is None and (others or row.kind == "try")):
@@ -89,9 +95,8 @@ def _open(app: RigApp, row: Beginning) -> None:
     files = str(row.file.resolve()), str(session.resolve())
     if row.kind == "try" or client.idle or (row.value and not client.up):
         app.driver.asked = files
-        app.begin(client.go_to("sim://", trial=True))
-    else:
-        app.begin(app.driver.open_session(*files, app.options.seed))
+        return client.go_to("sim://", trial=True)
+    return app.driver.open_session(*files, app.options.seed)
 
 
 def _connect(app: RigApp, row: Beginning) -> None:
@@ -105,17 +110,16 @@ def _connect(app: RigApp, row: Beginning) -> None:
 
 
 def _flash(app: RigApp, row: Beginning) -> None:
-    question = "What was on the board is replaced."
-    _confirm(app, "Write the firmware?", question, "flash",
-             lambda: app.begin(_run(app, "flash", "--board", row.value)))  # fmt: skip
+    flash = partial(_run, app, "flash", "--board", row.value)
+    _confirm(app, "Write the firmware?", "What was on the board is replaced.", "flash", flash)
 
 
-def _new(app: RigApp, row: Beginning) -> None:
+def _new(app: RigApp, row: Beginning) -> Work:
     """Draft a protocol under an unused name."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
     name = next(name for name in names if not Path(name).exists())
     written = f"{name} is written: change what differs in your rig; then Enter opens it"
-    app.begin(_run(app, "new", name, "--scene", row.value, "--yes", done=written))
+    return _run(app, "new", name, "--scene", row.value, "--yes", done=written)
 
 
 def _end_other(app: RigApp, row: Beginning) -> None:
@@ -134,35 +138,26 @@ def _end_other(app: RigApp, row: Beginning) -> None:
     _confirm(app, "End it?", question, "end it", end)
 
 
-_BEGIN: dict[str, Callable[[RigApp, Beginning], object]] = {
+_BEGIN: dict[str, Callable[[RigApp, Beginning], Work]] = {
     "try": _open,
     "open": _open,
     "board": _connect,
     "flash": _flash,
     "new": _new,
     "end": _end_other,
-    "results": lambda app, _: app.begin(_sessions(app)),
+    "results": lambda app, _: _sessions(app),
 }
 
 
-def _control(app: RigApp) -> None:
+def _control(app: RigApp) -> Work:
     """Take control, or ask whether to give it back."""
     client = app.client
     assert client is not None
-    if client.driving:
-        question = "Another screen can then take it; this screen keeps watching."
-        _confirm(app, "Give control back?", question, "give it back",
-                 lambda: app.begin(_try_command(app, client.release_control())))  # fmt: skip
-    else:
-        app.begin(_try_command(app, client.take_control()))
-
-
-async def _try_command(app: RigApp, work: Coroutine[Any, Any, Any]) -> None:
-    """Wait for a call to the daemon, and show its error if it fails."""
-    try:
-        await work
-    except RigError as error:
-        app.driver.refuse(error)
+    if not client.driving:
+        return client.take_control()
+    question = "Another screen can then take it; this screen keeps watching."
+    _confirm(app, "Give control back?", question, "give it back", client.release_control)
+    return None
 
 
 def _close(app: RigApp) -> None:
@@ -170,9 +165,9 @@ def _close(app: RigApp) -> None:
     client = app.client
     assert client is not None
 
-    def close() -> None:
+    def close() -> Work:
         app.driver.asked = None
-        app.begin(_try_command(app, client.call("close_session")))
+        return client.call("close_session")
 
     question = "Everything recorded stays in its file. You can continue it later."
     _confirm(app, "Close the session?", question, "close", close)
@@ -186,7 +181,7 @@ def _quit(app: RigApp) -> None:
     _confirm(app, "Quit?", question, "quit", app.exit)
 
 
-def _confirm(app: RigApp, title: str, question: str, yes: str, act: Callable[[], object]) -> None:
+def _confirm(app: RigApp, title: str, question: str, yes: str, act: Callable[[], Work]) -> None:
     app.ask(Confirm(title, question, yes), lambda _: act())
 
 
@@ -217,25 +212,21 @@ async def _sessions(app: RigApp) -> None:
     view = app.desk.other or app.model.view
     own = view.path if view else app.options.session
     folder = own.parent if own else Path()
-    entries = await asyncio.to_thread(session_list, folder)
+    survey = await asyncio.to_thread(import_module, "rig.tui.survey")
+    entries = await asyncio.to_thread(survey.session_list, folder)
     app.turn("history")
     whole = (at for at, entry in enumerate(entries) if not entry.trouble)
-    question = Ask(
-        f"Sessions in {plain(folder.resolve(), 80)}, newest first",
-        choices=[_session_line(entry) for entry in entries],
-        free=False, yes="play", chosen=next(whole, 0),
-    )  # fmt: skip
-    app.ask(question, lambda number: app.begin(_look_at(app, entries[number])))
+    title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
+    lines = [_session_line(entry) for entry in entries]
+    question = Ask(title, choices=lines, free=False, yes="play", chosen=next(whole, 0))
+    app.ask(question, lambda number: _look_at(app, entries[number]))
 
 
 async def _look_at(app: RigApp, entry: SessionEntry) -> None:
     desk, live = app.desk, app.model.view
-    try:
-        own = live is not None and live.path.resolve() == entry.path.resolve()
-        desk.other = None if own else await asyncio.to_thread(open_live(entry.path).read)
-        desk.players["history"] = Player(speed=desk.players["history"].speed)
-    except RigError as error:
-        app.driver.refuse(error)
+    own = live is not None and live.path.resolve() == entry.path.resolve()
+    desk.other = None if own else await asyncio.to_thread(open_live(entry.path).read)
+    desk.players["history"] = Player(speed=desk.players["history"].speed)
 
 
 def _session_line(entry: SessionEntry) -> str:
@@ -257,7 +248,7 @@ def _move(app: RigApp, by: int) -> None:
         app.sheet.scroll_tables(by)
 
 
-def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], None]:
+def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], Work]:
     return lambda app: app.desk.change(app.model, work)
 
 
@@ -270,23 +261,20 @@ def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
     if view is None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
         return
-    target = str(view.path.with_suffix(suffix))
-    _confirm(app, "Write files?", f"{target} will be replaced if it exists.", "write",
-             lambda: app.begin(_run(app, command, str(view.path), option, target)))  # fmt: skip
+    target = view.path.with_suffix(suffix)
+    write = partial(_run, app, command, view.path, option, target)
+    _confirm(app, "Write files?", f"{target} will be replaced if it exists.", "write", write)
 
 
-async def _run(app: RigApp, *command: str, done: str = "") -> None:
+async def _run(app: RigApp, *command: str | Path, done: str = "") -> None:
     """Run a command, and show its result, its files, or its error.
 
     It runs in a separate process, so that its computations do not delay STOP.
     """
     app.tell(f"rig {command[0]}: working …")
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "rig", *command,
-        stdin=asyncio.subprocess.DEVNULL,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.STDOUT,
-    )  # fmt: skip
+        sys.executable, "-m", "rig", *command, stdin=DEVNULL, stdout=PIPE, stderr=STDOUT
+    )
     try:
         output, _ = await process.communicate()
     except asyncio.CancelledError:  # the app quits
@@ -305,8 +293,7 @@ def _reject(app: RigApp) -> None:
     if model.flow.verdict == "rejected":
         verdict, _ = model.flow.judged
         question = f"The drop becomes {verdict} again. The log keeps both verdicts."
-        _confirm(app, "Undo the rejection?", question, "undo",
-                 lambda: app.driver.take(Restore()))  # fmt: skip
+        _confirm(app, "Undo the rejection?", question, "undo", lambda: app.driver.take(Restore()))
         return
 
     question = "Why is this drop rejected?"
@@ -339,8 +326,7 @@ def _unblind(app: RigApp) -> None:
         app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
         return
     question = "This shows all results. It is recorded and cannot be undone."
-    _confirm(app, "Unblind the session?", question, "show results",
-             lambda: app.begin(_try_command(app, client.call("unblind"))))  # fmt: skip
+    _confirm(app, "Unblind the session?", question, "show results", partial(client.call, "unblind"))
 
 
 def _begin_check(app: RigApp) -> None:
@@ -349,14 +335,14 @@ def _begin_check(app: RigApp) -> None:
 
 def _palette(app: RigApp) -> None:
     """Search the actions that are possible now."""
-    actions = [action for action in ACTIONS
-               if action.name != "palette" and app.possible(action)]  # fmt: skip
+    possible = filter(app.possible, ACTIONS)
+    actions = [action for action in possible if action.name != "palette"]
     lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
     question = Ask("Search commands", choices=lines, free=False, yes="run", chosen=0)
     app.ask(question, lambda number: app.action_do(actions[number].name))
 
 
-_DO: dict[str, Callable[[RigApp], object]] = {
+_DO: dict[str, Callable[[RigApp], Work]] = {
     "stop": lambda app: app.driver.take(StopRequest()),
     "reject": _reject,
     "note": _note,
@@ -375,7 +361,7 @@ _DO: dict[str, Callable[[RigApp], object]] = {
     "control": _control,
     "close": _close,
     "release_test": _try_release,
-    "sessions": lambda app: app.begin(_sessions(app)),
+    "sessions": _sessions,
     "play": _change(Player.toggle_play),
     "earlier": _change(lambda player, end_s: player.step_time(-1, end_s)),
     "later": _change(lambda player, end_s: player.step_time(1, end_s)),

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from textual.content import Content
 
+from rig.tui.beginnings import HERE, first_row, read_file
 from rig.tui.replay import Player, end_of
-from rig.tui.survey import HERE, first_row, read_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
     from rig.records import Job
     from rig.results.live import SessionView
+    from rig.tui.beginnings import Beginning, ProtocolFile
     from rig.tui.context import Options
     from rig.tui.model import Model
     from rig.tui.plotting import Picture
     from rig.tui.scale import Drawing
-    from rig.tui.survey import Beginning, ProtocolFile
 
 T = TypeVar("T")
 REPLAY_S = 6.0

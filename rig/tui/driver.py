@@ -75,12 +75,8 @@ class Driver:
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
         assert self._client is not None
-        try:
-            await self._client.call("open_session", protocol=protocol, session=session, seed=seed)
-        except RigError as error:
-            self.refuse(error)
-        else:
-            self.asked = protocol, session
+        await self._client.call("open_session", protocol=protocol, session=session, seed=seed)
+        self.asked = protocol, session
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
         """Carry out an effect, and handle the resulting event."""
@@ -97,19 +93,17 @@ class Driver:
                 case campaign.Wait(seconds):
                     await client.call("wait", seconds=seconds)
                 case campaign.ArmRelease(job):
-                    answer = await client.call("arm", run=job.run, attempt=job.attempt)
+                    answer = await client.call("arm", **job._asdict())
                     token = int(answer["token"])
                 case campaign.FireRelease(armed):
                     await client.call("fire", token=armed)
                 case campaign.Drive():
                     await client.call("test_release")
                 case campaign.Collect(job):
-                    await client.call("collect", run=job.run, attempt=job.attempt)
+                    await client.call("collect", **job._asdict())
                 case campaign.Log(job, state, reasons):
-                    await client.call(
-                        "log_state", run=job.run, attempt=job.attempt, state=state,
-                        reasons=[reason.record() for reason in reasons],
-                    )  # fmt: skip
+                    records = [reason.record() for reason in reasons]
+                    await client.call("log_state", **job._asdict(), state=state, reasons=records)
                 case campaign.Judge(job):
                     result = (await self._follower.read()).results[job]
                     row = self._follower.voids.row

@@ -51,7 +51,7 @@ class Indicators:
     @classmethod
     def of(cls, channels: tuple[int, ...]) -> Indicators:
         """Return unchecked gates of unknown state."""
-        return cls(tuple(Indicator(channel) for channel in channels))
+        return cls(tuple(map(Indicator, channels)))
 
     @property
     def blocked_channels(self) -> tuple[int, ...]:

@@ -52,6 +52,8 @@ def drop_pictures(view: SessionView, job: Job) -> list[Picture]:
 def session_pictures(view: SessionView) -> Iterator[tuple[Picture, str]]:
     """Yield figures of results and of runs in order (for drifts), each with its caption."""
     analysis, gravity = view.analysis, view.protocol.gravity.value
-    for chart in (result_figure(analysis, view.curves, site_m_s2=gravity),
-                  runs_figure(analysis, view.protocol.accept.release_skew)):  # fmt: skip
+    for chart in (
+        result_figure(analysis, view.curves, site_m_s2=gravity),
+        runs_figure(analysis, view.protocol.accept.release_skew),
+    ):
         yield from ((picture, chart.caption) for picture in pictures_of(chart) if chart)

@@ -27,9 +27,8 @@ if TYPE_CHECKING:
 _COLORS = ("border", "foreground", "accent", "warning", "secondary", "primary", "success", "error")
 """Colours of traces; the last is drawn above the others."""
 _COLOR_OF = {MODEL: "accent", SECOND: "secondary", MUTED: "foreground"}
-_ROLES = {"band": "⣿", "line": "⠒", "dash": "⠒", "thick": "⠒", "level": "⠒", "limit": "⠒",
-          "shade": "⠒", "points": "+", "cross": "×", "mean": "●", "ring": "○",
-          "square": "●"}  # fmt: skip
+_ROLES = dict.fromkeys(("line", "dash", "thick", "level", "limit", "shade"), "⠒")
+_ROLES |= {"band": "⣿", "points": "+", "cross": "×", "mean": "●", "ring": "○", "square": "●"}
 """Marks of the roles that are drawn: of a shade its edges; of gaps, maps and words nothing."""
 _TICK_COLUMNS, _TICK_ROWS = 9, 2
 """Least number of characters between numbers on an axis."""
@@ -224,7 +223,7 @@ def _draw(sheet: Sheet, trace: Trace, x: CellAxis, y: CellAxis) -> None:
     shape = _SHAPES.get(_ROLES[trace.role])
     if shape is not None:
         places = np.rint(places[np.isfinite(places).all(axis=1)])
-        sheet.dots((places[:, None] + np.array(shape, dtype=np.float64)).reshape(-1, 2), ink)
+        sheet.dots((places[:, None] + np.array(shape)).reshape(-1, 2), ink)
     elif not len(off):
         sheet.strokes(np.stack([places[:-1], places[1:]], axis=1), ink)
 

@@ -1,4 +1,7 @@
-"""Survey for the home page: sessions and protocols of the folder, ready protocols, boards."""
+"""Survey for the home page: sessions and protocols of the folder, ready protocols, boards.
+
+It needs more of the program than the first paint, so it is loaded when a survey is made.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +10,21 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.errors import InputError, RigError
+from rig.errors import RigError
 from rig.files import file_stamp
-from rig.protocol import reader
-from rig.protocol.measurable import check_gates, check_recordable
-from rig.tui.widgets.text import plain
+from rig.flash.drive import waiting_drives
+from rig.protocol.plan import runs
+from rig.ready import ready_protocols
+from rig.results import protocol_of
+from rig.session.store import Session
+from rig.tui.beginnings import HERE, Beginning
+from rig.usb.listing import serial_ports
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from rig.protocol.protocol import Protocol
     from rig.tui.context import Options
 
-HERE = "Experiments here"
 _MOST = 200
 """Number of session files listed, the newest first."""
 _SCENES = """\
@@ -56,36 +61,6 @@ class SessionEntry(NamedTuple):
     trouble: str = ""
 
 
-class ProtocolFile(NamedTuple):
-    """A protocol, and the fault of its file; empty if it can be used."""
-
-    protocol: Protocol | None
-    problem: str = ""
-
-
-class Beginning(NamedTuple):
-    """A row of the home page.
-
-    Attributes
-    ----------
-    kind
-        Action: ``try``, ``open``, ``board``, ``flash``, ``new``, ``results`` or ``end``.
-    file
-        The protocol to open, or to show as a picture.
-    value
-        Port of a board, or name of a scene or of a board to flash.
-    session
-        The session file to continue.
-    """
-
-    section: str
-    kind: str
-    title: str
-    file: Path | None = None
-    value: str = ""
-    session: Path | None = None
-
-
 def look_around(options: Options, port: str, other: str) -> list[Beginning]:
     """Return the rows of the home page from the folder, ready protocols and USB devices.
 
@@ -96,12 +71,10 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
     other
         Port of a daemon that blocks the wanted one; empty for none.
     """
-    from rig.ready import ready_protocols  # noqa: PLC0415 - not needed to paint
-
     ready = [*ready_protocols().values()]
     own = [*options.files, *sorted(Path().glob("[!.]*.yaml"))]
     files = [*{path.resolve(): path for path in own if path.resolve() not in ready}.values()]
-    named = {path.name: path for path in (*ready, *files)}
+    named = {path.name: path for path in ready + files}
     scenes = [
         Beginning(section, kind, title, named.get(f"{name}.yaml"), value)
         for row in _SCENES.splitlines()
@@ -139,24 +112,7 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
     ]
 
 
-def first_row(rows: list[Beginning], options: Options) -> int:
-    """Return the row to select first: a blocking daemon, unfinished session, file or trial."""
-    for at, row in enumerate(rows):
-        if row.kind == "end":
-            return at
-    sections = "Continue" * (not options.port), HERE, "Ready experiments"
-    places = [
-        (bool(read_file(row.file).problem), sections.index(row.section), at)
-        for at, row in enumerate(rows)
-        if row.section in sections and row.file and (row.session or row.file in options.files)
-    ]
-    return min(places, default=(False, 0, 0))[2]
-
-
 def _boards() -> Iterator[Beginning]:
-    from rig.flash.drive import waiting_drives  # noqa: PLC0415 - not needed to paint
-    from rig.usb.listing import serial_ports  # noqa: PLC0415 - nor is this
-
     for _ in waiting_drives():
         title = "Pico: put the firmware on it"
         yield Beginning("Connect a board", "flash", title, value="pico")
@@ -164,19 +120,6 @@ def _boards() -> Iterator[Beginning]:
         if port.candidate:
             title = f"{port.kind} at {port.path}"
             yield Beginning("Connect a board", "board", title, value=port.path)
-
-
-def read_file(file: Path) -> ProtocolFile:
-    """Return a protocol, or the fault of its file with the line."""
-    protocol = None
-    try:
-        protocol = reader.read(file)
-        check_gates(protocol)
-        check_recordable(protocol)
-    except InputError as error:
-        lines = [plain(problem, 300) for problem in error.problems]
-        return ProtocolFile(protocol, "\n".join(lines or [plain(error.message), plain(error.hint)]))
-    return ProtocolFile(protocol)
 
 
 def session_list(folder: Path) -> list[SessionEntry]:
@@ -190,10 +133,6 @@ def session_list(folder: Path) -> list[SessionEntry]:
 
 @lru_cache(maxsize=_MOST)  # the home page lists them repeatedly
 def _look(path: Path, _: object) -> SessionEntry:
-    from rig.protocol.plan import runs  # noqa: PLC0415 - not needed to paint
-    from rig.results import protocol_of  # noqa: PLC0415 - nor is this
-    from rig.session.store import Session  # noqa: PLC0415 - nor is this
-
     try:
         with Session.open(path, readonly=True) as session:
             protocol, source = protocol_of(session), Path(session.protocol_source).name

@@ -22,9 +22,12 @@ def hang(chain: Chain) -> World:
     """Hang a chain, at the moment of its release."""
     bodies = _bodies(chain)
     return World(
-        bodies, _strings(chain, bodies), _ground(chain, bodies), _neighbours(chain, bodies),
+        bodies,
+        _strings(chain, bodies),
+        _ground(chain, bodies),
+        _neighbours(chain, bodies),
         _record(chain),
-    )  # fmt: skip
+    )
 
 
 def stable_step(chain: Chain) -> float:
@@ -53,7 +56,7 @@ def gaps(world: World) -> Numbers:
     bodies, ground = world.bodies, world.ground
     normal = np.array(ground.normal)
     edges = bodies.place - np.array(
-        [rim(bodies, ground.normal, k) for k in range(len(bodies.mass))]
+        [rim(bodies, ground.normal, k) for k in range(bodies.mass.size)]
     )
     return np.asarray(edges @ normal - np.abs(bodies.axis @ normal) * bodies.half - ground.level)
 
@@ -74,24 +77,21 @@ def _bodies(chain: Chain) -> Bodies:
     mass[: chain.held], gravity[: chain.held] = _FIXED, 0.0
     half = np.full(mass.size, rods.length / 2.0)
     across = mass * (half**2 * (12.0 * rods.inertia) / 3.0 + radius**2 / 4.0)
-    axis = np.stack(
-        [np.cos(rods.tilts) * np.cos(rods.yaws), np.cos(rods.tilts) * np.sin(rods.yaws),
-         np.sin(rods.tilts)], axis=1,
-    )  # fmt: skip
+    level = np.cos(rods.tilts)
+    axis = np.stack([level * np.cos(rods.yaws), level * np.sin(rods.yaws), np.sin(rods.tilts)], 1)
     place, velocity, turning, force, torque, foreseen, turns = np.zeros((7, mass.size, 3))
     place[:, 1] = rods.aside
     place[:, 2] = chain.start + rods.heights
     if chain.swing is not None:
         velocity[:, 1] = chain.swing
     turning[:, 2] = chain.spin
-    along = (turning * axis).sum(axis=1)[:, None]
-    return Bodies(
-        place, velocity, axis, across[:, None] * (turning - along * axis), force, torque,
-        foreseen, turns, mass, radius, half, across,
-        float(rods.rolling) / (mass * radius**2 / 2.0) - 1.0 / across,
-        np.zeros(mass.size) if chain.drag is None else np.array(chain.drag, float), gravity,
-        2.0 + 1.0 / rods.end_mass,
-    )  # fmt: skip
+    along = (turning * axis).sum(1, keepdims=True)
+    spin = across[:, None] * (turning - along * axis)
+    motion = place, velocity, axis, spin, force, torque, foreseen, turns
+    roll = float(rods.rolling) / (mass * radius**2 / 2.0) - 1.0 / across
+    drag = np.zeros(mass.size) if chain.drag is None else np.array(chain.drag, float)
+    ease = 2.0 + 1.0 / rods.end_mass
+    return Bodies(*motion, mass, radius, half, across, roll, drag, gravity, ease)
 
 
 def _strings(chain: Chain, bodies: Bodies) -> StringPairs:
@@ -108,14 +108,11 @@ def _stiffness(rods: Rods, mass: Numbers, bounce: Bounce) -> Numbers:
 def _ground(chain: Chain, bodies: Bodies) -> Ground:
     count = bodies.mass.size
     if chain.board is None:
-        nothing = np.zeros(count), np.zeros((count, 2))
-        return Ground((0.0, 0.0, 1.0), -math.inf, 0.0, 0.0, *nothing)
-    bounce = chain.board.bounce
-    return Ground(
-        _normal(chain.board), -_contact(chain, chain.board), bounce.friction,
-        damping(bounce.restitution), _stiffness(chain.rods, bodies.mass, bounce),
-        np.zeros((count, 2)),
-    )  # fmt: skip
+        return Ground((0.0, 0.0, 1.0), -math.inf, 0.0, 0.0, np.zeros(count), np.zeros((count, 2)))
+    bounce, level = chain.board.bounce, -_contact(chain, chain.board)
+    losses = bounce.friction, damping(bounce.restitution)
+    stiffness = _stiffness(chain.rods, bodies.mass, bounce)
+    return Ground(_normal(chain.board), level, *losses, stiffness, np.zeros((count, 2)))
 
 
 def _normal(board: Board) -> tuple[float, float, float]:
@@ -145,9 +142,8 @@ def _neighbours(chain: Chain, bodies: Bodies) -> Neighbours:
 
 def _record(chain: Chain) -> Record:
     count = chain.rods.masses.size
-    nothing = np.zeros(count)
-    unknown = np.full(count, math.nan)
-    return Record(
-        np.full(count, math.inf), unknown, nothing, nothing.copy(), unknown.copy(), nothing.copy(),
-        np.zeros(AIR + 1), np.zeros(3), np.zeros(3), np.zeros(1), np.full(1, math.nan),
-    )  # fmt: skip
+    touched = np.full(count, math.inf)
+    height, after = np.full((2, count), math.nan)
+    pulled, before, since = np.zeros((3, count))
+    whole = np.zeros(AIR + 1), np.zeros(3), np.zeros(3), np.zeros(1), np.full(1, math.nan)
+    return Record(touched, height, pulled, before, after, since, *whole)

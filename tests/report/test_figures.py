@@ -19,7 +19,7 @@ from rig.measurands import SEPARATION
 from rig.predictions import predict_incline
 from rig.protocol import reader
 from rig.protocol.protocol import Run
-from rig.report.canvas import KINDS, drawing_file, figure_file, style, write_figures
+from rig.report.canvas import KINDS, figure_file, write_figures
 from rig.report.falls import fall_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
 from rig.report.figures import (
@@ -30,7 +30,7 @@ from rig.report.figures import (
     variance_shares,
 )
 from rig.report.looks import COLORS, PARTS
-from rig.report.plot import page_svg, plot
+from rig.report.plot import drawing_file, page_svg, plot, style
 from sim.dials import Dials
 from tests.analysis.drops import PROTOCOLS, UNIFORM, case
 from tests.analysis.test_datum_board import BOARD_GRADED

@@ -57,7 +57,7 @@ def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
 
 def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("rig.flash.drive.waiting_drives", lambda: [tmp_path])
+    monkeypatch.setattr("rig.tui.survey.waiting_drives", lambda: [tmp_path])
     asked = []
 
     async def record(_, *command, done=""):

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from rig.tui.replay import Player
     from rig.tui.scale import Drawing
 
-_DONE = {Stage.SETTLING: 2, Stage.ARMING: 3, Stage.COUNTDOWN: 3, Stage.FIRING: 3, Stage.LIVE: 3,
-         Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}  # fmt: skip
+_DONE = dict.fromkeys((Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING, Stage.LIVE), 3)
+_DONE |= {Stage.SETTLING: 2, Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}
 """Number of completed steps, by stage."""
 _REMEDIES = 2
 """Most instructions shown at once; others follow when these are done."""
@@ -109,10 +109,12 @@ def verdict_words(model: Model) -> Content:
     replaced = model.previous
     if verdict not in GOOD and replaced is not None:
         lines += [
-            Content(f"  Only the latest attempt counts: attempt {replaced.attempt} was good, "
-                    f"but run {model.job.run} has no result now."),
+            Content(
+                f"  Only the latest attempt counts: attempt {replaced.attempt} was good, "
+                f"but run {model.job.run} has no result now."
+            ),
             Content("  → press a to repeat it before you change anything at the rig"),
-        ]  # fmt: skip
+        ]
     if model.blind:
         lines.append(Content("  BLIND: results are hidden until you unblind the session"))
     if verdict == "void":
@@ -138,8 +140,9 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     seen = until(edges, hz, player.time_s) if begun else edges
     indicators = indicators_at(view.channels, drop, seen)
     run, recorded = view.plan[job.run], (drop, hz, view.results[job])
-    falls = desk.latest("moment", (view.path, job, hz),
-                        lambda: motions(view.protocol, run, recorded))  # fmt: skip
+    falls = desk.latest(
+        "moment", (view.path, job, hz), lambda: motions(view.protocol, run, recorded)
+    )
     key = view.path, view.reading, job, width
     pictures = desk.latest(
         "figures", key[:3], lambda: drop_pictures(view, job) or fall_pictures(falls)
@@ -171,7 +174,9 @@ def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason
             f"  run {job.run}, attempt {job.attempt} · {plain(what, 40)} · ",
             (f"{LOOKS[verdict][0]} {verdict}", LOOKS[verdict][1]),
         ),
-        Content(f"{state} at {player.speed:.3g} × real speed, t = {player.time_s * 1e3:.0f} ms · "
-                f"{plain(view.path.name, 60)}{'  ▲ SIMULATED' * view.simulated}"),
+        Content(
+            f"{state} at {player.speed:.3g} × real speed, t = {player.time_s * 1e3:.0f} ms · "
+            f"{plain(view.path.name, 60)}{'  ▲ SIMULATED' * view.simulated}"
+        ),
         *(Content(f"note: {plain(text, 160)}") for text in notes_in(reasons)),
-    ]  # fmt: skip
+    ]

@@ -19,10 +19,10 @@ from rig.tui.widgets.text import link_action, plain
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
+    from rig.tui.beginnings import Beginning
     from rig.tui.desk import Desk
     from rig.tui.model import Model
     from rig.tui.scale import Drawing
-    from rig.tui.survey import Beginning
 
 _FALLEN = 0.7  # share of the fall shown in small pictures
 _DOES = {
@@ -42,8 +42,8 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     """Return the home page: possible beginnings, or the protocol of the open session."""
     del width
     if model.flow.stage is not Stage.PROTOCOL and model.protocol is not None:
-        return Face(Content(""), _picture(desk, model.protocol),
-                    words=_description(desk, model.protocol), top=True)  # fmt: skip
+        words = _description(desk, model.protocol)
+        return Face(Content(""), _picture(desk, model.protocol), words=words, top=True)
     row = desk.chosen
     if row is None:
         return Face(Content("looking around …"))
@@ -70,11 +70,8 @@ def _menu(desk: Desk) -> Content:
     for section, group in groupby(enumerate(desk.rows), key=lambda row: row[1].section):
         lines.append(Content.styled(section, "bold $foreground 70%"))
         for at, row in group:
-            chosen = row is desk.chosen
-            text = Content.assemble(
-                (f"{'▸' if chosen else ' '} {plain(row.title, 30)}",
-                 "bold $primary" if chosen else ""),
-            )  # fmt: skip
+            mark, style = ("▸", "bold $primary") if row is desk.chosen else (" ", "")
+            text = Content.styled(f"{mark} {plain(row.title, 30)}", style)
             lines.append(link_action(text, f"app.choose({at})"))
     return Content("\n").join(lines)
 

@@ -32,17 +32,19 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     key, summary = (view.path, view.reading), view.analysis.summary
     means = desk.latest("means", key, lambda: _table(tables("means", summary)))
     drops = desk.latest(
-        "drops", key,
-        lambda: _table([*means_parts(summary), *scatter_parts(summary),
-                        *tables("runs", view.analysis.runs)]),
-    )  # fmt: skip
-    head = Content("\n").join([_progress(model), Content(means)])
-    shown = desk.latest("charts", (view.path, view.reading), lambda: [*session_pictures(view)])
+        "drops",
+        key,
+        lambda: _table(
+            [*means_parts(summary), *scatter_parts(summary), *tables("runs", view.analysis.runs)]
+        ),
+    )
+    head = Content("\n").join([_progress(model), means])
+    shown = desk.latest("charts", key, lambda: [*session_pictures(view)])
     turned = desk.chart % max(1, len(shown))
     pictures = [*shown[turned:], *shown[:turned]]
     foot = pictures[0][1] if pictures else ""
-    return Face(head, pictures=[picture for picture, _ in pictures], foot=Content(foot), beside=2,
-                words=Content(drops))  # fmt: skip
+    drawn = [picture for picture, _ in pictures]
+    return Face(head, pictures=drawn, foot=Content(foot), beside=2, words=drops)
 
 
 def _progress(model: Model) -> Content:
@@ -58,13 +60,17 @@ def _progress(model: Model) -> Content:
     remaining = f" · about {duration(left_s)} left" * bool(left_s)
     session = plain(Path(str(model.state.section("session").get("path", ""))).name, 60)
     return Content.assemble(
-        (f"{over} of {len(runs)} runs", "bold"), f"{remaining}  ", (session, "$foreground 70%"),
-        _fit_words(model), "\n", *_marks(model),
-    )  # fmt: skip
+        (f"{over} of {len(runs)} runs", "bold"),
+        f"{remaining}  ",
+        (session, "$foreground 70%"),
+        _fit_words(model),
+        "\n",
+        *_marks(model),
+    )
 
 
-def _table(parts: Iterable[Part]) -> str:
-    return "\n".join(line for part in parts for line in part.lines if line)
+def _table(parts: Iterable[Part]) -> Content:
+    return Content("\n".join(line for part in parts for line in part.lines if line))
 
 
 def _fit_words(model: Model) -> tuple[str, str]:

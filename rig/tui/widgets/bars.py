@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rig.tui.model import Model
 
 LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
-PAGES = {"protocol": "home", "device": "device", "run": "run", "result": "result",
-         "session": "session", "history": "history"}  # fmt: skip
+_NAMED = "device", "run", "result", "session", "history"
+PAGES = {"protocol": "home", **{page: page for page in _NAMED}}
 """Pages by name, with the text of their tabs."""
 KEYS_SHOWN = 4
 _OF_PAGE = {
@@ -76,17 +76,20 @@ def headline(model: Model, width: int) -> Content:
     if model.offline or model.idle:
         link = "file only" if model.offline else "no rig yet"
     right_side = f"{plain(model.port, 24)}  {link}" if model.port else link
-    stamp = " ▲ SIMULATED " if model.simulated else ""
-    blind = " BLIND " if model.blind else ""
+    stamp = " ▲ SIMULATED " * model.simulated
+    blind = " BLIND " * model.blind
     name = PAGES.get(model.page, model.page).upper()
     title = model.state.section("session").get("title") or (
-        model.protocol.title if model.protocol else "chainrig")  # fmt: skip
+        model.protocol.title if model.protocol else "chainrig"
+    )
     room = width - len(name) - len(stamp) - len(blind) - len(right_side) - 3
     return Content.assemble(
-        (name, "bold $primary"), "  ", plain(title, max(1, room)).ljust(room),
-        (stamp, "bold $background on $warning"), (blind, "bold $background on $accent"),
-        " ", right_side,
-    )  # fmt: skip
+        (f"{name}  ", "bold $primary"),
+        plain(title, max(1, room)).ljust(room),
+        (stamp, "bold $background on $warning"),
+        (blind, "bold $background on $accent"),
+        f" {right_side}",
+    )
 
 
 class StopLine(Words):

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from rig.protocol.protocol import SIDES
+
 if TYPE_CHECKING:
     from rig.protocol.protocol import Gate, Protocol
     from rig.tui.indicators import Indicators
@@ -21,14 +23,16 @@ def board(
     """Return a line for each gate, the highest first; both sides side by side if they fit."""
     if protocol is None or protocol.gates is None:
         return [Content("no gates in this scene")]
-    sides = [sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
-             for side in ("impact", "free")]  # fmt: skip
+    sides = [sorted(protocol.gates.on(side), key=lambda gate: -gate.height) for side in SIDES]
     titles = ("impact side", "free side") if protocol.vocabulary.two_sides else ("gates",) * 2
     columns = [
-        [Content.styled(title.ljust(_WIDE), "bold"),
-         *(_line(gate, indicators, now_s) for gate in gates)]
-        for title, gates in zip(titles, sides, strict=True) if gates
-    ]  # fmt: skip
+        [
+            Content.styled(title.ljust(_WIDE), "bold"),
+            *(_line(gate, indicators, now_s) for gate in gates),
+        ]
+        for title, gates in zip(titles, sides, strict=True)
+        if gates
+    ]
     if width < _WIDE * len(columns):
         return [line for column in columns for line in column]
     blank = Content(" " * _WIDE)
@@ -40,8 +44,9 @@ def _line(gate: Gate, indicators: Indicators, now_s: float) -> Content:
     lamp = next((lamp for lamp in indicators.gates if lamp.channel == gate.channel), None)
     symbol, color, word, quiet = "?", "", "unknown", ""
     if lamp is not None and indicators.known:
-        symbol, color, word = ("●", "$warning", "BLOCKED") if lamp.blocked else (
-            "○", "$success", "clear")  # fmt: skip
+        symbol, color, word = (
+            ("●", "$warning", "BLOCKED") if lamp.blocked else ("○", "$success", "clear")
+        )
         works = "works ✓" if gate.channel in indicators.checked else ""
         quiet = works if lamp.steady(now_s) else "moving"
         quiet = "FLICKERS" if lamp.flickers(now_s) else quiet
@@ -54,6 +59,6 @@ def label(model: Model, channel: int) -> str:
     """Return the name of a channel's gate."""
     for gate in model.protocol.gates.gates if model.protocol and model.protocol.gates else ():
         if gate.channel == channel:
-            side = f"{gate.side} side, " if model.words.two_sides else ""
+            side = f"{gate.side} side, " * model.words.two_sides
             return f"channel {channel}: {side}{gate.height * 1e3:.1f} mm"
     return f"channel {channel}, which the protocol does not use"

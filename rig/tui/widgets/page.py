@@ -46,8 +46,8 @@ class Page(Vertical):
 
     def show(self, face: Face, desk: Desk, *, fresh: bool) -> None:
         """Draw a page's content; `fresh` if another page was shown before."""
-        for name, content in (("head", face.head), ("list", face.menu), ("words", face.words),
-                              ("foot", face.foot)):  # fmt: skip
+        contents = {"head": face.head, "list": face.menu, "words": face.words, "foot": face.foot}
+        for name, content in contents.items():
             words = self.query_one(f"#{name}", Words)
             words.say(content)
             words.display = bool(content.plain)
@@ -65,8 +65,7 @@ class Page(Vertical):
         columns, lines = self.app.size
         room = 3 if columns >= _WIDE else 2 if columns >= _NORMAL else 1
         room = max(1, room + 1 - face.beside)
-        there = {"drawing": face.drawing is not None, "plots": bool(face.pictures),
-                 "tables": bool(face.words.plain)}  # fmt: skip
+        there = {"drawing": face.drawing, "plots": face.pictures, "tables": face.words.plain}
         order = ("tables", "drawing", "plots") if face.top else tuple(there)
         parts = [part for part in order if there[part]]
         turned = desk.part % len(parts) if len(parts) > room else 0

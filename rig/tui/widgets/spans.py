@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 class SpanView(Widget):
     """Widget that shows lines of spans, for content that changes many times a second."""
 
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002
-        super().__init__(id=id)
-        self._rows: Sequence[Sequence[Span]] = []
-        self._plain = Style()
+    _rows: Sequence[Sequence[Span]] = ()
+    _plain = Style()
 
     def take(self, rows: Sequence[Sequence[Span]]) -> None:
         """Show other lines."""
