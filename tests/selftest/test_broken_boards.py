@@ -27,7 +27,7 @@ def board_of(kind, monkeypatch):
 @pytest.mark.parametrize(("check", "code", "kind"), BROKEN)
 def test_a_broken_board_is_found_out(check, code, kind, monkeypatch):
     port = port_of(board_of(kind, monkeypatch))
-    findings = selftest(port, port.clock, SelftestOptions(GATE, 5, True, 0xFFFF))
+    findings = selftest(port, SelftestOptions(GATE, 5, True, 0xFFFF))
     finding = next(one for one in findings if one.name == check)
     assert finding.verdict is Verdict.FAILED, str(finding)
     assert finding.reason.code == code
