@@ -45,19 +45,22 @@ def _program() -> str:
     return quote(installed if here.startswith(os.pardir) else here)
 
 
-_PAIRS = re.compile(
-    r"(?<=\0--map\0)(?:(?!-)[^\0]*\0)*(?!-)[^\0]*=(?:[^\0]+|\0(?!-)[^\0]*)?(?:\0,(?=\0|$))?"
-)
-"""Words after ``--map``, up to the next option: to the last "=", the channel behind it and a comma.
-A file's name may follow."""
-
-
 def _join_pairs(typed: Sequence[str]) -> list[str]:
     """Make a single word of the pairs after ``--map``, whatever blanks were typed."""
-    line = "\0".join(typed).replace("\0--map=", "\0--map\0")
-    if "\0--map\0" not in line:
-        return [*typed]
-    return _PAIRS.sub(lambda pairs: pairs[0].replace("\0", " "), line).split("\0")
+    words = []
+    for word in typed:
+        words += word.split("=", 1) if word.startswith("--map=") else [word]
+    if "--map" not in words:
+        return words
+    first = words.index("--map") + 1
+    end = next((n for n in range(first, len(words)) if words[n].startswith("-")), len(words))
+    # A file's name may follow: the pairs end with the last "=" and the channel behind it.
+    signs = [n for n in range(first, end) if "=" in words[n]]
+    if signs:
+        last = min(end, signs[-1] + 1 + words[signs[-1]].endswith("="))
+        last += words[last : last + 1] == [","]
+        words[first:last] = [" ".join(words[first:last])]
+    return words
 
 
 class Parser(argparse.ArgumentParser):
@@ -172,7 +175,8 @@ def _number(text: str) -> int | str:
 def _matching_commands(words: Sequence[str]) -> list[Command]:
     """Return the commands that words may name: that of the first one, else all."""
     every = [*COMMANDS.values()]
-    return [each for each in every if each.name.split()[:1] == [*words[:1]]] or every
+    named = [command for command in every if command.name.split()[:1] == [*words[:1]]]
+    return named or every
 
 
 def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] = ()) -> Parser:
