@@ -1,5 +1,6 @@
 """What the screens are told: typed, and not changed under them."""
 
+import copy
 from pathlib import Path
 
 from rig.campaign.machine import Flow, Stage
@@ -25,6 +26,16 @@ def test_what_the_daemon_does_not_know_is_not_known():
     assert state.blocked_mask is None
     assert (state.runs, state.edges, state.holder) == ((), (), None)
     assert DaemonState().n < 0 <= state.n
+
+
+def test_a_state_once_taken_never_changes():
+    replica = Replica()
+    replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
+    taken = read_state(replica.n, replica.state)
+    as_it_was = copy.deepcopy(taken)
+    changes = {"set": {"gates": {"blocked": 9}}, "runs": [RUN | {"state": "void"}]}
+    replica.follow("change", {"n": 8, "edges": [[1, 2, 1]], **changes})
+    assert taken == as_it_was != read_state(replica.n, replica.state)
 
 
 def test_indicators_count_name_and_judge_steadiness():
