@@ -8,7 +8,7 @@ from rig.daemon.replica import Replica
 from rig.tui.client import ReconnectingClient
 from rig.tui.follow import _back
 from rig.tui.indicators import Indicators
-from rig.tui.model import Model
+from rig.tui.model import Model, alarm
 from rig.tui.state import DaemonState, read_state
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
@@ -59,6 +59,21 @@ def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
 
 def _model(state=None, **more):
     return Model(read_state(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
+
+
+def test_what_is_wrong_is_said_with_what_to_do():
+    assert alarm(_model()) is None
+    for stage, begun in ((Stage.PROTOCOL, False), (Stage.PREPARE, True)):
+        gone = alarm(Model(DaemonState(), Flow(stage), Indicators(), silence="it is gone"))
+        assert "it is gone" in gone.message
+        assert ("supply" in gone.hint) == begun, "nothing of ours can fall before that"
+    lost = alarm(
+        _model({"link": {"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}})
+    )
+    assert "[unplugged" in lost.message
+    assert "cable" in lost.hint
+    failed = alarm(_model({"error": {"message": "disk full", "hint": "make room"}}))
+    assert failed == ("disk full", "make room")
 
 
 def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
