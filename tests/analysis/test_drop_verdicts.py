@@ -3,7 +3,9 @@
 import json
 import random
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from bench.studies.layout_catalogue import KINDS, under
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
+from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
 from rig.protocol.protocol import Accept
 from rig.protocol.reader import parse
@@ -276,3 +279,17 @@ def test_a_session_of_void_drops_has_no_summary():
     assert "summary_with_rejected" not in found.json()
     assert analyze(SINGLE, [], scale).json() == {"runs": [], "summary": []}
     assert first_run(SINGLE, None) == 1
+
+
+@pytest.mark.parametrize(("share", "pushed"), [(0.9, False), (1.1, True)])
+def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
+    u = 0.5 * 4.0  # of the unknown in its own units, and one of these
+    fit = SimpleNamespace(
+        model=SimpleNamespace(
+            protocol=UNIFORM,
+            unknowns={"drag": slice(0, 1)},
+            kappa=lambda _x: -share * _SURE * u,
+        ),
+        estimate=SimpleNamespace(x=[0.0], inverse=np.array([[0.5]]), sd=[4.0], scatter=1.0),
+    )
+    assert bool(_air(fit)["air_accelerates"]) == pushed
