@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any, NoReturn
 
-    from rig.command_page import Command
-
 _NAMED = rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))"
 """A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""
 
@@ -45,19 +43,20 @@ def _program() -> str:
     return quote(installed if here.startswith(os.pardir) else here)
 
 
-_PAIRS = re.compile(
-    r"(?<=\0--map\0)(?:(?!-)[^\0]*\0)*(?!-)[^\0]*=(?:[^\0]+|\0(?!-)[^\0]*)?(?:\0,(?=\0|$))?"
-)
-"""Words after ``--map``, up to the next option: to the last "=", the channel behind it and a comma.
-A file's name may follow."""
-
-
 def _join_pairs(typed: Sequence[str]) -> list[str]:
     """Make a single word of the pairs after ``--map``, whatever blanks were typed."""
-    line = "\0".join(typed).replace("\0--map=", "\0--map\0")
-    if "\0--map\0" not in line:
-        return [*typed]
-    return _PAIRS.sub(lambda pairs: pairs[0].replace("\0", " "), line).split("\0")
+    words = []
+    for word in typed:
+        words += word.split("=", 1) if word.startswith("--map=") else [word]
+    first = words.index("--map") + 1 if "--map" in words else len(words)
+    end = next((n for n in range(first, len(words)) if words[n].startswith("-")), len(words))
+    # A file's name may follow: the pairs end with the last "=" and the channel behind it.
+    signs = [n for n in range(first, end) if "=" in words[n]]
+    if signs:
+        last = min(end, signs[-1] + 1 + words[signs[-1]].endswith("="))
+        last += words[last : last + 1] == [","]
+        words[first:last] = [" ".join(words[first:last])]
+    return words
 
 
 class Parser(argparse.ArgumentParser):
@@ -169,12 +168,6 @@ def _number(text: str) -> int | str:
     return int(text) if text.isdecimal() else text
 
 
-def _matching_commands(words: Sequence[str]) -> list[Command]:
-    """Return the commands that words may name: that of the first one, else all."""
-    every = [*COMMANDS.values()]
-    return [each for each in every if each.name.split()[:1] == [*words[:1]]] or every
-
-
 def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] = ()) -> Parser:
     """Make the parser of all commands.
 
@@ -184,13 +177,15 @@ def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] = ()) ->
         What argparse needs to know of each kind of value. What stands behind a kind's colon is the
         first argument of its ``type``.
     words
-        What is to be parsed: commands that it cannot name are left out, as they take time.
+        What is to be parsed. If the first word names commands, all others are left out, as they
+        take time.
     """
     parser = Parser(prog="rig", usage="rig [-h] [--version] COMMAND ...")
     parser.add_argument("--version", action="version", version=f"rig {__version__}")
     below = {"": parser.add_subparsers(prog="rig", metavar="COMMAND")}
     parsers = parser.commands
-    for command in _matching_commands(words):
+    named = [row for row in COMMANDS.values() if row.name.split()[:1] == [*words[:1]]]
+    for command in named or COMMANDS.values():
         name = command.name
         outer, _, last = name.rpartition(" ")
         if outer not in below:

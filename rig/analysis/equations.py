@@ -145,9 +145,7 @@ class ExpectedEdges(NamedTuple):
         to_strike = np.full(rods.size, np.inf)  # distance of each rod to its strike, m
         if record.ratios is not None:
             if strikes.size > 1:
-                # Along a vertical board it has no end, but a rod strikes no lower than it fell.
-                lower = protocol.priors.swing * strike_shifts(record, protocol)
-                u = np.hypot(u, np.minimum(lower, protocol.drop.value + strikes)[rods])
+                u = np.hypot(u, strike_shifts(record, protocol)[rods])
             to_strike = levels + strikes[rods] - protocol.contact.strike.value
         return cls(
             rods,

@@ -52,13 +52,14 @@ def drawn(lever: Array, protocol: Protocol, levels: Array) -> Array:
 def strike_shifts(record: ChainRecord, protocol: Protocol) -> Array:
     """Return how much lower each rod strikes an inclined board because of its sideways motion, m.
 
-    For a bottom rod released with 1 m/s down the slope, and a top rod at rest.
+    For a bottom rod released down the slope with the prior standard deviation of its speed, and a
+    top rod at rest. A vertical board sets no limit, but no rod strikes lower than it fell.
     """
     chain = record.chain.chain
     share = (chain.heights[-1] - np.array(chain.heights)) / chain.length
     fallen = np.maximum(protocol.drop.value + record.strikes, 0.0)
-    carried = share * np.sqrt(2.0 * fallen / protocol.gravity.value)
-    return np.asarray(carried * math.tan(math.radians(record.incline_deg)))
+    carried = protocol.priors.swing * share * np.sqrt(2.0 * fallen / protocol.gravity.value)
+    return np.minimum(carried * math.tan(math.radians(record.incline_deg)), fallen)
 
 
 def swing_sd(chain: Chain, protocol: Protocol) -> float:

@@ -116,12 +116,13 @@ def pulse_rate(split: Epochs, pulses: Iterable[Pulse], pings: TickRate) -> TickR
         if moment is not None:
             placed.append((*moment, pulse.number))
     rows = np.array(placed, np.int64).reshape(-1, 4)
-    rows = rows[np.diff(rows[:, :2], axis=0, prepend=-1).any(axis=1)]  # one pulse, told twice
+    # A pulse that was reported twice counts once.
+    rows = rows[np.diff(rows[:, :2], axis=0, prepend=-1).any(axis=1)]
     restarts, ticks, _, counts = np.diff(rows, axis=0).T
     seconds, counted = ticks / pings.hz, counts % _COUNT_WRAP
     counted += np.rint((seconds - counted) / _COUNT_WRAP).astype(np.int64) * _COUNT_WRAP
     broken = (restarts != 0) | (np.abs(seconds - counted) >= _ODD_S + _ODD * counted)
-    rows[:, -1] = np.append(0, np.cumsum(counted))  # beyond its wraps
+    rows[:, -1] = np.append(0, np.cumsum(counted))  # seconds, where the device's count wraps
     stretches = np.split(rows, np.flatnonzero(broken) + 1)
     pieces = [_pulse_piece(each, split.nominal_hz) for each in stretches if len(each) > 1]
     return _fit_track(pieces, split.nominal_hz)

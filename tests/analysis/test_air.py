@@ -50,9 +50,15 @@ def test_a_rod_strikes_lower_the_further_a_swing_carries_it():
     record = record_of("uniform", "impact", 60.0)
     lower = strike_shifts(record, protocol)
     lasted = math.sqrt(2.0 * protocol.drop.value / protocol.gravity.value)
-    assert lower[0] == pytest.approx(math.tan(math.radians(60.0)) * lasted)
+    carried = protocol.priors.swing * lasted
+    assert lower[0] == pytest.approx(math.tan(math.radians(60.0)) * carried)
     assert lower[-1] == 0.0
     assert not strike_shifts(replace(record, incline_deg=0.0), protocol).any()
+    # Along a vertical board no rod strikes lower than it fell; one that touches it fell no way.
+    thick = replace(record, incline_deg=90.0, higher=(0.2,) * record.chain.chain.rods)
+    lower = strike_shifts(thick, protocol)
+    assert lower[0] == 0.0
+    assert lower[-2] == pytest.approx(protocol.drop.value + thick.strikes[-2])
 
 
 def test_a_chain_of_another_wood_needs_not_fall_as_its_width_says():

@@ -3,7 +3,9 @@
 import json
 import random
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +13,9 @@ from hypothesis import strategies as st
 from bench.studies.layout_catalogue import KINDS, under
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
+from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
+from rig.model.chain import Chain
 from rig.protocol.protocol import Accept
 from rig.protocol.reader import parse
 from rig.reasons import Reason, make_reason, plain_reason
@@ -21,6 +25,7 @@ from sim.dials import Dials
 from tests.analysis.drops import (
     FENCE,
     HZ,
+    SCENES,
     SINGLE,
     UNIFORM,
     Case,
@@ -276,3 +281,39 @@ def test_a_session_of_void_drops_has_no_summary():
     assert "summary_with_rejected" not in found.json()
     assert analyze(SINGLE, [], scale).json() == {"runs": [], "summary": []}
     assert first_run(SINGLE, None) == 1
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("rods", [1, 2])
+def test_a_chain_of_few_rods(scene, rods):
+    protocol = SCENES[scene]
+    few = {
+        name: replace(
+            rod_chain,
+            chain=Chain(rod_chain.chain.masses[:rods], rod_chain.chain.heights[:rods]),
+            widths=rod_chain.widths[:rods],
+            diameters=rod_chain.diameters[:rods],
+        )
+        for name, rod_chain in protocol.chains.items()
+    }
+    one = case(replace(protocol, chains=few), Dials.quiet())
+    result = one.analyze()
+    assert result.verdict == "accepted"
+    assert result.matches == {n: edge[3] for n, edge in enumerate(one.truth.edges)}
+    for name, measured in result.quantities.items():
+        assert abs(measured.value - getattr(one.truth, name)) < 0.01 * measured.u
+    printable(result)
+
+
+@pytest.mark.parametrize(("share", "pushed"), [(0.9, False), (1.1, True)])
+def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
+    u = 0.5 * 4.0  # of the unknown in its own units, and one of these
+    fit = SimpleNamespace(
+        model=SimpleNamespace(
+            protocol=UNIFORM,
+            unknowns={"drag": slice(0, 1)},
+            kappa=lambda _x: -share * _SURE * u,
+        ),
+        estimate=SimpleNamespace(x=[0.0], inverse=np.array([[0.5]]), sd=[4.0], scatter=1.0),
+    )
+    assert bool(_air(fit)["air_accelerates"]) == pushed

@@ -11,7 +11,7 @@ from rig.analysis.budgets import Budgets
 from rig.analysis.components import LEAST_SHARE, above
 from rig.analysis.drop import DropCase
 from rig.analysis.equations import STRAY, linearize
-from rig.analysis.joint_fit import by_itself
+from rig.analysis.joint_fit import FEWEST, by_itself
 from rig.analysis.quantities import measurands
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
@@ -253,3 +253,13 @@ def test_where_little_scatters_and_few_gates_tell_of_it_the_joint_fit_settles(la
     for one, result in zip(drops, found.runs, strict=True):
         for name, measured in result.quantities.items():
             assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u, name
+
+
+def test_few_drops_teach_nothing():
+    drops = cases(FOUR)
+    some = drops[: FEWEST - 1]
+    few = analysis(some)
+    assert few.joint is None
+    assert not any(result.learned for result in few.runs)
+    assert [r.quantities for r in few.runs] == [one.analyze().quantities for one in some]
+    assert "learned" not in few.json()

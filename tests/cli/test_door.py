@@ -2,6 +2,8 @@
 
 import json
 import re
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import rig
 from rig.errors import InputError, SessionError
 from rig.threads import libraries, one_thread
 from tests.cli.lab import ROOT
+from tests.waiting import PATIENCE_S
 
 DOCS = ROOT / "docs"
 
@@ -93,4 +96,28 @@ def threads():
 def test_matrices_keep_to_one_thread_for_as_long_as_a_call_lasts():
     with threadpool_limits(2, user_api="blas"):
         assert one_thread(threads)() == {1}
+        assert threads() == {2}
+
+
+def test_who_is_done_leaves_the_others_their_one_thread():
+    first_is_at_it, first_is_done, second_is_at_it = Event(), Event(), Event()
+
+    @one_thread
+    def first():
+        first_is_at_it.set()
+        assert second_is_at_it.wait(PATIENCE_S)
+
+    @one_thread
+    def second():
+        second_is_at_it.set()
+        assert first_is_done.wait(PATIENCE_S)
+        return threads()
+
+    with threadpool_limits(2, user_api="blas"), ThreadPoolExecutor(2) as pool:
+        leaving = pool.submit(first)
+        assert first_is_at_it.wait(PATIENCE_S)
+        staying = pool.submit(second)
+        leaving.result()
+        first_is_done.set()
+        assert staying.result() == {1}
         assert threads() == {2}

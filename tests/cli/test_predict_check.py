@@ -34,6 +34,20 @@ def test_json_has_every_field_of_every_incline(call):
     assert all(line.keys() >= FIELDS for line in lines)
 
 
+def test_the_table_says_the_same(call):
+    """In other units, and with U of 95 % for u."""
+    path = PROTOCOLS / "inclined-uniform.yaml"
+    lines = json.loads(call("predict", path, "--json").out)["predictions"]
+    heading, _, *rows = call("predict", path).out.splitlines()
+    assert "Δz ± U (cm)" in heading
+    assert max(map(len, (heading, *rows))) <= 80
+    for line, row in zip(lines, rows[: len(lines)], strict=True):
+        incline, alpha, separation, expanded = map(float, row.replace("±", "").split()[:4])
+        assert (incline, alpha) == (line["incline_deg"], pytest.approx(line["alpha"], abs=5e-5))
+        assert separation == pytest.approx(100.0 * line["separation_m"], abs=0.05)
+        assert expanded == pytest.approx(196.0 * line["separation_u_m"], rel=0.06)
+
+
 def test_a_given_alpha_needs_no_surface_numbers(call):
     done = call("predict", PROTOCOLS / "bead-chain.yaml", "--json")
     (line,) = json.loads(done.out)["predictions"]

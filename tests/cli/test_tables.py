@@ -1,6 +1,7 @@
 """The export: what the scene has, in files other programs read."""
 
 import csv
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +19,7 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 
 def test_all_files(fences, call, tmp_path):
-    """That results are those of JSON, and edges those of the door, is tested there."""
+    """Edges are those of the Python door, see `tests.cli.test_door`."""
     copy = shutil.copy(fences, tmp_path / "s")
     with Session.open(copy) as session:
         session.add_drop(replace(session.drop(2, 1), attempt=2, certificate=None))
@@ -44,13 +45,30 @@ def test_all_files(fences, call, tmp_path):
 
 
 @pytest.mark.parametrize("scene", ["fences", "finished"])
-def test_a_table_has_the_columns_of_its_scene(scene, request, call, tmp_path):
+def test_a_table_has_the_columns_of_its_scene_and_the_values_of_json(
+    scene, request, call, tmp_path
+):
     session = request.getfixturevalue(scene)
-    assert call("export", getattr(session, "session", session), "--csv", tmp_path).code == 0
+    session = getattr(session, "session", session)
+    assert call("export", session, "--csv", tmp_path).code == 0
+    found = json.loads(call("analyze", session, "--json").out)
     struck = {"incline_deg", "impact_chain", "separation_m"}
     for table in ("runs", "summary"):
-        columns = set(rows(tmp_path / f"{table}.csv")[0])
+        lines = rows(tmp_path / f"{table}.csv")
+        columns = set(lines[0])
         assert columns & struck == (struck if scene == "finished" else set()) - (
             {"impact_chain"} if table == "summary" else set()
         )
         assert ("gravity_m_s2_U95" in columns) == (scene == "fences")
+        for line, record in zip(lines, found[table], strict=True):
+            quantities = {
+                name: there
+                for name, there in record.items()
+                if isinstance(there, dict) and "U95" in there
+            }
+            assert quantities
+            for name, there in quantities.items():
+                cells = [float(line[name + part]) for part in ("", "_u", "_U95")]
+                assert cells == [there[part] for part in ("value", "u", "U95")]
+            if table == "runs":
+                assert line["edges_received"] == str(record["edges"]["received"])

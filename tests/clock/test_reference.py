@@ -109,11 +109,40 @@ def test_pulses_come_out_of_the_bytes_and_repeats_do_not():
     assert both == [ClockSample(0, 1000, 77), Pulse(2000, 3000, 12, 6_500_000)]
 
 
+def log_of(pings=(), pulses=(), *, simulated=False):
+    """Give what a session has recorded of clocks until now."""
+    board = {"tick_hz": HZ}
+    log = Mock(simulated=simulated, **{"identities.return_value": [(0, board)]})
+    log.pings.side_effect = lambda after=0: pings[after:]
+    log.pulses.return_value, log.host_breaks.return_value = pulses, []
+    return log
+
+
 def test_without_samples_the_rate_is_the_one_that_the_board_states():
-    log = Mock(simulated=False, **{"identities.return_value": [(0, {"tick_hz": HZ})]})
-    for name in ("pings", "pulses", "host_breaks"):
-        getattr(log, name).return_value = []
-    clock = Calibrator().look(log, 1e-7)
+    clock = Calibrator().look(log_of(), 1e-7)
     assert clock.device.hz == HZ
     assert (clock.said["source"], clock.details["samples"]) == ("stated", 0)
     assert not {"pings", "pulses", "clock_u_ppm"} & clock.said.keys()
+
+
+def test_a_real_host_is_believed_no_further_than_its_quartz():
+    """50 ppm/√3 of a computer's clock; a simulated one is exact."""
+    pings = compared(Clock(8, last=200), 1, 120.0)
+    exact, real = (
+        Calibrator().look(log_of(pings, simulated=simulated), 1e-7).device
+        for simulated in (True, False)
+    )
+    assert exact.u < 2e-6
+    assert real.u == pytest.approx(50e-6 / 3**0.5, rel=0.01)
+    assert real.hz == exact.hz
+
+
+def test_looking_again_while_a_session_grows_gives_what_looking_once_gives():
+    clock = Clock(9, last=200)
+    pings, pulses = compared(clock, 1, 120.0), seconds(clock, 10, 60)
+    calibrator = Calibrator()
+    for count in (0, 1, 2, 9, 10, len(pings)):
+        log = log_of(pings[:count], pulses if count > 9 else [])
+        again, once = calibrator.look(log, 1e-7), Calibrator().look(log, 1e-7)
+        assert (again.said, again.device) == (once.said, once.device)
+    assert again.said["source"] == "reference"

@@ -3,7 +3,33 @@
 import numpy as np
 import pytest
 
+from rig.clock.wander import Readings, Track
 from tests.clock.clocks import HZ, Clock, compared, ppm, tick_rate
+
+
+@pytest.mark.parametrize("epochs", [1, 3])
+def test_the_estimate_is_that_of_the_whole_covariance(epochs):
+    """Universal kriging as in any textbook, of the rate at a moment, in s and without a trick."""
+    rng, n, span = np.random.default_rng(1), 24, 600.0
+    at, sigma = np.sort(rng.uniform(0.0, span, n)), rng.uniform(0.5e-4, 3e-4, n)
+    clock, epoch = Clock(1, walk=200.0, last=602), (np.linspace(0.0, 0.99, n) * epochs).astype(int)
+    phase = np.interp(at, clock.times, clock.phases) + rng.normal(0.0, sigma) + 0.01 * epoch
+    track = Track(Readings(at, phase, sigma, epoch))
+    track.search()
+    assert track.seen
+    t, when, q = at - at[0], 300.0 - at[0], track.wander**2
+    low, high = np.minimum.outer(t, t), np.maximum.outer(t, t)
+    inverse = np.linalg.inv(q * low**2 * (3 * high - low) / 6 + np.diag(track._scale2 * sigma**2))
+    design = np.column_stack([*(epoch == number for number in range(epochs)), t])
+    cross = q * np.where(t <= when, t**2 / 2, when * t - when**2 / 2)
+    of_beta = np.linalg.inv(design.T @ inverse @ design)
+    beta = of_beta @ design.T @ inverse @ phase
+    direct = np.eye(epochs + 1)[-1] - design.T @ inverse @ cross
+    value = beta[-1] + cross @ inverse @ (phase - design @ beta)
+    variance = q * when - cross @ inverse @ cross + direct @ of_beta @ direct
+    rate, u = track.rate(300.0)
+    assert rate == pytest.approx(value, abs=1e-6 * u)
+    assert u == pytest.approx(np.sqrt(variance), rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,16 @@ def captured(words, edges: list[tuple[int, int]], phase: int = 0) -> list[tuple[
     ]
 
 
+@pytest.mark.parametrize("phase", range(TICK))
+def test_every_edge_is_stamped_within_a_tick(words, phase):
+    """Whenever in the loop it comes; a change takes three ticks and counts three."""
+    edges = [(clock, gates) for clock, _, gates in flips(300, 60)]
+    stamps = captured(words, edges, phase)
+    assert [gates for _, gates in stamps] == [gates for _, gates in edges]
+    errors = [tick * TICK - clock for (clock, _), (tick, _) in zip(edges, stamps, strict=True)]
+    assert max(errors) - min(errors) < TICK
+
+
 @pytest.mark.parametrize(("second", "least"), [(0b00, 0), (0b11, 1)])
 def test_how_close_two_edges_may_be(words, second, least):
     """On one gate a pulse, on two gates: a tick apart there are two events, always."""

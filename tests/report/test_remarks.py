@@ -10,6 +10,7 @@ from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.report.finding import void_lines
 from rig.report.templates import lines
+from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
 
 
 def void(run, attempt, *reasons, verdict="void"):
@@ -20,6 +21,17 @@ def void(run, attempt, *reasons, verdict="void"):
 SKEW = make_reason("release_skew", skew_s=9.19e-3, limit_s=5e-3)
 MISSED = make_reason("edges_missed", missed=34, expected=660, limit=0.05)
 MOTHS = plain_reason("moths")
+
+
+def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_known():
+    known = {code: row.remedy for code, row in WORDINGS.items() if row.severity is Severity.VOID}
+    without = [code for code, remedy in known.items() if not remedy]
+    assert without == [OPERATOR]
+    assert [code for code, remedy in known.items() if remedy == WORDINGS["scatter"].remedy] == [
+        SENTENCE
+    ]
+    (general,) = remedies([MOTHS, plain_reason("a lorry")])
+    assert remedies([MOTHS, SKEW, SKEW]) == remedies([SKEW]) != [general]
 
 
 def test_void_drops_of_one_reason_share_a_line_above_what_to_do():

@@ -7,10 +7,15 @@ import pytest
 
 from rig.analysis.result import Measured
 from rig.report.finding import clock_lines
-from rig.report.numbers import plus_minus
+from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.report.parts import summary_table, tables
 from rig.units import Quantity
 from tests.report import fake_analysis
+
+
+def test_zero_has_no_sign_and_an_uncertainty_two_digits() -> None:
+    assert fixed(-0.0001, 2) == "0.00"
+    assert [decimals_for(u) for u in (0.0096, 0.0996, 1.0, 9.96)] == [4, 2, 1, 0]
 
 
 def test_summary_is_aligned() -> None:

@@ -1,5 +1,6 @@
 """What the screens are told: typed, and not changed under them."""
 
+import copy
 from pathlib import Path
 
 from rig.campaign.machine import Flow, Stage
@@ -7,7 +8,7 @@ from rig.daemon.replica import Replica
 from rig.tui.client import ReconnectingClient
 from rig.tui.follow import _back
 from rig.tui.indicators import Indicators
-from rig.tui.model import Model
+from rig.tui.model import Model, alarm
 from rig.tui.state import DaemonState, read_state
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
@@ -25,6 +26,16 @@ def test_what_the_daemon_does_not_know_is_not_known():
     assert state.blocked_mask is None
     assert (state.runs, state.edges, state.holder) == ((), (), None)
     assert DaemonState().n < 0 <= state.n
+
+
+def test_a_state_once_taken_never_changes():
+    replica = Replica()
+    replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
+    taken = read_state(replica.n, replica.state)
+    as_it_was = copy.deepcopy(taken)
+    changes = {"set": {"gates": {"blocked": 9}}, "runs": [RUN | {"state": "void"}]}
+    replica.follow("change", {"n": 8, "edges": [[1, 2, 1]], **changes})
+    assert taken == as_it_was != read_state(replica.n, replica.state)
 
 
 def test_indicators_count_name_and_judge_steadiness():
@@ -48,6 +59,21 @@ def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
 
 def _model(state=None, **more):
     return Model(read_state(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
+
+
+def test_what_is_wrong_is_said_with_what_to_do():
+    assert alarm(_model()) is None
+    for stage, begun in ((Stage.PROTOCOL, False), (Stage.PREPARE, True)):
+        gone = alarm(Model(DaemonState(), Flow(stage), Indicators(), silence="it is gone"))
+        assert "it is gone" in gone.message
+        assert ("supply" in gone.hint) == begun, "nothing of ours can fall before that"
+    lost = alarm(
+        _model({"link": {"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}})
+    )
+    assert "[unplugged" in lost.message
+    assert "cable" in lost.hint
+    failed = alarm(_model({"error": {"message": "disk full", "hint": "make room"}}))
+    assert failed == ("disk full", "make room")
 
 
 def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
