@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,7 +39,8 @@ if TYPE_CHECKING:
 _COMPARED = 3
 """Drops that are compared with falls: as many as tell a way of reading from another."""
 _MOST = 120
-"""Drops that are compared at most, evenly over a long session."""
+"""Drops of a long session that are compared: evenly in the order of how many edges they have, then
+of how long they last, so that those that are least like the others are among them."""
 
 
 def main(arguments: Namespace) -> None:
@@ -92,7 +94,9 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
     results: list[DropResult] = []
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
     compared = [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]
-    for drop in compared[:: 1 + len(compared) // _MOST]:
+    order = sorted(compared, key=lambda x: (len(x.edges), x.edges[-1].tick - x.edges[0].tick))
+    chosen = order[: -1 : 1 + len(order) // _MOST] + order[-1:]
+    for drop in sorted(chosen, key=attrgetter("run")):
         run = planned[drop.run]
         records = chain_records(protocol, run, drop, TICK_HZ)
         votes = sum(most_votes(protocol, record, rate.u, priors(protocol)) for record in records)
@@ -104,7 +108,8 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
             evidence += log_evidence(fit) if fit else 0.0
             gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
             results.append(result)
-    text = make_reason("falls_fit", runs=len(shares) - 1, near=near, due=expected).text
+    counts = {"compared": len(chosen), "runs": len(compared)}
+    text = make_reason("falls_fit", **counts, near=near, due=expected).text
     if gravity:
         text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)

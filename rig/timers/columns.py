@@ -149,9 +149,14 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     shared = _held(table)
     columns = [_read_heading(block, heading, n, fact | shared) for n, fact in facts.items()]
     if heading is None:
+        for row in block.headings:
+            if row.known > 1 and len(row.texts) > width:
+                file.problems.refuse(row.line, 1, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
         count = [f"D{n}" for n, column in enumerate(inputs) if column.role == "level"]
-        for column, name in zip(inputs, block.find_inputs(len(inputs)) or count, strict=False):
+        names = block.find_inputs(len(inputs))
+        file.is_counted |= not names
+        for column, name in zip(inputs, names or count, strict=False):
             column.gate = column.name = name
     _settle_roles(file, columns)
     above = heading or rows[0]
@@ -242,8 +247,8 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
         "plain": not any({"blocked", "clear"} & kind for kind in kinds),
         "beams": all({"blocked", "clear"} & kind for kind in kinds),
         "signals": all({"high", "low"} & kind for kind in kinds),
-        "fractions": any("." in text or "," in text for text in texts),
-        "rises": is_numeric and min(steps, default=0.0) >= 0.0,
+        "fractions": not is_whole and any("." in text or "," in text for text in texts),
+        "rises": is_numeric and min(steps, default=0.0) >= 0.0 and steps != {0.0},
         "counts": is_numeric and steps == {1.0},
         "counted": is_count and abs(int(texts[-1]) - int(texts[0])) > 100,
         "few": is_whole and len(texts) >= 2 * len(set(texts)),

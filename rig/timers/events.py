@@ -61,6 +61,8 @@ class TimerFile:
         Whether it says the unit of its times; those without are kept as if they were seconds.
     is_sampled
         Whether it has samples: a level that changes may be of an input that is no gate.
+    is_counted
+        Whether inputs without a heading are called by their place, which says nothing of gates.
     is_wide
         Whether a row has several times, so that it may be a run.
     first
@@ -84,6 +86,7 @@ class TimerFile:
     period: int | None = None
     has_unit: bool = True
     is_sampled: bool = False
+    is_counted: bool = False
     is_wide: bool = False
     first: TimerEvent | None = None
     rows: int = 0

@@ -6,7 +6,6 @@ decides is asked, and rows of which no edge is made are refused.
 
 from __future__ import annotations
 
-import gc
 import itertools
 import math
 from collections import Counter
@@ -38,6 +37,9 @@ _GOOD = 0.75
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
+_MOST_RUNS = 10_000
+"""Runs that are read in all ways together before the finalists are read in full:
+ten of each of a thousand ways, of which three are compared with falls."""
 _COARSE = 10**8
 """Picoseconds: times in whole tenths of milliseconds may be those of two falls by chance."""
 _FEWEST_SAME = 3
@@ -122,14 +124,8 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
         with closing(read_lines(place)) as rows:
             drops = read_edges(enumerate(rows, 1), ProblemList(place))
         return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
-    collects = gc.isenabled()
-    gc.disable()  # Records make no cycles: to look for some would take a third of the time.
-    try:
-        readings, stated = _find_readings(options, gates, bars)
-    finally:
-        if collects:
-            gc.enable()
-    reading, match = readings[0], FallMatch(0.0)
+    readings, stated = _find_readings(options, gates, bars)
+    reading, match = read_drops(readings[0].file, readings[0].layout), FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings
         reading, match = _choose(readings, place, fit, stated)
@@ -149,7 +145,7 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
 def _find_readings(
     options: Namespace, gates: Sequence[int], bars: int
 ) -> tuple[list[FileReading], dict[str, Any]]:
-    """Return every reading of a file that has drops, and what options decide."""
+    """Return every reading of a file that has drops, of its first ones, and what options decide."""
     readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
     way, ways = 0, 1
     while way < ways:
@@ -157,8 +153,9 @@ def _find_readings(
         try:
             read_file(file)
             stated = _read_stated(options, file, gates)
-            layouts = find_layouts(file, gates, bars, stated)
-            readings += [x for x in (read_drops(file, layout) for layout in layouts) if x.drops]
+            layouts = list(find_layouts(file, gates, bars, stated))
+            most = _MOST_RUNS // (len(layouts) or 1)
+            readings += [x for y in layouts if (x := read_drops(file, y, most)).drops]
         except InputError as error:
             faults.append(error)
         way, ways = way + 1, file.ways
@@ -181,11 +178,13 @@ def _choose(
     distinct = [*{tuple(x.drops): x for x in reversed(readings)}.values()][::-1]
     is_said = distinct[0].layout.dark == "states" and "dark" not in stated
     if len(distinct) == 1 and "channels" in stated and not is_said:
-        return distinct[0], fit(distinct[0].drops, True)
+        reading = read_drops(distinct[0].file, distinct[0].layout)
+        return reading, fit(reading.drops, True)
     rough = [(fit(x.drops, False), x) for x in distinct]
     rough.sort(key=lambda row: -row[0].share)
     likely = [x for match, x in rough if match.share >= _GOOD]
-    exact = [(fit(x.drops, True), x) for x in likely[:_FINALISTS]]
+    finalists = (read_drops(x.file, x.layout) for x in likely[:_FINALISTS])
+    exact = [(fit(x.drops, True), x) for x in finalists if x.drops]
     ranked = [row for row in exact if row[0].share >= _GOOD]
     ranked.sort(key=lambda row: -row[0].evidence)
     usual_first = [row for row in ranked if row[1].layout.first == "state"]

@@ -100,12 +100,18 @@ class FileReading(NamedTuple):
         return self.layout.dark not in {"high", "low"} or began_dark < len(counts)
 
 
-def read_drops(file: TimerFile, layout: FileLayout) -> FileReading:
-    """Turn what was understood into drops, a run each, numbered as in the file or from 1."""
+def read_drops(file: TimerFile, layout: FileLayout, most: int | None = None) -> FileReading:
+    """Turn what was understood into drops, a run each, numbered as in the file or from 1.
+
+    Parameters
+    ----------
+    most
+        How many are read, if not all.
+    """
     runs, lines, last = dict[int, list[Edge]](), dict[int, list[int]](), 0
     inputs, is_passing = [*layout.channels], layout.groups == "passing"
     grouping = layout.unit, layout.groups, layout.first, layout.pause_s
-    for number, events in _group_events(file, *grouping):
+    for number, events in _group_events(file, *grouping)[:most]:
         edges, rows, counts = list[Edge](), list[int](), Counter[str]()
         share = max(1, len(events) // max(1, len(inputs)))
         for k, event in enumerate(events):
@@ -190,10 +196,10 @@ def find_layouts(
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
     groups, events = ["runs"], file.events
-    if file.is_wide and len({event.line for event in events}) < len(events):
-        # Times that begin anew with each row are of a drop each.
-        is_one = len({event.part for event in events}) == 1
-        groups.insert(is_one and events == sorted(events, key=attrgetter("tick")), "rows")
+    # Times that begin anew with each row are of a drop each; of those that go on, pauses tell.
+    is_wide = file.is_wide and len({event.line for event in events}) < len(events)
+    if is_wide and events != sorted(events, key=attrgetter("tick")):
+        groups.insert(0, "rows")
     if len(file.labels) < 2 and bars == 1 and len(gates) > 1:
         groups.append("passing")
     return groups
@@ -206,7 +212,7 @@ def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
     of half a second or more that is three times as long as the one before.
     """
     drops = _group_events(file, layout.unit, layout.groups, "state", 0.0)
-    ticks = [event.tick for event in drops[0][1]] if len(drops) == 1 and not file.is_wide else []
+    ticks = [event.tick for event in drops[0][1]] if len(drops) == 1 else []
     pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
     for before, pause in itertools.pairwise(pauses):
         if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
@@ -220,7 +226,7 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     if layout.groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
-    if len(set(by_number.values())) == len(labels):
+    if len(set(by_number.values())) == len(labels) and not file.is_counted:
         return [by_number]
     first = {event.label: event.tick for event in sorted(file.events, reverse=True)}
     passed = sorted(labels, key=lambda label: first.get(label, 0))

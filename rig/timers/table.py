@@ -66,7 +66,8 @@ class Row(NamedTuple):
         texts = [vocabulary.normal(text.strip("()[]- ")) for text in self.texts]
         texts = list(filter(None, texts))
         is_unit = [form("unit").fullmatch(text) is not None for text in texts]
-        return bool(texts) and all(is_unit[1:]) and (is_unit[0] or "unit" in texts[0])
+        is_named = form("name of units").match("".join(texts[:1])) is not None
+        return bool(texts) and all(is_unit[1:]) and (is_unit[0] or is_named)
 
     def place(self, at: int) -> tuple[int, int]:
         """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
@@ -121,6 +122,7 @@ class RowBlock:
         A row with a measured number, or with more names than there are columns, is a setting. A
         remark may name the columns where nothing else does.
         """
+        is_numbered = form("time and numbers").fullmatch
         remarks = (row for row in self.remarks if not form("assignment").search(row.texts[0]))
         rows = [
             row
@@ -129,7 +131,7 @@ class RowBlock:
             and not row.is_mark
             and (len(row.texts) > 1 or len(filled) == 1)
             and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
-            and not any(map(is_measured, row.texts[:width]))
+            and (is_numbered(row.raw) or not any(map(is_measured, row.texts[:width])))
         ]
         return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
 
@@ -187,6 +189,7 @@ class Table:
         self.separator = "" if self._names else find_separator(plain)
         self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
+        self._fewest = 1 + (2 * sum(n for x, n in shapes.items() if len(x) > 1) > shapes.total())
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
@@ -247,7 +250,8 @@ class Table:
         if usual and not any(is_filled for is_filled, _ in usual[:2]):
             # Samples of an oscilloscope, beside which settings may stand.
             shape = tuple(a if b[0] else b for a, b in zip(shape, usual, strict=False))
-        if shape == usual or _is_data(texts):
+        # Above rows of several cells may stand a date, or a count.
+        if shape == usual or (len(texts) >= self._fewest and _is_data(texts)):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
         if not any(map(is_number, texts)):
@@ -260,7 +264,7 @@ def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
     """Split a line into cells, without the blanks and the quotes around them."""
     if separator == " ":
         # A heading has names of several words: two blanks or more part them.
-        cells = line.split()
+        cells = _words(line)
         is_row = len(cells) == usual or all(map(kinds_of, cells))
         return cells if is_row else re.split(r" {2,}|\t", line.strip())
     if '"' in line:
@@ -269,8 +273,14 @@ def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
     return [text.strip() for text in line.split(separator)]
 
 
+def _words(line: str) -> list[str]:
+    """Return the words of a line, without quotes and without what a sentence has behind them."""
+    return [word.strip('":') for word in line.split()]
+
+
 def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
+    line = form("exponent of Fortran").sub("E", line) if "D" in line else line
     if line[:1].isdigit() or not form("list").match(line):
         return [(number, line)]
     pieces = form("between lists").split(line)
@@ -296,7 +306,7 @@ def _find_names(lines: Sequence[str]) -> list[str]:
     # Below a heading with as many cells, words beside values are parts of cells: Gate 1, Run 2.
     heads = [cells for row, cells in zip(rows, marks, strict=True) if not row and any(cells)]
     is_named &= not any(cells in heads for row, cells in zip(rows, marks, strict=True) if row)
-    return list(usual) if is_named else []
+    return list(dict.fromkeys(usual)) if is_named else []
 
 
 def find_separator(lines: Sequence[str]) -> str:
@@ -311,7 +321,7 @@ def find_separator(lines: Sequence[str]) -> str:
         # 0,25 below 1,5 is no decimal comma: times go on.
         return ";" if sorted(numbers, key=float) == numbers else ","
     # Blanks part values; a comma behind one parts them, too.
-    parted = [row.split() for row in rows if ", " not in row and " " in row]
+    parted = [_words(row) for row in rows if ", " not in row and " " in row]
     return " " if sum(all(map(kinds_of, row)) for row in parted) * 2 > len(rows) else ","
 
 

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
 _SAMPLE = 200
 """Rows that show what columns are."""
-_SEPARATORS = {"\t": "separated by tabs", ";": "separated by semicolons", "|": "separated by bars"}
-_SEPARATORS |= {",": "separated by commas", " ": "separated by blanks", "": "between words"}
+_MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks", "": "words"}
 
 
 def read_file(file: TimerFile) -> TimerFile:
@@ -41,7 +40,7 @@ def read_file(file: TimerFile) -> TimerFile:
         numbered = enumerate(itertools.chain(head, lines), 1)
         is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
         table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
-        file.lines.append(f"a table, its cells {_SEPARATORS[table.separator]}")
+        file.lines.append(f"a table, its cells separated by {_MARKS[table.separator]}")
         readers: dict[object, SignalReader] = {}
         for block, rows in table.blocks():
             _read_block(file, block, rows, readers)

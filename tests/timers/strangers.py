@@ -140,6 +140,39 @@ def strangers() -> dict[str, Shape]:
     files["Axes by numbers"] = scope(
         "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", csv, options=("map", "1=0,2=1,3=2,4=3")
     )
+    for name, head, row in (
+        ("An array of volts without a heading", "# Created by Octave 8.4.0\n",
+         lambda k, t, v: " ".join(f"{x:.3e}" for x in (t, *v)) + "\n"),
+        ("Exponents of Fortran", "# t(s) A0 A1 A2 A3\n",
+         lambda k, t, v: " ".join(f"{x:.5E}" for x in (t, *v)).replace("E", "D") + "\n"),
+        ("Yokogawa", '"TraceName","CH1","CH2","CH3","CH4"\n"VUnit","V","V","V","V"\n'
+         '"HResolution",2e-04,2e-04,2e-04,2e-04\n"HUnit","s","s","s","s"\n\n',
+         lambda k, t, v: "," + ",".join(f"{x:.4e}" for x in v) + ",\n"),
+    ):  # fmt: skip
+        files[name] = scope(head, row, bare="Yoko" in name)
+    put(
+        "DSView",
+        "; Sample rate: 1 MHz\nTime(s), 0, 1, 2, 3\n"
+        + "".join(
+            f"{t:.6f}, {', '.join(map(str, levels(one, t)))}\n" for t, _, _ in [(0, 0, 0), *one]
+        ),
+    )
+    late = [edge for edge in one if edge[1]]
+    put(
+        "Inputs without names, of which the first gate is not among them",
+        table([f"{t:.6f}", *levels(one, t)[1:]] for t in (0, *(t for t, _, _ in late))),
+        [late],
+    )
+    put(
+        "More names than columns",
+        "gate,blocked (s),clear (s),foo\n"
+        + table([c, f"{a[0]:.6f}", f"{b[0]:.6f}"] for c, (a, b) in by_gate(one).items()),
+    )
+    put(
+        "A row for each gate that is passed",
+        "n,start (s),end (s)\n"
+        + table([c + 1, f"{a[0]:.6f}", f"{b[0]:.6f}"] for c, (a, b) in by_gate(one).items()),
+    )
     files["Rows of a period"] = scope(
         "Memory Length,4000,\nSampling Period,2e-04,\nCH1,CH2,CH3,CH4,\n",
         lambda k, t, v: ",".join(f"{x:.4f}" for x in v) + ",\n", bare=True)  # fmt: skip
@@ -150,6 +183,7 @@ NOT_READ = {
     "Runs by a word alone", "Written by hand",
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A word below",
+    "More names than columns", "A row for each gate that is passed",
     "Rows out of order", "Newest first", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
     "Thousands by points", "Microseconds as if they were seconds",

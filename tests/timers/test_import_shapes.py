@@ -11,7 +11,7 @@ from rig.errors import InputError
 from rig.protocol import reader
 from rig.timers.moments import TICK_HZ
 from tests.timers.mutations import mutate
-from tests.timers.shapes import PROTOCOL, Shape, shapes
+from tests.timers.shapes import PROTOCOL, Shape, run, shapes, table
 from tests.timers.strangers import NOT_READ, REFUSED, strangers
 
 SHAPES = shapes()
@@ -120,6 +120,17 @@ def test_a_copy_that_lacks_a_row_is_a_copy(tmp_path, gone):
                                STRANGERS["Twice the same"])  # fmt: skip
     assert runs is None
     assert "copy" in advice
+
+
+def test_a_run_that_is_unlike_many_others_is_named(tmp_path):
+    protocol, file = tmp_path / "protocol.yaml", tmp_path / "file"
+    text = PROTOCOL.read_text("utf-8").replace("repeats: 10", "repeats: 300")
+    protocol.write_text(text, "utf-8")
+    edges = [(n, *edge) for n in range(1, 301) for edge in run(0.3 + 1e-4 * n)]
+    rows = table([n, c, f"{t * (1.7 if n == 152 else 1):.6f}", int(d)] for n, t, c, d in edges)
+    file.write_text("run,gate,time (s),state\n" + rows, "utf-8")
+    with pytest.raises(InputError, match="run 152:"):
+        import_with_protocol(reader.read(str(protocol)), options(file))
 
 
 @pytest.mark.parametrize("name", STRANGERS)
