@@ -46,6 +46,15 @@ def test_the_count_may_wrap_and_the_same_pulse_be_told_twice():
     assert abs(ppm(rate.hz, -1300e-6)) < 3e-3
 
 
+def test_between_two_pulses_the_count_may_wrap():
+    """A count of 16 bits is told apart by the host's time, a night without pulses later too."""
+    clock = Clock(6, last=70_100)
+    pulses = [pulse for at in (10, 70_010) for pulse in seconds(clock, at, 30, number=at)]
+    rate = measured(clock, pulses, compared(clock, 6, 70_100.0, 40.0))
+    assert (rate.n, rate.span_s) == (60, pytest.approx(70_029.0, abs=0.1))
+    assert abs(ppm(rate.hz, -1300e-6)) < 1e-4
+
+
 def test_a_missed_pulse_and_one_too_many_begin_new_stretches():
     clock = Clock(3, last=200)
     pulses = seconds(clock, 10, 60)
