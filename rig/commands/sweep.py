@@ -13,7 +13,6 @@ from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
 from rig.report.canvas import ENDINGS, write_figure
-from rig.report.sweep import sweep_figure
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
@@ -61,6 +60,8 @@ def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
 def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> None:
     facts = provenance(protocol, layout)
     if output.suffix in ENDINGS:
+        from rig.report.sweep import sweep_figure  # noqa: PLC0415 - it needs matplotlib
+
         write_figure(output, sweep_figure(facts, layout, swept))
         return
     with replacing(output) as stream:

@@ -160,9 +160,11 @@ def _find_readings(
             faults.append(error)
         way, ways = way + 1, file.ways
     if not readings:
+        if faults:
+            raise faults[0]
         pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
-        raise (*faults, refusal(options.events, "inputs_unclear", **values, pairs=pairs))[0]
+        raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
     return readings, stated
 
 

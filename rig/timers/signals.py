@@ -156,13 +156,14 @@ class SignalReader:
     def _add_crossings(self, key: Key, samples: Array) -> None:
         """Add where volts cross the middle; note how many do, or that nothing passes."""
         pair, volts = self.pairs[key[0]], samples[:, 2]
+        label = key[2] or pair.label
         if (threshold := find_threshold(volts)) is None:
             limits = {"low": min(volts), "high": max(volts)}
-            self.file.notes.append(make_reason("no_passage", input=pair.label, **limits))
+            self.file.notes.append(make_reason("no_passage", input=label, **limits))
             return
         crossings = find_crossings(samples, threshold).tolist()
         counts = {"crossings": len(crossings), "level": threshold[0]}
-        self.file.notes.append(make_reason("crossings", input=pair.label, **counts))
+        self.file.notes.append(make_reason("crossings", input=label, **counts))
         for line, offset, is_high in crossings:
             tick = self.starts[pair.clock.at] + round(offset)
             self._add_event(key, tick, "high" if is_high else "low", int(line))

@@ -139,7 +139,7 @@ def kinds_of(text: str) -> frozenset[str]:
     kinds = {kind for kind in forms if form(kind).fullmatch(text[: LONGEST + 1])}
     if len(text) > LONGEST or ("input" in kinds and "start" in roles_in(text)):
         return frozenset()
-    return frozenset(kinds | ({"state", state} if state else kinds))
+    return frozenset(kinds | ({"state", state} if state else set()))
 
 
 def is_remark(line: str) -> bool:
