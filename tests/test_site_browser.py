@@ -17,7 +17,7 @@ import pytest
 from rig.cli import main
 from tests.report.test_browser import BROWSER, browse
 from tests.test_site import load
-from tests.tui.test_pictures import RECORDED
+from tests.tui.test_looks import RECORDED
 
 AXE = Path(__file__).parent / "axe/node_modules/axe-core/axe.min.js"
 REPORT = "report.html"

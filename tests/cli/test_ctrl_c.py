@@ -17,6 +17,7 @@ from textual.app import App
 from bench.mutants import CSV, make_session
 from rig import cli
 from rig.commands import demo, tui
+from tests.programs import run_program
 
 STRUCK = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
 LOADING = f"""
@@ -50,8 +51,7 @@ rig.__main__.start()
 @pytest.mark.parametrize(("program", "code"), [(BEFORE, 130), (LOADING, 130), (ENDING, 0)])
 def test_ctrl_c_where_no_command_is_at_work(program, code):
     command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == code
+    done = run_program(*command, code=code)
     assert "Traceback" not in done.stderr
     ours, theirs = os.pipe()
     os.close(ours)  # nobody reads what it says

@@ -12,7 +12,7 @@ import pytest
 from rig.commands import output
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS, ROOT, Terminal, command, rig, short
-from tests.waiting import PATIENCE_S
+from tests.programs import run_program
 
 
 def assert_told(done, code=2):
@@ -222,15 +222,7 @@ def test_a_full_disk_behind_stdout_is_told(finished):
 @pytest.mark.parametrize("closed", ["1", "2"])
 def test_streams_may_be_closed(call, finished, closed):
     words = "predict", finished.protocol
-    done = subprocess.run(
-        ["sh", "-c", f'exec "$@" {closed}>&-', "sh", *command(*words)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-    assert done.returncode == 0
+    done = run_program("sh", "-c", f'exec "$@" {closed}>&-', "sh", *command(*words), cwd=ROOT)
     assert done.stderr == ""
     assert done.stdout == ("" if closed == "1" else call(*words).out)
 

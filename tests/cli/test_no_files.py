@@ -16,6 +16,7 @@ from rig.cli import _parser
 from rig.errors import InputError
 from rig.files import write_atomic
 from tests.cli.lab import ROOT, command
+from tests.programs import run_program
 from tests.waiting import PATIENCE_S
 
 COMMANDS = {
@@ -150,11 +151,7 @@ def test_what_is_no_file_is_refused_in_words(case, thing, places, request, call)
 @pytest.mark.parametrize("said", ["check <(cat FENCE)", "check /dev/stdin < FENCE"])
 def test_a_shell_may_pass_on_text(said, fence, call):
     line = said.replace("FENCE", str(fence))
-    done = subprocess.run(
-        ["bash", "-c", f"{' '.join(command())} {line}"],
-        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = run_program("bash", "-c", f"{' '.join(command())} {line}", cwd=ROOT)
     assert done.stdout.splitlines()[1:] == call("check", fence).out.splitlines()[1:]
 
 

@@ -82,10 +82,10 @@ def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, m
             Client(Line(path, "one more"))
 
 
-def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch):
+async def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch):
     monkeypatch.setattr(service, "CLIENTS", 2)
 
-    async def test(server, path):
+    async with door() as (server, path):
         clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
         with pytest.raises(rpc.BusyError, match="any further client may only stop"):
             await clients[2].call("subscribe")
@@ -97,13 +97,11 @@ def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch)
         for client in clients:
             await client.close()
 
-    door(test)
 
-
-def test_who_says_nothing_is_told_so_and_sent_away(door, monkeypatch):
+async def test_who_says_nothing_is_told_so_and_sent_away(door, monkeypatch):
     monkeypatch.setattr("rig.daemon.server.HELLO_S", 0.05)
 
-    async def test(server, path):
+    async with door() as (_server, path):
         reader, writer = await asyncio.open_unix_connection(path)
         told = json.loads(await reader.readline())
         assert (told["id"], told["error"]["data"]["kind"]) == (None, "BusyError")
@@ -114,14 +112,12 @@ def test_who_says_nothing_is_told_so_and_sent_away(door, monkeypatch):
         assert await client.call("renew") == {"disk_s": 0.0}
         await client.close()
 
-    door(test)
-
 
 NAMES = ["\ud800x", "\x1b[2J", "\u202etxt.exe", "a\nb", "\0", "ü" * 500]
 
 
-def test_whatever_a_client_is_called_all_see_it(door):
-    async def test(server, path):
+async def test_whatever_a_client_is_called_all_see_it(door):
+    async with door() as (_server, path):
         watcher = await AsyncClient.connect(path, "watcher")
         await watcher.subscribe()
         for name in NAMES:
@@ -138,11 +134,10 @@ def test_whatever_a_client_is_called_all_see_it(door):
                 await asyncio.sleep(0)
         await watcher.close()
 
-    door(test)
 
+async def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog):
+    async with door() as (server, _path):
 
-def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog):
-    async def test(server, path):
         def broken():
             raise ArithmeticError("of a kind that nobody foresaw")
 
@@ -152,11 +147,10 @@ def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog)
             await server.serving
         assert "a part of the daemon failed" in caplog.text
 
-    door(test)
 
+async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
+    async with door() as (server, _path):
 
-def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
-    async def test(server, path):
         def broken():
             raise SystemError
 
@@ -165,11 +159,9 @@ def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
         with pytest.raises(SystemError):
             await server.serving
 
-    door(test)
 
-
-def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
-    async def test(server, path):
+async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
+    async with door() as (server, path):
         reader, writer = await asyncio.open_unix_connection(path)
         control = rpc.request("take_control", {}, 2)
         waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
@@ -193,11 +185,9 @@ def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
         assert told[299]["error"]["data"]["kind"] == "BusyError"
         writer.close()
 
-    door(test)
 
-
-def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch):
-    async def test(server, path):
+async def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch):
+    async with door() as (server, path):
         lines = [await asyncio.open_unix_connection(path) for _ in range(21)]
         for _, writer in lines:
             writer.write(HELLO)
@@ -222,11 +212,9 @@ def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch)
         for _, writer in lines:
             writer.close()
 
-    door(test)
 
-
-def test_of_a_client_that_goes_nothing_stays(door):
-    async def test(server, path):
+async def test_of_a_client_that_goes_nothing_stays(door):
+    async with door() as (server, path):
         reader, writer = await asyncio.open_unix_connection(path)
         writer.write(HELLO)
         await reader.readline()
@@ -236,5 +224,3 @@ def test_of_a_client_that_goes_nothing_stays(door):
         await asyncio.sleep(0)  # what is cancelled ends in the next turn
         running = [task.get_coro().__qualname__ for task in asyncio.all_tasks()]
         assert not [name for name in running if name.startswith("Connection.")]
-
-    door(test)

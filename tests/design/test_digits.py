@@ -15,24 +15,9 @@ from rig.design.forecast import GateLayout, forecast
 from rig.estimate.hypotheses import model_alpha
 from rig.protocol import reader
 from rig.protocol.protocol import Priors
+from tests.tables import protocol_text
 
-TEXT = """\
-protocol: 1
-chains:
-  A: {rods: 3, length: 300 mm, diameter: 12.7 mm, tilt: 12 deg}
-surface: {restitution: 0.50 ± 0.05, friction: 0.20 ± 0.02}
-drop: 180 mm ± 2 mm
-gravity: 9.81 m/s^2 ± 0.01 m/s^2
-gates:
-  impact:
-    - {channel: 0, height: 30 mm}
-    - {channel: 1, height: 140 mm}
-    - {channel: 2, height: 250 mm}
-  height_uncertainty: 0.3 mm
-  datum_uncertainty: 0.3 mm
-release: {channel: 0, pulse: 80 ms}
-plan: {incline: [40 deg, 70 deg], repeats: 1, settle: 10 s}
-"""
+TEXT = protocol_text("three-rods")
 PLAIN = reader.parse(TEXT)
 EXACT = reader.parse(
     re.sub(r" ± [^,}\n]+", "", TEXT).replace("uncertainty: 0.3 mm", "uncertainty: 0 mm")

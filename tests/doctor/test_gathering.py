@@ -20,6 +20,7 @@ from rig.session.store import Session
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import LoopedBoard, Wire, fire_drop, port_of
 from tests.session.altering import unguarded
+from tests.tables import cases
 
 
 @pytest.fixture
@@ -78,14 +79,7 @@ def test_modem_manager_and_what_udev_tells_it(terminal, process, tmp_path, monke
     ]
 
 
-@pytest.mark.parametrize(
-    ("group", "says", "advises"),
-    [
-        ("dialout", "the group dialout", "-aG dialout"),
-        (None, "its group", "-aG dialout"),
-        ("root", "the group root", "udev"),
-    ],
-)
+@cases
 def test_a_port_that_is_forbidden(group, says, advises, terminal, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)  # root may do everything
     named = {"return_value": group} if group else {"side_effect": KeyError}
@@ -196,18 +190,7 @@ def test_without_a_port_nothing_is_opened_and_a_damaged_session_is_said(doctor, 
     assert runnable("rig run") in out  # as this user can type it
 
 
-@pytest.mark.parametrize(
-    ("packages", "says", "advises"),
-    [
-        ({"chainrig": "rig", "pyserial": "serial"}, "pyserial 1.0", ""),
-        ({"chainrig": "rig"}, "not installed: pyserial", "pip install pyserial"),
-        (
-            {"rig": "rig", "chainrig": "rig", "pyserial": "serial"},
-            "rig too",
-            "pip uninstall rig chainrig",
-        ),
-    ],
-)
+@cases
 def test_what_rig_needs_is_listed_and_what_lacks_or_mixes_with_it(
     packages, says, advises, tmp_path, monkeypatch
 ):

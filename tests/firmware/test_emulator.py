@@ -8,6 +8,7 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig_emulator.avr import Avr
 from rig_emulator.controller import Stop
 from tests.firmware.emulated import MCUS
+from tests.tables import cases
 
 BYTE = 320  # cycles at 500 kbaud
 ENTRY = {"atmega2560": 5, "atmega328p": 4}  # "Interrupt Response Time", then a jump of 3
@@ -75,10 +76,7 @@ def test_a_byte_takes_ten_bits(compiled, mcu):
 # -- timers
 
 
-@pytest.mark.parametrize(
-    ("mcu", "index", "pin"),
-    [("atmega2560", 0, "PL0"), ("atmega2560", 1, "PL1"), ("atmega328p", 0, "PB0")],
-)
+@cases
 def test_input_capture_takes_the_very_cycle(compiled, mcu, index, pin):
     avr = Avr(compiled("tests/capture.c", mcu), mcu)
     avr.edge(0, pin, False)

@@ -17,6 +17,7 @@ from rig.link.messages import pack_label
 from rig.link.port import open_port, port_clock
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.toolchain import make
+from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
@@ -76,18 +77,7 @@ def test_a_drop_is_the_truth_to_the_cycle(tmp_path, board):
     assert (port.board.avr.overruns, port.board.avr.watchdog_resets) == (0, 0)
 
 
-@pytest.mark.parametrize(
-    ("settings", "complaint"),
-    [
-        ({"board": "due"}, "no board 'due'"),
-        ({"board": "uno", "protocol": PROTOCOLS / "inclined-uniform.yaml"}, "no gate 1[2-5]"),
-        ({"elf": "nowhere.elf"}, "cannot read nowhere.elf"),
-        ({"elf": __file__}, "is no AVR firmware"),
-        ({"seed": "one"}, "emu://: seed"),
-        ({"skew": "2 ms"}, "emu://: unknown dial 'skew'"),
-        ({"protocol": ""}, "emu:// needs a scene"),
-    ],
-)
+@cases
 def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
     with pytest.raises(InputError, match=complaint):
         open_port(url(**settings))

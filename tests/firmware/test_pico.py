@@ -19,6 +19,7 @@ from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import arm
 from tests.link.virtual import VirtualBench
+from tests.tables import cases
 
 HZ = 20_000_000
 CYCLES = 6 * HZ
@@ -75,13 +76,7 @@ def test_an_afternoon_with_one():
     bench.serial.close()
 
 
-@pytest.mark.parametrize(
-    ("patched", "named", "hint"),
-    [
-        ("shutil.which", "needs node", "nodejs"),
-        ("rig_emulator.pico_chip.HERE", "rp2040js", "npm ci"),
-    ],
-)
+@cases
 def test_without_its_emulator_it_says_what_to_install(monkeypatch, tmp_path, patched, named, hint):
     monkeypatch.setattr(patched, tmp_path if "HERE" in patched else lambda _: None)
     with pytest.raises(InputError, match=named) as caught:

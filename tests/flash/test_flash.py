@@ -10,6 +10,7 @@ import serial
 from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
 from tests.flash.pty_board import PtyBoard
+from tests.tables import cases
 
 VERSION = read_image(TARGETS["mega"].image_path, TARGETS["mega"]).firmware
 NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
@@ -65,25 +66,7 @@ def test_another_image_and_another_avrdude(avrdude, flash, tmp_path, monkeypatch
 
 
 # What avrdude 6.3 and 7.1 say.
-@pytest.mark.parametrize(
-    ("says", "message"),
-    [
-        (
-            "avrdude: Device signature = 0x1e950f (probably m328p)\n"
-            "avrdude: Expected signature for ATmega2560 is 1E 98 01\n",
-            "the chip on this port is another one than --board says",
-        ),
-        (
-            "avrdude error: expected signature for ATmega2560 is 1E 98 01\n",
-            "the chip on this port is another one than --board says",
-        ),
-        ("avrdude: verification error, first mismatch at byte 0x0000\n", "what was read back"),
-        ("avrdude error: verification mismatch\n", "what was read back"),
-        ("avrdude: stk500_getsync() attempt 1 of 10: not in sync: resp=0x00\n", "boot loader"),
-        ("avrdude: stk500v2_ReceiveMessage(): timeout\n", "boot loader does not answer"),
-        ("something else\n", "avrdude ended with 1"),
-    ],
-)
+@cases
 def test_avrdude_fails(says, message, avrdude, flash):
     avrdude.will(says, 1)
     with silent_port() as path:

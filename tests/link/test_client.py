@@ -22,6 +22,7 @@ from rig.reasons import make_reason
 from rig.records import ClockSample
 from sim.clock import VirtualClock
 from tests.link.strategies import MESSAGES
+from tests.tables import cases
 
 SMALL = st.integers(0, 3)
 
@@ -440,13 +441,6 @@ def test_a_port_belongs_to_one_program():
         os.close(line)
 
 
-@pytest.mark.parametrize(
-    ("start_up_s", "when"),
-    [
-        (None, "within 900 ms of FIRE"),
-        (1.5, "within 900 ms of FIRE"),
-        (0.7, "about 200 ms after FIRE"),
-    ],
-)
+@cases
 def test_when_a_board_restarted_is_said_as_well_as_it_is_known(start_up_s, when):
     assert Restart(0, 1, label=1, back_s=0.9, start_up_s=start_up_s).when == when

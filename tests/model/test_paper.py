@@ -1,10 +1,15 @@
 """The paper's scenes and claims, against the reference values that were worked out elsewhere."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from rig.model import paper
+from rig.model.predict import predict
+from rig.protocol.reader import read
+from tests.tables import cases
 
 
 def row(columns: dict[str, list[float]], **wanted: float) -> dict[str, float]:
@@ -51,3 +56,22 @@ def test_figure_6_vanishes_at_both_ends():
     assert max(separations) > 10 * separations[-1]
     peak = columns["inertia"][separations.index(max(separations))]
     assert 0.2 < peak < 1 / 3  # "close to the peaks", says the text
+
+
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
+
+
+@cases
+def test_read_from_the_protocol(name, pile, incline, alpha, separation, speed, time):
+    protocol = read(PROTOCOLS / f"{name}.yaml")
+    surface = protocol.surface if pile else replace(protocol.surface, pile=None)
+    chain = next(iter(protocol.chains.values())).chain
+    found = predict(chain, surface, incline, protocol.drop, protocol.gravity)
+    assert (found.in_domain, found.incline_deg) == (True, incline)
+    values = found.alpha, found.separation_m, found.speed_m_s, found.fall_time_s
+    for value, wanted in zip(values, (alpha, separation, speed, time), strict=True):
+        if wanted is not None:
+            assert value == pytest.approx(float(wanted), rel=1e-12, abs=0)
+    stone = math.sqrt(2 * protocol.gravity.value * (protocol.drop.value + chain.heights[-1]))
+    assert found.free_fall_speed_m_s == pytest.approx(stone, rel=1e-15)
+    assert found.speed_m_s > stone

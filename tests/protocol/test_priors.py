@@ -11,6 +11,7 @@ from rig.protocol.keys import SECTIONS
 from rig.protocol.protocol import Priors
 from rig.protocol.reader import parse
 from tests.analysis.drops import FENCE, UNIFORM, case
+from tests.tables import cases
 
 PRIORS = SECTIONS["priors"]
 
@@ -26,16 +27,7 @@ def test_every_prior_has_a_key_and_what_is_left_out_is_as_by_default():
     assert UNIFORM.priors == Priors()
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("{hnag: 1 mm}", "did you mean hang?"),
-        ("{hang: 1 s}", "a length"),
-        ("{hang: -1 mm}", "0 mm to 100 mm"),
-        ("{hang: 1 mm ± 1 mm}", "±"),
-        ("3", "a mapping"),
-    ],
-)
+@cases
 def test_what_is_no_prior_is_refused_at_its_place(text, said):
     with pytest.raises(InputError) as caught:
         scene(text)

@@ -9,16 +9,9 @@ from rig.protocol.plan import runs
 from rig.protocol.protocol import Run
 from rig.protocol.reader import parse
 from rig.protocol.site import gravity_at
+from tests.tables import protocol_text
 
-TWO = """\
-protocol: 1
-chains:
-  A: {rods: 5, length: 200 mm}
-  B: {like: A}
-surface: {restitution: 0.5}
-drop: 180 mm
-gravity: 9.81 m/s^2
-"""
+TWO = protocol_text("two-chains")
 
 
 def planned(**changes):

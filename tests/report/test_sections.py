@@ -22,6 +22,7 @@ from rig.sections import Sections
 from rig.session.store import Session
 from rig.units import Quantity
 from tests.cli.lab import PROTOCOLS
+from tests.tables import cases
 
 
 @pytest.fixture(scope="module")
@@ -105,10 +106,7 @@ def test_a_missing_package_is_no_failed_section():
     assert sections.failed == {"one": "one could not be made: no good drop"}
 
 
-@pytest.mark.parametrize(("where", "words"), [
-    ("rig.results.estimated.estimate", "The estimate of the impacts could not be made"),
-    ("rig.estimate.session.impulses", "could not be made"),
-])  # fmt: skip
+@cases
 def test_what_an_estimate_lacks_is_said_in_the_report_and_on_stderr(
     single, tmp_path, capsys, monkeypatch, where, words
 ):

@@ -15,6 +15,7 @@ from rig.session.store import Session
 from tests.cli.conftest import call  # noqa: F401 - a fixture
 from tests.cli.lab import PROTOCOLS
 from tests.session.altering import unguarded
+from tests.tables import cases
 
 
 def record(folder, name, scene="picket-fence", seed=1, series=0, change=("", "")):
@@ -149,10 +150,7 @@ def test_a_damaged_session_is_refused(two, tmp_path):
     refused("records_damaged", InputError, two[1], copy)
 
 
-@pytest.mark.parametrize(
-    ("sessions", "options"),
-    [(2, ("--budget", "1")), (1, ("--same-rig",)), (1, ("--no-same-rig",)), (1, ("--unfinished",))],
-)
+@cases
 def test_options_for_another_number_of_sessions_are_refused(two, call, sessions, options):  # noqa: F811
     done = call("analyze", *two[:sessions], *options)
     assert done.code == 2

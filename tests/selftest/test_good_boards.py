@@ -15,6 +15,7 @@ from rig.selftest.run import CHECKS
 from tests.flash.pty_board import PtyBoard
 from tests.selftest.benches import LoopedBoard, Wire, hold_drop, outcomes, port_of
 from tests.selftest.broken import claims
+from tests.tables import cases
 
 HANDS = {"GATE_BLOCKED", "GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
 FENCE = "sim://?protocol=protocols/picket-fence.yaml"
@@ -70,48 +71,18 @@ def fewer_gates(lab, number=12):
     return board
 
 
-FEWER = "it needs gate 15, and this board has gates 0 to 11"
 TIME = "it needs a computer with time to ask the board every 125 ms"
-WHICH = "it needs the gates in use, by --protocol FILE or --gates 0,1,8,9: gates 4, 5, 6,"
-WIRES = "it needs a gate that is clear and steady; on a bare board a wire from one gate input to gr"
+BOARDS = {"looped": LoopedBoard, "held up": HeldUp, "stopped": Stopped, "12 gates": fewer_gates}
 
 
-@pytest.mark.parametrize(
-    ("kind", "wiring", "options", "says"),
-    [
-        (
-            LoopedBoard,
-            {},
-            {"release": False},
-            {"COOLING": "it needs leave to drive release 0: --r"},
-        ),
-        (
-            LoopedBoard,
-            {"late_s": 2e-6},
-            {},
-            {"sync output to gate": "5 drops, latency +2.000 µs, "},
-        ),
-        (HeldUp, {}, {}, {"round trips": TIME}),
-        (Stopped, {}, {}, {"ARMED": "it needs a closed emergency stop"}),
-        (LoopedBoard, {"blocked": 0xFFF0}, {}, {"gates": WHICH, "GATE_BLOCKED": "gate 4"}),
-        (
-            LoopedBoard,
-            {"blocked": 0xFFF0},
-            {"gates": 0xF},
-            {"gates": "4 gates clear; not in use and blocked: gates 4, 5,"},
-        ),
-        (LoopedBoard, {"blocked": 0xFFFF}, {"loopback": None}, {"HOLDING": WIRES}),
-        (LoopedBoard, {}, {"loopback": None}, {"sync output to gate": "it needs a wire from the"}),
-        (fewer_gates, {}, {"loopback": 15}, {"sync output to gate": FEWER}),
-    ],
-)
+@cases
 def test_a_right_rig_fails_nothing_and_is_told_what_it_lacks(
-    kind, wiring, options, says, monkeypatch
+    board, wiring, options, says, monkeypatch
 ):
     lab = Wire(**wiring)
     controller = claims("gates", lambda gates: gates | lab.blocked)
     monkeypatch.setattr("sim.board.Microcontroller", controller)
-    board = kind(lab)
+    board = BOARDS[board](lab)
     found = outcomes(port_of(board), **options)
     assert failed(found) == []
     assert {check: found[check].what[: len(what)] for check, what in says.items()} == says
@@ -125,13 +96,7 @@ def test_a_busy_computer_blames_no_board(monkeypatch):
     assert found["arming times out"].what == TIME.replace("125", "250")
 
 
-@pytest.mark.parametrize(
-    ("number", "blocked", "in_use", "code", "what"),
-    [
-        (16, 0xFFF0, 0x1F, "gates_blocked", "gate 4 blocked all the time"),
-        (12, 0, 0x300F, "gates_not_fitted", "in use, but not on this board: gates 12, 13"),
-    ],
-)
+@cases
 def test_a_gate_in_use_that_is_blocked_or_not_there_fails(
     number, blocked, in_use, code, what, monkeypatch
 ):

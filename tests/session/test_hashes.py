@@ -14,6 +14,7 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.session.altering import unguarded
 from tests.session.test_session_store import make, make_older
+from tests.tables import cases
 
 
 def record(session, run):
@@ -51,25 +52,7 @@ def test_what_is_as_recorded_has_no_fault(sound, tmp_path):
     assert faults(copy) == []
 
 
-@pytest.mark.parametrize(
-    ("sql", "fault"),
-    [
-        ('UPDATE edge SET tick = 2 WHERE "drop" = 3 AND idx = 0', "edge: not as recorded: run 3"),
-        ('DELETE FROM edge WHERE "drop" = 4', "edge: not as recorded: run 4, attempt 1"),
-        ('DELETE FROM "drop" WHERE id = 2', "drop: not as recorded: rows 2 to 2"),
-        ("DELETE FROM ping WHERE id = 5", "ping: not as recorded: rows 5 to 5"),
-        ("UPDATE ping SET id = 7 - id WHERE id IN (3, 4)", "ping: not as recorded: rows 4 to 4"),
-        ("UPDATE bytes SET direction = 'tx' WHERE id = 1", "bytes: not as recorded: rows 1 to 1"),
-        ("UPDATE run_state SET state = 'void' WHERE id = 2", "run_state: not as recorded: rows 2"),
-        ("UPDATE meta SET value = 'x' WHERE key = 'origin'", "meta: not as recorded: rows 1 to 6"),
-        ("UPDATE protocol SET text = 'p'", "protocol: not as recorded: rows 1"),
-        ("INSERT INTO ping VALUES (6, 1, 2, 3)", "ping: rows after 5 are in no hash"),
-        ("DELETE FROM hash WHERE id = 9", "hash: rows 9 to 9 are missing"),
-        ("DELETE FROM hash WHERE id > 9", "run_state: rows after 1 are in no hash"),
-        ("UPDATE hash SET covered = 'no' WHERE id = 4", "no: not as recorded: rows 1"),
-        ("DELETE FROM hash", "hash: all its rows are missing"),
-    ],
-)
+@cases
 def test_what_is_not_as_recorded_is_named(sql, fault, sound, tmp_path):
     path = tmp_path / "altered"
     shutil.copy(sound, path)

@@ -19,25 +19,12 @@ from sim.resolved import foresight
 from sim.resolved.fall import fall
 from sim.resolved_lab import ResolvedLab, at_level
 from sim.scene import set_scene
+from tests.tables import protocol_text
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
 
 GRAVITY = 9.81
-SCENE = """
-protocol: 1
-title: Four rods
-chains:
-  A: {rods: 4, length: 145 mm, diameter: 12.7 mm, rod_length: 102 mm, tilt: 12 deg}
-  B: {like: A}
-surface: {restitution: 0.5, friction: 0.2}
-drop: 600 mm
-gravity: 9.81 m/s^2
-gates:
-  impact: [{channel: 0, height: 25 mm}, {channel: 1, height: 60 mm}, {channel: 2, height: 400 mm}]
-  free: [{channel: 8, height: 25 mm}, {channel: 9, height: 60 mm}, {channel: 10, height: 400 mm}]
-plan: {incline: 40 deg, repeats: 2, order: ABBA, settle: 0 s}
-accept: {release_skew: 20 ms}
-"""
+SCENE = protocol_text("four-rods")
 
 
 @pytest.fixture(scope="module")

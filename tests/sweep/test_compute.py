@@ -17,6 +17,7 @@ from rig.sweep.layout import MOST_POINTS, lay_out
 from rig.units import Quantity
 from tests.cli.lab import PROTOCOLS
 from tests.sweep.conftest import SCENE, VARY
+from tests.tables import cases
 
 
 def points(protocol, vary, length=7):
@@ -82,11 +83,7 @@ def test_a_value_holds_a_parameter_and_the_inclines_are_layers():
     assert layout.fixed_values["incline"] == 40.0
 
 
-@pytest.mark.parametrize(("scene", "vary", "said"), [
-    ("picket-fence.yaml", "drop=1m..2m:3", "no surface"),
-    ("bead-chain.yaml", "friction=0..1:3", "it can vary: alpha, gamma, drop, gravity"),
-    ("single-chain.yaml", "alpha=0..1:3", "it can vary: incline, restitution, friction, inertia"),
-])  # fmt: skip
+@cases
 def test_only_what_the_scene_has_can_be_varied(scene, vary, said):
     with pytest.raises(InputError, match=said):
         lay_out(reader.read(PROTOCOLS / scene), [vary])

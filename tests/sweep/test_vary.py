@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.errors import InputError
-from rig.sweep.layout import MOST_VALUES, linspace, read_vary
+from rig.sweep.layout import linspace, read_vary
 from rig.sweep.variables import VARIABLES
+from tests.tables import cases
 
 NAMES = tuple(VARIABLES)
 SPACES = st.sampled_from(["", " ", "  "])
@@ -41,23 +42,7 @@ def test_units_lead_to_si_and_degrees():
     assert list(found) == ["drop", "incline", "friction"]
 
 
-@pytest.mark.parametrize(("text", "column", "said"), [
-    ("friktion=0..1:5", 1, "did you mean friction"),
-    ("tilt=0deg..5deg:5", 1, "it can vary: incline, restitution"),
-    ("friction", 1, "restitution=-0.4..0.9:200"),
-    ("drop=100..300mm:5", 6, "without a unit"),
-    ("drop=100mm..300deg:5", 13, "is an angle"),
-    ("restitution=-2..0.9:3", 13, "accepted: -1 to 1"),
-    ("restitution=0..1.5:3", 16, "accepted: -1 to 1"),
-    ("restitution=0..0.5 ± 0.1:3", 16, "no uncertainty"),
-    ("friction=0...5:3", 11, "two dots"),
-    ("friction=0.5..0.5:3", 15, "more than 0.5"),
-    ("friction=0..0.5", 16, "how many"),
-    ("friction=0..0.5:1", 17, "'1'"),
-    ("friction=0..0.5:²", 17, "'²'"),
-    (f"friction=0..0.5:{MOST_VALUES + 1}", 17, "a whole number from 2"),
-    ("friction=0.5:3", 10, "LOW..HIGH:COUNT"),
-])  # fmt: skip
+@cases
 def test_a_fault_is_told_at_its_column(text, column, said):
     with pytest.raises(InputError) as caught:
         read_vary([text], NAMES)

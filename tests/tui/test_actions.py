@@ -9,6 +9,7 @@ from rig.errors import InputError
 from rig.tui.actions import ACTIONS, BY_NAME, help_text, possible, shown_key
 from rig.tui.keys import merge_keys, read_keys
 from rig.tui.widgets.text import LONGEST, duration, plain
+from tests.tables import cases
 
 
 def test_every_key_has_one_meaning():
@@ -52,20 +53,7 @@ def test_f9_always_stops_and_enter_goes_on():
         merge_keys({"note": "f9"}, "k")
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ('fly = "x"', "unknown action fly"),
-        ("note = 3", "note: give a key or several"),
-        ('note = "escape"', "escape always means STOP"),
-        ('note = "k"\nreject = "k"', "reject: k already belongs to note"),
-        ('note = "x"', "reject has no key left"),
-        ("note", "keys.toml:1:5: "),
-        ('reject = "r"\n\nfly = "x"', "keys.toml:3: unknown action fly"),
-        ('note = "rr"', "keys.toml:1: note: unknown key rr"),
-        ('note = "hyper+r,."', "unknown key hyper+r"),
-    ],
-)
+@cases
 def test_a_wrong_key_file_says_what_is_wrong(tmp_path, text, said):
     file = tmp_path / "keys.toml"
     file.write_text(text, "utf-8")

@@ -1,6 +1,5 @@
 """What is drawn where there is only ASCII."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,8 +9,8 @@ from rig.tui.app import RigApp
 from rig.tui.ascii import in_ascii
 from rig.tui.context import Options, ascii_only
 from rig.tui.state import DaemonState
-from tests.tui.lab import KEYS, run
-from tests.tui.screen import text_of
+from tests.tables import cases
+from tests.tui.lab import KEYS, text_of
 
 
 @given(st.text(st.characters(exclude_categories=["M", "C"])))
@@ -25,29 +24,16 @@ def test_what_matters_can_still_be_told():
     assert in_ascii("⠉⣀⡇⣿ ") == "'.:# "
 
 
-@pytest.mark.parametrize(
-    ("environment", "true"),
-    [
-        ({}, False),
-        ({"LANG": "de_DE.UTF-8"}, False),
-        ({"LANG": "C.utf8", "LC_ALL": ""}, False),
-        ({"LANG": "de_DE.UTF-8", "LC_ALL": "C"}, True),
-        ({"LC_CTYPE": "en_US.ISO-8859-1"}, True),
-        ({"LANG": "de_DE.UTF-8", "TERM": "linux"}, True),
-    ],
-)
-def test_terminal_and_locale_say_when(environment, true):
-    assert ascii_only(environment) is true
+@cases
+def test_terminal_and_locale_say_when(environment, is_ascii):
+    assert ascii_only(environment) is is_ascii
 
 
-def test_a_whole_screen_is_ascii():
-    async def work():
-        app = RigApp(Options(ascii=True), KEYS, FakeClient(DaemonState(0, QUIET)))
-        app.driver.flow = Flow(Stage.DEVICE)
-        async with app.run_test(size=(80, 24)) as pilot:
-            while "DEVICE" not in text_of(app):
-                await pilot.pause()
-            assert text_of(app).isascii()
-            assert "# STOP  F9 or Esc" in text_of(app)
-
-    run(work())
+async def test_a_whole_screen_is_ascii():
+    app = RigApp(Options(ascii=True), KEYS, FakeClient(DaemonState(0, QUIET)))
+    app.driver.flow = Flow(Stage.DEVICE)
+    async with app.run_test(size=(80, 24)) as pilot:
+        while "DEVICE" not in text_of(app):
+            await pilot.pause()
+        assert text_of(app).isascii()
+        assert "# STOP  F9 or Esc" in text_of(app)

@@ -1,7 +1,7 @@
 """Whatever looks as if it could be clicked can be."""
 
 from rig.tui.widgets.text import Words
-from tests.tui.lab import flat, run
+from tests.tui.lab import flat
 
 LOOKS = 5
 """That many looks in a row must find a thing at the same place before it is clicked."""
@@ -36,33 +36,30 @@ async def click(op, action):
     await op.pilot.click(offset=(x, y))
 
 
-def test_a_protocol_and_stop_are_clicked(lab, fence):
+async def test_a_protocol_and_stop_are_clicked(lab, fence):
     other = lab.folder / "other.yaml"
     other.write_text(fence.replace("TITLE", "The other one"), "utf-8")
     broken = lab.folder / "broken.yaml"
     broken.write_text("protocol: 1\n", "utf-8")
 
-    async def work():
-        async with lab.operator(files=(broken, lab.protocol, other)) as op:
-            # What can be used, and not the first of the list.
-            await op.sees("A short fence", "Ready experiments")
-            await op.until(lambda: op.app.client and op.app.client.driving)
+    async with lab.operator(files=(broken, lab.protocol, other)) as op:
+        # What can be used, and not the first of the list.
+        await op.sees("A short fence", "Ready experiments")
+        await op.until(lambda: op.app.client and op.app.client.driving)
 
-            async def chosen():  # again, should the list have been laid out anew under the pointer
-                rows = [row.title for row in op.app.desk.rows]
-                await click(op, f"app.choose({rows.index('other')})")
-                return "The other one" in flat(op.app)
+        async def chosen():  # again, should the list have been laid out anew under the pointer
+            rows = [row.title for row in op.app.desk.rows]
+            await click(op, f"app.choose({rows.index('other')})")
+            return "The other one" in flat(op.app)
 
-            await op.until(chosen)
-            stopped = []
-            real = op.app.client.call
+        await op.until(chosen)
+        stopped = []
+        real = op.app.client.call
 
-            async def call(method, **params):
-                stopped.append(method)
-                return await real(method, **params)
+        async def call(method, **params):
+            stopped.append(method)
+            return await real(method, **params)
 
-            op.app.client.call = call
-            await click(op, "app.do('stop')")
-            await op.until(lambda: "stop" in stopped)
-
-    run(work())
+        op.app.client.call = call
+        await click(op, "app.do('stop')")
+        await op.until(lambda: "stop" in stopped)
