@@ -15,8 +15,10 @@ from rig.cache.store import CacheFile
 from rig.cli import main
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.cli import lab
 from tests.cli.lab import PROTOCOLS, short
 from tests.report.undrawn import undrawn  # noqa: F401 - a fixture
+from tests.tables import read_table
 
 SCENES = {
     "fence": ("picket-fence.yaml", ""),
@@ -26,17 +28,7 @@ SCENES = {
     "chains": (None, "skew_sd=1ms"),
     "voids": (None, "skew_sd=8ms"),
 }
-COMMANDS = [
-    ("analyze", "SESSION"),
-    ("analyze", "SESSION", "--json"),
-    ("analyze", "SESSION", "--scatter"),
-    ("analyze", "SESSION", "--priors", "--json"),
-    ("analyze", "SESSION", "--budget", "1", "--trials", "2"),
-    ("estimate", "SESSION"),
-    ("estimate", "SESSION", "--json", "-o", "OUT/pictures"),
-    ("export", "SESSION", "--csv", "OUT/tables"),
-    ("report", "SESSION", "-o", "OUT/page.html", "--figures", "OUT/figures"),
-]
+COMMANDS = [words.split() for words in read_table(lab.__file__, "commands")["kept"]]
 
 
 def record(folder, scene):

@@ -6,6 +6,7 @@ import pytest
 
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS
+from tests.tables import cases
 
 TIMES = "Time (s),D7 (V),D9 (V)\n" + "".join(
     f"{n * 1e-3:.3f},{5 * (100 <= n < 140)},{5 * (300 <= n < 320)}\n" for n in range(600)
@@ -57,22 +58,7 @@ def test_other_arguments_are_no_pairs(look, tmp_path):
     assert "inputs that are no gate: D9 (V)" in done.err
 
 
-@pytest.mark.parametrize(
-    ("typed", "message"),
-    [
-        ("--map D8=0", "--map: 'D8' is not an input of the file: D7 (V), D9 (V)\n"),
-        ("--map 'D7 (V)'", "--map: 'D7 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, "),
-        (
-            "--map 'D7 (V)=0, D9 (V)'",
-            "--map: 'D9 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, ",
-        ),
-        ("--map 'D7 (V)=7'", "--map: 'D7 (V)=7' is not INPUT=CHANNEL with a gate's channel: 0, "),
-        ("--map 'D7 (V)='", "--map: 'D7 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, "),
-        ("--map ''", "--map: '' is not an input of the file: "),
-        ("--map =3", "--map: '3' is not an input of the file: "),
-        ("--map --dry-run", "rig import: argument --map: expected one argument"),
-    ],
-)
+@cases
 def test_a_pair_that_is_none_is_located(look, typed, message):
     done = look(typed)
     assert done.code == 2

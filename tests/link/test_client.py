@@ -103,9 +103,19 @@ def _with(message):
 def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
     port = Captive(clock, {})
     assert Device(port, clock).connect() == IDENTITY
+
+
+@pytest.mark.parametrize(("tries", "asked"), [(40, 4), (4, 4), (2, 2)])
+def test_who_never_answers_is_asked_a_few_times_whatever_patience_a_bad_line_needs(
+    clock, tries, asked
+):
+    """Each time: at first, behind what a boot loader is told, and when it should have let go."""
+    port = FakePort(clock, {})
     with pytest.raises(DeviceTimeoutError, match="did not answer Identify") as caught:
-        device(clock, {}).connect()
+        Device(port, clock, tries=tries).connect()
     assert "cable" in caught.value.hint
+    frames = [frame for data in port.written for frame in Decoder().feed(data)]
+    assert [frame.type for frame in frames] == [wire.CODES[wire.Identify]] * 3 * asked
 
 
 def test_repeats_have_the_same_seq_and_back_off(clock):
