@@ -11,8 +11,7 @@ from rig.protocol.reader import parse, read
 from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.cli.lab import PROTOCOLS, short
-from tests.model.air_reference import reference_air_fall, reference_way
-from tests.model.reference import printed_alpha
+from tests.model.reference import printed_alpha, reference_air_fall, reference_way
 from tests.tables import cases
 
 TIGHT = 1e-13

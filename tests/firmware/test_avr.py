@@ -17,9 +17,8 @@ from rig_emulator.wiring import BOARDS
 from sim.dials import read_dials
 from sim.lab import ChainLab
 from tests.firmware.toolchain import FIRMWARE, make
-from tests.link.bench import ScriptedLab
+from tests.link.bench import ScriptedLab, VirtualBench
 from tests.link.conformance import DeviceConformance
-from tests.link.virtual import VirtualBench
 
 _TURN_TICKS = 1 << 16
 

@@ -15,10 +15,9 @@ from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, symbol
 from tests.firmware.toolchain import FIRMWARE
-from tests.link.bench import LABEL, ScriptedLab, falling_rods
+from tests.link.bench import LABEL, ScriptedLab, VirtualBench, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import arm
-from tests.link.virtual import VirtualBench
 from tests.tables import cases
 
 HZ = 20_000_000

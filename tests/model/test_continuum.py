@@ -12,7 +12,7 @@ from rig.errors import DomainError
 from rig.model.continuum import UniformChain, end, separation_leading_order, speed
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
-from tests.model.continuum_reference import closed_end, printed_squared_speed
+from tests.model.reference import closed_end, printed_squared_speed
 from tests.tables import cases
 
 # A sum of some hundred positive terms, each of a dozen roundings; 4e-15 is the worst seen.
