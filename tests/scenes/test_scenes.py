@@ -99,7 +99,8 @@ def known_exactly(kind: str) -> list[tuple[str, ...]]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "zeros"), [(kind, zeros) for kind in ("two", "fence") for zeros in known_exactly(kind)]
+    ("kind", "zeros"),
+    [(kind, zeros) for kind in ("two", "fence", "glider") for zeros in known_exactly(kind)],
 )
 def test_some_things_known_exactly_leave_a_drop_sound(kind, zeros):
     scene = parse(protocol(kind, zeros))
@@ -109,7 +110,7 @@ def test_some_things_known_exactly_leave_a_drop_sound(kind, zeros):
 
 
 @pytest.mark.parametrize(
-    "kind", ["two", "glider", *(pytest.param(kind, marks=SLOW) for kind in ("air", "fence"))]
+    "kind", ["two", *(pytest.param(kind, marks=SLOW) for kind in ("air", "fence", "glider"))]
 )
 def test_all_known_exactly_goes_through_every_command(kind, tmp_path):
     text = protocol(kind, ALL)
