@@ -8,6 +8,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+from rig.cli import main
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -40,6 +41,15 @@ def short_fence(repeats: int = 2, settle: str = "1 s") -> str:
     """Write a protocol of a few drops of a fence, which are quickly analysed."""
     text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
     return text.replace("repeats: 10, settle: 5 s", f"repeats: {repeats}, settle: {settle}")
+
+
+def record(folder: Path, text: str, url: str = "sim://", name: str = "s", codes=(0,)) -> Path:
+    """Write a protocol, have its runs recorded, and return the session."""
+    protocol, session = folder / f"{name}.yaml", folder / f"{name}.session"
+    protocol.write_text(text, "utf-8")
+    words = ["run", str(protocol), "--port", url, "--session", str(session), "--yes"]
+    assert main(words) in codes
+    return session
 
 
 def without(key: str, text: str) -> str:

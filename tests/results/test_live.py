@@ -12,7 +12,6 @@ from rig.analysis.comparison import compare
 from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.session import analyze
-from rig.cli import main
 from rig.clock.calibration import TimeScale
 from rig.reasons import plain_reason
 from rig.records import Job
@@ -24,18 +23,14 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
-from tests.cli.lab import short
+from tests.cli.lab import record, short
 
 
 @pytest.fixture(scope="module")
 def blocks(tmp_path_factory):
     """Six drops, the first four of them a block of A, B, B, A."""
-    folder = tmp_path_factory.mktemp("blocks")
-    protocol, session = folder / "abba.yaml", folder / "abba.session"
-    protocol.write_text(short("[40 deg]", 6).replace("settle", "order: ABBA, settle"), "utf-8")
-    words = ["run", protocol, "--port", "sim://?seed=5", "--session", session, "--yes"]
-    assert main([*map(str, words)]) == 0
-    return session
+    text = short("[40 deg]", 6).replace("settle", "order: ABBA, settle")
+    return record(tmp_path_factory.mktemp("blocks"), text, "sim://?seed=5")
 
 
 @pytest.fixture

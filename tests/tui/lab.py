@@ -90,6 +90,16 @@ def flat(app: RigApp) -> str:
     return re.sub(r"\s+", " ", text_of(app))
 
 
+@asynccontextmanager
+async def at_screen(options: Options, size=(80, 24), **of_client: Any) -> AsyncIterator[Operator]:
+    """Sit down at a screen, whose client has other attributes."""
+    app = RigApp(options, KEYS)
+    for attribute, other in of_client.items():
+        setattr(app.client, attribute, other)
+    async with app.run_test(size=size) as pilot:
+        yield Operator(app, pilot)
+
+
 @dataclass
 class Lab:
     """One bench with its daemon."""
@@ -150,17 +160,13 @@ class Lab:
             countdown_s=countdown_s,
             still_s=0.0,
         )
-        app = RigApp(options, KEYS)
-        if app.client:
-            app.client.patience_s = self.patience_s
-        if name and app.client:
-            app.client.name = name
-        async with app.run_test(size=size) as pilot:
-            operator = Operator(app, pilot)
-            await operator.until(lambda: app.page)
+        named = {"name": name} if name else {}
+        async with at_screen(options, size, patience_s=self.patience_s, **named) as operator:
+            client = operator.app.client
+            await operator.until(lambda: operator.app.page)
             yield operator
-            if app.client and app.client.daemon:
-                self.daemons.append(app.client.daemon)
+            if client.daemon:
+                self.daemons.append(client.daemon)
 
     @asynccontextmanager
     async def ready(

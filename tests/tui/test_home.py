@@ -14,13 +14,12 @@ from rig.results.whole import notes
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui import client, commands
-from rig.tui.app import RigApp
 from rig.tui.context import Options
 from rig.tui.survey import session_list
 from rig.tui.widgets.text import Words
 from rig.wordings import NOTE
 from tests.cli.lab import short
-from tests.tui.lab import KEYS, PATIENCE_S, Operator, flat, short_folder
+from tests.tui.lab import PATIENCE_S, at_screen, flat, short_folder
 
 KEYS_AT_MOST = 4
 
@@ -32,12 +31,11 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeyp
     pressed = []
 
     options = Options(socket=folder / "rig.sock", countdown_s=0.2, still_s=0.0)
-    app = RigApp(options, KEYS)
-    async with app.run_test(size=(80, 24)) as pilot:
-        op = Operator(app, pilot)
+    async with at_screen(options) as op:
+        app = op.app
         await op.sees("HOME", "Try it", "New experiment", "no rig yet", "Enter open")
         await op.press("escape")
-        await pilot.pause(0.3)
+        await op.pilot.pause(0.3)
         assert "✗" not in flat(app)
         assert "supply" not in flat(app)
         assert app.driver.stop is None
@@ -53,7 +51,7 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeyp
         await press("enter")
         await op.at(Stage.PREPARE)
         await op.sees("Run 1 of 10", "Enter arms")
-        await pilot.pause(0.7)  # it stands there to be read
+        await op.pilot.pause(0.7)  # it stands there to be read
         await press("enter")
         await op.at(Stage.RESULT)
         await op.sees("g = 9.")
@@ -75,9 +73,7 @@ async def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypat
     monkeypatch.setattr(commands, "_run", record)
 
     folder = short_folder()
-    app = RigApp(Options(socket=folder / "rig.sock", still_s=0.0), KEYS)
-    async with app.run_test(size=(80, 24)) as pilot:
-        op = Operator(app, pilot)
+    async with at_screen(Options(socket=folder / "rig.sock", still_s=0.0)) as op:
         await op.sees("Pico: put the firmware on it")
         await op.press("down", "down", "enter")
         await op.sees("Write the firmware?")
@@ -121,9 +117,7 @@ async def test_drops_are_compared_and_files_are_written_from_inside(recorded, tm
     with Session.open(mine, readonly=True) as session:
         assert notes(session) == {Job(2, 1): "a [draught]"}
 
-    app = RigApp(Options(session=mine, offline=True, still_s=0.0), KEYS)
-    async with app.run_test(size=(120, 36)) as pilot:
-        op = Operator(app, pilot)
+    async with at_screen(Options(session=mine, offline=True, still_s=0.0), (120, 36)) as op:
         await op.sees("drop 1 of 4")
         await op.press("down")
         await op.sees("drop 2 of 4", "note: a [draught]")
@@ -143,13 +137,11 @@ async def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(re
     assert (entries["abba.session"].drops, entries["zero.session"].drops) == (4, 0)
     assert entries["broken.session"].trouble
 
-    app = RigApp(Options(session=other, offline=True), KEYS)
-    async with app.run_test(size=(120, 36)) as pilot:
-        op = Operator(app, pilot)
+    async with at_screen(Options(session=other, offline=True), (120, 36)) as op:
 
         async def enter():  # which right behind letters may be part of what was pasted
             await op.press("enter")
-            return len(app.screen_stack) == 1
+            return len(op.app.screen_stack) == 1
 
         await op.sees("No drop recorded yet")
         await op.press("o")
@@ -167,9 +159,7 @@ async def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(re
 
 
 async def test_the_session_page_says_how_many_taught_each_other(recorded):
-    app = RigApp(Options(session=recorded, offline=True), KEYS)
-    async with app.run_test(size=(120, 36)) as pilot:
-        op = Operator(app, pilot)
+    async with at_screen(Options(session=recorded, offline=True), (120, 36)) as op:
         await op.press("5")
         await op.sees("joint fit of 4 runs", "separation")
         await op.press("y", "y")
