@@ -11,21 +11,6 @@ from tests.tables import cases
 TIMES = "Time (s),D7 (V),D9 (V)\n" + "".join(
     f"{n * 1e-3:.3f},{5 * (100 <= n < 140)},{5 * (300 <= n < 320)}\n" for n in range(600)
 )
-TYPED = (
-    "--map 'D7 (V)=0,D9 (V)=3'",
-    "--map 'D7 (V)=0, D9 (V)=3'",
-    "--map 'D7 (V) = 0, D9 (V) = 3'",
-    "--map 'D7 (V)=0 D9 (V)=3'",
-    "--map ' D7 (V) = 0 , D9 (V) = 3 '",
-    "--map='D7 (V)=0, D9 (V)=3'",
-    "--map 'D7 (V)=0' 'D9 (V)=3'",
-    "--map 'D7 (V)=0', 'D9 (V)=3',",
-    "--map 'D7 (V)' = 0, 'D9 (V)' = 3",
-    "--map 'D7 (V)' = 0 , 'D9 (V)' = 3 ,",
-    "--map 'D7 (V)'= 0 'D9 (V)' =3",
-    "--map='D7 (V)=0' 'D9 (V)=3'",
-    "--map D7 '(V)' = 0 D9 '(V)' = 3",
-)
 
 
 @pytest.fixture
@@ -41,9 +26,7 @@ def look(call, tmp_path):
     return run
 
 
-@pytest.mark.parametrize(
-    ("typed", "first"), [*((typed, True) for typed in TYPED), *((one, False) for one in TYPED[::6])]
-)
+@cases
 def test_pairs_are_understood_as_they_are_typed(look, typed, first):
     done = look(typed, first=first)
     assert done.code == 0, done.err

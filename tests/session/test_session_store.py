@@ -175,15 +175,7 @@ def test_latest_drops_are_the_last_attempts(path):
 
 
 @pytest.mark.parametrize("table", TABLES)
-@pytest.mark.parametrize(
-    "statement",
-    [
-        "DELETE FROM {table}",
-        "UPDATE {table} SET {column} = {column}",
-        "INSERT OR REPLACE INTO {table} SELECT * FROM {table}",
-        "REPLACE INTO {table} SELECT * FROM {table}",
-    ],
-)
+@cases
 def test_raw_records_are_never_altered(path, table, statement):
     with make(path) as session:
         fill(session)
