@@ -99,9 +99,15 @@ def test_alias_bomb_is_refused():
 
 
 def test_scenes_without_a_surface():
-    text = GOOD.replace("surface: {restitution: 0.50 ± 0.05}\n", "")
-    lines = problems(text)
-    assert [line.split(": ")[1] for line in lines] == ["chains", "gates.impact", "plan.incline"]
+    text = GOOD.replace("surface: {restitution: 0.50 ± 0.05}", "contact: {level: 0 mm ± 1 mm}")
+    faulty = [line.split(": ")[1] for line in problems(text)]
+    assert faulty == ["chains", "contact", "gates.impact", "plan.incline"]
+
+
+@cases
+def test_what_a_key_needs_of_both_chains_is_asked_for_of_each(line, lacking):
+    told = zip(problems(GOOD.replace("title: on", line)), "AB", strict=True)
+    assert all(problem.startswith(lacking % chain) for problem, chain in told)
 
 
 @pytest.mark.parametrize("order", ["ABBA", "alternate"])
