@@ -12,21 +12,13 @@ from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.cli.lab import PROTOCOLS, short
 from tests.model.reference import printed_alpha, reference_air_fall, reference_way
-from tests.tables import cases
+from tests.tables import cases, protocol_text
 
 TIGHT = 1e-13
 MASSES = (0.0241, 0.0203, 0.0162, 0.0131, 0.0108, 0.0089, 0.0072, 0.0060)
 GAPS = (0.051, 0.049, 0.048, 0.047, 0.046, 0.045, 0.044)
 HEIGHTS = tuple(sum(GAPS[:k]) for k in range(8))
-SCENE = """\
-protocol: 1
-chains:
-  A: {rods: 6, length: 250 mm, mass: 10 g, diameter: 8 mm, rod_length: 90 mm, tilt: 15 deg}
-surface: {restitution: 0.5, friction: 0.2}
-drop: 150 mm
-gravity: 9.81 m/s^2
-plan: {incline: 50 deg}
-"""
+SCENE = protocol_text("six-rods")
 EVEN = tuple(0.05 * k for k in range(6))
 UNLIKE = "  B: {like: A, length: 300 mm, diameter: 12 mm}\nsurface"
 

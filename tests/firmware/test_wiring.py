@@ -11,15 +11,7 @@ from tests.firmware.toolchain import FIRMWARE
 from tests.tables import read_table
 
 README = (FIRMWARE / "README.md").read_text(encoding="utf-8")
-WORDS = {
-    "RELEASE_0": "release 0",
-    "RELEASE_1": "release 1",
-    "SYNC": "sync out",
-    "STOP": "emergency stop",
-    "SENSE": "release sense",
-    "REFERENCE": "1 Hz reference",
-    "LED": "status LED",
-}
+WORDS = read_table(__file__, "pins")["words"]
 MAPS = read_table(__file__, "pins")
 EACH = pytest.mark.parametrize("board", BOARDS)
 
