@@ -247,7 +247,7 @@ def _reached(room: str, copies: SimpleQueue[Path]) -> Reached:
 def _state_of(room: Room) -> str:
     found = hashlib.sha256()
     for folder in (*room.sources, *room.tests):
-        for path in sorted((ROOT / folder).rglob("*.[pch]*")) or [ROOT / folder]:
+        for path in sorted((ROOT / folder).rglob("*.[pchy]*")) or [ROOT / folder]:
             if path.is_file() and "__pycache__" not in path.parts:
                 found.update(path.read_bytes())
     return found.hexdigest()[:12]

@@ -2,7 +2,7 @@
 
 A figure that was measured is written as a link to the page of docs/results in which it stands:
 ``[0.6 mm](results/…)``. Such pages are written by benches. Every other figure with a unit is a
-given one (a setting, a limit, a dimension, an example), listed here with where it is from.
+given one (a setting, a limit, a dimension, an example), in ``given_figures.yaml`` with its origin.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tables import read_table
+
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "docs/results"
 WORLD = ROOT / "docs/resolved-world.md"
@@ -23,49 +25,7 @@ GIVEN_PAGES = {
     "docs/protocol.md": "limits and defaults, written from the code",
     "firmware/README.md": "circuits and data sheets",
 }
-GIVEN = {
-    "docs/accuracy.md": {"95 %": "the meaning of U"},
-    "docs/architecture.md": {"250 ms": "firmware/PROTOCOL.md"},
-    "docs/boards.md": {
-        "940 nm": "parts", "0.5 mm": "a ruler", "0.1 ppm": "docs/protocol.md",
-        "±30 ppm": "as sold", "±0.5 %": "as sold", "6 m/s": "a speed to compare at",
-        "71 ns": "the table above it", "0.4 µm": "71 ns of it", "1 mm": "firmware/README.md",
-    },
-    "docs/first-board.md": {
-        **dict.fromkeys(("30 µs", "1 ms", "100 µs", "1 µs"), "rig/selftest/judge.py"),
-        "200 ns": "late_ticks of firmware/pico/board.h",
-        "±60 ppm": "two crystals as sold", "300 µs": "STOP_TICKS in firmware/core/device.c",
-        **dict.fromkeys(("75 ns", "0 ns"), "tests/selftest/test_judge.py"),
-    },
-    "docs/build.md": {
-        "20 mm": "a ball", "50 mm": "a hand",
-    },
-    "docs/daemon.md": {"300 s": "rig/tui", "250 ms": "firmware/PROTOCOL.md"},
-    "docs/decisions.md": {"250 ms": "firmware/PROTOCOL.md"},
-    "docs/method.md": {
-        "0.3 mm": "1 - V(free)/V at 40°, by the model", "0.05 mm": "rig/analysis/likeness.py",
-        "10 %": "rig/analysis/likeness.py",
-    },
-    "docs/one-object.md": {"0.3 mm": "an example"},
-    "docs/timers.md": {"2 µs": "docs/protocol.md"},
-    "docs/troubleshooting.md": {"1 %": "an example"},
-    "docs/tutorial.md": {
-        "20 to 35 mm": "a place for a gate", "1 to 15 cm": "Fig. 3",
-        "10 and 170 mm": "a place for a gate", "25 mm": "a place for a gate",
-        "80 and 150 mm": "a place for a gate", "4 ms": "sim/dials.py", "3 %": "sim/dials.py",
-    },
-    "firmware/emulator/README.md": {
-        "3.4 ms": "data sheet",
-        "50 µs": "firmware/emulator/rig_emulator/pico/run.mjs",
-    },
-    "docs/resolved-world.md": dict.fromkeys(("1 nm", "1.4 %", "2 %"), "tests/sim/test_resolved.py")
-    | dict.fromkeys(
-        ("96 %", "89 %", "70 %", "41 %", "19 %"), "resolved-published.csv, looked at below"
-    ) | {
-        "80.2 mm": "the paper's", "16 mm": "119 - 103 of the table",
-        "75 ± 8 and 88 ± 4 mm": "resolved-published.csv, looked at below",
-    },
-}  # fmt: skip
+GIVEN = read_table(__file__, "given_figures")
 
 _CODE = re.compile(r"```.*?```|~~~.*?~~~|`[^`\n]*`", re.DOTALL)
 _LINK = re.compile(r"!?\[([^\]]*)\]\(([^)\s]+)\)")
@@ -120,11 +80,11 @@ def test_every_other_figure_is_a_given_one(page):
         said = figure in given or set(re.findall(r"[0-9.]+", number)) <= known
         assert said, (
             f"{figure}: measured? then make it a link to its row in docs/results; "
-            "else say in GIVEN where it is from"
+            "else say in tests/given_figures.yaml where it is from"
         )
     for place in given.values():
         assert "/" not in place or (ROOT / place).exists() or " " in place, place
-    assert not set(given) - found, "no longer claimed: leave it out of GIVEN"
+    assert not set(given) - found, "no longer claimed: leave it out of the table"
 
 
 def tables(page: Path) -> list[list[str]]:

@@ -3,7 +3,6 @@
 import ast
 import json
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 
 from rig.cli import OPTIONAL
 from rig.ready import WIRED, ready_protocol, wiring_picture
-from tests.waiting import PATIENCE_S
+from tests.programs import run_program
 
 ROOT = Path(__file__).parents[1]
 PROTOCOL = "protocols/inclined-uniform.yaml"
@@ -39,15 +38,7 @@ assert code in (0, 3), code
 
 def packages_loaded_by(program: str, *arguments: str) -> set[str]:
     """Run `program` in an interpreter of its own and name the modules it loaded."""
-    done = subprocess.run(
-        [sys.executable, "-c", program + LAST_LINE, *arguments],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE_S,
-    )
-    assert done.returncode == 0, done.stderr
+    done = run_program(sys.executable, "-c", program + LAST_LINE, *arguments, cwd=ROOT)
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 

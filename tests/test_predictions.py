@@ -10,6 +10,7 @@ from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.tui.motion import motions
 from tests.cli.lab import PROTOCOLS, short
+from tests.tables import protocol_text
 
 AIR = "drag: {terminal_speed: 12 m/s ± 1 m/s}\n"
 UNLIKE = (
@@ -22,14 +23,7 @@ SCENES = {
     "unlike, in air": UNLIKE + AIR,
     "single": (PROTOCOLS / "single-chain.yaml").read_text("utf-8"),
 }
-ON_BOARD = """protocol: 1
-chains: {{A: {{rods: 2, length: {length}, diameter: 13 mm}}}}
-surface: {{restitution: 0.5, friction: 0.2}}
-contact: {{datum: board}}
-gravity: 9.81 m/s^2
-drop: 20 mm
-plan: {{incline: [40 deg, 80 deg], repeats: 1, settle: 1 s}}
-"""
+ON_BOARD = protocol_text("two-rods-on-board")
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -82,7 +76,7 @@ def test_air_holds_back():
 @pytest.mark.parametrize("length", ["600 mm", "15 mm"])
 def test_a_rod_that_touches_before_the_release_is_a_note_at_its_incline(length, air):
     """A rod of 13 mm touches 8 mm above a board at 40°, and 37 mm at 80°."""
-    low, steep = predictions(reader.parse(ON_BOARD.format(length=length) + air))
+    low, steep = predictions(reader.parse(ON_BOARD.replace("LENGTH", length) + air))
     assert low.speed_m_s > 0.0
     assert steep.speed_m_s is None
     assert "before the release" in steep.notes[0]

@@ -15,6 +15,7 @@ import pytest
 
 from rig.cli import _parser
 from tests.once import filled_once
+from tests.tables import read_table
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -22,17 +23,7 @@ PAGES = [
     *sorted((ROOT / "docs").glob("*.md")),
 ]
 CHOICE = (ROOT / "rig/commands/choose.txt").read_text("utf-8")
-NOT_RUN = {
-    "/dev/ttyACM0": "needs a board on a cable: tests/firmware and tests/daemon use emulated boards",
-    "rig flash": "needs a board: tests/flash does it with a board that is simulated",
-    "sudo ": "changes the computer: tests/usb compares the rule and the service",
-    "rig service install": "changes the computer: tests/usb reads the units",
-    "rig tui --name left": "needs a daemon: tests/cli/test_ready.py has two",
-    "ctl ": "changes the computer",
-    "./run": "developers' jobs; ./run demo is tried below",
-    ".venv/bin/": "developers' jobs: ./run test does the same",
-    "make -C firmware": "needs a clone and compilers: ./run test builds the same",
-}
+NOT_RUN = read_table(__file__, "not_run")
 """Parts of commands that no test runs as printed, and why."""
 CHAINS = "rig new my-chains.yaml --scene two-chains --repeats 4 --yes"
 DROPS = "rig run my-chains.yaml --port sim:// --session my.session --yes"

@@ -17,42 +17,16 @@ import pytest
 from rig.cli import main
 from tests.report.test_browser import BROWSER, browse
 from tests.test_site import load
-from tests.tui.test_pictures import RECORDED
+from tests.tui.test_looks import RECORDED
 
 AXE = Path(__file__).parent / "axe/node_modules/axe-core/axe.min.js"
 REPORT = "report.html"
+SCRIPTS = Path(__file__).with_name("browser")
 AT_ONCE = 10  # pages a browser visits before it is started anew
 MISSING = (BROWSER is None or not AXE.is_file()) and not os.environ.get("CI")
-_HOST = """<title></title><body><script>
-const visit = (page) => new Promise((loaded) => {
-  const frame = document.createElement("iframe");
-  Object.assign(frame, { width: WIDTH, height: 900, src: page, onload: () => loaded(frame) });
-  document.body.append(frame);
-});
-const tell = (found) => { document.title = JSON.stringify(found); };
-(async () => { WORK })();
-</script></body>"""
-RUN_AXE = """const findings = {};
-for (const page of PAGES) {
-  const frame = await visit(page), inside = frame.contentWindow, { body } = inside.document;
-  const script = inside.document.createElement("script");
-  script.src = "SOURCE";
-  await new Promise((loaded) => { script.onload = loaded; body.append(script); });
-  const { violations, passes } = await inside.axe.run(inside.document);
-  const places = violations.flatMap((rule) => rule.nodes.map((node) => [rule.id, node.target]));
-  const wide = inside.document.documentElement.scrollWidth > inside.innerWidth;
-  findings[page] = [places, wide, body.dataset.mdColorScheme ?? null, passes.length > 10];
-  frame.remove();
-}
-tell(findings);"""
-_SEARCH = """const inside = (await visit("docs/method.html")).contentWindow, page = inside.document;
-const field = page.querySelector("[data-md-component=search-query]");
-page.querySelector("#__search").click();
-field.focus();
-field.value = "photogate";
-field.dispatchEvent(new inside.Event("input", { bubbles: true }));
-const results = page.querySelector(".md-search-result__meta");
-new MutationObserver(() => tell(results.textContent)).observe(results, { childList: true });"""
+_HOST = (SCRIPTS / "host.html").read_text("utf-8")
+RUN_AXE = (SCRIPTS / "axe.js").read_text("utf-8")
+_SEARCH = (SCRIPTS / "search.js").read_text("utf-8")
 _LOOP = 'tell((await visit("docs/pictures/loop.svg")).contentDocument.getAnimations().length);'
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(MISSING, reason="chromium or axe is missing")]
 

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.waiting import PATIENCE_S
+from tests.programs import run_program
+from tests.tables import read_table
 
 ROOT = Path(__file__).parents[1]
 BARE = """
@@ -47,14 +48,8 @@ def bare(tmp_path_factory):
     environment = os.environ | {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache")}
 
     def call(*lines, code=0):
-        done = subprocess.run(
-            [sys.executable, "-c", BARE, *lines],
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=PATIENCE_S,
+        done = run_program(
+            sys.executable, "-c", BARE, *lines, code=None, cwd=folder, env=environment
         )
         assert "Traceback" not in done.stderr
         assert "internal error" not in done.stderr
@@ -83,26 +78,7 @@ def test_results_are_the_same_as_anywhere(bare):
 
 def test_commands_work(bare):
     """One after the other in one process, as none leaves anything behind in it."""
-    bare(
-        "ready",
-        "check falling-ball -o mounting.svg",
-        "predict inclined-uniform --json",
-        "new my.yaml --scene object --yes",
-        "analyze chains.session",
-        "report chains.session -o report.html",
-        "export chains.session --csv csv",
-        "export chains.session --bundle chains.eln",
-        "replay chains.session",
-        "recover chains.session -o saved.session",
-        "estimate chains.session",
-        "design single-chain --no-search",
-        "notes chains.session --run 1 windy",
-        "verify chains.session",
-        "ports",
-        "import csv/edges.csv --protocol chains --session imported.session --simulated",
-        "analyze imported.session --json",
-        "doctor --port sim://?protocol=chains.yaml --session chains.session",
-    )
+    bare(*read_table(__file__, "commands_without_unix"))
 
 
 def test_one_writer_at_a_time(bare):

@@ -1,4 +1,4 @@
-/* What rig/link/messages.py defines; tests/link/test_wire_header.py compares each value.
+/* What rig/link/messages.py defines; tests/link/test_wire_page.py compares each value.
  *
  * MSG_X is a message's code, X_F where its field F begins in the payload (as long as nothing of
  * variable length stands before it), X_SIZE the payload's size without such fields. */

@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
 from rig.model.chain import Chain
 from rig.model.fall import kicks
-from tests.model.air_reference import exact_hits, exact_way
+from tests.model.reference import exact_hits, exact_way
 
 MASSES = (3.0, 1.0, 2.0, 0.4, 1.5)
 PLACES = (0.0004, 0.0493, 0.0967, 0.1461, 0.1939)  # above the reference point; rod 0 is off it

@@ -3,8 +3,6 @@
 import hashlib
 import os
 import shutil
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -15,8 +13,11 @@ from rig.cache.store import CacheFile
 from rig.cli import main
 from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.cli.lab import PROTOCOLS, short
+from tests.cli import lab
+from tests.cli.lab import PROTOCOLS, record, short
 from tests.report.undrawn import undrawn  # noqa: F401 - a fixture
+from tests.session.altering import unguarded
+from tests.tables import read_table
 
 SCENES = {
     "fence": ("picket-fence.yaml", ""),
@@ -26,30 +27,15 @@ SCENES = {
     "chains": (None, "skew_sd=1ms"),
     "voids": (None, "skew_sd=8ms"),
 }
-COMMANDS = [
-    ("analyze", "SESSION"),
-    ("analyze", "SESSION", "--json"),
-    ("analyze", "SESSION", "--scatter"),
-    ("analyze", "SESSION", "--priors", "--json"),
-    ("analyze", "SESSION", "--budget", "1", "--trials", "2"),
-    ("estimate", "SESSION"),
-    ("estimate", "SESSION", "--json", "-o", "OUT/pictures"),
-    ("export", "SESSION", "--csv", "OUT/tables"),
-    ("report", "SESSION", "-o", "OUT/page.html", "--figures", "OUT/figures"),
-]
+COMMANDS = [words.split() for words in read_table(lab.__file__, "commands")["kept"]]
 
 
-def record(folder, scene):
-    """Record a session of a scene."""
+def record_scene(folder, scene):
     name, dials = SCENES[scene]
-    protocol, path = folder / "p.yaml", folder / "s.session"
     text = (PROTOCOLS / name).read_text("utf-8") if name else short("[40 deg]", 4)
     if scene == "fence":  # enough for a joint fit
         text = text.replace("repeats: 10", "repeats: 4")
-    protocol.write_text(text, "utf-8")
-    url = f"sim://?seed=3&{dials}"
-    assert main(["run", str(protocol), "--port", url, "--session", str(path), "--yes"]) in {0, 3}
-    return path
+    return record(folder, text, f"sim://?seed=3&{dials}", codes=(0, 3))
 
 
 @pytest.fixture(
@@ -59,7 +45,7 @@ def record(folder, scene):
     ],
 )
 def session(request, tmp_path_factory):
-    return record(tmp_path_factory.mktemp(request.param), request.param)
+    return record_scene(tmp_path_factory.mktemp(request.param), request.param)
 
 
 def fingerprint(folder: Path) -> dict[str, str]:
@@ -110,7 +96,7 @@ def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("recorded")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(folder / "caches"))
-        return record(folder, "fence")
+        return record_scene(folder, "fence")
 
 
 @pytest.fixture
@@ -151,14 +137,8 @@ def test_of_a_record_that_was_added_to_only_what_is_new_is_analysed(fence, count
 def test_a_record_of_which_a_number_was_altered_is_analysed_again(fence, counted, table):
     """The file has the same length, name and time."""
     about = fence.stat()
-    with closing(sqlite3.connect(fence)) as connection, connection:
-        guards = "SELECT name, sql FROM sqlite_master WHERE type = 'trigger' AND tbl_name = ?"
-        triggers = connection.execute(guards, [table]).fetchall()
-        for name, _ in triggers:
-            connection.execute(f"DROP TRIGGER {name}")
+    with unguarded(fence) as connection:
         connection.execute(f"UPDATE {table} SET tick = tick + 1")
-        for _, sql in triggers:
-            connection.execute(sql)
     os.utime(fence, ns=(about.st_atime_ns, about.st_mtime_ns))
     with rig.open(fence) as session:
         session.analyze()
@@ -193,9 +173,7 @@ def test_doctor_tells_the_size_and_forgets(fence, capsys):
 
 def test_a_blind_session_keeps_no_numbers(tmp_path, capsys):
     text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
-    protocol, path = tmp_path / "p.yaml", tmp_path / "s.session"
-    protocol.write_text(f"{text}\nblind: true\n", "utf-8")
-    main(["run", str(protocol), "--port", "sim://?seed=3", "--session", str(path), "--yes"])
+    path = record(tmp_path, f"{text}\nblind: true\n", "sim://?seed=3")
     assert CacheFile().size().entries == 1
     with rig.open(path) as session:
         hidden = session.analyze()

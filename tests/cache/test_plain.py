@@ -13,6 +13,7 @@ from rig.analysis.result import Measured
 from rig.cache.plain import from_text, to_text
 from rig.clock.calibration import TimeScale
 from rig.reasons import Reason, plain_reason
+from tests.tables import cases
 
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 KEYS = st.text() | st.integers() | st.tuples(st.integers(), st.integers())
@@ -82,14 +83,7 @@ def test_what_is_no_plain_record_is_not_written(record):
         to_text([record])
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "", "{", "[]", "[1]", '["os:system","true"]', '["rig.cli:main","--help"]', '["array"]',
-        '["mapping",[1],[]]', '["rig.clock.calibration:TimeScale",1]', '["rig.none:None"]',
-        '["rig.clock.calibration:None"]', '["array","O",[1],"AAAAAAAAAAA="]', '["tuple",[]]',
-    ],
-)  # fmt: skip
+@cases
 def test_what_is_no_kept_text_is_refused(text):
     with pytest.raises(ValueError, match=r"."):
         from_text(text)

@@ -8,9 +8,23 @@ from hypothesis import strategies as st
 
 from rig.campaign import machine as on
 from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, Stage, step
+from rig.campaign.plan import (
+    ATTEMPTS,
+    CLOCK_S,
+    CLOCK_U,
+    RunLine,
+    describe_setup,
+    job_to_judge,
+    next_job,
+    rest_s,
+)
+from rig.campaign.voids import MANY, Void, after, in_common, voids_of, why_halted
 from rig.link.messages import RefusalReason
+from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason
 from rig.records import Job
+from rig.session.reading import StateEntry
+from rig.session.schema import RunState
 from rig.wordings import NOTE, OPERATOR
 
 JOB = Job(1, 1)
@@ -212,15 +226,15 @@ def test_what_is_not_let_go_is_switched_off_first(reason, attended):
         assert effects[4:] == ([on.GiveUp()] if over else [])
 
 
-SKEW = "release_skew"
+SKEW_CODE = "release_skew"
 
 
-def skewed(number, code=SKEW):
-    values = {"skew_s": 0.01 * number, "limit_s": 5e-3} if code == SKEW else {"edges": number}
+def skewed(number, code=SKEW_CODE):
+    values = {"skew_s": 0.01 * number, "limit_s": 5e-3} if code == SKEW_CODE else {"edges": number}
     return make_reason(code, **values)
 
 
-def void(number, reason=SKEW):
+def void(number, reason=SKEW_CODE):
     """ArmRelease and judge one drop, which is void."""
     job = Job(1, number)
     return (
@@ -238,7 +252,9 @@ def voids(*reasons, **more):
 
 @pytest.mark.parametrize("attended", [True, False])
 def test_three_voids_of_a_kind_halt_it(attended):
-    flow, effects = through(voids(SKEW, SKEW, SKEW, attended=attended), on.GoOn(NEXT))
+    flow, effects = through(
+        voids(SKEW_CODE, SKEW_CODE, SKEW_CODE, attended=attended), on.GoOn(NEXT)
+    )
     assert (flow.stage, effects) == (Stage.HALTED, [])
     assert "the last 3 drops are void for the same reason: release skew" in flow.trouble
     assert "run 1 is tried again" in flow.trouble
@@ -251,24 +267,26 @@ def test_three_voids_of_a_kind_halt_it(attended):
 
 @pytest.mark.parametrize("onward", [on.GoOn(None), on.Again(Job(1, 4))])
 def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
-    flow, effects = through(voids(SKEW, SKEW, SKEW), onward)
+    flow, effects = through(voids(SKEW_CODE, SKEW_CODE, SKEW_CODE), onward)
     assert (flow.stage, effects) == (Stage.HALTED, [])
 
 
 def test_two_of_a_kind_or_three_of_others_do_not():
-    for reasons in ((SKEW, SKEW), (SKEW, "late_stamps", SKEW)):
+    for reasons in ((SKEW_CODE, SKEW_CODE), (SKEW_CODE, "late_stamps", SKEW_CODE)):
         assert through(voids(*reasons), on.GoOn(NEXT))[0].stage is Stage.PREPARE
-    flow, _ = through(voids(SKEW, SKEW, SKEW), on.Reject("I moved a gate"), DONE, on.GoOn(NEXT))
+    flow, _ = through(
+        voids(SKEW_CODE, SKEW_CODE, SKEW_CODE), on.Reject("I moved a gate"), DONE, on.GoOn(NEXT)
+    )
     assert flow.stage is Stage.PREPARE, "the operator knows why"
 
 
 def test_voids_that_others_logged_count_too():
-    row = voids(SKEW, SKEW).row
+    row = voids(SKEW_CODE, SKEW_CODE).row
     judged = on.DropVerdict(-1, "void", (skewed(9),), row)
     flow, _ = through(Flow(stage=Stage.PREPARE), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
     assert flow.stage is Stage.HALTED
     judged = judged._replace(row=())
-    flow = voids(SKEW, SKEW)
+    flow = voids(SKEW_CODE, SKEW_CODE)
     flow, _ = through(flow, on.GoOn(NEXT), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
     assert flow.stage is Stage.PREPARE
 
@@ -277,3 +295,107 @@ def test_a_drop_that_fell_has_no_refusals_left():
     flow = replace(Flow(stage=Stage.FIRING, attended=False), job=JOB, refusals=LOOKS - 1)
     flow, effects = through(flow, DONE)
     assert (flow.refusals, effects) == (0, [on.Collect(JOB)])
+
+
+def lines(*states):
+    return [RunLine(n, 0.0, "A", "B", 1, state) for n, state in enumerate(states, start=1)]
+
+
+def test_runs_come_in_order_until_each_is_settled_or_void_too_often():
+    runs = lines("accepted", "marginal", "rejected", "void", "planned")
+    assert next_job(runs, {4: 1}) == Job(4, 2)
+    assert next_job(runs, {4: 3}) == Job(5, 2)
+    assert next_job(lines("accepted"), {}) is None
+    assert next_job(lines("interrupted", "planned"), {}) == Job(1, 2)
+    assert runs[0].again == Job(1, 2)
+    assert job_to_judge(lines("accepted", "recorded")) == Job(2, 1)
+
+
+def test_chains_rest_longer_while_the_clock_is_not_known():
+    assert rest_s(0.5, None) == rest_s(0.5, 2 * CLOCK_U) == CLOCK_S
+    assert rest_s(0.5, CLOCK_U) == 0.5
+    assert rest_s(9.0, None) == 9.0
+
+
+def test_who_stands_at_the_rig_is_told_what_goes_where():
+    """A glider on its track does not hang, and a single chain has no sides."""
+    assert describe_setup(Run(1, 40.0, "A", "B")) == "incline 40° · impact side: A · free side: B"
+    assert describe_setup(Run(1, 40.0, "A", None)) == "incline 40° · hang A"
+    assert describe_setup(Run(1, 0.0, None, "glider")) == "put glider at its start, at rest"
+
+
+SKEW = [make_reason("release_skew", skew_s=skew, limit_s=5e-3) for skew in (7.78e-3, -0.01, 1.0)]
+LOST = make_reason("edges_lost", lost=3)
+DEAD = [make_reason("gate_silent", channel=n, side="free", height_m=0.1 * n) for n in (1, 2)]
+OTHER_SIDE = make_reason("gate_silent", channel=3, side="impact", height_m=0.3)
+A, B = plain_reason("a"), plain_reason("b")
+
+
+def row(*reasons):
+    return tuple(Void(Job(n, 1), each) for n, each in enumerate(reasons, start=1))
+
+
+def entries(*told):
+    return [StateEntry(run, attempt, RunState(state), 0, tuple(reasons))
+            for run, attempt, state, *reasons in told]  # fmt: skip
+
+
+def test_reasons_are_of_a_kind_without_their_numbers():
+    assert in_common(row(*((one,) for one in SKEW))) == ("release skew",)
+    assert in_common(row((SKEW[0],), (LOST, SKEW[1]), (SKEW[2], LOST))) == ("release skew",)
+    assert in_common(row((LOST,), (LOST,), (LOST,))) == (LOST.text,)
+    assert in_common(row((DEAD[0],), (DEAD[1],), (DEAD[0],))) == ("gate silent (free)",)
+
+
+@pytest.mark.parametrize(
+    "reasons",
+    [[], [SKEW[0]] * 2, [SKEW[0], LOST, SKEW[1]],
+     [*DEAD, OTHER_SIDE]],
+)  # fmt: skip
+def test_fewer_or_others_have_nothing_in_common(reasons):
+    found = row(*((one,) for one in reasons))
+    assert in_common(found) == ()
+    assert why_halted(found) == ""
+
+
+def test_a_good_drop_ends_the_row_and_a_rejected_one_leaves_it():
+    kept = after((), Job(1, 1), "void", (A,))
+    assert after(kept, Job(1, 2), "accepted", ()) == ()
+    assert after(kept, Job(1, 2), "marginal", ()) == ()
+    assert after(kept, Job(1, 2), "rejected", (B,)) == kept
+    assert after(kept, Job(1, 1), "rejected", (B,)) == ()
+    noted = after(kept, Job(1, 1), "void", (A, plain_reason("b", NOTE)))
+    assert [one.job for one in noted] == [Job(1, 1)]
+    for n in range(2, 9):
+        kept = after(kept, Job(1, n), "void", (A,))
+    assert len(kept) == MANY
+
+
+def test_voids_for_which_it_halted_are_not_held_against_their_runs():
+    told = [(1, 1, "void", LOST), (2, 1, "void", SKEW[0]), (2, 2, "void", SKEW[1]),
+            (3, 1, "armed"), (3, 1, "recorded")]  # fmt: skip
+    before = voids_of(entries(*told))
+    assert before.counts() == {1: 1, 2: 2}
+    halted = [
+        *told,
+        (3, 1, "void", SKEW[2]),
+        (3, 1, "void", SKEW[2], plain_reason("a loose plug", NOTE)),
+    ]
+    found = voids_of(entries(*halted))
+    assert found.row == ()
+    assert found.counts() == {1: 1}
+    assert found.forgiven == {(2, 1), (2, 2), (3, 1)}
+
+
+def test_what_was_heard_of_since_the_log_was_read_counts_once(run_line):
+    found = voids_of(entries((1, 1, "void", LOST), (1, 2, "void", SKEW[0])))
+    assert found.counts([run_line(1, 2)]) == {1: 2}
+    assert found.counts([run_line(1, 3)]) == {1: 3} == {1: ATTEMPTS}
+    assert found.counts([run_line(2, 1)]) == {1: 2, 2: 1}
+
+
+@pytest.fixture
+def run_line():
+    from rig.campaign.plan import RunLine
+
+    return lambda run, attempt: RunLine(run, 0.0, "A", "B", attempt, "void")

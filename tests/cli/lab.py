@@ -8,51 +8,18 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+from rig.cli import main
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.tables import protocol_text
 from tests.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
 PROTOCOLS = ROOT / "protocols"
 GOOD = {RunState.ACCEPTED, RunState.MARGINAL}
 
-_SHORT = """\
-protocol: 1
-title: A short campaign
-chains:
-  A: {rods: 25, length: 1165 mm, diameter: 12.7 mm, rod_length: 102 mm, tilt: 12 deg}
-  B: {like: A}
-surface:
-  restitution: 0.50 ± 0.05
-  friction: 0.20 ± 0.02
-  pile: {below: 30 deg, restitution: -0.37}
-drop: 180 mm ± 2 mm
-gravity: 9.81 m/s^2
-gates:
-  impact:
-    - {channel: 0, height: 22 mm}
-    - {channel: 1, height: 34 mm}
-    - {channel: 2, height: 70 mm}
-    - {channel: 3, height: 130 mm}
-    - {channel: 4, height: 204 mm}
-    - {channel: 5, height: 350 mm}
-    - {channel: 6, height: 690 mm}
-    - {channel: 7, height: 1078 mm}
-  free:
-    - {channel: 8, height: 20 mm}
-    - {channel: 9, height: 60 mm}
-    - {channel: 10, height: 100 mm}
-    - {channel: 11, height: 140 mm}
-    - {channel: 12, height: 204 mm}
-    - {channel: 13, height: 350 mm}
-    - {channel: 14, height: 690 mm}
-    - {channel: 15, height: 1078 mm}
-  height_uncertainty: 0.3 mm
-release: {channel: 0, pulse: 80 ms}
-plan: {incline: INCLINES, repeats: REPEATS, settle: SETTLE}
-accept: {release_skew: 5 ms, missed_edges: 5 %}
-"""
+_SHORT = protocol_text("short-campaign")
 
 
 class Terminal(io.StringIO):
@@ -74,6 +41,15 @@ def short_fence(repeats: int = 2, settle: str = "1 s") -> str:
     """Write a protocol of a few drops of a fence, which are quickly analysed."""
     text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
     return text.replace("repeats: 10, settle: 5 s", f"repeats: {repeats}, settle: {settle}")
+
+
+def record(folder: Path, text: str, url: str = "sim://", name: str = "s", codes=(0,)) -> Path:
+    """Write a protocol, have its runs recorded, and return the session."""
+    protocol, session = folder / f"{name}.yaml", folder / f"{name}.session"
+    protocol.write_text(text, "utf-8")
+    words = ["run", str(protocol), "--port", url, "--session", str(session), "--yes"]
+    assert main(words) in codes
+    return session
 
 
 def without(key: str, text: str) -> str:

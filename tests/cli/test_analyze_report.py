@@ -7,7 +7,7 @@ from unittest.mock import Mock
 import pytest
 
 from rig.session.store import Session
-from tests.cli.lab import PROTOCOLS
+from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 
@@ -66,16 +66,7 @@ def test_a_report_can_be_written_of_a_session_without_a_drop(call, tmp_path, pro
     assert call("replay", session).code == 0
 
 
-@pytest.mark.parametrize(
-    ("command", "work", "place"),
-    [
-        (["report", "SESSION", "-o"], "report.results", "none/r.html"),
-        (["estimate", "SESSION", "-o"], "estimate.results", "file/figures"),
-        (["export", "SESSION", "--csv"], "export.results", "file/tables"),
-        (["design", PROTOCOLS / "picket-fence.yaml", "-o"], "design.better", "none/new.yaml"),
-        (["predict", "--figure", "3", "-o"], "predict._write_table", "none/figure.svg"),
-    ],
-)
+@cases
 def test_what_cannot_be_written_is_not_begun(
     call, finished, tmp_path, monkeypatch, command, work, place
 ):
@@ -125,14 +116,7 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
     assert max(map(len, table.splitlines())) <= 80
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ((1, "--trials", "many"), "found 'many'; accepted: a whole number from 2"),
-        ((1, "--trials", "1"), "found '1'; accepted: a whole number from 2"),
-        ((99,), "there are: runs 1–4"),
-    ],
-)
+@cases
 def test_what_is_no_run_or_no_number_of_trials_is_bad_input(call, finished, words, said):
     done = call("analyze", finished.session, "--budget", *words)
     assert (done.code, done.out) == (2, "")

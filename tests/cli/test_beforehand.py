@@ -1,19 +1,12 @@
 """What a protocol's drops need is known before the first: which board."""
 
-import pytest
-
 from rig.protocol.describe import describe
 from rig.protocol.reader import read
 from tests.cli.lab import short
+from tests.tables import cases
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "problem"),
-    [
-        ("channel: 0, pulse", "channel: 5, pulse", "32:20: release.channel: found 5;"),
-        ("pulse: 80 ms", "pulse: 800 ms", "32:30: release.pulse: found 800 ms;"),
-    ],
-)
+@cases
 def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     call, tmp_path, old, new, problem
 ):

@@ -20,7 +20,7 @@ from rig.tui.indicators import Indicators
 from rig.tui.motion import motions
 from rig.tui.scale import drawing
 from tests.cli.lab import command
-from tests.tui.test_pictures import RECORDED
+from tests.tui.test_looks import RECORDED
 from tests.waiting import PATIENCE_S, until
 
 CLIENTS = 400

@@ -17,7 +17,7 @@ from rig.cli import main
 from rig.recorder.published import PublishedState
 from tests.report.test_browser import browse
 from tests.test_site_browser import AXE, MISSING, RUN_AXE, ask_browser
-from tests.tui.test_pictures import RECORDED
+from tests.tui.test_looks import RECORDED
 from tests.waiting import PATIENCE_S
 
 PAGES = ["board.html", "local.html", "report.html"]

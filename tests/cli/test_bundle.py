@@ -23,6 +23,7 @@ from rig.errors import InputError
 from tests.cli.lab import PROTOCOLS, short
 from tests.once import once
 from tests.session.altering import unguarded
+from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 FLIPS = int(os.environ.get("RIG_FLIPS", "60"))
@@ -137,13 +138,7 @@ def test_a_byte_altered_anywhere_is_found_and_named(bundle, tmp_path):
     assert read_bundle(altered)[1]
 
 
-@pytest.mark.parametrize(
-    ("sql", "named"),
-    [
-        ('UPDATE edge SET tick = tick + 1 WHERE "drop" = 3 AND idx = 2', "run 3, attempt 1"),
-        ("DELETE FROM run_state WHERE id = 5", "table run_state: not as recorded: rows 5"),
-    ],
-)
+@cases
 def test_an_altered_row_is_named_even_where_all_is_hashed_anew(sql, named, files, call, tmp_path):
     session, altered = tmp_path / "session", tmp_path / "altered.eln"
     session.write_bytes(files[SESSION])
@@ -323,15 +318,7 @@ def test_notes_and_files_are_appended_and_travel(fences, call, tmp_path):
     assert "rig µ.jpg" in call("verify", tmp_path / "saved.session").out
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("notes", "--run", "99", "x"), "run 99 has no recorded drop"),
-        (("notes", "--run", "1", " "), "found ' '; accepted: words"),
-        (("attach", "/dev/null"), "it is a device"),
-        (("attach", "absent.jpg"), "No such file"),
-    ],
-)
+@cases
 def test_what_cannot_be_noted_or_attached_is_said(words, said, fences, call, tmp_path):
     session = tmp_path / "my.session"
     shutil.copy(fences, session)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.command_page import COMMANDS
+from tests.programs import run_program
 from tests.waiting import PATIENCE_S
 
 
@@ -53,8 +54,5 @@ def test_bash_reads_what_is_printed(tmp_path):
     echo "${COMPREPLY[@]}"
     """
     path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
-    done = subprocess.run(
-        ["bash", "-c", script], env=os.environ | {"PATH": path}, capture_output=True, text=True,
-        check=True, timeout=PATIENCE_S, cwd=tmp_path,
-    )  # fmt: skip
+    done = run_program("bash", "-c", script, env=os.environ | {"PATH": path}, cwd=tmp_path)
     assert done.stdout.split() == ["analyze"]

@@ -17,6 +17,8 @@ from textual.app import App
 from bench.mutants import CSV, make_session
 from rig import cli
 from rig.commands import demo, tui
+from tests.programs import run_program
+from tests.tables import read_table
 
 STRUCK = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
 LOADING = f"""
@@ -50,8 +52,7 @@ rig.__main__.start()
 @pytest.mark.parametrize(("program", "code"), [(BEFORE, 130), (LOADING, 130), (ENDING, 0)])
 def test_ctrl_c_where_no_command_is_at_work(program, code):
     command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == code
+    done = run_program(*command, code=code)
     assert "Traceback" not in done.stderr
     ours, theirs = os.pipe()
     os.close(ours)  # nobody reads what it says
@@ -96,26 +97,7 @@ def test_a_demo_that_was_interrupted_says_what_goes_on_with_it(call, tmp_path, m
 
 
 MOMENTS = 40
-COMMANDS = {
-    "analyze": ["SESSION"],
-    "check": ["fence.yaml"],
-    "daemon": ["--port", "sim://", "--socket", "door/rig.sock", "--idle-timeout", "1"],
-    "demo": ["-o", "demo"],
-    "design": ["fence.yaml"],
-    "doctor": [],
-    "estimate": ["SESSION"],
-    "export": ["SESSION", "--csv", "tables"],
-    "flash": ["--board", "mega", "--port", "PORT", "--avrdude", "./avrdude"],
-    "import": ["edges.csv", "--protocol", "fence.yaml", "--session", "imported"],
-    "new": ["new.yaml", "--yes"],
-    "predict": ["fence.yaml"],
-    "recover": ["SESSION", "-o", "recovered"],
-    "replay": ["SESSION"],
-    "report": ["SESSION", "-o", "report.html"],
-    "run": ["fence.yaml", "--port", "sim://", "--session", "ran", "--yes"],
-    "selftest": ["--port", "sim://?protocol=fence.yaml"],
-    "sweep": ["fence.yaml", "--vary", "drop=100mm..300mm:50", "-o", "map.csv"],
-}
+COMMANDS = read_table(__file__, "commands")["interrupted"]
 
 
 # Before that it is Python itself that is interrupted, and nobody there to end it in another way.
@@ -131,7 +113,7 @@ def test_ctrl_c_at_any_moment_of_a_command(command, tmp_path):
     (tmp_path / "avrdude").chmod(0o755)
     near, far = os.openpty()  # nobody answers there
     words = {"SESSION": str(session), "PORT": os.ttyname(far)}
-    given = [words.get(one, one) for one in COMMANDS[command]]
+    given = [words.get(one, one) for one in COMMANDS[command].split()]
 
     def ended(after_s):
         """Strike so long after the program took over; the time it had, and how it ended."""

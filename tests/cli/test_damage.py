@@ -15,6 +15,7 @@ from rig.records import ClockSample, HostBreak, Job, Pulse
 from rig.results import calibration, protocol_of
 from rig.session.store import Session
 from tests.session.altering import unguarded
+from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("analysed_once", "undrawn")
 RUNS = 3
@@ -130,10 +131,7 @@ ALTERED = (
 BY_BYTES_ALONE = 'UPDATE "drop" SET tick_hz = tick_hz / 2 WHERE id = 2'
 
 
-@pytest.mark.parametrize(
-    ("sql", "bytes_too"),
-    [*((sql, False) for sql in ALTERED), (ALTERED[0], True), (BY_BYTES_ALONE, False)],
-)
+@cases
 def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     sql, bytes_too, call, sound, without, tmp_path
 ):

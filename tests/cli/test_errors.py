@@ -12,7 +12,8 @@ import pytest
 from rig.commands import output
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS, ROOT, Terminal, command, rig, short
-from tests.waiting import PATIENCE_S
+from tests.programs import run_program
+from tests.tables import cases
 
 
 def assert_told(done, code=2):
@@ -43,17 +44,7 @@ def test_a_simulation_that_cannot_be_is_bad_input(call, protocol, tmp_path, port
     assert_told(call("run", protocol, "--port", port, "--session", tmp_path / "s"))
 
 
-@pytest.mark.parametrize(
-    ("port", "said"),
-    [
-        ("/dev/nonexistent", "cannot open /dev/nonexistent: there is no such port\n  hint: "),
-        ("/dev/null", "cannot open /dev/null: "),
-        ("no://such", "'no' not known"),
-        ("socket:nobody", "cannot open socket:nobody: there is no such port"),
-        ("hwgrep://nobody", "cannot open hwgrep://nobody: "),
-        ("loop://", "did not answer"),
-    ],
-)
+@cases
 def test_a_port_that_cannot_be_opened_is_device_trouble(
     call, protocol, tmp_path, port, said, monkeypatch
 ):
@@ -71,17 +62,7 @@ def test_a_port_that_cannot_be_opened_is_device_trouble(
         assert session.states() == []
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("daemon",),
-        ("doctor",),
-        ("flash", "--board", "mega"),
-        ("run", "p.yaml", "--session", "s"),
-        ("selftest",),
-        ("tui",),
-    ],
-)
+@cases
 def test_an_empty_port_is_refused(call, words):
     """As a variable of a shell is that nobody has set."""
     done = call(*words, "--port", "")
@@ -155,16 +136,7 @@ def test_simulated_and_real_data_are_never_mixed(call, finished, protocol, tmp_p
     assert not (tmp_path / "real.truth.jsonl").exists()
 
 
-@pytest.mark.parametrize(
-    ("port", "found", "instead"),
-    [
-        ("sim://anything", "unexpected 'anything'", "sim://?seed=3"),
-        ("sim://lab/7?seed=1", "unexpected 'lab/7'", "sim://?seed=3"),
-        ("emu://pico", "unexpected 'pico'", "emu://?board=mega"),
-        ("emu://uno?board=mega", "unexpected 'uno'", "emu://?board=mega"),
-        ("sim://?seed=1#2", "unexpected '#2'", "%23"),
-    ],
-)
+@cases
 def test_a_name_that_means_nothing_starts_nothing(call, protocol, tmp_path, port, found, instead):
     session = tmp_path / "new.session"
     socket = tmp_path / "place" / "rig.sock"
@@ -222,33 +194,12 @@ def test_a_full_disk_behind_stdout_is_told(finished):
 @pytest.mark.parametrize("closed", ["1", "2"])
 def test_streams_may_be_closed(call, finished, closed):
     words = "predict", finished.protocol
-    done = subprocess.run(
-        ["sh", "-c", f'exec "$@" {closed}>&-', "sh", *command(*words)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-    )
-    assert done.returncode == 0
+    done = run_program("sh", "-c", f'exec "$@" {closed}>&-', "sh", *command(*words), cwd=ROOT)
     assert done.stderr == ""
     assert done.stdout == ("" if closed == "1" else call(*words).out)
 
 
-@pytest.mark.parametrize(
-    ("code", "streams", "arguments"),
-    [
-        (2, ("stdout", "stderr"), ("no-such-command",)),
-        (2, ("stderr",), ("check", "/none")),
-        (0, ("stdout", "stderr"), ("check", "FENCE")),
-        (0, ("stderr",), ("run", "FENCE", "--port", "sim://", "--session", "PLACE/s", "--yes")),
-        (
-            0,
-            ("stdout", "stderr"),
-            ("daemon", "--port", "sim://", "--socket", "PLACE/d/s", "--idle-timeout", "0.1"),
-        ),
-    ],
-)
+@cases
 def test_a_command_that_nobody_listens_to_keeps_its_exit_code(
     tmp_path, fence, code, streams, arguments
 ):

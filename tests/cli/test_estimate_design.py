@@ -9,6 +9,7 @@ from rig.protocol import reader
 from sim.dials import Dials
 from tests.analysis.drops import SINGLE, case
 from tests.cli.lab import PROTOCOLS
+from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 FENCE = PROTOCOLS / "picket-fence.yaml"
@@ -106,14 +107,7 @@ def test_a_design_by_the_scatter_that_a_session_taught(call, finished):
     assert "has another kind of scene" in unlike.err
 
 
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
-        (["--lowest", "7 kg"], "--lowest: "),
-        (["--highest", "1 mm"], "--lowest is above --highest"),
-        (["--spacing", "-1 mm"], "--spacing: found '-1 mm'; accepted: a length above 0"),
-    ],
-)
+@cases
 def test_bad_limits_are_said(call, more, said):
     done = call("design", FENCE, *more)
     assert done.code == 2

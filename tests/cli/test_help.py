@@ -12,7 +12,7 @@ from rig.commands.output import VOID
 from rig.commands.replay import DIFFERENT
 from rig.errors import DeviceError, InputError, RigError
 from rig.flash.boards import TARGETS
-from tests.cli.lab import PROTOCOLS
+from tests.tables import cases
 
 
 def commands():
@@ -78,51 +78,7 @@ def test_examples_are_commands(line):
         assert _parser().parse(words).module
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["analyse", "x"], "did you mean analyze?"),
-        (["analyze", "x", "--josn"], "rig analyze [-h]"),
-        (["run", "p", "--port", "sim://", "--session", "s", "--seed", "-1"], "found '-1'"),
-        (
-            ["predict", "nothere.yaml", "--figure", "3"],
-            "--figure: not allowed with argument PROTOCOL",
-        ),
-        (["predict"], "PROTOCOL --figure is required"),
-        (["predict", "--figure", "3"], "--figure needs --output"),
-        (["predict", "--figure", "x", "-o", "x.svg"], "found 'x'; accepted: 3, 4, 6"),
-        (["check", "x", "--keys"], "--keys: not allowed with argument PROTOCOL"),
-        (["check", "--keys", "--board", "uno"], "--board needs PROTOCOL"),
-        (["export", "x", "--csv", "x", "--sign", "x"], "--sign needs --bundle"),
-        (["design", "x", "--no-search", "-o", "x"], "--output is of no use beside --no-search"),
-        (["design", "x", "-o", PROTOCOLS / "glider.yaml"], "glider.yaml already exists"),
-        (["analyze", "x", "--unfinished"], "--unfinished needs further SESSION"),
-        (["analyze", "x", "y", "--scatter"], "--scatter is of no use beside further SESSION"),
-        (["analyze", "x", "--budget", "1", "--priors"], "--priors is of no use beside --budget"),
-        (["import", "x", "--protocol", "x", "--channel", "a"], "found 'a'; accepted: a whole"),
-        (["report", "x", "-o", "x.session"], "accepted endings: .html"),
-        (["report", "x", "-o", "x.html", "--pdf", "x.html"], "accepted endings: .pdf"),
-        (["sweep", "x", "--vary", "friction=0..1:3", "-o", "s.txt"], "endings: .csv, .npz, .svg"),
-        (["export", "x", "--bundle", "x.yaml"], "accepted endings: .eln"),
-        (["export", "x", "--bundle", "x."], "accepted endings: .eln"),
-        (["analyze", "x", "--trials", "5"], "--trials needs --budget"),
-        (["new", "x.yaml", "--scene", "object", "--length", "1 m"], "--length: not in the scene"),
-        (
-            ["predict", "--figure", "3", "-o", "x.doc"],
-            "found 'x.doc'; accepted endings: .svg, .png, .pdf",
-        ),
-        (["selftest", "--port", "/dev/null"], "/dev/null: it is no serial port"),
-        (["selftest", "--port", "/dev"], "/dev: it is a folder"),
-        (
-            ["import", "/dev/zero", "--protocol", "falling-ball", "--session", "s"],
-            "/dev/zero: cannot read this file: it is a device",
-        ),
-        (
-            ["run", PROTOCOLS / "picket-fence.yaml", "--session", "s", "--port", "sim://?pace=-1"],
-            "'-1' is not a whole number from 0",
-        ),
-    ],
-)
+@cases
 def test_a_mistake_is_named(call, words, said):
     done = call(*words)
     assert done.code in {2, 4}

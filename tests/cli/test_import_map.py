@@ -6,24 +6,10 @@ import pytest
 
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS
+from tests.tables import cases
 
 TIMES = "Time (s),D7 (V),D9 (V)\n" + "".join(
     f"{n * 1e-3:.3f},{5 * (100 <= n < 140)},{5 * (300 <= n < 320)}\n" for n in range(600)
-)
-TYPED = (
-    "--map 'D7 (V)=0,D9 (V)=3'",
-    "--map 'D7 (V)=0, D9 (V)=3'",
-    "--map 'D7 (V) = 0, D9 (V) = 3'",
-    "--map 'D7 (V)=0 D9 (V)=3'",
-    "--map ' D7 (V) = 0 , D9 (V) = 3 '",
-    "--map='D7 (V)=0, D9 (V)=3'",
-    "--map 'D7 (V)=0' 'D9 (V)=3'",
-    "--map 'D7 (V)=0', 'D9 (V)=3',",
-    "--map 'D7 (V)' = 0, 'D9 (V)' = 3",
-    "--map 'D7 (V)' = 0 , 'D9 (V)' = 3 ,",
-    "--map 'D7 (V)'= 0 'D9 (V)' =3",
-    "--map='D7 (V)=0' 'D9 (V)=3'",
-    "--map D7 '(V)' = 0 D9 '(V)' = 3",
 )
 
 
@@ -40,9 +26,7 @@ def look(call, tmp_path):
     return run
 
 
-@pytest.mark.parametrize(
-    ("typed", "first"), [*((typed, True) for typed in TYPED), *((one, False) for one in TYPED[::6])]
-)
+@cases
 def test_pairs_are_understood_as_they_are_typed(look, typed, first):
     done = look(typed, first=first)
     assert done.code == 0, done.err
@@ -57,22 +41,7 @@ def test_other_arguments_are_no_pairs(look, tmp_path):
     assert "inputs that are no gate: D9 (V)" in done.err
 
 
-@pytest.mark.parametrize(
-    ("typed", "message"),
-    [
-        ("--map D8=0", "--map: 'D8' is not an input of the file: D7 (V), D9 (V)\n"),
-        ("--map 'D7 (V)'", "--map: 'D7 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, "),
-        (
-            "--map 'D7 (V)=0, D9 (V)'",
-            "--map: 'D9 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, ",
-        ),
-        ("--map 'D7 (V)=7'", "--map: 'D7 (V)=7' is not INPUT=CHANNEL with a gate's channel: 0, "),
-        ("--map 'D7 (V)='", "--map: 'D7 (V)=' is not INPUT=CHANNEL with a gate's channel: 0, "),
-        ("--map ''", "--map: '' is not an input of the file: "),
-        ("--map =3", "--map: '3' is not an input of the file: "),
-        ("--map --dry-run", "rig import: argument --map: expected one argument"),
-    ],
-)
+@cases
 def test_a_pair_that_is_none_is_located(look, typed, message):
     done = look(typed)
     assert done.code == 2

@@ -10,8 +10,7 @@ from rig.analysis.quantities import COMPUTED
 from rig.measurands import MEASURANDS, Measurand
 from rig.results.live import LiveAnalysis
 from rig.tui.drop_words import number_table
-from tests.tui.lab import KEYS, unseen
-from tests.tui.screen import text_of
+from tests.tui.lab import KEYS, text_of, unseen
 
 SIZE = [(120, 36)]
 

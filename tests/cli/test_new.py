@@ -10,6 +10,7 @@ from rig.protocol.draft import SCENES, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.protocol.reader import parse, read
 from tests.cli.lab import Terminal
+from tests.tables import cases
 
 
 def drafted(scene, gates, **changes):
@@ -93,21 +94,7 @@ def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
     assert (draft.drop, draft.repeats, draft.gates) == ("350 mm ± 1 mm", 5, 2)
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--scene", "two-chains", "--gates", "1"], "two chains need two gates"),
-        (
-            ["--scene", "one-chain", "--gates", "14", "--board", "uno"],
-            "found 12; the board (Arduino Uno) has gates",
-        ),
-        (["--gates", "many"], "--gates: found many; accepted: a whole number"),
-        (["--gates", "99"], "--gates: found 99; accepted: a whole number from 1 to 16"),
-        (["--diameter", "20"], "diameter"),
-        (["--drop", "900 mm}"], "drop"),
-        (["--scene", "one-chain", "--rods", "3", "--length", "50 mm", "--gates", "9"], "no space"),
-    ],
-)
+@cases
 def test_answers_that_make_no_protocol_are_refused(options, said, call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = call("new", "x.yaml", *options, "--yes")

@@ -16,39 +16,12 @@ from rig.cli import _parser
 from rig.errors import InputError
 from rig.files import write_atomic
 from tests.cli.lab import ROOT, command
+from tests.programs import run_program
+from tests.tables import read_table
 from tests.waiting import PATIENCE_S
 
-COMMANDS = {
-    ("attach", "file"): "SESSION X",
-    ("attach", "session"): "X CSV",
-    ("export", "sign"): "SESSION --bundle OUT --sign X",
-    ("notes", "session"): "X --run 1 text",
-    ("verify", "file"): "X",
-    ("verify", "key"): "BUNDLE --key X",
-    ("analyze", "session"): "X",
-    ("analyze", "video"): "SESSION --video X",
-    ("check", "protocol"): "X",
-    ("compare", "session"): "X SESSION",
-    ("design", "learned"): "FENCE --learned X",
-    ("design", "protocol"): "X",
-    ("doctor", "session"): "--session X",
-    ("estimate", "session"): "X",
-    ("export", "session"): "X --csv OUT",
-    ("flash", "hex"): "--board mega --port /dev/null --avrdude /bin/true --hex X",
-    ("import", "events"): "X --protocol FENCE --session OUT",
-    ("import", "protocol"): "CSV --protocol X --session OUT",
-    ("predict", "protocol"): "X",
-    ("recover", "protocol"): "SESSION -o OUT --protocol X",
-    ("recover", "session"): "X",
-    ("replay", "session"): "X",
-    ("report", "session"): "X -o OUT",
-    ("run", "protocol"): "X --port sim:// --session OUT",
-    ("run", "session"): "FENCE --port sim:// --session X",
-    ("sweep", "protocol"): "X --vary drop=100mm..300mm:3 -o OUT.csv",
-    ("tui", "keys"): "--keys X",
-    ("unblind", "session"): "X",
-    ("selftest", "protocol"): "--port sim:// --protocol X",
-}
+FILES = read_table(__file__, "commands")["files"]
+COMMANDS = {(name, file): words for name, of in FILES.items() for file, words in of.items()}
 WRITTEN = {("import", "session"), ("tui", "protocol"), ("tui", "session")}
 """A new file, and those that are only read on a terminal."""
 
@@ -105,18 +78,8 @@ def test_every_command_that_takes_a_file_is_tried():
     (commands,) = (
         action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction)
     )
-    files = {
-        "protocol",
-        "session",
-        "events",
-        "video",
-        "learned",
-        "hex",
-        "keys",
-        "file",
-        "sign",
-        "key",
-    }
+    files = {"protocol", "session", "events", "video", "learned", "hex", "keys", "file"}
+    files |= {"sign", "key"}
     taken = {
         (name, action.dest)
         for name, parser in commands.choices.items()
@@ -150,11 +113,7 @@ def test_what_is_no_file_is_refused_in_words(case, thing, places, request, call)
 @pytest.mark.parametrize("said", ["check <(cat FENCE)", "check /dev/stdin < FENCE"])
 def test_a_shell_may_pass_on_text(said, fence, call):
     line = said.replace("FENCE", str(fence))
-    done = subprocess.run(
-        ["bash", "-c", f"{' '.join(command())} {line}"],
-        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = run_program("bash", "-c", f"{' '.join(command())} {line}", cwd=ROOT)
     assert done.stdout.splitlines()[1:] == call("check", fence).out.splitlines()[1:]
 
 

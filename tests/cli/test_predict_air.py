@@ -11,22 +11,14 @@ from rig.protocol.reader import parse, read
 from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.cli.lab import PROTOCOLS, short
-from tests.model.air_reference import reference_air_fall, reference_way
-from tests.model.reference import printed_alpha
+from tests.model.reference import printed_alpha, reference_air_fall, reference_way
+from tests.tables import cases, protocol_text
 
 TIGHT = 1e-13
 MASSES = (0.0241, 0.0203, 0.0162, 0.0131, 0.0108, 0.0089, 0.0072, 0.0060)
 GAPS = (0.051, 0.049, 0.048, 0.047, 0.046, 0.045, 0.044)
 HEIGHTS = tuple(sum(GAPS[:k]) for k in range(8))
-SCENE = """\
-protocol: 1
-chains:
-  A: {rods: 6, length: 250 mm, mass: 10 g, diameter: 8 mm, rod_length: 90 mm, tilt: 15 deg}
-surface: {restitution: 0.5, friction: 0.2}
-drop: 150 mm
-gravity: 9.81 m/s^2
-plan: {incline: 50 deg}
-"""
+SCENE = protocol_text("six-rods")
 EVEN = tuple(0.05 * k for k in range(6))
 UNLIKE = "  B: {like: A, length: 300 mm, diameter: 12 mm}\nsurface"
 
@@ -103,14 +95,7 @@ def test_uncertain_speed_and_drag_widen_the_prediction(predict):
         assert unsure["speed_u_m_s"] == pytest.approx(abs(high - low) / 2, rel=0.03)
 
 
-@pytest.mark.parametrize(
-    ("line", "start"),
-    [
-        ("drag: {coefficient: 1, terminal_speed: 2 m/s}", "f:8:24: drag.terminal_speed: coeffi"),
-        ("drag: {terminal_speed: 2 m/s, air_density: 1 kg/m3}",
-         "f:8:31: drag.air_density: not used with terminal_speed"),
-    ],
-)  # fmt: skip
+@cases
 def test_keys_that_exclude_each_other_are_found_at_their_place(line, start):
     """What else may be wrong with a key is for tests/protocol."""
     with pytest.raises(InputError) as caught:

@@ -8,19 +8,9 @@ from rig.design.trials import Trials
 from rig.predictions import predictions
 from rig.protocol.reader import read
 from tests.cli.lab import PROTOCOLS
+from tests.tables import read_table
 
-FIELDS = {
-    "incline_deg",
-    "model",
-    "alpha",
-    "gamma",
-    "separation_m",
-    "speed_m_s",
-    "fall_time_s",
-    "free_fall_speed_m_s",
-    "in_domain",
-    "notes",
-}
+FIELDS = {*read_table(__file__, "fields")["predictions"]}
 
 
 def test_json_has_every_field_of_every_incline(call):

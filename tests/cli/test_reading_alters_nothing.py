@@ -11,6 +11,7 @@ import pytest
 from bench.mutants import make_session
 from rig import door
 from rig.results.live import LiveAnalysis
+from tests.tables import read_table
 
 WRITER = """
 import os, sys
@@ -25,19 +26,7 @@ print("ready", flush=True)
 sys.stdin.read()
 """
 pytestmark = pytest.mark.usefixtures("undrawn")
-COMMANDS = [
-    ("analyze", "SESSION"),
-    ("analyze", "SESSION", "--json"),
-    ("analyze", "SESSION", "--budget", "1", "--trials", "2"),
-    ("estimate", "SESSION"),
-    ("report", "SESSION", "-o", "OUT/page.html"),
-    ("export", "SESSION", "--csv", "OUT/tables"),
-    ("replay", "SESSION"),
-    ("verify", "SESSION"),
-    ("recover", "SESSION"),
-    ("recover", "SESSION", "-o", "OUT/saved"),
-    ("doctor", "--session", "SESSION"),
-]
+COMMANDS = [words.split() for words in read_table(__file__, "commands")["read"]]
 
 
 def fresh(session):

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterator
+from contextlib import asynccontextmanager
 
 import pytest
 
@@ -44,23 +45,22 @@ def driver(processes, client):
 
 @pytest.fixture
 def door(tmp_path):
-    """Run a test inside the daemon's own loop: a daemon whose simulated port is still closed."""
+    """Have a daemon in the test's own loop, whose simulated port is still closed."""
 
-    def within(test):
-        async def run():
-            path = tmp_path / "door" / "rig.sock"
-            server, ready = Server("sim://", path), asyncio.Event()
-            server.serving = asyncio.create_task(server.run(ready.set))
-            await asyncio.wait_for(ready.wait(), PATIENCE_S)
-            try:
-                await asyncio.wait_for(test(server, path), PATIENCE_S)
-                failed = server.serving.done()
-            finally:
-                server.end()
-                await asyncio.gather(server.serving, return_exceptions=True)
-            assert failed or server.serving.exception() is None
-            assert not any(path.parent.iterdir()), "nothing stays of it"
+    @asynccontextmanager
+    async def opened():
+        path = tmp_path / "door" / "rig.sock"
+        server, ready = Server("sim://", path), asyncio.Event()
+        server.serving = asyncio.create_task(server.run(ready.set))
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                await ready.wait()
+                yield server, path
+            failed = server.serving.done()
+        finally:
+            server.end()
+            await asyncio.gather(server.serving, return_exceptions=True)
+        assert failed or server.serving.exception() is None
+        assert not any(path.parent.iterdir()), "nothing stays of it"
 
-        asyncio.run(run())
-
-    return within
+    return opened

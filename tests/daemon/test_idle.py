@@ -1,6 +1,5 @@
 """A daemon that nobody asked for by name ends when nobody needs it, and never with a drop."""
 
-import subprocess
 import sys
 import time
 
@@ -12,6 +11,7 @@ from rig.errors import RigError
 from rig.link.messages import Phase
 from rig.session.store import Session
 from tests.daemon.at_work import states
+from tests.programs import run_program
 from tests.waiting import PATIENCE_S, until
 
 IDLE_S = 0.4
@@ -66,11 +66,9 @@ def test_it_stays_while_a_client_is_there_and_ends_after_it(processes, client):
 def test_one_that_was_started_by_hand_stays(tmp_path):
     with ProcessFixture(runs=1) as processes:
         processes.start_daemon()
-        other = subprocess.run(
-            [sys.executable, "-m", "rig", "daemon", "--port", "sim://", "--socket",
-             str(processes.folder / "other" / "rig.sock"), "--idle-timeout", str(IDLE_S)],
-            capture_output=True, text=True, timeout=PATIENCE_S, check=True,
-        )  # fmt: skip
+        words = f"-m rig daemon --port sim:// --idle-timeout {IDLE_S} --socket".split()
+        place = processes.folder / "other" / "rig.sock"
+        other = run_program(sys.executable, *words, place)
         assert ALONE in other.stderr
         processes.client().close()
 

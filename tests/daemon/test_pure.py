@@ -32,6 +32,7 @@ from rig.reasons import make_error
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import Interrupts, StoppedError
 from rig.recorder.published import EDGES_LIMIT, PublishedState
+from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
 ERRORS = [
@@ -105,16 +106,7 @@ def test_a_request_is_read_as_it_was_written():
     )
 
 
-@pytest.mark.parametrize(
-    ("told", "why"),
-    [
-        (b"HTTP/1.1 400 Bad Request\n", "not a daemon of this rig"),
-        (b"\xff\xfe\n", "not a daemon of this rig"),
-        (b"[1]\n", "not a daemon of this rig"),
-        (b'{"half": ', "hung up"),
-        (b"", "hung up"),
-    ],
-)
+@cases
 def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
     tmp_path.chmod(0o700)
     with socket.socket(socket.AF_UNIX) as other, ThreadPoolExecutor(1) as pool:
@@ -124,7 +116,7 @@ def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
         line, _ = other.accept()
         with line:
             line.recv(1 << 10)
-            line.sendall(told)
+            line.sendall(told.encode("latin-1"))
         with pytest.raises(DeviceError, match=why):
             client.result()
 

@@ -1,4 +1,6 @@
-"""A board that comes back somewhere else, and another one that sits where it was."""
+"""A board that comes back elsewhere or is in another room, and another one where it was."""
+
+from __future__ import annotations
 
 import os
 from contextlib import closing
@@ -6,12 +8,16 @@ from contextlib import closing
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
+from bench.invariants import broken
 from bench.process_fixture import ProcessFixture
 from rig.errors import DeviceError
+from rig.link.messages import Phase
+from rig.link.port import BAUDRATE
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.session.store import Session
 from tests.daemon.at_work import let_fall, working
+from tests.daemon.far_port import FarPort
 from tests.waiting import until
 
 
@@ -88,3 +94,25 @@ def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):
             pytest.raises(DeviceError, match="no such"),
         ):
             controller.open_session(str(processes.protocol), str(processes.session))
+
+
+@pytest.mark.parametrize(
+    ("scheme", "lost", "said"),
+    [
+        ("rfc2217", FarPort.hang_up, "connection lost"),
+        pytest.param("socket", FarPort.fall_silent, "did not answer", marks=pytest.mark.slow),
+    ],
+)
+def test_a_session_survives_a_connection_that_is_lost_while_chains_fall(scheme, lost, said):
+    with ProcessFixture(1) as processes, FarPort(processes.port, scheme) as far:
+        processes.port = far.url
+        processes.start_daemon()
+        processes.start_runner()
+        processes.await_phase(Phase.RECORDING)
+        lost(far)
+        assert processes.waited() == 4
+        assert said in processes.told
+        assert processes.run() == 0, processes.told
+        assert broken(processes.session, processes.happened(), 1) == []
+        if scheme == "rfc2217":
+            assert far.baudrates[0] == BAUDRATE, "as it was asked for over there"

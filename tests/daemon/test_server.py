@@ -1,20 +1,26 @@
-"""The door: who comes in, what is said there, and what a client that does not read costs."""
+"""The door: who comes in, what is said there, and what crowds and bad clients cost."""
 
 import asyncio
 import contextlib
 import json
 import os
+import resource
 import socket
 import stat
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from bench.process_fixture import ProcessFixture
-from rig.daemon import rpc
+from rig.daemon import connection, rpc, service
 from rig.daemon.client import AsyncClient, Client, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, InputError, RigError
+from tests.tables import cases
+from tests.waiting import PATIENCE_S
 
 _SECTIONS = {
     "daemon", "port", "link", "device", "statistics", "gates", "phase", "drop", "edges", "session",
@@ -27,7 +33,7 @@ async def told(path, *lines):
     reader, writer = await asyncio.open_unix_connection(path)
     writer.write(b"".join(lines))
     answers = []
-    with contextlib.suppress(ConnectionResetError):
+    with contextlib.suppress(ConnectionError):
         for _ in lines:
             answers.append(json.loads(await reader.readline() or b"null"))  # noqa: PERF401
     answers += [None] * (len(lines) - len(answers))
@@ -38,12 +44,10 @@ async def told(path, *lines):
 HELLO = rpc.request("hello", {"api": rpc.API, "client": "t"}, 1)
 
 
-def test_only_the_user_may_come_near(door):
-    async def test(server, path):
+async def test_only_the_user_may_come_near(door):
+    async with door() as (_server, path):
         assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
-
-    door(test)
 
 
 def test_a_folder_that_is_open_to_others_is_refused(tmp_path):
@@ -68,17 +72,15 @@ def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
         prepare_folder(tmp_path)
 
 
-def test_another_user_is_not_served(door, monkeypatch):
-    async def test(server, path):
+async def test_another_user_is_not_served(door, monkeypatch):
+    async with door() as (_server, path):
         uid = os.getuid()
         monkeypatch.setattr("rig.daemon.server.peer_uid", lambda _: uid + 1)
         assert await told(path, HELLO) == [None]
 
-    door(test)
 
-
-def test_a_client_of_another_version_is_told_so_and_sent_away(door):
-    async def test(server, path):
+async def test_a_client_of_another_version_is_told_so_and_sent_away(door):
+    async with door() as (_server, path):
         skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
         answer, end = await told(path, skewed, HELLO)
         error = rpc.error_of(answer)
@@ -86,50 +88,26 @@ def test_a_client_of_another_version_is_told_so_and_sent_away(door):
         assert "version 2 of the daemon's interface" in str(error)
         assert end is None
 
-    door(test)
+
+@cases
+async def test_nonsense_gets_its_code_and_the_next_request_its_answer(door, method, params, code):
+    line = f"{params}\n".encode() if method is None else rpc.request(method, params, 2)
+
+    async with door() as (_server, path):
+        _, nonsense, answer = await told(path, HELLO, line, rpc.request("unsubscribe", {}, 3))
+        assert nonsense["error"]["code"] == code
+        assert answer["result"] == {}
 
 
-NONSENSE = [
-    (b"what?\n", rpc.PARSE),
-    (rpc.request("dance", {}, 2), rpc.NO_METHOD),
-    (rpc.request("arm", {"run": 1}, 2), rpc.BAD_PARAMS),
-    (rpc.request("fire", {"token": "x"}, 2), rpc.BAD_PARAMS),
-    (rpc.request("wait", {"seconds": -1}, 2), rpc.BAD_PARAMS),
-    (rpc.request("wait", {"seconds": True}, 2), rpc.BAD_PARAMS),
-    (rpc.request("wait", {"seconds": float("nan")}, 2), rpc.PARSE),
-    (rpc.request("open_session", {"protocol": "p.yaml", "session": "/s"}, 2), rpc.BAD_PARAMS),
-    (rpc.request("open_session", {"protocol": "/p\0", "session": "/s"}, 2), rpc.BAD_PARAMS),
-    (rpc.request("open_session", {"protocol": "/\ud800", "session": "/s"}, 2), rpc.BAD_PARAMS),
-    (b"[]\n", rpc.INVALID),
-    (b'{"jsonrpc":"2.0","method":"renew"}\n', rpc.INVALID),
-    (b'[{"jsonrpc":"2.0","id":1,"method":"renew"}]\n', rpc.INVALID),
-    (rpc.request("subscribe", {"to": "all"}, 2), rpc.BAD_PARAMS),
-    (rpc.request("log_state", {"run": 1, "attempt": 1, "state": "fine", "reasons": []}, 2),
-     rpc.BAD_PARAMS),
-]  # fmt: skip
-
-
-def test_nonsense_gets_its_code_and_the_next_request_its_answer(door):
-    async def test(server, path):
-        for line, code in NONSENSE:
-            _, nonsense, answer = await told(path, HELLO, line, rpc.request("unsubscribe", {}, 3))
-            assert nonsense["error"]["code"] == code, line
-            assert answer["result"] == {}
-
-    door(test)
-
-
-def test_hello_comes_first(door):
-    async def test(server, path):
+async def test_hello_comes_first(door):
+    async with door() as (_server, path):
         answer, end = await told(path, rpc.request("subscribe", {}, 1), HELLO)
         assert answer["error"]["code"] == rpc.INVALID
         assert end is None
 
-    door(test)
 
-
-def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
-    async def test(server, path):
+async def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
+    async with door() as (_server, path):
         reader, writer = await asyncio.open_unix_connection(path)
         writer.write(HELLO + b"x" * (2 * rpc.REQUEST_LIMIT))
         await reader.readline()
@@ -137,11 +115,9 @@ def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
         writer.close()
         assert (await told(path, HELLO))[0]["result"]["api"] == rpc.API
 
-    door(test)
 
-
-def test_a_snapshot_has_every_section_that_is_promised(door):
-    async def test(server, path):
+async def test_a_snapshot_has_every_section_that_is_promised(door):
+    async with door() as (_server, path):
         client = await AsyncClient.connect(path, "tui")
         await client.subscribe()
         assert set(client.replica.state) == _SECTIONS
@@ -151,11 +127,9 @@ def test_a_snapshot_has_every_section_that_is_promised(door):
         assert client.replica.state["clients"] == 1
         await client.close()
 
-    door(test)
 
-
-def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_does(door):
-    async def test(server, path):
+async def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_does(door):
+    async with door() as (server, path):
         slow = socket.socket(socket.AF_UNIX)
         slow.connect(str(path))
         slow.sendall(HELLO + rpc.request("subscribe", {}, 2))
@@ -184,8 +158,6 @@ def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_do
         assert methods.count("change") < 400
         slow.close()
         await quick.close()
-
-    door(test)
 
 
 def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
@@ -225,3 +197,213 @@ def test_the_usual_place(monkeypatch, tmp_path):
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert default_socket() == tmp_path / ".cache/chainrig/rig.sock"
+
+
+FEW = 200  # descriptors that the daemon may have: fewer than come
+
+
+@pytest.fixture
+def daemon(tmp_path):
+    """Start a daemon of a simulated port, with few descriptors."""
+    tmp_path.chmod(0o700)
+    path = tmp_path / "rig.sock"
+    started = subprocess.Popen(
+        [sys.executable, "-W", "error", "-m", "rig", "daemon", "--port", "sim://",
+         "--socket", path],
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert started.stderr.readline().startswith("rig daemon: sim://")
+        resource.prlimit(started.pid, resource.RLIMIT_NOFILE, (FEW, FEW))
+        yield path, started
+    finally:
+        started.terminate()
+        started.communicate(timeout=PATIENCE_S)
+
+
+def test_a_silent_crowd_keeps_nobody_out(daemon):
+    path, _ = daemon
+    with contextlib.ExitStack() as crowd:
+        for number in range(2 * FEW):
+            line = crowd.enter_context(socket.socket(socket.AF_UNIX))
+            line.setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                line.connect(str(path))
+                line.send(b"{" * (number % 2))  # some begin a line
+        client = Client(Line(path, "the one that means it"))
+        client.stop("enough")
+        client.close()
+
+
+def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
+    path, started = daemon
+    with contextlib.ExitStack() as crowd:
+
+        def come(number):
+            try:
+                crowd.callback(Client(Line(path, f"client {number}")).close)
+            except rpc.BusyError:
+                return 0
+            return 1
+
+        with ThreadPoolExecutor(160) as pool:
+            let_in = sum(pool.map(come, range(160)))
+        assert let_in + sum(map(come, range(let_in, connection.CLIENTS))) >= connection.CLIENTS
+    assert started.poll() is None
+
+
+def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.daemon.client._REACH_S", 1)
+    tmp_path.chmod(0o700)
+    path = tmp_path / "rig.sock"
+    with contextlib.ExitStack() as stack:
+        deaf, waiting = (stack.enter_context(socket.socket(socket.AF_UNIX)) for _ in range(2))
+        deaf.bind(str(path))
+        deaf.listen(0)
+        waiting.connect(str(path))  # the kernel keeps one waiting
+        with pytest.raises(rpc.BusyError, match="it took no new client"):
+            Client(Line(path, "one more"))
+
+
+async def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch):
+    monkeypatch.setattr(service, "CLIENTS", 2)
+
+    async with door() as (server, path):
+        clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
+        with pytest.raises(rpc.BusyError, match="any further client may only stop"):
+            await clients[2].call("subscribe")
+        assert await clients[2].call("stop") == {}
+        await clients[0].close()
+        while server.published.get("clients") > 1:
+            await asyncio.sleep(0)
+        await (await AsyncClient.connect(path, "in its place")).close()
+        for client in clients:
+            await client.close()
+
+
+async def test_who_says_nothing_is_told_so_and_sent_away(door, monkeypatch):
+    monkeypatch.setattr("rig.daemon.server.HELLO_S", 0.05)
+
+    async with door() as (_server, path):
+        reader, writer = await asyncio.open_unix_connection(path)
+        told = json.loads(await reader.readline())
+        assert (told["id"], told["error"]["data"]["kind"]) == (None, "BusyError")
+        assert await reader.read() == b""
+        writer.close()
+        client = await AsyncClient.connect(path, "who says hello stays")
+        await asyncio.sleep(0.1)
+        assert await client.call("renew") == {"disk_s": 0.0}
+        await client.close()
+
+
+NAMES = ["\ud800x", "\x1b[2J", "\u202etxt.exe", "a\nb", "\0", "ü" * 500]
+
+
+async def test_whatever_a_client_is_called_all_see_it(door):
+    async with door() as (_server, path):
+        watcher = await AsyncClient.connect(path, "watcher")
+        await watcher.subscribe()
+        for name in NAMES:
+            client = await AsyncClient.connect(path, name)
+            await client.call("take_control")
+            while watcher.replica.state["control"] is None:
+                await asyncio.sleep(0)
+            shown = watcher.replica.state["control"]["client"]
+            assert shown.isprintable()
+            assert 0 < len(shown) <= 80
+            assert await client.call("stop", reason=name) == {}
+            await client.close()
+            while watcher.replica.state["control"] is not None:
+                await asyncio.sleep(0)
+        await watcher.close()
+
+
+async def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog):
+    async with door() as (server, _path):
+
+        def broken():
+            raise ArithmeticError("of a kind that nobody foresaw")
+
+        monkeypatch.setattr(server.service.publisher, "spread", broken)
+        server.published.set(error={"message": "anything"})
+        with pytest.raises(ArithmeticError, match="nobody foresaw"):
+            await server.serving
+        assert "a part of the daemon failed" in caplog.text
+
+
+async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
+    async with door() as (server, _path):
+
+        def broken():
+            raise SystemError
+
+        monkeypatch.setattr(server._worker, "_attend", broken)
+        server._worker.wake()
+        with pytest.raises(SystemError):
+            await server.serving
+
+
+async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
+    async with door() as (server, path):
+        reader, writer = await asyncio.open_unix_connection(path)
+        control = rpc.request("take_control", {}, 2)
+        waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
+        writer.write(HELLO)
+        await reader.readline()
+        (client,) = server.service.connections
+        do = client._do
+
+        async def held(one, request):
+            if request.method == "wait":
+                await asyncio.Event().wait()
+            return await do(one, request)
+
+        monkeypatch.setattr(client, "_do", held)
+        writer.write(control + b"".join(waits) + rpc.request("stop", {}, 1000))
+        told = {}
+        while not {299, 1000} <= told.keys():  # the stop may overtake
+            answer = json.loads(await reader.readline())
+            told[answer["id"]] = answer
+        assert told[1000]["result"] == {}
+        assert told[299]["error"]["data"]["kind"] == "BusyError"
+        writer.close()
+
+
+async def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch):
+    async with door() as (server, path):
+        lines = [await asyncio.open_unix_connection(path) for _ in range(21)]
+        for _, writer in lines:
+            writer.write(HELLO)
+        while server.published.get("clients") < len(lines):
+            await asyncio.sleep(0)
+        (_, stopping), *many = lines
+        done, do = [], server.service.do
+
+        def noted(client, request):
+            if not done:
+                stopping.write(rpc.request("stop", {}, 9))
+            done.append(request.method)
+            return do(client, request)
+
+        for one in server.service.connections:
+            monkeypatch.setattr(one, "_do", noted)
+        for _, writer in many:
+            writer.write(b"".join(rpc.request("subscribe", {}, number) for number in range(20)))
+        while "stop" not in done:
+            await asyncio.sleep(0)
+        assert done.count("subscribe") < len(many)
+        for _, writer in lines:
+            writer.close()
+
+
+async def test_of_a_client_that_goes_nothing_stays(door):
+    async with door() as (server, path):
+        reader, writer = await asyncio.open_unix_connection(path)
+        writer.write(HELLO)
+        await reader.readline()
+        writer.close()
+        while server._serving:
+            await asyncio.sleep(0)
+        await asyncio.sleep(0)  # what is cancelled ends in the next turn
+        running = [task.get_coro().__qualname__ for task in asyncio.all_tasks()]
+        assert not [name for name in running if name.startswith("Connection.")]

@@ -13,6 +13,7 @@ from rig.estimate.hypotheses import one_alpha
 from rig.estimate.hypothesis_fit import fit
 from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merge_like
+from rig.estimate.rods import _gains
 from rig.estimate.session import estimate
 from rig.model.impact import alpha_inclined
 from rig.predictions import predict_incline
@@ -266,3 +267,17 @@ def test_chains_with_an_alpha_of_their_own_are_told_apart():
         measured = parameter(both.json(), name)["least_squares"]
         assert abs(measured["value"] - truth) < 4 * measured["u"] < 0.02
     assert "α of A" in estimate_text(both, Sections(), simulated=True)
+
+
+def test_rods_that_are_not_resolved_are_taken_with_their_neighbours():
+    sizes, sure = np.ones(5), 0.01  # beside u = 1
+    middle = np.diag([sure, 1.0, 1.0, sure, sure])
+    middle[1, 2] = middle[2, 1] = sure - 1.0
+    for covariance, groups in (
+        (middle, [(0, 0), (1, 2), (3, 3), (4, 4)]),  # known by their sum alone
+        # What is left over at the end joins the last group; if nothing is known, all are one.
+        (np.diag([sure] * 4 + [1.0]), [(0, 0), (1, 1), (2, 2), (3, 4)]),
+        (np.eye(5), [(0, 4)]),
+    ):
+        gains = _gains(sizes, covariance, sizes)
+        assert [(gain.first, gain.last) for gain in gains] == groups

@@ -1,7 +1,6 @@
 """The Pico's image and its emulator, or the reason why there is none."""
 
 import os
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -9,6 +8,7 @@ import pytest
 from rig.errors import InputError
 from rig_emulator.pico_chip import need_pico
 from tests.firmware.toolchain import FIRMWARE, make, need
+from tests.programs import run_program
 
 FOLDER = FIRMWARE / "build" / "rp2040"
 
@@ -28,9 +28,7 @@ def build() -> Path:
 
 def symbol(name: str) -> int:
     """Say where a variable of the firmware is."""
-    table = subprocess.run(
-        ["arm-none-eabi-nm", FOLDER / "firmware.elf"], capture_output=True, text=True, check=True
-    ).stdout
+    table = run_program("arm-none-eabi-nm", FOLDER / "firmware.elf").stdout
     return next(
         int(line.split()[0], 16) for line in table.splitlines() if line.endswith(f" {name}")
     )

@@ -5,10 +5,9 @@ import pytest
 from rig.link import messages as wire
 from rig.link.client import Device
 from tests.firmware.core_board import BROWN_OUT, CoreBoard
-from tests.link.bench import LABEL, ScriptedLab, falling_rods
+from tests.link.bench import LABEL, ScriptedLab, VirtualBench, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import Wire, arm
-from tests.link.virtual import VirtualBench
 
 
 class CoreBench(VirtualBench):

@@ -15,6 +15,7 @@ from rig.selftest.findings import Verdict
 from tests.firmware.toolchain import FIRMWARE, need
 from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL
+from tests.programs import run_program
 from tests.selftest.benches import outcomes, port_of
 
 FLAGS = "-std=c11 -O1 -Wall -Wextra -Wconversion -Wshadow -Werror -fsanitize=address,undefined"
@@ -35,8 +36,7 @@ def built(tmp_path_factory):
     ):
         sources = [FIRMWARE / f"examples/{part}.c" for part in (source, "frames")]
         command = ["gcc", *FLAGS.split(), "-o", folder / name, *sources, *more]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
+        run_program(*command)
     return folder
 
 
@@ -51,8 +51,7 @@ def device_of(built):
 def client(built, port, gates, record_ms):
     """Let the client make a drop; give its rows of ticks since FIRE and state."""
     command = [built / "client", port, hex(gates), str(record_ms)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    done = run_program(*command)
     head, *rows = csv.reader(done.stdout.splitlines())
     assert head == ["ticks since FIRE", "state"]
     return [(int(tick), int(state)) for tick, state in rows]

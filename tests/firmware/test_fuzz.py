@@ -1,4 +1,4 @@
-"""The core under the address and undefined-behaviour sanitizers, fed with anything."""
+"""Anything at all before the core and the real binaries: no fault, and no pulse unasked for."""
 
 import struct
 import subprocess
@@ -7,8 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.link import messages as wire
+from rig_emulator.fuzz import Fuzz
+from rig_emulator.wiring import BOARDS, PICO, firmware_for
 from tests.examples import examples
+from tests.firmware.pico import build
 from tests.firmware.toolchain import FIRMWARE, make
 
 
@@ -76,3 +80,26 @@ def test_the_script_can_fire(survivor):
     arm = wire.Arm(1, 1, 1, 500_000, 5000, 1000)
     wait = bytes((3 | 15 << 3, 255))  # 8.4 million ticks
     assert survivor(frame(arm, 1) + bytes((3 | 8 << 3, 255)) + bytes((2, 2)) + wait) == 1
+
+
+def judge_pulses(wiring, steps: int, least: int) -> None:
+    fuzz = Fuzz(wiring, firmware_for(wiring), seed=3)
+    for _ in range(steps):
+        fuzz.step()
+    assert fuzz.judge.faults == []
+    assert fuzz.judge.pulses["ordered"] >= least, "or else this would show nothing"
+    assert fuzz.avr.watchdog_resets == 0
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_every_pulse_was_armed_and_fired(name):
+    make("all")
+    judge_pulses(BOARDS[name], steps=150, least=3)
+
+
+@pytest.mark.parametrize(
+    ("steps", "least"), [(25, 1), pytest.param(1000, 20, marks=pytest.mark.slow)]
+)
+def test_every_pulse_of_a_pico_was_too(steps, least):
+    build()
+    judge_pulses(PICO, steps, least)

@@ -1,7 +1,7 @@
 """The photogate as drawn: `rig gate` against ngspice, and its resistors against the pages."""
 
 import re
-import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -9,33 +9,16 @@ from rig.cli import main
 from rig.errors import InputError
 from rig.model import photogate
 from tests.firmware.toolchain import FIRMWARE, need
+from tests.programs import run_program
 
 NAMED = {"distance_m": 0.06, "slit_m": 0.5e-3, "led": "TSAL6100", "detector": "BPW85C"}
-DECK = """\
-a photogate whose light goes and comes back
-VCC vcc 0 5
-VPULL pull 0 {pull}
-R1 vcc ref 33k
-R2 ref 0 10k
-RH ref out 220k
-RP pull out 2.2k
-ILIT 0 sig PWL(0 {lit} 1m {lit} 11m 0 12m 0 22m {lit} 23m {lit})
-RL sig 0 {load}
-* an open output: it pulls down while the signal is above the reference
-SOUT out 0 sig ref comparator
-.model comparator SW(VT=0 VH=0 RON=50 ROFF=100Meg)
-.tran 10u 23m
-.meas tran goes WHEN v(out)={half} RISE=1
-.meas tran back WHEN v(out)={half} FALL=LAST
-.meas tran lit FIND v(sig) AT=0.5m
-.end
-"""
+DECK = Path(__file__).with_name("photogate.cir").read_text("ascii")
 
 
 def spice(deck, tmp_path):
     need("ngspice")
     (path := tmp_path / "deck.cir").write_text(deck)
-    done = subprocess.run(["ngspice", "-b", path], capture_output=True, text=True, check=False)
+    done = run_program("ngspice", "-b", path, code=None)
     found = {}
     for line in done.stdout.splitlines():
         name, equals, value = line.partition("=")

@@ -15,10 +15,10 @@ from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, symbol
 from tests.firmware.toolchain import FIRMWARE
-from tests.link.bench import LABEL, ScriptedLab, falling_rods
+from tests.link.bench import LABEL, ScriptedLab, VirtualBench, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import arm
-from tests.link.virtual import VirtualBench
+from tests.tables import cases
 
 HZ = 20_000_000
 CYCLES = 6 * HZ
@@ -75,13 +75,7 @@ def test_an_afternoon_with_one():
     bench.serial.close()
 
 
-@pytest.mark.parametrize(
-    ("patched", "named", "hint"),
-    [
-        ("shutil.which", "needs node", "nodejs"),
-        ("rig_emulator.pico_chip.HERE", "rp2040js", "npm ci"),
-    ],
-)
+@cases
 def test_without_its_emulator_it_says_what_to_install(monkeypatch, tmp_path, patched, named, hint):
     monkeypatch.setattr(patched, tmp_path if "HERE" in patched else lambda _: None)
     with pytest.raises(InputError, match=named) as caught:

@@ -8,43 +8,11 @@ from firmware.pictures import BOARDS, draw
 from firmware.pins import read_pins
 from rig.flash.boards import TARGETS
 from tests.firmware.toolchain import FIRMWARE
+from tests.tables import read_table
 
 README = (FIRMWARE / "README.md").read_text(encoding="utf-8")
-WORDS = {
-    "RELEASE_0": "release 0",
-    "RELEASE_1": "release 1",
-    "SYNC": "sync out",
-    "STOP": "emergency stop",
-    "SENSE": "release sense",
-    "REFERENCE": "1 Hz reference",
-    "LED": "status LED",
-}
-# From the pin-out of each board, as its maker prints it: port by Arduino pin.
-MAPS = {
-    "rp2040": {
-        **{f"GP{n}": f"{at}" for n, at in enumerate((1, 2, 4, 5, 6, 7, 9, 10, 11, 12))},
-        **{f"GP{10 + n}": f"{at}" for n, at in enumerate((14, 15, 16, 17, 19, 20, 21, 22))},
-        **{f"GP{18 + n}": f"{at}" for n, at in enumerate((24, 25, 26, 27))},
-        "GP25": "on board",
-    },
-    "atmega2560": {
-        **{f"D{53 - n}": f"PB{n}" for n in range(4)},
-        **{f"D{10 + n}": f"PB{4 + n}" for n in range(4)},
-        **{f"A{8 + n}": f"PK{n}" for n in range(8)},
-        "D5": "PE3",
-        "D3": "PE5",
-        "D2": "PE4",
-        "D22": "PA0",
-        "D24": "PA2",
-        "D49": "PL0",
-        "D48": "PL1",
-    },
-    "atmega328p": {
-        **{f"D{n}": f"PD{n}" for n in range(8)},
-        **{f"D{8 + n}": f"PB{n}" for n in range(6)},
-        **{f"A{n}": f"PC{n}" for n in range(6)},
-    },
-}
+WORDS = read_table(__file__, "pins")["words"]
+MAPS = read_table(__file__, "pins")
 EACH = pytest.mark.parametrize("board", BOARDS)
 
 

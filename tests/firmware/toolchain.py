@@ -2,10 +2,11 @@
 
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
+
+from tests.programs import run_program
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 
@@ -21,10 +22,4 @@ def need(*tools: str) -> None:
 def make(*targets: str) -> None:
     """Bring targets of the firmware's Makefile up to date, one test process at a time."""
     need("make", "gcc", *([] if all("host" in t for t in targets) else ["avr-gcc"]))
-    done = subprocess.run(
-        ["flock", str(FIRMWARE), "make", "-C", str(FIRMWARE), *targets],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    run_program("flock", FIRMWARE, "make", "-C", FIRMWARE, *targets, timeout=None)

@@ -21,6 +21,7 @@ from rig.link.messages import RefusalReason
 from rig.reasons import make_error
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
+from tests.tables import cases
 
 VERSION = shipped_firmware(DRIVE.board.name)
 NAMES = {"board": DRIVE.board.name, "firmware": VERSION}
@@ -183,14 +184,7 @@ def test_what_is_no_such_drive_is_left_alone(flash, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["flash", "--board", "mega"], "--port is missing"),
-        (["flash", "--board", "mega", "--drive", "x"], "--drive is for a Raspberry Pi Pico"),
-        (["flash", "--board", "pico", "--avrdude", "x"], "--avrdude does not write"),
-    ],
-)
+@cases
 def test_options_of_the_other_boards(capsys, arguments, message):
     assert main(arguments) == 2
     assert message in capsys.readouterr().err

@@ -3,13 +3,10 @@
 The bench is the device with hands around it, see `tests.link.bench`.
 """
 
-from tests.link.suite_checks import CheckSuite
-from tests.link.suite_drop import DropSuite
+from tests.link.suite_drop import CheckSuite, DropSuite, InputSuite, RefusalSuite
 from tests.link.suite_hold import HoldSuite
-from tests.link.suite_input import InputSuite
 from tests.link.suite_line import LineSuite
 from tests.link.suite_memory import MemorySuite
-from tests.link.suite_refuse import RefusalSuite
 from tests.link.suite_safe import SafetySuite
 
 

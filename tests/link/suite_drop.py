@@ -1,11 +1,24 @@
-"""Who is there, and a whole drop from arming to acknowledging."""
+"""Who is there, a drop from arming to acknowledging, its other inputs, and what forbids it."""
 
 import pytest
 
-from rig.link.messages import Phase
+from rig.link import messages as wire
+from rig.link.messages import Phase, RefusalReason
+from rig.selftest.board import SelftestOptions
+from rig.selftest.findings import Verdict
+from rig.selftest.run import selftest
 from tests.link.bench import GATES, LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm
+
+NEEDS_HANDS = {"GATE_BLOCKED", "sync output to gate", "GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
+
+
+class CheckSuite(Suite):
+    def test_it_passes_the_self_test(self, bench):
+        findings = list(selftest(bench.port(), SelftestOptions(release=True)))
+        assert [str(one) for one in findings if one.verdict is Verdict.FAILED] == []
+        assert {one.name for one in findings if one.verdict is not Verdict.OK} == NEEDS_HANDS
 
 
 class DropSuite(Suite):
@@ -42,3 +55,59 @@ class DropSuite(Suite):
         drop = device.collect(LABEL)
         assert drop.fire_tick > 2**32 - 0.06 * identity.tick_hz
         self.check(bench, drop, identity)
+
+
+class InputSuite(Suite):
+    def test_without_a_pulse_the_reference_is_empty(self, device):
+        assert device.reference() == wire.ReferencePulse(0, 0)
+
+    def test_reference_pulses_are_counted_and_timed(self, bench, device, identity):
+        if not bench.can_reference:
+            pytest.skip("no reference can be given here")
+        bench.reference([0.05, 0.15, 0.25])
+        bench.clock().sleep(0.1)
+        first = device.reference()
+        assert first.count == 1
+        assert device.reference() == first
+        bench.clock().sleep(0.2)
+        third = device.reference()
+        assert third.count == 3
+        self.close(bench, identity, (third.tick - first.tick) % 2**32, 0.2)
+        now = device.ping().tick
+        assert (now - third.tick) % 2**32 < 0.2 * identity.tick_hz
+
+    def test_the_release_sense_is_timed(self, bench, device, identity):
+        if not bench.can_sense:
+            pytest.skip("the release-sense input cannot be driven here")
+        bench.sense(0.012)
+        drop = self.drop(device)
+        self.check(bench, drop, identity)
+        self.close(bench, identity, drop.certificate.release_sense, 0.012)
+
+    def test_without_a_change_there_is_no_release_sense(self, device):
+        assert self.drop(device).certificate.release_sense is None
+
+    def test_a_change_behind_the_recording_is_not_of_the_drop(self, bench, device):
+        if not bench.can_sense:
+            pytest.skip("the release-sense input cannot be driven here")
+        bench.sense(0.1)
+        assert self.drop(device, record_ms=50).certificate.release_sense is None
+
+
+class RefusalSuite(Suite):
+    def test_a_gate_blocked_after_arming_forbids_fire(self, bench, device):
+        token = arm(device)
+        bench.touch(0x0102)
+        bench.touch(0x0100)  # gate 1 has moved, which matters less
+        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
+        assert self.refused(RefusalReason.GATE_BLOCKED, device.fire, token).detail == 0x0100
+
+    def test_a_gate_that_moved_after_arming_forbids_fire(self, bench, device):
+        token = arm(device)
+        bench.touch(0x0802)
+        bench.touch(0)
+        assert self.refused(RefusalReason.GATE_UNSTEADY, device.fire, token).detail == 0x0002
+        device.abort()
+        device.fire(arm(device))
+
+    # -- what is no request

@@ -1,7 +1,17 @@
+"""Frames, messages and a drop put together of them: all that is said comes out again."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import fields
+
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from rig import boards
+from rig.link import messages as wire
+from rig.link.assembly import Assembly
 from rig.link.frames import (
     FRAME_LIMIT,
     PAYLOAD_LIMIT,
@@ -12,7 +22,10 @@ from rig.link.frames import (
     decode,
     encode,
 )
+from rig.link.messages import Event, pack_events
+from rig.link.refusals import DeviceRefusedError
 from tests.examples import examples
+from tests.link.strategies import LONG, MESSAGES
 
 FRAMES = st.builds(
     Frame,
@@ -114,6 +127,147 @@ def test_idle_delimiters_are_no_fault():
 @pytest.mark.parametrize(
     "frame", [Frame(1, 1, 0, bytes(PAYLOAD_LIMIT + 1)), Frame(256, 0, 0, b""), Frame(1, -1, 0, b"")]
 )
-def test_what_does_not_fit_is_refused(frame):
+def test_a_frame_that_does_not_fit_is_refused(frame):
     with pytest.raises(ValueError, match=r"at most|range"):
         encode(frame)
+
+
+@given(MESSAGES)
+def test_round_trip(message):
+    code, payload = wire.pack(message)
+    assert len(payload) <= PAYLOAD_LIMIT
+    assert wire.unpack(code, payload) == message
+
+
+@given(st.integers(0, 255), st.binary(max_size=PAYLOAD_LIMIT))
+def test_any_payload_is_a_message_or_an_error(code, payload):
+    try:
+        message = wire.unpack(code, payload)
+    except wire.MessageError:
+        return
+    assert wire.pack(message) == (code, payload)
+
+
+@given(MESSAGES, st.data())
+def test_a_cut_payload_is_never_another_size(message, data):
+    code, payload = wire.pack(message)
+    for wrong in (payload[: data.draw(st.integers(0, len(payload)))], payload + b"\1"):
+        if wrong != payload and not isinstance(message, wire.EventsFrame):
+            with pytest.raises(wire.MessageError):
+                wire.unpack(code, wrong)
+
+
+def test_every_message_is_in_the_table_once():
+    assert len(wire.CODES) == len(wire.TABLE) == 23, "a code is never given twice"
+    for code, kind in wire.TABLE.items():
+        assert issubclass(kind, wire.HostMessage if code < 0x80 else wire.DeviceMessage)
+        assert [f.name for f in wire.FIELDS[kind]] == [f.name for f in fields(kind)]
+        assert not any(getattr(f.wire, "tail", False) for f in wire.FIELDS[kind][:-1])
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        wire.Pong(2**32),
+        wire.Pong(-1),
+        wire.Read(1, 2, 256),
+        wire.EventsFrame(1, 2, bytes(7)),
+        wire.Identity(1, "b" * 25, "f", bytes(8), 1, 1, 1, 1, 1, 0, 1, ""),
+        wire.Identity(1, "b", "f", bytes(7), 1, 1, 1, 1, 1, 0, 1, ""),
+    ],
+)
+def test_what_does_not_fit_is_refused(message):
+    with pytest.raises(wire.MessageError):
+        wire.pack(message)
+
+
+def test_values_without_a_name_are_refused():
+    with pytest.raises(wire.MessageError, match="RefusalReason"):
+        wire.unpack(0x86, b"\xff\0\0")
+    with pytest.raises(wire.MessageError, match="0x42"):
+        wire.unpack(0x42, b"")
+
+
+@given(st.integers(0, 0xFFFF), st.integers(1, 0xFFFF))
+def test_labels(run, attempt):
+    label = wire.pack_label(run, attempt)
+    assert 0 < label < 2**32
+    assert wire.unpack_label(label) == (run, attempt)
+
+
+@pytest.mark.parametrize("pair", [(-1, 1), (65536, 1), (1, 0), (1, 65536)])
+def test_impossible_labels(pair):
+    with pytest.raises(ValueError, match="65535"):
+        wire.pack_label(*pair)
+
+
+def test_a_flicker_of_some_gate_is_told_without_a_number():
+    assert (
+        DeviceRefusedError(wire.RefusalReason.GATE_UNSTEADY, 0).message
+        == "a gate changed after arming"
+    )
+
+
+@pytest.mark.parametrize("reason", wire.RefusalReason)
+def test_every_refusal_has_advice(reason):
+    error = DeviceRefusedError(reason, 0x0005)
+    assert error.hint
+    assert "{" not in error.message
+
+
+def test_the_wire_has_room_for_what_the_table_of_boards_allows():
+    width = {field.name: 8 * field.wire.size for field in wire.FIELDS[wire.Arm]}
+    assert width["gates"] == boards.GATES
+    assert width["release"] == boards.RELEASES
+    assert 2 ** width["record_ms"] - 1 == boards.LONGEST_RECORD_MS
+
+
+STATES = st.integers(0, 2**16 - 1) | st.integers(0, 3)
+EVENT_LISTS = st.lists(st.builds(Event, LONG, STATES), max_size=12)
+
+
+def edges_one_by_one(known, certificate, fire_tick):
+    """Edges from a dictionary of events by number."""
+    found, state, expected = [], certificate.initial_state & certificate.gates, 0
+    for number, event in sorted(known.items()):
+        if number >= certificate.events:
+            continue
+        now = event.state & certificate.gates
+        since = (event.tick - fire_tick + 2**31) % 2**32 - 2**31
+        changed = state ^ now if number == expected else 0
+        channels = [channel for channel in range(16) if changed >> channel & 1]
+        found += [(since, channel, bool(now >> channel & 1)) for channel in channels]
+        state, expected = now, number + 1
+    return tuple(found)
+
+
+@examples(200)
+@given(st.data())
+def test_a_drop_is_put_together_as_from_single_events(data):
+    drop, known = Assembly(wire.pack_label(1, 1)), {}
+    assert not drop.begun
+    for _ in range(data.draw(st.integers(0, 5))):
+        first, events = data.draw(st.integers(0, 30)), data.draw(EVENT_LISTS)
+        drop.add(wire.EventsFrame(drop.label, first, pack_events(events)))
+        known |= dict(enumerate(events, first))
+    assert drop.begun == bool(known)
+    if data.draw(st.booleans()):
+        latest = data.draw(st.integers(1, 20))
+        drop.forget_events(latest)
+        known = dict(sorted(known.items())[:-latest])
+    assert drop.missing() == []
+    total, fire_tick = data.draw(st.integers(0, 40)), data.draw(LONG)
+    crc = zlib.crc32(pack_events([e for number, e in sorted(known.items()) if number < total]))
+    crc ^= data.draw(st.integers(0, 1))
+    gates, initial = data.draw(STATES), data.draw(STATES)
+    drop.certificate = wire.DropCertificate(
+        drop.label, fire_tick, gates, initial, total, crc, 0, 0, 0, 0, 0
+    )
+    first = data.draw(st.integers(0, 10))
+    assert drop.missing(first) == [n for n in range(first, total) if n not in known]
+    whole = set(range(total)) <= set(known)
+    right = crc == zlib.crc32(pack_events([known[n] for n in range(total)])) if whole else False
+    assert drop.sound() == right
+    made = drop.drop(16_000_000)
+    assert made.edges == edges_one_by_one(known, drop.certificate, fire_tick)
+    assert bool(made.faults) != drop.sound()

@@ -12,7 +12,8 @@ from rig.errors import DomainError
 from rig.model.continuum import UniformChain, end, separation_leading_order, speed
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
-from tests.model.continuum_reference import closed_end, printed_squared_speed
+from tests.model.reference import closed_end, printed_squared_speed
+from tests.tables import cases
 
 # A sum of some hundred positive terms, each of a dozen roundings; 4e-15 is the worst seen.
 TIGHT = 1e-13
@@ -63,17 +64,7 @@ def test_above_the_surface_the_chain_falls_freely():
     assert speed(chain, 2.0) == chain.strike_speed == 13.0
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"length_m": 0.0}, "no chain"),
-        ({"spacing_m": -1.0}, "spacing_m"),
-        ({"gamma": math.nan}, "gamma"),
-        ({"drop_m": math.inf}, "drop_m"),
-        ({"initial_speed": -1.0}, "initial_speed"),
-        ({"gravity": 0.0}, "never falls"),
-    ],
-)
+@cases
 def test_says_what_is_wrong_with_a_chain(change, message):
     with pytest.raises(DomainError, match=message):
         replace(PAPER, **change)

@@ -6,16 +6,9 @@ import pytest
 
 from rig.errors import InputError
 from rig.protocol.reader import parse
+from tests.tables import cases, protocol_text
 
-SCENE = """\
-protocol: 1
-chains:
-  A: {rods: 5, length: 200 mm}
-  B: {like: A}
-surface: {restitution: 0.5}
-drop: 0 mm
-gravity: 9.81 m/s^2
-"""
+SCENE = protocol_text("five-rods")
 
 
 def scene(a, b="like: A"):
@@ -87,44 +80,8 @@ def test_what_a_chain_says_itself_displaces_what_it_inherits():
     assert b.chain.heights == (0.0, 0.1, 0.2)
 
 
-@pytest.mark.parametrize(
-    ("a", "start"),
-    [
-        ("rods: 3, length: 1 m, masses: [1 g, 2 g]",
-         "f:3:37: chains.A.masses: found 2 masses for 3 rods"),
-        ("rods: 2, length: 1 m, masses: [1 g, 2 mm]",
-         "f:3:43: chains.A.masses[1]: 2 mm is a length; accepted: a mass"),
-        ("rods: 2, length: 1 m, inertia: 0.26",
-         "f:3:38: chains.A.inertia: found 0.26; accepted: above 0, up to 0.25"),
-        ("rods: 2, length: 1 m, masses: [1 g, 0 g]", "f:3:43: chains.A.masses[1]: found 0 g"),
-        ("rods: 2, length: 1 m, masses: 3 g", "f:3:37: chains.A.masses: found '3 g'; accepted"),
-        ("rods: 2, length: 1 m, masses: {}", "f:3:37: chains.A.masses.exponential: missing"),
-        ("rods: 2, length: 1 m, masses: {exponentail: 1}",
-         "f:3:38: chains.A.masses.exponentail: unknown key; did you mean exponential?"),
-        ("rods: 2, length: 1 m, masses: {exponential: {bottom: 1 g}}",
-         "f:3:51: chains.A.masses.exponential.top: missing"),
-        ("rods: 2, length: 1 m, masses: {table: [{height: 0 mm}]}",
-         "f:3:46: chains.A.masses.table[0].mass: missing"),
-        ("rods: 2, length: 1 m, "
-         "masses: {table: [{height: 0 m, mass: 1 g}, {height: 0 m, mass: 1 g}]}",
-         "f:3:81: chains.A.masses.table[1].height: heights must increase"),
-        ("rods: 2, length: 1 m, masses: {table: [{height: 0 m, mass: 1 g}]}",
-         "f:3:45: chains.A.masses.table: runs from 0 m to 0 m; the rods are from 0 m to 1 m"),
-        ("rods: 2, length: 1 m, "
-         "masses: {exponential: {bottom: 2 g, top: 1 g}, table: [{height: 0 m, mass: 1 g}]}",
-         "f:3:76: chains.A.masses.table: exponential is also given, on line 3; keep one of them"),
-        ("rods: 2, length: 1 m, mass: 1 g, masses: [1 g, 2 g]",
-         "f:3:40: chains.A.masses: mass is also given"),
-        ("rods: [{mass: 1 g}, {count: 2}], length: 1 m", "f:3:13: chains.A.rods: mass is given"),
-        ("rods: 3, spacing: [4 mm]", "f:3:25: chains.A.spacing: found 1 distances; 2 are between"),
-        ("rods: 2, spacing: [4]", "f:3:26: chains.A.spacing[0]: found '4' without a unit"),
-        ("rods: 2, spacing: [4 mm], length: 4 mm", "f:3:33: chains.A.length: follows from"),
-        ("rods: 2, spacing: [4 mm], diameter: 5 mm", "f:3:25: chains.A.spacing: rods 1 and 2 over"),
-        ("rods: 2, spacing: equal-gap, length: 1 m", "f:3:25: chains.A.spacing: found 'equal-gap'"),
-        ("rods: 2", "f:3:6: chains.A.length: missing"),
-    ],
-)  # fmt: skip
-def test_each_fault_is_found_at_its_place(a, start):
+@cases
+def test_each_fault_of_a_chain_is_found_at_its_place(a, start):
     found = problems(a)
     assert len(found) == 1, found
     assert found[0].startswith(start)

@@ -10,22 +10,10 @@ from rig.protocol.describe import describe
 from rig.protocol.reader import parse, read
 from rig.protocol.yamltree import load
 from tests.examples import examples
+from tests.tables import cases, protocol_text
 
 READY = sorted((Path(__file__).parents[2] / "protocols").glob("*.yaml"))
-GOOD = """\
-protocol: 1
-title: on
-chains:
-  A: {rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg}
-  B: {like: A}
-surface: {restitution: 0.50 ± 0.05}
-drop: 180 mm ± 2 mm
-gravity: 9.81 m/s^2
-gates:
-  impact: [{channel: 0, height: 25 mm}]
-  free: [{channel: 8, height: 20 mm}]
-plan: {incline: [0 deg, 40 deg], repeats: 4}
-"""
+GOOD = protocol_text("two-gates")
 
 
 def problems(text):
@@ -75,52 +63,7 @@ def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
     assert rods.chain.masses == pytest.approx([(d / 0.032) ** 2 for d in diameters])
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "start"),
-    [
-        ("protocol: 1", "protocol: 2", "f:1:11: protocol: found 2; accepted: 1"),
-        ("title: on", "titel: on", "f:2:1: titel: unknown key; did you mean title?"),
-        ("title: on", "title: true", "f:2:8: title: found true, which is a boolean"),
-        ("title: on", "title: a\ntitle: b", "f:3:1: title: repeated key, first given on line 2"),
-        ("rods: 25", "rods: 1", "f:4:13: chains.A.rods: found 1 rod; a chain that strikes"),
-        ("rods: 25, ", "", "f:4:6: chains.A.rods: missing"),
-        ("1165 mm", "1165", "f:4:25: chains.A.length: found '1165' without a unit"),
-        ("1165 mm", "1165 ± 1 mm", "f:4:25: chains.A.length: found '1165 ± 1 mm'; no uncert"),
-        ("1165 mm", "300 mm", "f:4:25: chains.A.length: rods 1 and 2 overlap"),
-        ("diameter: 12.7 mm, ", "", "f:4:6: chains.A.diameter: missing"),
-        ("like: A", "like: C", "f:5:13: chains.B.like: found 'C'; accepted: 'A'"),
-        ("like: A", "like: B", "f:5:13: chains.B.like: found 'B'; accepted: 'A'"),
-        ("rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg", "like: B",
-         "f:4:13: chains.A.like: like refers back to itself"),
-        ("0.50 ± 0.05", "30 cm", "f:6:24: surface.restitution: 30 cm is a length; accepted: a"),
-        ("0.50 ± 0.05", "2", "f:6:24: surface.restitution: found 2; accepted: -1 to 1"),
-        ("restitution: 0.50 ± 0.05", "", "f:6:10: surface.restitution: missing"),
-        ("drop: 180 mm ± 2 mm\n", "", "f:1:1: drop: missing"),
-        ("drop: 180", "drop:\t180", "f:7:6: a tab; use blanks"),
-        ("gravity: 9.81 m/s^2\n", "", "f:1:1: gravity: missing; write for example gravity:"),
-        ("gravity:", "site: {latitude: 45 deg, height: 0 m}\ngravity:",
-         "f:9:1: gravity: site is also given, on line 8"),
-        ("  free: [{channel: 8, height: 20 mm}]\n", "", "f:10:3: gates.free: missing"),
-        ("channel: 8", "channel: 0", "f:11:20: gates.free[0].channel: channel 0 is already used"),
-        ("channel: 8", "channel: 16", "f:11:20: gates.free[0].channel: found 16; accepted: a"),
-        ("20 mm", "230 mm", "f:11:31: gates.free[0].height: found 230.0 mm, which rod 2 of"),
-        ("20 mm", "2 mm", "f:11:31: gates.free[0].height: found 2.0 mm; a rod at rest"),
-        ("20 mm", "1.4 m", "f:11:31: gates.free[0].height: found 1400.0 mm; no rod passes"),
-        ("40 deg", "91 deg", "f:12:25: plan.incline[1]: found 91 deg; accepted: 0 deg to 90"),
-        ("40 deg", "0 deg", "f:12:25: plan.incline[1]: found '0 deg' again"),
-        ("repeats: 4", "order: abab", "f:12:41: plan.order: found 'abab'; did you mean ABBA?"),
-        ("repeats: 4", "repeats: 4.0", "f:12:43: plan.repeats: found 4.0; accepted: a"),
-        ("repeats: 4", "repeats: 4]", "f:12:43: [ is missing before '4'"),
-        ("title: on", "title: !!python/name:os.system x", "f:2:8: the tag 'tag:yaml"),
-        ("title: on", "title: *x", "f:2:8: no anchor stands before the alias 'x'"),
-        ("title: on", 'title: "\\ud800"', "f:2:8: half of a surrogate pair"),
-        ("title: on", 'title: "\\e[2J"', "f:2:8: title: found '\\x1b[2J' with control"),
-        ("title: on", "title: \x07", "f:2:8: control character U+0007"),
-        ("title: on", "notes: " + "[" * 40, "f:2:39: more than 32 levels"),
-        ("plan:", "---\nplan:", "f:12:1: a second document"),
-        ("  B: {like: A}\n", "", "f:10:3: gates.free: the only chain"),
-    ],
-)  # fmt: skip
+@cases
 def test_each_fault_is_found_at_its_place(old, new, start):
     assert old in GOOD
     found = problems(GOOD.replace(old, new, 1))
@@ -156,9 +99,15 @@ def test_alias_bomb_is_refused():
 
 
 def test_scenes_without_a_surface():
-    text = GOOD.replace("surface: {restitution: 0.50 ± 0.05}\n", "")
-    lines = problems(text)
-    assert [line.split(": ")[1] for line in lines] == ["chains", "gates.impact", "plan.incline"]
+    text = GOOD.replace("surface: {restitution: 0.50 ± 0.05}", "contact: {level: 0 mm ± 1 mm}")
+    faulty = [line.split(": ")[1] for line in problems(text)]
+    assert faulty == ["chains", "contact", "gates.impact", "plan.incline"]
+
+
+@cases
+def test_what_a_key_needs_of_both_chains_is_asked_for_of_each(line, lacking):
+    told = zip(problems(GOOD.replace("title: on", line)), "AB", strict=True)
+    assert all(problem.startswith(lacking % chain) for problem, chain in told)
 
 
 @pytest.mark.parametrize("order", ["ABBA", "alternate"])

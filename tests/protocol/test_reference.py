@@ -16,7 +16,8 @@ from rig.protocol.keys import KEYS
 from rig.protocol.reader import parse
 from rig.protocol.reference import page, schema
 from rig.protocol.yamltree import load
-from tests.protocol.keys import BARE, around, put, value
+from tests.protocol.keys import around, put, value
+from tests.tables import cases
 
 ROOT = Path(__file__).parents[2]
 READY = sorted((ROOT / "protocols").glob("*.yaml"))
@@ -110,13 +111,9 @@ def test_ready_protocols_obey_the_schema(path):
     VALIDATOR.validate(yaml.safe_load(path.read_text("utf-8")))
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [{"gatez": {}}, {"plan": {"repeats": 0}}, {"plan": {"order": "BAAB"}}, {"drop": ["1 m"]},
-     {"release": {"channel": 9}}, {"chains": {}}],
-)  # fmt: skip
+@cases
 def test_what_the_reader_refuses_the_schema_refuses(wrong):
-    data = {**BARE, **wrong}
+    data = {**around("protocol"), **wrong}
     with pytest.raises(InputError):
         parse(text(data))
     with pytest.raises(jsonschema.ValidationError):

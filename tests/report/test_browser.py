@@ -1,6 +1,6 @@
 """The page on paper, from a browser and without; `tests/cli/test_board_browser.py` looks at it too.
 
-Of `./run bench soaks`, for a browser is large; `test_html.py` holds what can be told without one.
+Of `./run bench soaks`, for a browser is large; `test_page.py` holds what can be told without one.
 """
 
 from __future__ import annotations
@@ -8,13 +8,13 @@ from __future__ import annotations
 import lzma
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
 from rig.cli import main
-from tests.tui.test_pictures import RECORDED
+from tests.programs import run_program
+from tests.tui.test_looks import RECORDED
 
 BROWSER = shutil.which("chromium")
 MISSING = BROWSER is None and not os.environ.get("CI")
@@ -39,12 +39,12 @@ def page(tmp_path_factory):
 
 def browse(folder: Path, *arguments: str) -> str:
     command = [BROWSER, *_QUIET, f"--user-data-dir={folder / 'profile'}", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    done = run_program(*command)
     return done.stdout
 
 
 def read_pages(paper: Path) -> list[str]:
-    written = subprocess.run(["pdftotext", paper, "-"], capture_output=True, text=True, check=True)
+    written = run_program("pdftotext", paper, "-")
     return written.stdout.split("\f")[:-1]
 
 
@@ -68,7 +68,5 @@ def test_a_pdf_needs_no_browser(page, tmp_path):
     assert "Figure 1." in pages[0]
     assert all(text.split()[-1] == str(number) for number, text in enumerate(pages, 1))
     assert "Choose" not in "".join(pages), "nobody can click on paper"
-    listed = subprocess.run(
-        ["pdfdetach", "-list", paper], capture_output=True, text=True, check=True
-    )
+    listed = run_program("pdfdetach", "-list", paper)
     assert {"data.zip", "method.md"} <= set(listed.stdout.split())

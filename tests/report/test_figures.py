@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import signal
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -19,6 +20,7 @@ from rig.measurands import SEPARATION
 from rig.predictions import predict_incline
 from rig.protocol import reader
 from rig.protocol.protocol import Run
+from rig.protocol.reader import parse, read
 from rig.report.canvas import KINDS, figure_file, write_figures
 from rig.report.falls import fall_figures
 from rig.report.figure import COLUMN_PT, WIDE_PT, Chart, PlotAxis, csv_table, residual_panels
@@ -30,11 +32,13 @@ from rig.report.figures import (
     variance_shares,
 )
 from rig.report.looks import COLORS, PARTS
+from rig.report.mounting import beam_ends, mounting_figure
 from rig.report.plot import drawing_file, page_svg, plot, style
 from sim.dials import Dials
 from tests.analysis.drops import PROTOCOLS, UNIFORM, case
 from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.report import fake_analysis
+from tests.tables import cases
 
 TWO = fake_analysis.two_chains()
 CURVES = model_curves(UNIFORM)
@@ -181,10 +185,7 @@ def test_points_of_a_perfect_separation_lie_on_the_models_line(protocol, run):
     assert free_fall.x[-1] == pytest.approx(stated.free_fall_speed_m_s**2)
 
 
-@pytest.mark.parametrize(("number", "own", "other"), [
-    (3, "friction raises", "Eq. 15 within"), (6, "Eq. 15 within", "friction raises"),
-    (4, "graded chain", "Eq. 15 within"),
-])  # fmt: skip
+@cases
 def test_a_figure_its_numbers_and_its_caption(number, own, other, tmp_path):
     target = tmp_path / "figure.svg"
     assert cli.main(["predict", "--figure", str(number), "-o", str(target)]) == 0
@@ -212,3 +213,45 @@ def test_sources_beyond_the_colours_are_among_the_others():
         assert sum(shares) == pytest.approx(100.0)
         assert len({bar["color"] for bar in bars}) == len(bars)
     assert len(colors) == len(PARTS)
+
+
+READY = [
+    path
+    for path in sorted(PROTOCOLS.glob("*.yaml"))
+    if "\ngates:" in path.read_text("utf-8") and "uno" not in path.stem  # as its like, with fewer
+]
+
+
+def drawn(protocol):
+    return figure_file(mounting_figure(protocol, protocol.gates), "svg").decode()
+
+
+@pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
+def test_each_ready_protocol_has_its_drawing(path):
+    protocol = read(path)
+    said = "".join(ET.fromstring(drawn(protocol)).itertext()).split("\n")
+    said = [words.strip() for words in said]
+    for gate in protocol.gates.gates:
+        assert f"{gate.channel}: {1e3 * gate.height:g}" in said
+    inclines = {incline for incline in protocol.plan.inclines if protocol.surface is not None}
+    assert {f"{incline:g}°" for incline in inclines} <= set(said)
+
+
+def test_a_beam_ends_where_the_face_is_that_a_rod_lies_on():
+    protocol = read(PROTOCOLS / "single-chain.yaml")
+    slope, radius = math.radians(40), 12.7e-3 / 2
+    uphill, along = beam_ends(protocol, 22e-3, 40)
+    # The face is the line at a rod's radius from the contact point.
+    assert -uphill * math.sin(slope) + 22e-3 * math.cos(slope) == pytest.approx(-radius, abs=1e-12)
+    assert along * math.cos(slope) == pytest.approx(uphill)
+    assert beam_ends(protocol, 22e-3, 80)[0] < uphill
+
+
+def test_from_the_board_heights_are_those_above_its_face():
+    text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8").replace("22 mm", "40 mm")
+    protocol = parse(f"{text}\ncontact: {{datum: board}}\n")
+    uphill, _ = beam_ends(protocol, 40e-3, 40)
+    assert uphill == pytest.approx(40e-3 / math.tan(math.radians(40)))
+    svg = drawn(protocol)
+    assert "mm above the board" in svg
+    assert "contact point" not in svg

@@ -12,39 +12,30 @@ from rig.analysis.result import Measured
 from rig.cli import main
 from rig.errors import InputError
 from rig.estimate.posterior import Posterior
-from rig.estimate.session import Coefficient
+from rig.estimate.session import Coefficient, estimate
 from rig.report.estimate import page_parts
 from rig.report.estimate_figures import estimate_pictures
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
-from rig.results import results
+from rig.results import complete_analysis, protocol_of, results
 from rig.sections import Sections
 from rig.session.store import Session
 from rig.units import Quantity
-from tests.cli.lab import PROTOCOLS
+from tests.cli.lab import PROTOCOLS, record
+from tests.tables import cases
 
 
 @pytest.fixture(scope="module")
 def single(tmp_path_factory):
     """Make a session of a single chain with four good drops."""
-    from rig.cli import main
-
-    folder = tmp_path_factory.mktemp("single")
     text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8")
     text = text.replace("{incline: 40 deg, repeats: 12, settle: 10 s}",
                         "{incline: [40 deg, 60 deg], repeats: 2, settle: 1 s}")  # fmt: skip
-    (folder / "p.yaml").write_text(text, "utf-8")
-    arguments = ["run", folder / "p.yaml", "--port", "sim://", "--session", folder / "s", "--yes"]
-    assert main([*map(str, arguments)]) == 0
-    return folder / "s"
+    return record(tmp_path_factory.mktemp("single"), text)
 
 
 @pytest.fixture(scope="module")
 def found(single):
-    from rig.estimate.session import estimate
-    from rig.results import complete_analysis, protocol_of
-    from rig.session.store import Session
-
     with Session.open(single, readonly=True) as session:
         return estimate(protocol_of(session), complete_analysis(session))
 
@@ -105,10 +96,7 @@ def test_a_missing_package_is_no_failed_section():
     assert sections.failed == {"one": "one could not be made: no good drop"}
 
 
-@pytest.mark.parametrize(("where", "words"), [
-    ("rig.results.estimated.estimate", "The estimate of the impacts could not be made"),
-    ("rig.estimate.session.impulses", "could not be made"),
-])  # fmt: skip
+@cases
 def test_what_an_estimate_lacks_is_said_in_the_report_and_on_stderr(
     single, tmp_path, capsys, monkeypatch, where, words
 ):

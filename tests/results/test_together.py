@@ -13,29 +13,23 @@ from rig.protocol import reader
 from rig.results.together import results_together
 from rig.session.store import Session
 from tests.cli.conftest import call  # noqa: F401 - a fixture
-from tests.cli.lab import PROTOCOLS
+from tests.cli.lab import PROTOCOLS, record
 from tests.session.altering import unguarded
+from tests.tables import cases
 
 
-def record(folder, name, scene="picket-fence", seed=1, series=0, change=("", "")):
+def record_few(folder, name, scene="picket-fence", seed=1, series=0, change=("", "")):
     """Record a session of few simulated drops."""
-    from rig.cli import main
-
     text = (PROTOCOLS / f"{scene}.yaml").read_text("utf-8")
-    text = re.sub(r"repeats: \d+", "repeats: 4", text)
-    text = text.replace(*change)
-    protocol, session = folder / f"{name}.yaml", folder / f"{name}.session"
-    protocol.write_text(text, "utf-8")
-    port = f"sim://?stated=1&missed=0&seed={seed}&series={series}"
-    assert main(["run", str(protocol), "--port", port, "--session", str(session), "--yes"]) == 0
-    return session
+    text = re.sub(r"repeats: \d+", "repeats: 4", text).replace(*change)
+    return record(folder, text, f"sim://?stated=1&missed=0&seed={seed}&series={series}", name)
 
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
     """Two sessions of a fence, on two rigs."""
     folder = tmp_path_factory.mktemp("two")
-    return record(folder, "a", seed=1), record(folder, "b", seed=2)
+    return record_few(folder, "a", seed=1), record_few(folder, "b", seed=2)
 
 
 def together(*paths, **options):
@@ -71,7 +65,7 @@ def test_what_one_rig_shares_is_one_unknown_and_of_two_rigs_there_are_two(two):
 
 
 def test_errors_of_one_rig_cancel_in_the_difference_of_its_sessions(tmp_path):
-    first, other = (record(tmp_path, f"s{n}", series=n) for n in (1, 2))
+    first, other = (record_few(tmp_path, f"s{n}", series=n) for n in (1, 2))
     (cancelled,) = together(first, other, same_rig=True).differences()
     (whole,) = together(first, other, same_rig=False).differences()
     assert cancelled.value.budget["common"] < 0.1 * whole.value.budget["common"]
@@ -107,7 +101,7 @@ def refused(code, kind, *paths, work=together):
 def test_another_scene_is_refused_and_what_has_no_incline_in_common(two, tmp_path):
     changes = (("", ""), ("incline: 40 deg", "incline: 50 deg"))
     first, other = (
-        record(tmp_path, f"s{n}", "single-chain", series=n, change=change)
+        record_few(tmp_path, f"s{n}", "single-chain", series=n, change=change)
         for n, change in enumerate(changes, 1)
     )
     refused("sessions_unlike", InputError, first, two[0])
@@ -123,7 +117,7 @@ def test_a_session_and_its_copy_are_one(two, tmp_path):
 
 
 def test_a_blind_session_is_refused(two, tmp_path, call):  # noqa: F811
-    blind = record(tmp_path, "blind", change=("protocol: 1\n", "protocol: 1\nblind: true\n"))
+    blind = record_few(tmp_path, "blind", change=("protocol: 1\n", "protocol: 1\nblind: true\n"))
     refused("session_blind", SessionError, two[1], blind)
     for command in ("compare", "analyze"):
         done = call(command, two[1], blind, "--json")
@@ -132,7 +126,7 @@ def test_a_blind_session_is_refused(two, tmp_path, call):  # noqa: F811
 
 def test_an_unfinished_session_is_refused_unless_it_is_asked_for(two, tmp_path):
     more = tmp_path / "more.session"
-    with Session.open(record(tmp_path, "whole", seed=3), readonly=True) as whole:
+    with Session.open(record_few(tmp_path, "whole", seed=3), readonly=True) as whole:
         first = next(whole.drops())
         with Session.create(
             more, whole.protocol_text, "more", simulated=True, origin="test"
@@ -149,10 +143,7 @@ def test_a_damaged_session_is_refused(two, tmp_path):
     refused("records_damaged", InputError, two[1], copy)
 
 
-@pytest.mark.parametrize(
-    ("sessions", "options"),
-    [(2, ("--budget", "1")), (1, ("--same-rig",)), (1, ("--no-same-rig",)), (1, ("--unfinished",))],
-)
+@cases
 def test_options_for_another_number_of_sessions_are_refused(two, call, sessions, options):  # noqa: F811
     done = call("analyze", *two[:sessions], *options)
     assert done.code == 2

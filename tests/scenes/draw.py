@@ -7,60 +7,9 @@ from itertools import pairwise
 
 from rig.protocol.protocol import Protocol
 from rig.protocol.reader import parse
+from tests.tables import read_table
 
-TITLES = (
-    "",
-    "a plain one",
-    'Ωμέγα <b>bold</b> & \\"quoted\\" $x_1$',
-    "100 % {of} it; a, b | c `d`",
-    "名前 🔩 %s \\\\alpha",
-    "'single' # no comment: really",
-    "5 $ and \\\\frac{ of a beam",
-    "long " * 40,
-)
-NAMES = (("A", "B"), ("left", "right"), ("Kette_1", "Kette_2"), ("ψ", "φ"))
-PORTS = (
-    "sim://",
-    "sim://",
-    "sim://",
-    "sim://?quiet=1",
-    "sim://?quiet=1&clock=-1300 ppm&latency=0.3ms",
-    "sim://?missed=4%&chatter=3%",
-    "sim://?skew_sd=8ms&rod_sd=0.6mm",
-    "sim://?drag=0.03",
-    "sim://?jitter_sd=50us&gate_sd=1mm",
-    "sim://?missed=60%",
-)
-GRAVITIES = (
-    "gravity: 9.81 m/s^2",
-    "gravity: 9.81 m/s^2",
-    "gravity: 9.82 ± 0.01 m/s^2",
-    "gravity: 162 cm/s^2",
-    "gravity: 24.8 m/s^2",
-    "site: {latitude: 61.19 deg, height: 30 m}",
-    "site: {latitude: -90 deg, height: -400 m}",
-)
-INCLINES = (
-    "0 deg",
-    "40 deg",
-    "42.5 deg",
-    "[0 deg, 42.5 deg]",
-    "[40 deg, 60 deg]",
-    "[10 deg, 42.5 deg, 80 deg]",
-    "[0 deg, 0.25 deg, 1 rad]",
-    "90 deg",
-    "[42.5 deg, 42.25 deg]",
-)
-SURFACES = (
-    "{restitution: 0.50 ± 0.05, friction: 0.20 ± 0.02}",
-    "{restitution: 0.50 ± 0.05, friction: 0.20}",
-    "{restitution: 0.5, friction: 0.20 ± 0.02}",
-    "{restitution: 0.5, friction: 0.2}",
-    "{restitution: 0.5}",
-    "{restitution: -0.3 ± 0.1}",
-    "{restitution: 0.50 ± 0.05, friction: 0.2, pile: {below: 30 deg, restitution: -0.37}}",
-    "{restitution: 0.5, friction: 0 ± 0.02, pile: {below: 45 deg, restitution: -0.37 ± 0.05}}",
-)
+CHOICES = read_table(__file__, "choices")
 
 
 @dataclass(frozen=True)
@@ -98,12 +47,12 @@ def scene(seed: int, drops: int = 4) -> Scene:
     text = _scene(chance, kind, drops)
     if kind != "predicted":
         text = _with_gates(chance, text)
-    return Scene(seed, text, chance.choice(PORTS), parse(text, f"scene-{seed}.yaml"))
+    return Scene(seed, text, chance.choice(CHOICES["ports"]), parse(text, f"scene-{seed}.yaml"))
 
 
 def _scene(chance: random.Random, kind: str, drops: int) -> str:
     """Everything but the gates."""
-    title = chance.choice(TITLES)
+    title = chance.choice(CHOICES["titles"])
     lines = ["protocol: 1", *([f'title: "{title}"'] if title else [])]
     rods = chance.choices((2, 3, 4, 5, 8, 12, 25, 40, 60), (8, 8, 8, 8, 8, 8, 6, 1, 1))[0]
     two = kind == "two" or (kind == "predicted" and chance.random() < 0.5)
@@ -116,10 +65,10 @@ def _scene(chance: random.Random, kind: str, drops: int) -> str:
         lines += ["chains:", *_chains(chance, rods, two=two, given=given)]
     if struck:
         bare = given and chance.random() < 0.5
-        lines.append(f"surface: {'{}' if bare else chance.choice(SURFACES)}")
+        lines.append(f"surface: {'{}' if bare else chance.choice(CHOICES['surfaces'])}")
     drop = chance.choice((30, 60, 180, 400, 900))
     lines.append(f"drop: {drop} mm{chance.choice(('', f' ± {drop / 100} mm'))}")
-    lines.append(chance.choice(GRAVITIES))
+    lines.append(chance.choice(CHOICES["gravities"]))
     if kind == "predicted":
         lines.append(chance.choice(("initial_speed: 1.5 m/s", "drag: {terminal_speed: 25 m/s}")))
     lines.append(f"plan: {{{', '.join(_plan(chance, kind, drops, two=two))}}}")
@@ -132,7 +81,7 @@ def _scene(chance: random.Random, kind: str, drops: int) -> str:
 
 def _chains(chance: random.Random, rods: int, *, two: bool, given: bool) -> list[str]:
     """One chain, or two that are alike or not."""
-    first, second = chance.choice(NAMES)
+    first, second = chance.choice(CHOICES["names"])
     pitch = chance.choice((8, 15, 30, 49, 90)) if rods < 25 else chance.choice((8, 20, 49))
     about, graded = _rods(chance, rods, pitch)
     if given:
@@ -180,7 +129,7 @@ def _unlike(
 
 def _plan(chance: random.Random, kind: str, drops: int, *, two: bool) -> list[str]:
     """The plan's keys."""
-    inclines = "" if kind in {"fence", "object"} else chance.choice(INCLINES)
+    inclines = "" if kind in {"fence", "object"} else chance.choice(CHOICES["inclines"])
     found = [f"incline: {inclines}"] if inclines else []
     repeats = [n for n in (1, 2, 3, 4, 6, 8) if n * (inclines.count(",") + 1) <= drops]
     found.append(f"repeats: {chance.choice(repeats)}")

@@ -25,8 +25,7 @@ from rig.session.schema import RunState
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from tests.scenes.through import lacking
-from tests.tui.lab import KEYS, draw_without_pause, unseen
-from tests.tui.screen import text_of
+from tests.tui.lab import KEYS, draw_without_pause, text_of, unseen
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 SCENES = {

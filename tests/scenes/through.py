@@ -22,6 +22,7 @@ from rig.report import canvas
 from rig.report.figure import Chart
 from rig.report.templates import sentence
 from tests.scenes.draw import Scene
+from tests.tables import read_table
 
 LONGEST_S = 60.0
 """Processor time of one command, far beyond what any of them needs."""
@@ -32,26 +33,7 @@ _PYTHON = re.compile(
 )
 """How Python writes what is no text, in a key or a value."""
 _EXPONENT = re.compile(r"±\s*[\d.]+e[+-]?\d+")
-_STRUNG = (r"\bchains?\b", r"\brods?\b", r"\bhangs?\b", r"\bhanging\b", r"\bhung\b", "free side")
-_OTHERS = {
-    "object": (*_STRUNG, "glider"),
-    "track": _STRUNG,
-    "picket-fence": (*_STRUNG, "glider"),
-    "free-chain": ("glider", r"\bfence"),
-}
-"""Words of other scenes that strike nothing."""
-_PAIR = ("Δz", "separation", "skew", "ABBA", "simultaneous", "both chains")
-_IMPACT = (
-    "inclin",
-    "impact",
-    "strike",
-    r"\bstruck",
-    "restitution",
-    "friction",
-    "α",
-    "surface",
-    " V ",
-)
+_WORDS = read_table(__file__, "words")
 
 
 class TooLongError(BaseException):
@@ -68,13 +50,13 @@ class Done(NamedTuple):
 
 def lacking(protocol: Protocol) -> tuple[str, ...]:
     """Words of what a scene does not have."""
-    surface = protocol.surface
+    surface, pair, others = protocol.surface, _WORDS["pair"], _WORDS["others"]
     if surface is None:
-        words = (*_PAIR, *_IMPACT, *_OTHERS[protocol.vocabulary.scene], "pile")
+        words = [*pair, *_WORDS["impact"], *others[protocol.vocabulary.scene], "pile"]
         of_tracks = () if protocol.track is None else ("inclin", "friction")
         return tuple(word for word in words if word not in of_tracks)
-    words = _OTHERS["free-chain"]
-    words += () if protocol.two_chains else (*_PAIR, "free side", "free chain")
+    alone = [] if protocol.two_chains else [*pair, "free side", "free chain"]
+    words = *others["free-chain"], *alone
     if all(rods.chain.alpha is not None for rods in protocol.chains.values()):
         return (*words, "restitution", "friction", "pile")
     return (*words, "pile") if surface.pile is None else words

@@ -1,5 +1,6 @@
-"""Files that somebody sent: altered anywhere, they are read or refused in plain words."""
+"""Files that somebody sent, altered, old or of a broken board: read or refused in plain words."""
 
+import json
 import sqlite3
 from contextlib import closing
 
@@ -17,10 +18,13 @@ from bench.mutants import (
 from rig.cli import main
 from rig.errors import SessionError
 from rig.protocol import reader
+from rig.records import Certificate, Drop, Edge
 from rig.recover.examine import describe, examine
 from rig.session import foreign
+from rig.session.schema import RunState, read_reasons
 from rig.session.store import Session
 from tests.session.altering import unguarded
+from tests.tables import cases
 
 
 @pytest.fixture(scope="module")
@@ -73,26 +77,7 @@ def test_any_protocol_is_read_or_refused(tmp_path):
     assert failures(each, range(2000)) == []
 
 
-VIEW = """
-ALTER TABLE edge RENAME TO edge_of_old;
-CREATE VIEW edge AS WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n)
-SELECT 1 AS "drop", i AS idx, i AS tick, 0 AS channel, i % 2 AS blocked FROM n;
-"""
-
-
-@pytest.mark.parametrize(
-    "sql",
-    [
-        VIEW,
-        "CREATE VIEW more AS SELECT 1",
-        "CREATE TABLE more (x)",
-        "CREATE TRIGGER more AFTER INSERT ON meta BEGIN SELECT 1; END",
-        "DROP TRIGGER edge_no_update",
-        "DROP INDEX run_state_by_run",
-        "ALTER TABLE ping ADD COLUMN more INTEGER GENERATED ALWAYS AS (tick + 1)",
-        "DROP TABLE reference",
-    ],
-)
+@cases
 def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp_path, capsys):
     path = tmp_path / "altered"
     path.write_bytes(sound.read_bytes())
@@ -105,24 +90,7 @@ def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp
     assert "rig cannot read it" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("sql", "what"),
-    [
-        (
-            "UPDATE bytes SET direction = 'up' WHERE id = 3",
-            "table bytes, row 3: direction 'up' is not",
-        ),
-        ("UPDATE run_state SET reasons = '{}' WHERE id = 1", "table run_state, row 1: reasons"),
-        (
-            "UPDATE identity SET host_ns = 9223372036854775807 WHERE id = 1",
-            "table identity, row 1: host_ns 9223372036854775807 is not",
-        ),
-        (
-            'UPDATE identity SET json = \'{"tick_hz": "x"}\' WHERE id = 1',
-            "table identity, row 1: json",
-        ),
-    ],
-)
+@cases
 def test_a_value_of_the_wrong_form_is_refused(sql, what, sound, tmp_path):
     path = tmp_path / "altered"
     path.write_bytes(sound.read_bytes())
@@ -161,3 +129,38 @@ def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
         )
     with pytest.raises(SessionError, match="run 1, attempt 1: it has more than"):
         read_through(path)
+
+
+HZ = 16_000_000
+TICKS = {
+    "backwards": lambda n: HZ // 2 - 100 * n,
+    "at the end of 64 bits": lambda n: 2**63 - 200 + n,
+    "before all time": lambda n: n - 2**63,
+    "at once": lambda _: 1000,
+    "as fast as it can": lambda n: n,
+}
+COUNT = 200
+
+
+@pytest.mark.parametrize("ticks", TICKS.values(), ids=TICKS)
+def test_edges_that_cannot_be_are_kept_and_void(ticks, tmp_path, capsys):
+    edges = tuple(Edge(ticks(n), n % 2, n // 2 % 2 == 0) for n in range(COUNT))
+    session = make_session(tmp_path)
+    with Session.open(session) as opened:
+        # A pulse too short to be seen leaves open what the CRC is of.
+        account = Certificate(COUNT + 1, crc32=1, glitches=1)
+        opened.add_drop(Drop(1, 2, HZ, edges, 5, 0, account), provenance="device")
+        opened.add_state(1, 2, RunState.RECORDED, 10**12)
+    capsys.readouterr()
+    assert main(["analyze", "--json", str(session)]) == 3
+    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    assert run["verdict"] == "void"
+    assert run["reasons"]
+    with Session.open(session, readonly=True) as opened:
+        assert opened.drop(1, 2).edges == edges
+
+
+@cases
+def test_a_sentence_of_an_old_file_is_read_as_it_stands(sentence, code):
+    (reason,) = read_reasons(json.dumps([sentence]))
+    assert (reason.code, reason.values["text"]) == (code, sentence.removeprefix("note: "))

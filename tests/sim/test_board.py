@@ -16,9 +16,8 @@ from sim.clock import VirtualClock
 from sim.dials import Dials
 from sim.serial_port import SimulatedSerial
 from sim.snapshots import take_snapshots
-from tests.link.bench import ScriptedLab
+from tests.link.bench import ScriptedLab, VirtualBench
 from tests.link.conformance import DeviceConformance
-from tests.link.virtual import VirtualBench
 
 
 def bench_of(lab: ScriptedLab, *, line=None, **board) -> VirtualBench:

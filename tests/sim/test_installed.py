@@ -1,11 +1,12 @@
 """The simulation as others install it: under a name of its own, found by its URL."""
 
 import os
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
 from shutil import copytree
+
+from tests.programs import run_program
 
 ROOT = Path(__file__).parents[2]
 WHEEL = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["hatch"]["build"][
@@ -24,12 +25,6 @@ def test_an_installed_simulation_leaves_the_name_sim_to_others(tmp_path):
         copytree(ROOT / source, tmp_path / WHEEL["sources"].get(source, source))
     (tmp_path / "sim.py").write_text("raise SystemExit('this is another package')\n")
     protocol = ROOT / "protocols/falling-ball.yaml"
-    done = subprocess.run(
-        [sys.executable, "-c", DROP, str(protocol)],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = run_program(sys.executable, "-c", DROP, protocol, cwd=tmp_path, env=environment)
     assert done.stdout.split() == [str(tmp_path / "rig/__init__.py"), "rig_sim"], done.stderr

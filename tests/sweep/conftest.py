@@ -7,18 +7,9 @@ from typing import NamedTuple
 import pytest
 
 from rig.cli import main
+from tests.tables import protocol_text
 
-SCENE = """\
-protocol: 1
-title: Few rods on a surface
-chains:
-  A: {rods: 4, length: 600 mm}
-  B: {rods: 4, length: 650 mm}
-surface: {restitution: 0.5, friction: 0.2, pile: {below: 5 deg, restitution: -0.37}}
-drop: 180 mm
-gravity: 9.81 m/s^2
-plan: {incline: [0 deg, 10 deg, 40 deg]}
-"""
+SCENE = protocol_text("few-rods")
 VARY = ("restitution=-1..1:5", "inertia=0.00025..0.05:6", "friction=0..1:6")
 """With the scene's inclines: points on the pile, not sliding, with α above ½ and without one."""
 

@@ -1,4 +1,4 @@
-"""Every point of a sweep is the single fall there."""
+"""Every point of a sweep is the single fall there, and what stands behind --vary."""
 
 import itertools
 from concurrent.futures import ThreadPoolExecutor
@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rig.errors import DomainError, InputError
 from rig.model.fall import fall
@@ -13,10 +15,12 @@ from rig.model.impact import impact_on
 from rig.model.surface import Surface
 from rig.protocol import reader
 from rig.sweep.compute import ABOVE_HALF, NO_ANSWER, NOT_SLIDING, PILE, compute
-from rig.sweep.layout import MOST_POINTS, lay_out
+from rig.sweep.layout import MOST_POINTS, lay_out, linspace, read_vary
+from rig.sweep.variables import VARIABLES
 from rig.units import Quantity
 from tests.cli.lab import PROTOCOLS
 from tests.sweep.conftest import SCENE, VARY
+from tests.tables import cases
 
 
 def points(protocol, vary, length=7):
@@ -82,11 +86,7 @@ def test_a_value_holds_a_parameter_and_the_inclines_are_layers():
     assert layout.fixed_values["incline"] == 40.0
 
 
-@pytest.mark.parametrize(("scene", "vary", "said"), [
-    ("picket-fence.yaml", "drop=1m..2m:3", "no surface"),
-    ("bead-chain.yaml", "friction=0..1:3", "it can vary: alpha, gamma, drop, gravity"),
-    ("single-chain.yaml", "alpha=0..1:3", "it can vary: incline, restitution, friction, inertia"),
-])  # fmt: skip
+@cases
 def test_only_what_the_scene_has_can_be_varied(scene, vary, said):
     with pytest.raises(InputError, match=said):
         lay_out(reader.read(PROTOCOLS / scene), [vary])
@@ -102,3 +102,59 @@ def test_too_many_points_are_refused_before_they_are_computed():
     vary = ["friction=0..1:3000", f"drop=0m..1m:{MOST_POINTS // 9000 + 1}"]
     with pytest.raises(InputError, match=f"at most {MOST_POINTS}"):
         lay_out(reader.parse(SCENE), vary)
+
+
+NAMES = tuple(VARIABLES)
+SPACES = st.sampled_from(["", " ", "  "])
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.integers(2, 40), st.lists(SPACES, min_size=5))
+def test_a_range_is_read_as_written(one, other, count, spaces):
+    low, high = sorted((one, other))
+    if low == high:
+        low, high = -1.0, 1.0
+    parts = ["restitution", "=", repr(low), "..", repr(high), ":", str(count)]
+    for place, space in enumerate(spaces[:4]):
+        parts[2 * place] = f"{space}{parts[2 * place]}{spaces[-1]}"
+    assert read_vary(["".join(parts)], NAMES) == {"restitution": linspace(low, high, count)}
+
+
+@given(st.text(alphabet="restiuon=.:0123456789-e mdg±", max_size=30))
+def test_any_text_is_read_or_refused_in_one_line(text):
+    try:
+        found = read_vary([text], NAMES)
+    except InputError as error:
+        problem = error.message
+    else:
+        assert all(len(values) > 1 for values in found.values())
+        return
+    assert len(problem.splitlines()) == 1
+
+
+def test_units_lead_to_si_and_degrees():
+    found = read_vary(["drop=100mm..300 mm:3", "incline=0deg..80deg:3", "friction=0.1"], NAMES)
+    assert found == {"drop": (0.1, 0.2, 0.3), "incline": (0.0, 40.0, 80.0), "friction": (0.1,)}
+    assert list(found) == ["drop", "incline", "friction"]
+
+
+@cases
+def test_a_fault_is_told_at_its_column(text, column, said):
+    with pytest.raises(InputError) as caught:
+        read_vary([text], NAMES)
+    assert caught.value.exit_code == 2
+    assert f", column {column}: " in caught.value.message
+    assert said in caught.value.message
+
+
+def test_all_faults_are_told_at_once():
+    with pytest.raises(InputError) as caught:
+        read_vary(["drop=1", "friction=0..0.5:3", "friction=0.1", "mu=1"], NAMES)
+    first, second, third = caught.value.message.splitlines()
+    assert "'drop=1'" in first
+    assert "given twice" in second
+    assert "'mu=1'" in third
+
+
+def test_something_must_vary():
+    with pytest.raises(InputError, match="nothing is varied"):
+        read_vary(["friction=0.1"], NAMES)

@@ -12,6 +12,7 @@ import pytest
 from rig import __version__
 from tests.cli.lab import Terminal
 from tests.sweep.conftest import SCENE, VARY
+from tests.tables import cases
 
 ONE_INCLINE = "incline=40deg"
 
@@ -59,11 +60,7 @@ def test_the_same_sweep_gives_the_same_bytes(sweep, tmp_path, kind):
     assert (tmp_path / f"one.{kind}").read_bytes() == (tmp_path / f"two.{kind}").read_bytes()
 
 
-@pytest.mark.parametrize(("vary", "maps"), [
-    (("restitution=-1..1:9", "friction=0..1:9", ONE_INCLINE), 2),  # two maps
-    (("incline=0deg..80deg:9",), 0),
-    (("incline=20deg..21deg:3", "inertia=0.00025..0.0005:3", "friction=1"), 2),  # no answer
-])  # fmt: skip
+@cases
 def test_a_picture_has_maps_or_curves_and_its_provenance(sweep, tmp_path, vary, maps):
     assert sweep("s.svg", *vary).code == 0
     svg = (tmp_path / "s.svg").read_text("utf-8")
@@ -73,12 +70,7 @@ def test_a_picture_has_maps_or_curves_and_its_provenance(sweep, tmp_path, vary, 
     assert hashlib.sha256(SCENE.encode()).hexdigest() in svg
 
 
-@pytest.mark.parametrize(("output", "vary", "said"), [
-    ("no/s.csv", ("friction=0..1:3",), "No such file or directory"),
-    ("s.svg", ("friction=0..1:3",), "the plan has 0, 10, 40 degrees"),
-    ("s.svg", ("friction=0..1:3", "drop=0m..1m:3", "inertia=0.05..1/4:3", ONE_INCLINE), "not 3"),
-    ("s.csv", ("friktion=0..1:3",), "did you mean friction?"),
-])  # fmt: skip
+@cases
 def test_bad_input_is_told_before_anything_is_computed(
     sweep, tmp_path, monkeypatch, output, vary, said
 ):

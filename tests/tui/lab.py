@@ -1,6 +1,7 @@
-"""A daemon with a simulated rig, and an operator's hands on the screen."""
+"""A daemon with a simulated rig, an operator's hands on the screen, and the screen as text."""
 
 import asyncio
+import io
 import os
 import re
 import signal
@@ -8,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from inspect import isawaitable
@@ -16,7 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 from textual._compositor import Compositor
+from textual.app import App
 from textual.pilot import Pilot
 
 from rig.campaign.machine import Stage
@@ -24,7 +27,6 @@ from rig.tui.actions import ACTIONS
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from tests.cli.lab import ROOT
-from tests.tui.screen import text_of
 from tests.waiting import PATIENCE_S
 
 KEYS = {action.name: action.keys for action in ACTIONS}
@@ -88,6 +90,16 @@ def flat(app: RigApp) -> str:
     return re.sub(r"\s+", " ", text_of(app))
 
 
+@asynccontextmanager
+async def at_screen(options: Options, size=(80, 24), **of_client: Any) -> AsyncIterator[Operator]:
+    """Sit down at a screen, whose client has other attributes."""
+    app = RigApp(options, KEYS)
+    for attribute, other in of_client.items():
+        setattr(app.client, attribute, other)
+    async with app.run_test(size=size) as pilot:
+        yield Operator(app, pilot)
+
+
 @dataclass
 class Lab:
     """One bench with its daemon."""
@@ -148,17 +160,13 @@ class Lab:
             countdown_s=countdown_s,
             still_s=0.0,
         )
-        app = RigApp(options, KEYS)
-        if app.client:
-            app.client.patience_s = self.patience_s
-        if name and app.client:
-            app.client.name = name
-        async with app.run_test(size=size) as pilot:
-            operator = Operator(app, pilot)
-            await operator.until(lambda: app.page)
+        named = {"name": name} if name else {}
+        async with at_screen(options, size, patience_s=self.patience_s, **named) as operator:
+            client = operator.app.client
+            await operator.until(lambda: operator.app.page)
             yield operator
-            if app.client and app.client.daemon:
-                self.daemons.append(app.client.daemon)
+            if client.daemon:
+                self.daemons.append(client.daemon)
 
     @asynccontextmanager
     async def ready(
@@ -205,3 +213,26 @@ def short_folder() -> Path:
 
 def run(work: Any) -> Any:
     return asyncio.run(work)
+
+
+def text_of(app: App[object]) -> str:
+    """Write what stands on the screen, one line a row, without blanks at the ends."""
+    console = _printed(app)
+    return "\n".join(line.rstrip() for line in console.export_text().splitlines())
+
+
+def colours_of(app: App[object]) -> Iterator[tuple[str, tuple[int, ...], tuple[int, ...]]]:
+    """Tell every piece of text on the screen with the colours of ink and paper."""
+    for segment in _printed(app)._record_buffer:
+        style = segment.style
+        if segment.text.strip() and style and style.color and style.bgcolor:
+            yield segment.text, tuple(style.color.triplet), tuple(style.bgcolor.triplet)
+
+
+def _printed(app: App[object]) -> Console:
+    width, height = app.size
+    console = Console(width=width, height=height, file=io.StringIO(), record=True,
+                      force_terminal=True, legacy_windows=False)  # fmt: skip
+    stack = app._background_screens
+    console.print(app.screen._compositor.render_update(full=True, screen_stack=stack))
+    return console

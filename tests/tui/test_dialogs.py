@@ -8,7 +8,7 @@ from textual.widgets import Input
 from rig.campaign.machine import Stage
 from rig.session.store import Session
 from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
-from tests.tui.lab import DAEMON, run
+from tests.tui.lab import DAEMON
 
 
 @asynccontextmanager
@@ -34,36 +34,33 @@ async def stops(op, key):
         await op.until(lambda: "stop answered" in called)
 
 
-def test_stop_works_on_every_page_and_in_every_dialog(lab):
-    async def work():
-        async with lab.ready() as op:
-            for page in "123456":
-                await op.press(page)
-                await stops(op, "f9")
-            await op.press("3")
-            for opens, dialog, key in (
-                ("l", Confirm, "f9"), ("l", Confirm, "escape"),
-                ("question_mark", TextDialog, "f9"), ("question_mark", TextDialog, "escape"),
-            ):  # fmt: skip
-                await op.press(opens)
-                await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))
-                await stops(op, key)
-                await op.until(lambda: len(op.app.screen_stack) == 1)
-            await op.press("3")
-            await op.arms(Stage.RESULT)
-            await op.press("n", *"warm")
-            await op.until(lambda: isinstance(op.app.screen, Ask))
+async def test_stop_works_on_every_page_and_in_every_dialog(lab):
+    async with lab.ready() as op:
+        for page in "123456":
+            await op.press(page)
             await stops(op, "f9")
-            assert op.app.screen.query_one(Input).value == "warm"  # nothing typed is lost
-            async with listening(op) as called:
-                await op.press("escape")
-                await op.until(lambda: len(op.app.screen_stack) == 1)
-            assert not called  # while typing it only leaves the line
-            await op.press("ctrl+p")
-            await op.until(lambda: len(op.app.screen_stack) == 2)
-            await stops(op, "f9")
-
-    run(work())
+        await op.press("3")
+        for opens, dialog, key in (
+            ("l", Confirm, "f9"), ("l", Confirm, "escape"),
+            ("question_mark", TextDialog, "f9"), ("question_mark", TextDialog, "escape"),
+        ):  # fmt: skip
+            await op.press(opens)
+            await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))
+            await stops(op, key)
+            await op.until(lambda: len(op.app.screen_stack) == 1)
+        await op.press("3")
+        await op.arms(Stage.RESULT)
+        await op.press("n", *"warm")
+        await op.until(lambda: isinstance(op.app.screen, Ask))
+        await stops(op, "f9")
+        assert op.app.screen.query_one(Input).value == "warm"  # nothing typed is lost
+        async with listening(op) as called:
+            await op.press("escape")
+            await op.until(lambda: len(op.app.screen_stack) == 1)
+        assert not called  # while typing it only leaves the line
+        await op.press("ctrl+p")
+        await op.until(lambda: len(op.app.screen_stack) == 2)
+        await stops(op, "f9")
 
 
 _HELD_UP = """\
@@ -80,73 +77,64 @@ Controller.stop = late
 """A daemon whose board is heard of at its first STOP only when the daemon has answered."""
 
 
-def test_stop_is_asked_for_until_it_is_known_that_all_is_off(lab, monkeypatch):
+async def test_stop_is_asked_for_until_it_is_known_that_all_is_off(lab, monkeypatch):
     lab.stop()
     lab.daemons.clear()
     monkeypatch.setattr("tests.tui.lab.DAEMON", _HELD_UP + DAEMON)
     lab.start()
 
-    async def work():
-        async with lab.ready() as op:
-            await op.press("ctrl+p")
-            await op.until(lambda: len(op.app.screen_stack) == 2)
-            async with listening(op) as called:
-                await op.press("f9")
-                await op.until(lambda: op.app.driver.stop.heard is False)
-                assert "stop answered" not in called
-                await op.until(lambda: op.app.driver.stop.heard)
-            assert "stop answered" in called
-
-    run(work())
+    async with lab.ready() as op:
+        await op.press("ctrl+p")
+        await op.until(lambda: len(op.app.screen_stack) == 2)
+        async with listening(op) as called:
+            await op.press("f9")
+            await op.until(lambda: op.app.driver.stop.heard is False)
+            assert "stop answered" not in called
+            await op.until(lambda: op.app.driver.stop.heard)
+        assert "stop answered" in called
 
 
-def test_stop_works_in_every_state_that_lasts(lab):
+async def test_stop_works_in_every_state_that_lasts(lab):
     lab.stop()
     lab.daemons.clear()
     lab.url += "&pace=1"
     lab.start()
 
-    async def work():
-        async with lab.ready(countdown_s=600.0) as op:
-            for stage, key, said in (
-                (Stage.SETTLING, "f9", "nothing fell"), (Stage.COUNTDOWN, "escape", "nothing fell"),
-                (Stage.TESTING, "f9", "the release is off"),
-            ):  # fmt: skip
-                if stage is Stage.TESTING:
-                    await op.press("l")
-                    await op.until(lambda: isinstance(op.app.screen, Confirm))
-                    await op.means()
-                await op.arms(stage)
-                await stops(op, key)
-                await op.at(Stage.PREPARE)
-                await op.sees(said)
-            await op.until(lambda: op.app.follower.state.phase == "idle")
-            op.app.driver.flow = replace(op.app.flow, countdown_s=0.1)
-            await op.arms(Stage.LIVE)
-            await stops(op, "escape")
-            await op.at(Stage.RESULT)  # what there is is kept and judged
-
-    run(work())
+    async with lab.ready(countdown_s=600.0) as op:
+        for stage, key, said in (
+            (Stage.SETTLING, "f9", "nothing fell"), (Stage.COUNTDOWN, "escape", "nothing fell"),
+            (Stage.TESTING, "f9", "the release is off"),
+        ):  # fmt: skip
+            if stage is Stage.TESTING:
+                await op.press("l")
+                await op.until(lambda: isinstance(op.app.screen, Confirm))
+                await op.means()
+            await op.arms(stage)
+            await stops(op, key)
+            await op.at(Stage.PREPARE)
+            await op.sees(said)
+        await op.until(lambda: op.app.follower.state.phase == "idle")
+        op.app.driver.flow = replace(op.app.flow, countdown_s=0.1)
+        await op.arms(Stage.LIVE)
+        await stops(op, "escape")
+        await op.at(Stage.RESULT)  # what there is is kept and judged
     with Session.open(lab.session, readonly=True) as session:
         (drop,) = session.drops()
         assert drop.run == 1
 
 
-def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
-    async def work():
-        async with lab.ready() as op:
-            async with listening(op) as called:
-                await op.press("l")
-                await op.sees("Test the release?", "once, for 80 ms", "Take the fence off")
-                await op.press("n")
-                await op.until(lambda: len(op.app.screen_stack) == 1)
-                assert not called
+async def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
+    async with lab.ready() as op:
+        async with listening(op) as called:
             await op.press("l")
-            await op.means()
-            await op.sees("Release driven for 80 ms", "no gate saw an edge")
-            assert op.app.page == "device"
-            await op.press("3")
-            await op.sees("Run 1 of 3", "Enter arms")
-            assert {line.state for line in op.app.follower.state.runs} == {"planned"}
-
-    run(work())
+            await op.sees("Test the release?", "once, for 80 ms", "Take the fence off")
+            await op.press("n")
+            await op.until(lambda: len(op.app.screen_stack) == 1)
+            assert not called
+        await op.press("l")
+        await op.means()
+        await op.sees("Release driven for 80 ms", "no gate saw an edge")
+        assert op.app.page == "device"
+        await op.press("3")
+        await op.sees("Run 1 of 3", "Enter arms")
+        assert {line.state for line in op.app.follower.state.runs} == {"planned"}

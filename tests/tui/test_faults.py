@@ -1,4 +1,4 @@
-"""The daemon dies, texts are hostile, protocols are wrong: said at once, and recovered from."""
+"""Daemon, cable, disk and protocol fail before each screen: said at once, and recovered from."""
 
 import asyncio
 import os
@@ -6,10 +6,12 @@ import signal
 import sqlite3
 from contextlib import closing
 
+import pytest
+
 from rig.campaign.machine import Stage
+from rig.session.store import Session
 from rig.tui import app, client
-from tests.tui.lab import PATIENCE_S, run
-from tests.tui.screen import text_of
+from tests.tui.lab import PATIENCE_S, run, text_of
 
 
 def test_all_that_waits_before_a_hanging_daemon_is_said_is_less_than_a_second():
@@ -17,60 +19,122 @@ def test_all_that_waits_before_a_hanging_daemon_is_said_is_less_than_a_second():
     assert client._BEAT_S + client._SILENT_S + client._LATE_S + drawn < 1.0
 
 
-def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_goes_on(lab):
-    async def work():
-        lab.patience_s = client._SILENT_S
-        async with lab.ready(countdown_s=600.0) as op:
-            await op.arms(Stage.COUNTDOWN)
-            os.kill(lab.daemons[0].pid, signal.SIGSTOP)
-            try:
-                await op.sees("no daemon: no answer for", "an armed board has switched itself off")
-                assert op.app.flow.stage is Stage.PREPARE
-                await op.press("f9")
-                await op.sees("STOP NOT CONFIRMED: switch the release's supply off")
-            finally:
-                os.kill(lab.daemons[0].pid, signal.SIGCONT)
-            await op.sees("the daemon was lost before the release: nothing fell")
-            await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
-            await op.until(lambda: op.app.follower.state.phase == "idle")
-
-    run(work())
+async def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_goes_on(lab):
+    lab.patience_s = client._SILENT_S
+    async with lab.ready(countdown_s=600.0) as op:
+        await op.arms(Stage.COUNTDOWN)
+        os.kill(lab.daemons[0].pid, signal.SIGSTOP)
+        try:
+            await op.sees("no daemon: no answer for", "an armed board has switched itself off")
+            assert op.app.flow.stage is Stage.PREPARE
+            await op.press("f9")
+            await op.sees("STOP NOT CONFIRMED: switch the release's supply off")
+        finally:
+            os.kill(lab.daemons[0].pid, signal.SIGCONT)
+        await op.sees("the daemon was lost before the release: nothing fell")
+        await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
+        await op.until(lambda: op.app.follower.state.phase == "idle")
 
 
-def test_a_disk_that_takes_nothing_is_said(lab):
-    async def work():
-        async with lab.ready() as op:
-            with closing(
-                sqlite3.connect(lab.session, PATIENCE_S, check_same_thread=False)
-            ) as other:
-                await asyncio.to_thread(other.execute, "BEGIN IMMEDIATE")
-                await op.sees("the disk has not finished a write for", "armed board has switched")
-            await op.until(lambda: "the disk" not in text_of(op.app))
-
-    run(work())
+async def test_a_disk_that_takes_nothing_is_said(lab):
+    async with lab.ready() as op:
+        with closing(sqlite3.connect(lab.session, PATIENCE_S, check_same_thread=False)) as other:
+            await asyncio.to_thread(other.execute, "BEGIN IMMEDIATE")
+            await op.sees("the disk has not finished a write for", "armed board has switched")
+        await op.until(lambda: "the disk" not in text_of(op.app))
 
 
-def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab, fence):
+async def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab, fence):
     good = fence.replace("TITLE", "mended")
     lab.protocol.write_text(good.replace("rods: 8 ", "rods: many "), "utf-8")
 
-    async def work():
-        async with lab.operator() as op:
-            await op.until(lambda: op.app.client.driving)
-            await op.sees("fence.yaml:8:11:", "found 'many'")
-            await op.press("enter")
-            lab.protocol.write_text(good, "utf-8")
-            await op.sees("mended")
-            assert op.app.flow.stage is Stage.PROTOCOL
-
-    run(work())
+    async with lab.operator() as op:
+        await op.until(lambda: op.app.client.driving)
+        await op.sees("fence.yaml:8:11:", "found 'many'")
+        await op.press("enter")
+        lab.protocol.write_text(good, "utf-8")
+        await op.sees("mended")
+        assert op.app.flow.stage is Stage.PROTOCOL
 
 
-def test_a_daemon_of_another_port_is_named(lab):
+async def test_a_daemon_of_another_port_is_named(lab):
     lab.url = "sim://?seed=99"
 
-    async def work():
-        async with lab.operator() as op:
-            await op.sees("the daemon has sim://?seed=3, not sim://?seed=99", "--name")
+    async with lab.operator() as op:
+        await op.sees("the daemon has sim://?seed=3, not sim://?seed=99", "--name")
 
-    run(work())
+
+PULLED = ("✗ the port is lost", "reconnecting")
+
+
+def pull(processes, lab):
+    processes.hand("pull 3600")
+
+
+def plug(processes):
+    processes.hand("pull 0")  # and in again at once
+
+
+def kill(processes, lab):
+    lab.kill()
+
+
+async def mended(op):
+    await op.until(lambda: op.app.follower.state.link == "up" and op.app.client.driving)
+    await op.until(lambda: op.app.follower.state.section("session"))
+
+
+async def session_on(op):
+    await op.until(lambda: op.app.client.driving and op.app.follower.state.link == "up")
+    await op.press("enter")
+    await op.at(Stage.DEVICE)
+    await op.until(lambda: op.app.view and op.app.indicators.known)
+
+
+async def test_a_pulled_cable_is_said_on_every_screen(cabled):
+    processes, lab = cabled
+
+    async with lab.operator(countdown_s=0.1) as op:
+        await op.until(lambda: op.app.follower.state.link == "up")
+        pull(processes, lab)  # before there is a session
+        await op.sees(*PULLED, "HOME")
+        plug(processes)
+        await session_on(op)
+        pull(processes, lab)
+        for page in "123456":
+            await op.press(page)
+            await op.sees(*PULLED)
+        plug(processes)
+        await mended(op)
+        await op.sees("the port was lost and is back")
+        await op.press("enter")
+        await op.arms(Stage.RESULT)
+        pull(processes, lab)
+        await op.sees(*PULLED, "RESULT")
+        assert op.app.flow.verdict == "accepted"  # stays until it is acknowledged
+
+
+@pytest.mark.parametrize("fault", [pull, kill])
+def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fault):
+    processes, lab = cabled
+
+    async def work():
+        async with lab.operator(countdown_s=0.1) as op:
+            await session_on(op)
+            await op.press("enter")
+            await op.arms(Stage.LIVE)
+            job = op.app.flow.job
+            await asyncio.to_thread(fault, processes, lab)
+            if fault is pull:
+                await op.sees("the port is lost")
+                plug(processes)
+            else:
+                await op.sees("no daemon")
+            await op.at(Stage.RESULT)
+            again = f"attempt {job.attempt}" * (job.attempt > 1)  # the first goes without saying
+            await op.sees("Run 1 of 2", again, "ACCEPTED")
+        return job
+
+    job = run(work())
+    with Session.open(lab.session, readonly=True) as session:
+        assert [(drop.run, drop.attempt) for drop in session.drops()] == [job]

@@ -1,61 +1,68 @@
-"""From an empty folder to a first result, and what becomes of the daemon that a screen began."""
+"""From an empty folder to a first result, and back to what was recorded: by keys and by mouse."""
 
 import asyncio
 import shutil
+from pathlib import Path
+
+import pytest
 
 from rig.campaign.machine import Stage
 from rig.cli import _parser
+from rig.reasons import plain_reason
+from rig.records import Job
+from rig.results.whole import notes
+from rig.session.schema import RunState
+from rig.session.store import Session
 from rig.tui import client, commands
-from rig.tui.app import RigApp
 from rig.tui.context import Options
-from tests.tui.lab import KEYS, PATIENCE_S, Operator, flat, run, short_folder
+from rig.tui.survey import session_list
+from rig.tui.widgets.text import Words
+from rig.wordings import NOTE
+from tests.cli.lab import short
+from tests.tui.lab import PATIENCE_S, at_screen, flat, short_folder
 
 KEYS_AT_MOST = 4
 
 
-def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
+async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
     folder = short_folder()
     (folder / "work").mkdir()
     monkeypatch.chdir(folder / "work")
     pressed = []
 
-    async def work():
-        options = Options(socket=folder / "rig.sock", countdown_s=0.2, still_s=0.0)
-        app = RigApp(options, KEYS)
-        async with app.run_test(size=(80, 24)) as pilot:
-            op = Operator(app, pilot)
-            await op.sees("HOME", "Try it", "New experiment", "no rig yet", "Enter open")
-            await op.press("escape")
-            await pilot.pause(0.3)
-            assert "✗" not in flat(app)
-            assert "supply" not in flat(app)
-            assert app.driver.stop is None
+    options = Options(socket=folder / "rig.sock", countdown_s=0.2, still_s=0.0)
+    async with at_screen(options) as op:
+        app = op.app
+        await op.sees("HOME", "Try it", "New experiment", "no rig yet", "Enter open")
+        await op.press("escape")
+        await op.pilot.pause(0.3)
+        assert "✗" not in flat(app)
+        assert "supply" not in flat(app)
+        assert app.driver.stop is None
 
-            async def press(key):
-                pressed.append(key)
-                await op.press(key)
+        async def press(key):
+            pressed.append(key)
+            await op.press(key)
 
-            app.desk.rows = []  # as before it has looked around
-            await press("enter")
-            await op.at(Stage.DEVICE)
-            await op.until(lambda: app.view and app.indicators.known and app.client.driving)
-            await press("enter")
-            await op.at(Stage.PREPARE)
-            await op.sees("Run 1 of 10", "Enter arms")
-            await pilot.pause(0.7)  # it stands there to be read
-            await press("enter")
-            await op.at(Stage.RESULT)
-            await op.sees("g = 9.")
-            trial = app.client.daemon
-            assert trial.poll() is None
-        assert trial.poll() is not None
-
-    run(work())
+        app.desk.rows = []  # as before it has looked around
+        await press("enter")
+        await op.at(Stage.DEVICE)
+        await op.until(lambda: app.view and app.indicators.known and app.client.driving)
+        await press("enter")
+        await op.at(Stage.PREPARE)
+        await op.sees("Run 1 of 10", "Enter arms")
+        await op.pilot.pause(0.7)  # it stands there to be read
+        await press("enter")
+        await op.at(Stage.RESULT)
+        await op.sees("g = 9.")
+        trial = app.client.daemon
+        assert trial.poll() is None
+    assert trial.poll() is not None
     assert len(pressed) <= KEYS_AT_MOST
     shutil.rmtree(folder)
 
 
-def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tmp_path):
+async def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("rig.tui.survey.waiting_drives", lambda: [tmp_path])
     asked = []
@@ -65,39 +72,157 @@ def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tm
 
     monkeypatch.setattr(commands, "_run", record)
 
-    async def work():
-        folder = short_folder()
-        app = RigApp(Options(socket=folder / "rig.sock", still_s=0.0), KEYS)
-        async with app.run_test(size=(80, 24)) as pilot:
-            op = Operator(app, pilot)
-            await op.sees("Pico: put the firmware on it")
-            await op.press("down", "down", "enter")
-            await op.sees("Write the firmware?")
-            await op.means()
-            await op.until(lambda: asked)
-        shutil.rmtree(folder)
-
-    run(work())
+    folder = short_folder()
+    async with at_screen(Options(socket=folder / "rig.sock", still_s=0.0)) as op:
+        await op.sees("Pico: put the firmware on it")
+        await op.press("down", "down", "enter")
+        await op.sees("Write the firmware?")
+        await op.means()
+        await op.until(lambda: asked)
+    shutil.rmtree(folder)
     assert asked == [("flash", "pico")]
 
 
-def test_a_daemon_that_a_screen_started_ends_by_itself(monkeypatch):
+async def test_a_daemon_that_a_screen_started_ends_by_itself(monkeypatch):
     monkeypatch.setattr(client, "_IDLE_S", 1.0)
     folder = short_folder()
 
-    async def work():
-        there = asyncio.Event()
+    there = asyncio.Event()
 
-        async def connected():
-            there.set()
+    async def connected():
+        there.set()
 
-        line = client.ReconnectingClient("sim://", folder / "rig.sock", connected)
-        keeping = asyncio.get_running_loop().create_task(line.keep())
-        await asyncio.wait_for(there.wait(), PATIENCE_S)
-        keeping.cancel()
-        assert line.daemon.poll() is None
-        assert await asyncio.to_thread(line.daemon.wait, PATIENCE_S) == 0
-        assert "no client for 1 s" in (folder / "rig.log").read_text()
-
-    run(work())
+    line = client.ReconnectingClient("sim://", folder / "rig.sock", connected)
+    keeping = asyncio.get_running_loop().create_task(line.keep())
+    await asyncio.wait_for(there.wait(), PATIENCE_S)
+    keeping.cancel()
+    assert line.daemon.poll() is None
+    assert await asyncio.to_thread(line.daemon.wait, PATIENCE_S) == 0
+    assert "no client for 1 s" in (folder / "rig.log").read_text()
     shutil.rmtree(folder)
+
+
+@pytest.fixture
+def recorded(finished, tmp_path) -> Path:
+    """Four drops of two chains, at two inclines."""
+    return finished.copy(tmp_path).rename(tmp_path / "abba.session")
+
+
+async def test_drops_are_compared_and_files_are_written_from_inside(recorded, tmp_path):
+    mine = tmp_path / "mine.session"
+    mine.write_bytes(recorded.read_bytes())
+    with Session.open(mine) as session:
+        session.add_state(2, 1, RunState.ACCEPTED, 0, [plain_reason("a [draught]", NOTE)])
+        session.commit()
+    with Session.open(mine, readonly=True) as session:
+        assert notes(session) == {Job(2, 1): "a [draught]"}
+
+    async with at_screen(Options(session=mine, offline=True, still_s=0.0), (120, 36)) as op:
+        await op.sees("drop 1 of 4")
+        await op.press("down")
+        await op.sees("drop 2 of 4", "note: a [draught]")
+        await op.press("e")
+        await op.sees("Write files?", "mine.csv")
+        await op.means()
+        await op.sees("CSV files: ")
+    assert (tmp_path / "mine.csv" / "edges.csv").is_file()
+
+
+async def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(recorded):
+    other = recorded.with_name("zero.session")
+    Session.create(other, short(), "zero.yaml", simulated=True, origin="sim://").close()
+    (recorded.parent / "broken.session").write_bytes(b"nothing")
+    entries = {entry.path.name: entry for entry in session_list(recorded.parent)}
+    assert list(entries) == ["broken.session", "zero.session", "abba.session"]  # newest first
+    assert (entries["abba.session"].drops, entries["zero.session"].drops) == (4, 0)
+    assert entries["broken.session"].trouble
+
+    async with at_screen(Options(session=other, offline=True), (120, 36)) as op:
+
+        async def enter():  # which right behind letters may be part of what was pasted
+            await op.press("enter")
+            return len(op.app.screen_stack) == 1
+
+        await op.sees("No drop recorded yet")
+        await op.press("o")
+        await op.sees("abba.session", "4 drops", "broken.session")
+        await op.press(*"abba")
+        await op.until(enter)
+        await op.sees("drop 1 of 4", "abba.session")
+        await op.press("6", "up")
+        await op.sees("drop 4 of 4")
+        await op.press("o")
+        await op.sees("broken.session")
+        await op.press(*"broken")
+        await op.until(enter)
+        await op.sees("✗", "drop 4 of 4")
+
+
+async def test_the_session_page_says_how_many_taught_each_other(recorded):
+    async with at_screen(Options(session=recorded, offline=True), (120, 36)) as op:
+        await op.press("5")
+        await op.sees("joint fit of 4 runs", "separation")
+        await op.press("y", "y")
+        await op.sees("skew")
+
+
+LOOKS = 5
+"""That many looks in a row must find a thing at the same place before it is clicked."""
+
+
+def spots(app):
+    """Where on the screen each action can be clicked, one place an action."""
+    found = {}
+    for words in app.screen.query(Words):
+        if not words.region or not words.display:
+            continue
+        for y in range(words.content_region.height):
+            x, top = words.content_region.x, words.content_region.y
+            for part in words.render_line(y + top - words.region.y):
+                said = part.style.meta.get("@click") if part.style else None
+                if said:
+                    found.setdefault(said, (x, y + top))
+                x += part.cell_length
+    return found
+
+
+async def click(op, action):
+    seen = []
+
+    def rests():  # what is still being laid out moves from under the pointer
+        seen.append(spots(op.app).get(action))
+        return len(seen) >= LOOKS and seen[-1] is not None and len(set(seen[-LOOKS:])) == 1
+
+    await op.until(rests)
+    x, y = seen[-1]
+    assert op.app.screen.get_style_at(x, y).meta["@click"] == action
+    await op.pilot.click(offset=(x, y))
+
+
+async def test_a_protocol_and_stop_are_clicked(lab, fence):
+    other = lab.folder / "other.yaml"
+    other.write_text(fence.replace("TITLE", "The other one"), "utf-8")
+    broken = lab.folder / "broken.yaml"
+    broken.write_text("protocol: 1\n", "utf-8")
+
+    async with lab.operator(files=(broken, lab.protocol, other)) as op:
+        # What can be used, and not the first of the list.
+        await op.sees("A short fence", "Ready experiments")
+        await op.until(lambda: op.app.client and op.app.client.driving)
+
+        async def chosen():  # again, should the list have been laid out anew under the pointer
+            rows = [row.title for row in op.app.desk.rows]
+            await click(op, f"app.choose({rows.index('other')})")
+            return "The other one" in flat(op.app)
+
+        await op.until(chosen)
+        stopped = []
+        real = op.app.client.call
+
+        async def call(method, **params):
+            stopped.append(method)
+            return await real(method, **params)
+
+        op.app.client.call = call
+        await click(op, "app.do('stop')")
+        await op.until(lambda: "stop" in stopped)

@@ -1,15 +1,19 @@
-"""What stands on the screens, at three sizes, against text files.
+"""What stands on the screens, at three sizes, against text files; and the pictures of them.
 
 ``GOLDENS=write ./run test tests/tui/test_looks.py`` writes the files anew; look at the difference.
+``looks.session.xz`` is what ``rig run`` recorded of `tests.cli.lab.short` at ``sim://?seed=4``.
 """
 
+import lzma
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from bench.pictures import QUIET, FakeClient, at_rest
+from bench import pictures
+from bench.pictures import QUIET, SIZES, FakeClient, at_rest, draw, screenshots, seen
 from rig.campaign.machine import Flow, Stage
 from rig.reasons import plain_reason
 from rig.records import Job
@@ -19,12 +23,10 @@ from rig.tui.app import THEMES, RigApp
 from rig.tui.context import Options
 from rig.tui.state import state_of
 from tests.cli.lab import short
-from tests.tui.lab import KEYS, draw_without_pause, run
-from tests.tui.screen import colours_of, text_of
+from tests.tui.lab import KEYS, colours_of, draw_without_pause, run, text_of
 
 THEME_NAMES = [theme.name for theme in THEMES]
 GOLDENS = Path(__file__).parent / "goldens"
-SIZES = ((80, 24), (120, 36), (200, 60))
 BLOCKED = {"gates": {"blocked": 1 << 3, "age_s": 0.1}}
 MOMENTS = {
     "device": (Flow(Stage.DEVICE), BLOCKED),
@@ -112,3 +114,39 @@ async def _screens(moment, sizes, path, look, themes=THEME_NAMES[:1]):
                 await at_rest(app, pilot, lambda: text_of(app))
                 found += look(app)
     return found
+
+
+RECORDED = Path(__file__).with_name("looks.session.xz")
+PAGES = ["protocol", "device", "run", "live", "result", "session", "history"]
+
+
+@pytest.fixture
+def recorded(tmp_path, monkeypatch):
+    """A session and its protocol in the working folder, so that no screen shows another's name."""
+    monkeypatch.chdir(tmp_path)
+    draw_without_pause(monkeypatch)
+    protocol, session = Path("looks.yaml"), Path("looks.session")
+    protocol.write_text(short(), "utf-8")
+    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
+    return session, (protocol,)
+
+
+def test_all_pages_look_as_they_did(recorded):
+    session, files = recorded
+    found = list(seen(session, KEYS, files, SIZES, ["dark"], text_of))
+    assert [name for name, size, *_ in found if size == SIZES[0]] == PAGES
+    for name, (columns, lines), _, text in found:
+        golden = GOLDENS / f"page-{name}-{columns}x{lines}.txt"
+        if os.environ.get("GOLDENS") == "write":
+            golden.write_text(text + "\n", "utf-8")
+        assert text + "\n" == golden.read_text("utf-8"), golden.name
+
+
+def test_pictures_say_that_they_are_simulated_and_need_no_server(recorded, tmp_path, monkeypatch):
+    """The first page has no session, and the last has: words of all are compared above."""
+    session, files = recorded
+    monkeypatch.setattr(pictures, "screenshots", lambda view: screenshots(view)[::6])
+    for path in draw(session, tmp_path / "drawn", KEYS, files, [(80, 24)], ["light"]):
+        text = path.read_text("utf-8")
+        assert "SIMULATED" in text or path.name.startswith("protocol"), path.name
+        assert not re.search(r"url\(['\"]?http", text)

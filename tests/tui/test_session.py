@@ -8,29 +8,25 @@ from rig.session.store import Session
 from rig.tui.commands import REASONS
 from rig.tui.widgets.dialogs import Ask
 from tests.cli.lab import log_of
-from tests.tui.lab import flat, run
-from tests.tui.screen import text_of
+from tests.tui.lab import flat, text_of
 
 
-def test_any_key_before_the_release_stops_and_nothing_falls(lab):
+async def test_any_key_before_the_release_stops_and_nothing_falls(lab):
     stopped_at = []
 
-    async def work():
-        async with lab.ready(countdown_s=600.0) as op:
-            for key in ("f9", "escape", "k"):
-                stopped = False
-                while not stopped:  # a board that a busy machine leaves alone disarms itself
-                    await op.arms(Stage.COUNTDOWN)
-                    stopped_at.append(attempt := op.app.flow.job.attempt)
-                    await op.until(lambda: op.app.flow.stage is not Stage.COUNTDOWN
-                                   or "Any key stops" in flat(op.app))  # fmt: skip
-                    await op.press(key)
-                    await op.at(Stage.PREPARE)
-                    await op.sees(f"Run 1 of 3 · attempt {attempt + 1}")
-                    stopped = "stopped: nothing fell" in flat(op.app)
-                await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
-
-    run(work())
+    async with lab.ready(countdown_s=600.0) as op:
+        for key in ("f9", "escape", "k"):
+            stopped = False
+            while not stopped:  # a board that a busy machine leaves alone disarms itself
+                await op.arms(Stage.COUNTDOWN)
+                stopped_at.append(attempt := op.app.flow.job.attempt)
+                await op.until(lambda: op.app.flow.stage is not Stage.COUNTDOWN
+                               or "Any key stops" in flat(op.app))  # fmt: skip
+                await op.press(key)
+                await op.at(Stage.PREPARE)
+                await op.sees(f"Run 1 of 3 · attempt {attempt + 1}")
+                stopped = "stopped: nothing fell" in flat(op.app)
+            await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
     log = [entry for entries in log_of(lab.session).values() for entry in entries]
     assert log == [
         (attempt, state)
@@ -39,60 +35,57 @@ def test_any_key_before_the_release_stops_and_nothing_falls(lab):
     ]
 
 
-def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
+async def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
     rung = []
 
-    async def work():
-        async with lab.ready() as op:
-            op.app.options = replace(op.app.options, bell=True)
-            op.app.bell = lambda: rung.append(op.app.flow.stage)
-            await op.arms(Stage.RESULT)
-            await op.until(lambda: op.app.flow.logged and rung)
-            await op.press("n", *"[/b] hn", "enter")
-            await op.sees("note: [/b] hn")
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("n", "backspace", "m", "enter")  # what is there is changed
-            await op.sees("note: [/b] hm")
-            assert rung == [Stage.RESULT]
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("x", "escape")
-            assert op.app.flow.verdict == "accepted"
-            await op.press("x")
-            await op.until(lambda: isinstance(op.app.screen, Ask))
-            await op.until(pressed_and_seen(op, "enter", "type or choose a reason first"))
-            await op.press(*"draught", "enter")
-            await op.sees("REJECTED", "draught", "note: [/b] hm")
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("x")
-            await op.means()
-            await op.until(lambda: op.app.flow.verdict == "accepted" and op.app.flow.logged)
-            await op.press("x", "down", "enter")
-            await op.sees("REJECTED", REASONS[0])
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("a")
-            await op.means()
-            await op.arms(Stage.RESULT)
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("x")
-            await op.press("escape")
-            await op.press("a")
-            await op.sees("the new attempt will count instead")
-            await op.means()
-            await op.arms(Stage.RESULT)
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("x")
-            await op.sees("attempt 2 was good")
-            await op.press("down", "down", "enter")
-            await op.sees("attempt 2 was good, but run 1 has no result now")
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("enter")
-            await op.at(Stage.PREPARE)
-            await op.sees("Run 2 of 3")
-            await op.press("z")
-            await op.means()
-            await op.at(Stage.PROTOCOL)
-
-    run(work())
+    async with lab.ready() as op:
+        op.app.options = replace(op.app.options, bell=True)
+        op.app.bell = lambda: rung.append(op.app.flow.stage)
+        await op.arms(Stage.RESULT)
+        await op.until(lambda: op.app.flow.logged and rung)
+        await op.press("n", *"[/b] hn", "enter")
+        await op.sees("note: [/b] hn")
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("n", "backspace", "m", "enter")  # what is there is changed
+        await op.sees("note: [/b] hm")
+        assert rung == [Stage.RESULT]
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("x", "escape")
+        assert op.app.flow.verdict == "accepted"
+        await op.press("x")
+        await op.until(lambda: isinstance(op.app.screen, Ask))
+        await op.until(pressed_and_seen(op, "enter", "type or choose a reason first"))
+        await op.press(*"draught", "enter")
+        await op.sees("REJECTED", "draught", "note: [/b] hm")
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("x")
+        await op.means()
+        await op.until(lambda: op.app.flow.verdict == "accepted" and op.app.flow.logged)
+        await op.press("x", "down", "enter")
+        await op.sees("REJECTED", REASONS[0])
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("a")
+        await op.means()
+        await op.arms(Stage.RESULT)
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("x")
+        await op.press("escape")
+        await op.press("a")
+        await op.sees("the new attempt will count instead")
+        await op.means()
+        await op.arms(Stage.RESULT)
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("x")
+        await op.sees("attempt 2 was good")
+        await op.press("down", "down", "enter")
+        await op.sees("attempt 2 was good, but run 1 has no result now")
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("enter")
+        await op.at(Stage.PREPARE)
+        await op.sees("Run 2 of 3")
+        await op.press("z")
+        await op.means()
+        await op.at(Stage.PROTOCOL)
     with Session.open(lab.session, readonly=True) as session:
         told = [
             (entry.state, tuple(reason.text for reason in entry.reasons))
@@ -120,47 +113,41 @@ def pressed_and_seen(op, key, text):
     return there
 
 
-def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
+async def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
     lab.protocol.write_text(lab.protocol.read_text("utf-8") + "blind: true\n", "utf-8")
 
-    async def work():
-        async with lab.ready() as op:
-            await op.arms(Stage.RESULT)
-            await op.sees("BLIND: results are hidden", "ACCEPTED")
-            assert op.app.follower.state.edges == ()
-            for page in "4356":
-                await op.press(page)
-                await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.page}")
-                assert "± 0" not in text_of(op.app)
-                assert not op.app.view.drops[op.app.view.jobs[0]].edges
-            await op.until(lambda: op.app.flow.logged)
-            await op.press("4", "b")
-            await op.means()
-            await op.sees("ACCEPTED", "m/s²", "± 0")
-            await op.press("b")
-            await op.sees("this session is not blind")
-
-    run(work())
+    async with lab.ready() as op:
+        await op.arms(Stage.RESULT)
+        await op.sees("BLIND: results are hidden", "ACCEPTED")
+        assert op.app.follower.state.edges == ()
+        for page in "4356":
+            await op.press(page)
+            await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.page}")
+            assert "± 0" not in text_of(op.app)
+            assert not op.app.view.drops[op.app.view.jobs[0]].edges
+        await op.until(lambda: op.app.flow.logged)
+        await op.press("4", "b")
+        await op.means()
+        await op.sees("ACCEPTED", "m/s²", "± 0")
+        await op.press("b")
+        await op.sees("this session is not blind")
 
 
-def test_a_second_screen_watches_and_can_only_stop(lab):
-    async def work():
-        async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
-            await other.until(lambda: other.app.view)
-            assert not other.app.client.driving
-            await op.arms(Stage.COUNTDOWN)
-            await other.sees("ARMED by another client", "watching rig tui")
-            await other.press("k", "enter")
-            await other.sees("this screen only watches")
-            assert op.app.flow.stage is Stage.COUNTDOWN
-            await other.press("f9")
-            await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
-            await op.at(Stage.PREPARE)  # only at rest is control given back
-            await op.sees("stopped by the operator: nothing fell")
-            await op.press("c")
-            await op.means()
-            await other.until(lambda: other.app.follower.state.holder is None)
-            await other.press("c")
-            await other.until(lambda: other.app.client.driving)
-
-    run(work())
+async def test_a_second_screen_watches_and_can_only_stop(lab):
+    async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
+        await other.until(lambda: other.app.view)
+        assert not other.app.client.driving
+        await op.arms(Stage.COUNTDOWN)
+        await other.sees("ARMED by another client", "watching rig tui")
+        await other.press("k", "enter")
+        await other.sees("this screen only watches")
+        assert op.app.flow.stage is Stage.COUNTDOWN
+        await other.press("f9")
+        await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
+        await op.at(Stage.PREPARE)  # only at rest is control given back
+        await op.sees("stopped by the operator: nothing fell")
+        await op.press("c")
+        await op.means()
+        await other.until(lambda: other.app.follower.state.holder is None)
+        await other.press("c")
+        await other.until(lambda: other.app.client.driving)

@@ -192,27 +192,21 @@ async def _typed(session, lived):
         return app.client.told, hands.keys
 
 
-def test_a_key_that_comes_back_from_its_field_after_the_end_is_dropped(session):
-    async def work():
-        async with _screen(session) as (app, _):
-            key = events.Key("x", "x")
-            key._set_forwarded()
-        with app._context():
-            await app.on_event(key)
-
-    run(work())
+async def test_a_key_that_comes_back_from_its_field_after_the_end_is_dropped(session):
+    async with _screen(session) as (app, _):
+        key = events.Key("x", "x")
+        key._set_forwarded()
+    with app._context():
+        await app.on_event(key)
 
 
-def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
-    async def work():
-        async with _screen(session) as (app, pilot):
-            for moment in MOMENTS:
-                await _at(app, pilot, moment)
-                end = time.monotonic() + PATIENCE_S
-                while (waited := await _stopped(app, pilot)) > 0.1:  # for other programs' sake
-                    assert time.monotonic() < end, (moment, waited)
-
-    run(work())
+async def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
+    async with _screen(session) as (app, pilot):
+        for moment in MOMENTS:
+            await _at(app, pilot, moment)
+            end = time.monotonic() + PATIENCE_S
+            while (waited := await _stopped(app, pilot)) > 0.1:  # for other programs' sake
+                assert time.monotonic() < end, (moment, waited)
 
 
 async def _at(app, pilot, moment):

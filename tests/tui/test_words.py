@@ -1,18 +1,35 @@
-"""Text from outside on the screen: no markup, no control characters, no endless lines."""
+"""What screens are told and say: state, actions and keys, text from outside, ASCII."""
 
+import copy
+from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from bench.pictures import QUIET, FakeClient
 from rig.campaign.machine import Flow, GoOn, Stage, step
+from rig.daemon.replica import Replica
+from rig.errors import InputError
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.records import Job
+from rig.tui.actions import ACTIONS, BY_NAME, help_text, possible, shown_key
+from rig.tui.app import RigApp
+from rig.tui.ascii import in_ascii
+from rig.tui.client import ReconnectingClient
+from rig.tui.context import Options, ascii_only
+from rig.tui.follow import _back
 from rig.tui.indicators import Indicators
-from rig.tui.model import Model
+from rig.tui.keys import merge_keys, read_keys
+from rig.tui.model import Model, alarm
 from rig.tui.pages.drop import verdict_words
-from rig.tui.state import read_state
+from rig.tui.state import DaemonState, read_state
 from rig.tui.widgets.bars import headline, hints
-from tests.tui.lab import KEYS
+from rig.tui.widgets.text import LONGEST, duration, plain
+from tests.tables import cases
+from tests.tui.lab import KEYS, text_of
 
 NASTY = ["[red]x[/", "[/]", "\x1b[2J\x07\x9b31m", "x" * 10_000, "[@click=app.exit]a", "a\nb\u202ec"]
 
@@ -64,3 +81,201 @@ def test_keys_fit_their_line(width):
     assert (
         len(hints(replace(model("x"), page="result"), KEYS, width, lambda _: True).plain) <= width
     )
+
+
+RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
+       "reasons": [], "reason_codes": []}  # fmt: skip
+STATE = {
+    "phase": "idle", "link": {"state": "up", "error": None, "retry_s": None},
+    "port": {"url": "sim://", "simulated": True}, "gates": {"blocked": 5, "age_s": 0.0},
+    "drop": None, "session": None, "control": None, "error": None,
+    "runs": [RUN, RUN | {"run": 2, "impact": "B", "free": "A"}], "edges": [[1, 2, 1]],
+}  # fmt: skip
+
+
+def test_what_the_daemon_does_not_know_is_not_known():
+    state = read_state(0, STATE | {"gates": None, "runs": None, "edges": None})
+    assert state.blocked_mask is None
+    assert (state.runs, state.edges, state.holder) == ((), (), None)
+    assert DaemonState().n < 0 <= state.n
+
+
+def test_a_state_once_taken_never_changes():
+    replica = Replica()
+    replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
+    taken = read_state(replica.n, replica.state)
+    as_it_was = copy.deepcopy(taken)
+    changes = {"set": {"gates": {"blocked": 9}}, "runs": [RUN | {"state": "void"}]}
+    replica.follow("change", {"n": 8, "edges": [[1, 2, 1]], **changes})
+    assert taken == as_it_was != read_state(replica.n, replica.state)
+
+
+def test_indicators_count_name_and_judge_steadiness():
+    indicators = Indicators.of((0, 3)).seen(0b0000, 0.0).seen(0b1000, 1.0)
+    assert indicators.alone == 3
+    assert indicators.blocked_channels == (3,)
+    indicators = indicators.seen(0, 1.2)
+    assert indicators.checked == {3}
+    assert indicators.restless(1.3) == (3,)
+    assert (indicators.blocked_channels, indicators.restless(2.3)) == ((), ())
+    assert [one.edges for one in indicators.gates] == [0, 2]
+    assert indicators.count_edges((0, 0, 0, 0), 5.0).gates[0].flickers(5.0)
+    assert not indicators.seen(None, 3.0).known
+    assert indicators.reset().checked == frozenset()
+
+
+def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
+    indicators = Indicators.of((2,)).seen(0b100, 0.0)
+    assert (indicators.gates[0].edges, indicators.blocked_channels) == (0, (2,))
+
+
+def _model(state=None, **more):
+    return Model(read_state(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
+
+
+def test_what_is_wrong_is_said_with_what_to_do():
+    assert alarm(_model()) is None
+    for stage, begun in ((Stage.PROTOCOL, False), (Stage.PREPARE, True)):
+        gone = alarm(Model(DaemonState(), Flow(stage), Indicators(), silence="it is gone"))
+        assert "it is gone" in gone.message
+        assert ("supply" in gone.hint) == begun, "nothing of ours can fall before that"
+    lost = alarm(
+        _model({"link": {"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}})
+    )
+    assert "[unplugged" in lost.message
+    assert "cable" in lost.hint
+    failed = alarm(_model({"error": {"message": "disk full", "hint": "make room"}}))
+    assert failed == ("disk full", "make room")
+
+
+def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
+    """Changes come in between two looks: a board restarts in less than a tenth of a second."""
+
+    async def connected():
+        return
+
+    line, replica = ReconnectingClient("sim://", Path("rig.sock"), connected), Replica()
+    error = {"message": "the board restarted", "hint": "check its supply"}
+    replica.follow(
+        "snapshot", {"n": 1, "state": {"link": {"state": "down"}, "error": error, "edges": []}}
+    )
+    line._note(replica)
+    replica.follow("change", {"n": 2, "set": {"link": {"state": "up"}}})
+    line._note(replica)
+    assert not [*_back(line, read_state(replica.n, replica.state))]  # not all is well yet
+    replica.follow("change", {"n": 3, "set": {"error": None}})
+    line._note(replica)
+    back = read_state(replica.n, replica.state)
+    (said,) = _back(line, back)
+    assert said.trouble == "the port was lost and is back: the board restarted\ncheck its supply"
+    assert not [*_back(line, back)]
+
+
+def test_a_watcher_sees_where_the_drop_is():
+    for drop, stage in (("armed", Stage.COUNTDOWN), ("fired", Stage.LIVE)):
+        watched = _model({"drop": {"run": 1, "attempt": 1, "state": drop}})
+        assert watched.stage is stage
+    assert _model({"drop": {"state": "armed"}}, driving=True).stage is Stage.PROTOCOL
+
+
+def test_every_key_has_one_meaning():
+    keys = Counter(key for action in ACTIONS for key in action.keys.split(","))
+    assert max(keys.values()) == 1
+    assert len(BY_NAME) == len(ACTIONS)
+
+
+def test_help_has_every_action_under_one_heading():
+    text = help_text({action.name: action.keys for action in ACTIONS}, wide=True).plain
+    for action in ACTIONS:
+        assert text.count(f"  {shown_key(action.keys):8}{action.text}") == 1
+        assert text.count(f"\n{action.group}\n") == 1
+
+
+def test_stop_is_possible_always():
+    for stage in Stage:
+        for driving in (True, False):
+            assert possible(BY_NAME["stop"], stage, driving=driving)
+
+
+def test_what_drives_the_rig_needs_control_and_its_stage():
+    arms = BY_NAME["go_on"]
+    assert possible(arms, Stage.PREPARE, driving=True)
+    assert not possible(arms, Stage.PREPARE, driving=False)
+    assert not possible(arms, Stage.COUNTDOWN, driving=True)
+
+
+def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
+    file = tmp_path / "keys.toml"
+    file.write_text('reject = "r,f5"\nnote = "x"\n', "utf-8")
+    keys = read_keys(file)
+    assert (keys["reject"], keys["note"]) == ("r,f5", "x")
+    assert keys["go_on"] == BY_NAME["go_on"].keys
+
+
+def test_f9_always_stops_and_enter_goes_on():
+    given = merge_keys({"stop": "f12", "go_on": "space"}, "k")
+    assert (given["stop"], given["go_on"]) == ("f12,f9", "space,enter")
+    with pytest.raises(InputError, match="f9 already belongs to stop"):
+        merge_keys({"note": "f9"}, "k")
+
+
+@cases
+def test_a_wrong_key_file_says_what_is_wrong(tmp_path, text, said):
+    file = tmp_path / "keys.toml"
+    file.write_text(text, "utf-8")
+    with pytest.raises(InputError) as caught:
+        read_keys(file)
+    assert said in str(caught.value)
+
+
+def test_a_key_file_that_was_named_must_be_there(tmp_path):
+    with pytest.raises(InputError, match="No such file"):
+        read_keys(tmp_path / "none.toml")
+
+
+def test_without_a_file_the_keys_are_the_tables(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert read_keys() == {action.name: action.keys for action in ACTIONS}
+
+
+def test_text_from_outside_is_one_harmless_line():
+    nasty = "a\x1b[31m[/red]\n\x07b\u202ec\ud800"
+    assert plain(nasty) == "a�[31m[/red] �b�c�"
+    assert len(plain("x" * 10**6)) == LONGEST
+    assert plain("x" * LONGEST) == "x" * LONGEST
+
+
+def test_durations():
+    assert [duration(s) for s in (3, 61, 3660)] == ["3 s", "1 min 01 s", "1 h 01 min"]
+
+
+def test_keys_are_written_as_they_stand_on_a_keyboard():
+    assert [shown_key(keys) for keys in ("f9", "ctrl+p", "x", "question_mark,f1", "enter")] == [
+        "F9", "Ctrl-P", "x", "?", "Enter"
+    ]  # fmt: skip
+
+
+@given(st.text(st.characters(exclude_categories=["M", "C"])))
+def test_every_text_keeps_its_length_and_is_ascii(text):
+    assert in_ascii(text).isascii()
+    assert len(in_ascii(text)) == len(text)
+
+
+def test_what_matters_can_still_be_told():
+    assert in_ascii("Δz 8.79 ± 0.02 cm at 40°") == "dz 8.79+/-0.02 cm at 40'"
+    assert in_ascii("⠉⣀⡇⣿ ") == "'.:# "
+
+
+@cases
+def test_terminal_and_locale_say_when(environment, is_ascii):
+    assert ascii_only(environment) is is_ascii
+
+
+async def test_a_whole_screen_is_ascii():
+    app = RigApp(Options(ascii=True), KEYS, FakeClient(DaemonState(0, QUIET)))
+    app.driver.flow = Flow(Stage.DEVICE)
+    async with app.run_test(size=(80, 24)) as pilot:
+        while "DEVICE" not in text_of(app):
+            await pilot.pause()
+        assert text_of(app).isascii()
+        assert "# STOP  F9 or Esc" in text_of(app)

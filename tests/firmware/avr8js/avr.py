@@ -12,6 +12,7 @@ from typing import Any, Self
 import pytest
 
 from rig_emulator.controller import Change, Sent, Stop
+from tests.programs import run_program
 
 HERE = Path(__file__).parent
 _INSTALLED = HERE / "node_modules" / "avr8js" / "package.json"
@@ -27,13 +28,8 @@ def install() -> None:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one test process at a time
         if _INSTALLED.is_file() and json.loads(_INSTALLED.read_text())["version"] == wanted:
             return
-        done = subprocess.run(
-            ["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--fetch-retries=0"],
-            cwd=HERE,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        words = ["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--fetch-retries=0"]
+        done = run_program(*words, code=None, timeout=None, cwd=HERE)
     if done.returncode:
         why = [line for line in done.stderr.splitlines() if line.startswith("npm error")]
         pytest.skip(f"npm could not install avr8js {wanted}: {'; '.join(why[:2])}")

@@ -1,0 +1,273 @@
+"""A board that is in order passes, and for every check there is one broken in just that way."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from rig.cli import main
+from rig.errors import DeviceError
+from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.frames import Frame, encode
+from rig.link.messages import Phase, RefusalReason
+from rig.selftest.board import SelftestOptions
+from rig.selftest.checks import BAD_ORDERS
+from rig.selftest.findings import Verdict
+from rig.selftest.run import CHECKS, selftest
+from sim.controller import Microcontroller
+from tests.flash.pty_board import PtyBoard
+from tests.selftest.benches import GATE, LoopedBoard, Wire, hold_drop, outcomes, port_of
+from tests.selftest.broken import BROKEN, claims, odd
+from tests.tables import cases
+
+HANDS = {"GATE_BLOCKED", "GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
+FENCE = "sim://?protocol=protocols/picket-fence.yaml"
+
+
+@pytest.fixture
+def rig(capsys):
+    def call(*arguments):
+        code = main(["selftest", *arguments])
+        out, err = capsys.readouterr()
+        return code, out.splitlines(), err
+
+    return call
+
+
+def failed(found):
+    return [str(outcome) for outcome in found.values() if outcome.verdict is Verdict.FAILED]
+
+
+@pytest.mark.parametrize("streams", [False, True])
+@pytest.mark.parametrize("ppm", [-3000.0, 0.0, 3000.0])
+def test_a_good_board_passes(ppm, streams):
+    board = LoopedBoard(Wire(), seed=2, ppm=ppm, streams=streams)
+    found = outcomes(port_of(board))
+    assert failed(found) == []
+    assert {n for n, o in found.items() if o.verdict is Verdict.NOT_POSSIBLE} == HANDS
+    assert board.driven == 1
+    assert list(found) == list(CHECKS)
+
+
+class HeldUp(LoopedBoard):
+    """One of its answers is late: this computer had no time."""
+
+    heard = 0
+
+    def receive(self, start_ns, data):
+        self.heard += 1
+        super().receive(start_ns + 150_000_000 * (self.heard == 60), data)
+
+
+class Stopped(LoopedBoard):
+    """Its emergency stop is open."""
+
+    def __init__(self, lab):
+        super().__init__(lab)
+        self.stop(True)
+
+
+def fewer_gates(lab, number=12):
+    board = LoopedBoard(lab)
+    names = " ".join(board.identity.channels.split()[:number])
+    board.identity = replace(board.identity, gates=number, channels=names)
+    return board
+
+
+TIME = "it needs a computer with time to ask the board every 125 ms"
+BOARDS = {"looped": LoopedBoard, "held up": HeldUp, "stopped": Stopped, "12 gates": fewer_gates}
+
+
+@cases
+def test_a_right_rig_fails_nothing_and_is_told_what_it_lacks(
+    board, wiring, options, says, monkeypatch
+):
+    lab = Wire(**wiring)
+    controller = claims("gates", lambda gates: gates | lab.blocked)
+    monkeypatch.setattr("sim.board.Microcontroller", controller)
+    board = BOARDS[board](lab)
+    found = outcomes(port_of(board), **options)
+    assert failed(found) == []
+    assert {check: found[check].what[: len(what)] for check, what in says.items()} == says
+    assert board.driven == options.get("release", True) * (found["COOLING"].verdict is Verdict.OK)
+
+
+def test_a_busy_computer_blames_no_board(monkeypatch):
+    monkeypatch.setattr("rig.selftest.line_checks._ASK_S", 0.3)
+    found = outcomes(port_of(LoopedBoard(Wire())))
+    assert failed(found) == []
+    assert found["arming times out"].what == TIME.replace("125", "250")
+
+
+@cases
+def test_a_gate_in_use_that_is_blocked_or_not_there_fails(
+    number, blocked, in_use, code, what, monkeypatch
+):
+    monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | blocked))
+    board = fewer_gates(Wire(blocked=blocked), number)
+    gates = outcomes(port_of(board), gates=in_use)["gates"]
+    assert (gates.verdict, gates.reason.code, gates.what) == (Verdict.FAILED, code, what)
+
+
+def test_json_lists_each_check_with_its_codes(rig):
+    code, lines, _ = rig("--port", FENCE, "--loopback", "2", "--drops", "1", "--json")
+    assert code == 4
+    listed = {entry.pop("name"): entry for entry in json.loads("\n".join(lines))["checks"]}
+    assert list(listed) == list(CHECKS)
+    assert listed["bad requests"] == {"verdict": "ok", "what": "", "advice": "", "reason_codes": []}
+    codes = {name: (entry["verdict"], entry["reason_codes"]) for name, entry in listed.items()}
+    events = {"code": "sync_edges", "values": {"gate": 2, "events": 0}}
+    assert codes["sync output to gate"] == ("failed", [events])
+    needed = {"code": "check_needs", "values": {"needed": "a hand at the emergency stop"}}
+    assert codes["STOPPED"] == ("not_possible", [needed])
+
+
+@pytest.mark.parametrize("port", [FENCE, "sim://", "sim://?seed=3"])
+def test_a_protocol_says_which_gates_are_in_use(rig, port):
+    code, lines, _ = rig("--port", port, "--protocol", "protocols/picket-fence.yaml")
+    assert code == 0
+    assert any(line.startswith("gates: ok: ") and "gates clear" in line for line in lines)
+
+
+@pytest.mark.parametrize("gates", ["", "0,", "0,16", "a"])
+def test_gates_are_a_list_of_numbers(rig, gates):
+    with pytest.raises(SystemExit, match="2"):
+        rig("--port", FENCE, "--gates", gates)
+
+
+def test_behind_a_terminal_in_real_time(rig):
+    with PtyBoard() as there:
+        code, lines, _ = rig("--port", there.path)
+    assert code == 0, lines
+
+
+def test_a_drop_of_a_session_is_left_alone(monkeypatch):
+    monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | 1))
+    port = port_of(LoopedBoard(Wire()))
+    _, order, drop = hold_drop(port, 7)
+    results = outcomes(port)
+    assert failed(results) == []
+    possible = {name for name, finding in results.items() if finding.verdict is Verdict.OK}
+    assert possible == {"handshake", "bad requests", "round trips"}
+    assert results["RECORDING"].what == "the board holds a drop (run 7, attempt 2)"
+    assert results["RECORDING"].reason.values == {"run": 7, "attempt": 2}
+    again = Device(port, port.clock)
+    again.connect(boot_wait_s=0)
+    assert again.fetch(order["label"]) == drop
+    with pytest.raises(DeviceError, match="still holds the drop of run 7"):
+        again.arm(wire.Arm(**order))  # no ABORT made it free to be discarded
+
+
+def test_a_drop_that_an_earlier_test_left_is_cleared_away():
+    port = port_of(LoopedBoard(Wire()))
+    device, *_ = hold_drop(port, wire.TEST_RUN)
+    assert failed(outcomes(port)) == []
+    assert device.status().phase is Phase.IDLE
+
+
+ONLY_HANDS = {"GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
+"""Nothing but somebody at the rig can make these."""
+
+
+def board_of(kind, monkeypatch):
+    if not (isinstance(kind, type) and issubclass(kind, Microcontroller)):
+        return kind(Wire()) if isinstance(kind, type) else kind()
+    monkeypatch.setattr("sim.board.Microcontroller", kind)
+    return LoopedBoard(Wire())
+
+
+@pytest.mark.parametrize(("check", "code", "kind"), BROKEN)
+def test_a_broken_board_is_found_out(check, code, kind, monkeypatch):
+    port = port_of(board_of(kind, monkeypatch))
+    findings = selftest(port, SelftestOptions(GATE, 5, True, 0xFFFF))
+    finding = next(one for one in findings if one.name == check)
+    assert finding.verdict is Verdict.FAILED, str(finding)
+    assert finding.reason.code == code
+
+
+def test_each_check_has_a_board_that_fails_it():
+    assert {check for check, *_ in BROKEN} == CHECKS.keys() - ONLY_HANDS - {"bad orders"}
+
+
+@pytest.mark.parametrize(("name", "value"), BAD_ORDERS)
+def test_each_bad_order_that_is_accepted_is_found_out(name, value, monkeypatch):
+    class Lax(Microcontroller):
+        def _arm(self, order):
+            answer = super()._arm(order)
+            # Only the very variant: another bad order may share its one value.
+            usual = order.pulse_us in {0, 50_000} or name == "pulse_us"
+            lax = getattr(order, name) == value and usual and order.release
+            if answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0) and (
+                lax or name == "release"
+            ):
+                return wire.Armed(1) if getattr(order, name) == value else answer
+            return answer
+
+    finding = outcomes(port_of(board_of(Lax, monkeypatch)))["bad orders"]
+    assert finding.verdict is Verdict.FAILED
+    assert f"{name}={value}" in finding.what
+    assert "should give Refused(reason=BAD_PARAMETER, detail=0), but gives Armed(t" in finding.what
+
+
+def test_what_a_board_accepts_wrongly_is_not_fired(monkeypatch):
+    """Not even when it cannot be disarmed any more: a release might be driven."""
+    fired = []
+
+    class Stubborn(Microcontroller):
+        def _arm(self, order):
+            if order.label == 0:  # a bad order, with a release
+                self.order, self._token, self._deadline_ns = order, 1, 2**62
+                return wire.Armed(1)
+            return super()._arm(order)
+
+        def _abort(self):
+            return wire.Done()
+
+        def _fire(self, request):
+            if self.order is not None:
+                fired.append(self.order.release)
+            return super()._fire(request)
+
+        @property
+        def lapses_ns(self):
+            return 2**62
+
+    found = outcomes(port_of(board_of(Stubborn, monkeypatch)), release=False)
+    assert found["bad orders"].verdict is Verdict.FAILED
+    assert not any(fired)
+
+
+def test_a_board_that_falls_silent_fails_what_is_left():
+    def listen(self, usual):
+        return self._inbox.popleft() if self._last and self._last[0] == 0x55 else usual()
+
+    found = outcomes(port_of(odd(LoopedBoard, _listen=listen)(Wire())))
+    assert {name for name in found if found[name].verdict is Verdict.OK} == {"handshake"}
+    assert found["ARMED"].what == "the device did not answer Status()"
+
+
+def test_what_is_no_message_is_a_failure():
+    def listen(self, usual):
+        usual()
+        if self._last is not None and self._last[0] == wire.CODES[wire.Reference]:
+            self.line.send(self._now_ns, encode(Frame(0xF0, 1, 0, b"")))
+
+    found = outcomes(port_of(odd(LoopedBoard, _listen=listen)(Wire())))
+    assert found["IDLE"].reason.code == "invalid_message"
+    assert found["IDLE"].reason.values == {"text": "unknown message code 0xF0"}
+    assert found["junk on the line"].verdict is Verdict.OK
+
+
+def test_a_cable_that_is_pulled_is_said(monkeypatch):
+    port = port_of(LoopedBoard(Wire()))
+    tests = selftest(port, SelftestOptions())
+    next(tests)
+
+    def gone(*_):
+        raise OSError("device disconnected")
+
+    monkeypatch.setattr(port, "read", gone)
+    assert {finding.what for finding in tests if finding.failed} == {
+        "connection lost: device disconnected"
+    }

@@ -1,0 +1,26 @@
+"""Data of the tests: what is tried and must come of it (`cases.yaml` of a folder), protocols."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+import yaml
+
+PROTOCOLS = Path(__file__).with_name("protocols")
+
+
+@cache
+def read_table(folder_of: str, name: str):
+    """Read a table that lies beside a module."""
+    return yaml.safe_load(Path(folder_of).with_name(f"{name}.yaml").read_text("utf-8"))
+
+
+def cases(test):
+    """Parametrise a test by the table of its name; a table's first row names the arguments."""
+    names, *rows = read_table(test.__code__.co_filename, "cases")[test.__name__]
+    return pytest.mark.parametrize(names, rows)(test)
+
+
+def protocol_text(name: str) -> str:
+    """Return the text of a protocol that several tests change and read."""
+    return (PROTOCOLS / f"{name}.yaml").read_text("utf-8")

@@ -1,0 +1,244 @@
+"""Boards on USB: which ports are candidates, and the rule and units that open them."""
+
+import configparser
+import json
+import re
+import runpy
+import shutil
+from pathlib import Path
+
+import pytest
+from serial.tools.list_ports_common import ListPortInfo
+
+from rig.boards import PICO
+from rig.cli import _parser, main
+from rig.errors import DeviceError
+from rig.flash.drive import pico_ports
+from rig.usb.listing import KNOWN, Known, SerialPort, path_of, serial_number_at, serial_ports
+from tests.flash.pty_board import PtyBoard
+from tests.programs import run_program
+from tests.tables import cases
+
+PACKAGING = Path(__file__).parents[2] / "packaging"
+
+
+def info(path, vid=None, pid=None, serial_number=None, product=None):
+    found = ListPortInfo(path)
+    found.vid, found.pid = vid, pid
+    found.serial_number, found.product = serial_number, product
+    return found
+
+
+@pytest.fixture
+def plugged(monkeypatch):
+    def plug(*infos):
+        monkeypatch.setattr("serial.tools.list_ports.comports", lambda: list(infos))
+
+    plug(
+        info("/dev/ttyS0"),
+        info("/dev/ttyUSB0", 0x1A86, 0x7523, product="USB Serial"),
+        info("/dev/ttyUSB1", 0x1234, 0x5678, "X1", "Oscilloscope"),
+        info("/dev/ttyACM3", 0x2341, 0x0042, "85430", "Mega"),
+    )
+    return plug
+
+
+@pytest.fixture
+def never(monkeypatch):
+    def fail(url):
+        raise AssertionError(f"{url} was opened")
+
+    monkeypatch.setattr("rig.commands.ports.open_port", fail)
+
+
+def test_candidates_come_first_and_the_others_say_why_not(plugged, never, capsys):
+    assert main(["ports"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == [
+        *("/dev/ttyACM3", "/dev/ttyS0", "/dev/ttyUSB0", "/dev/ttyUSB1")
+    ]
+    assert lines[0].endswith("serial number 85430  Mega  Arduino Mega 2560  a candidate")
+    assert lines[1].endswith("skipped: no USB device")
+    assert "CH340  skipped: a chip that boards and other instruments have" in lines[2]
+    assert "skipped: no board's USB numbers" in lines[3]
+
+
+def test_json_has_everything(plugged, never, capsys):
+    assert main(["ports", "--json"]) == 0
+    first, *rest = json.loads(capsys.readouterr().out)["ports"]
+    assert first == {
+        "path": "/dev/ttyACM3",
+        "vid": 0x2341,
+        "pid": 0x0042,
+        "serial_number": "85430",
+        "manufacturer": None,
+        "product": "Mega",
+        "kind": "Arduino Mega 2560",
+        "kinds": ["Arduino Mega 2560"],
+        "skipped": "",
+        "candidate": True,
+        "identity": None,
+        "trouble": None,
+    }
+    assert not any(port["candidate"] for port in rest)
+
+
+def test_nothing_there_is_said(plugged, never, capsys):
+    plugged()
+    assert main(["ports"]) == 0
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "no board found" in err
+
+
+def test_only_candidates_are_asked_who_they_are(plugged, monkeypatch, capsys):
+    opened = []
+
+    def refuse(url):
+        opened.append(url)
+        raise DeviceError(f"cannot open {url}: busy", "close it")
+
+    monkeypatch.setattr("rig.commands.ports.open_port", refuse)
+    assert main(["ports", "--identify"]) == 0
+    assert "cannot open /dev/ttyACM3: busy" in capsys.readouterr().out
+    assert main(["ports", "--identify", "/dev/ttyUSB0"]) == 0
+    assert opened == ["/dev/ttyACM3", "/dev/ttyUSB0"]
+
+
+def test_who_is_there_is_said_and_that_boards_share_an_id(plugged, capsys):
+    with PtyBoard(board="Arduino Uno") as one, PtyBoard(board="Arduino Uno") as other:
+        assert main(["ports", "--identify", one.path, other.path]) == 0
+    out, err = capsys.readouterr()
+    assert f"{other.path}  Arduino Uno, sim, id " in out.splitlines()[-1]
+    assert re.search("several boards have the id [0-9a-f]{16}: erase", err)
+
+
+def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):
+    (link := tmp_path / "by-id").symlink_to("/dev/ttyACM3")
+    places = "/dev/ttyACM3", str(link), "/dev/ttyUSB0", "sim://"
+    assert [*map(serial_number_at, places)] == ["85430", "85430", None, None]
+    other = info("/dev/ttyACM3", 0x2341, 0x43, "other")
+    plugged(other)
+    assert path_of("85430", serial_ports()) is None
+    plugged(other, info("/dev/ttyACM9", 1, 2, "85430"))
+    assert path_of("85430", serial_ports()) == "/dev/ttyACM9"
+
+
+def test_a_pico_with_another_program_is_not_opened(plugged):
+    numbers = 0x2E8A, 0x000A
+    plugged(
+        info("/dev/ttyACM0", *numbers, product="MicroPython"),
+        info("/dev/ttyACM1", *numbers),
+        info("/dev/ttyACM2", *numbers, product="chainrig on a Pico"),
+    )
+    ports = serial_ports()
+    assert [(port.path, port.candidate) for port in ports] == [
+        *(("/dev/ttyACM2", True), ("/dev/ttyACM0", False), ("/dev/ttyACM1", False))
+    ]
+    assert "another program" in ports[1].skipped
+    assert pico_ports() == {"/dev/ttyACM2"}
+
+
+def test_copies_that_share_a_number_are_not_confused(plugged):
+    plugged(info("/dev/ttyUSB0", serial_number="0001"), info("/dev/ttyUSB1", serial_number="0001"))
+    with pytest.raises(DeviceError, match="/dev/ttyUSB0 and /dev/ttyUSB1 have the same"):
+        path_of("0001", serial_ports())
+
+
+@pytest.mark.parametrize("first", KNOWN, ids=lambda kind: kind.name)
+def test_a_second_board_may_have_the_same_chip(plugged, monkeypatch, first):
+    """Once either may be there, the port is a board's."""
+    other = Known("Teensy 9", first.numbers[:9], "")
+    monkeypatch.setattr("rig.usb.listing.KNOWN", (*KNOWN, other))
+    plugged(info("/dev/ttyACM0", *(int(part, 16) for part in first.numbers[:9].split(":"))))
+    (port,) = serial_ports()
+    assert (port.kind, port.candidate) == (f"{first.name} or Teensy 9", True)
+    assert pico_ports() == ({port.path} if first.name == PICO.name else set())
+
+
+def test_the_udev_rule_opens_every_kind_and_hides_boards_from_modem_manager(capsys):
+    runpy.run_module("rig.usb.udev", run_name="__main__")
+    rule = capsys.readouterr().out
+    assert rule == (PACKAGING / "60-chainrig.rules").read_text("ascii")
+    expected = []
+    for kind in KNOWN:
+        for vid, pid in (pair.split(":") for pair in kind.numbers.split()):
+            match = f'ATTRS{{idVendor}}=="{vid}", ATTRS{{idProduct}}=="{pid}", '
+            access = 'GROUP="dialout", MODE="0660", TAG+="uaccess"'
+            expected.append(f'SUBSYSTEM=="tty", {match}{access}')
+            if kind.product is not None:
+                expected.append(f'{match}ENV{{ID_MM_DEVICE_IGNORE}}="1"')
+    lines = [line for line in rule.splitlines() if "ATTRS" in line]
+    assert lines == expected
+
+
+IS_HERE = bool(shutil.which("systemd-analyze"))
+
+
+def complaints_of(unit: Path) -> list[str]:
+    """Lines that name the unit."""
+    done = run_program("systemd-analyze", "verify", unit, code=None)
+    return [line for line in done.stderr.splitlines() if unit.name in line]
+
+
+ROOT = Path(__file__).parents[2]
+UNITS = pytest.mark.parametrize(
+    "unit", [*(ROOT / "packaging").glob("*.service")], ids=lambda unit: unit.stem
+)
+
+
+@UNITS
+def test_it_starts_a_command_that_there_is(unit):
+    settings = configparser.ConfigParser(interpolation=None)
+    settings.optionxform = str
+    settings.read(unit)
+    words = settings["Service"]["ExecStart"].split()
+    rig = words.index("rig")
+    arguments = [word.replace("%i", "left") for word in words[rig + 1 :] if word != "$RIG_OPTIONS"]
+    assert _parser().parse_args(arguments).module == "daemon"
+
+
+@pytest.mark.skipif(not IS_HERE, reason="needs systemd-analyze")
+@UNITS
+def test_systemd_understands_it(unit):
+    assert complaints_of(unit) == []
+
+
+@pytest.fixture
+def units(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    boards = [SerialPort("/dev/ttyACM0"), SerialPort("/dev/ttyS0", skipped="no USB device")]
+    monkeypatch.setattr("rig.usb.listing.serial_ports", lambda: boards)
+    return tmp_path / "systemd/user"
+
+
+@cases
+def test_the_unit_starts_a_daemon_at_the_board(units, capsys, words, service, command):
+    assert main(["service", "install", *words]) == 0
+    (unit,) = units.iterdir()
+    assert unit.name == f"{service}.service"
+    text = unit.read_text()
+    (line,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
+    assert f" {command} $RIG_OPTIONS" in line
+    assert "EnvironmentFile=-" in text
+    assert f"enable --now {service}\n" in capsys.readouterr().err
+    if IS_HERE:
+        assert complaints_of(unit) == []
+
+
+def test_a_port_is_named_so_that_it_stays(units, tmp_path, monkeypatch, capsys):
+    link, device = tmp_path / "usb-Pico", tmp_path / "ttyACM0"
+    link.symlink_to(device)
+    monkeypatch.setattr(
+        "rig.commands.service_install.Path",
+        lambda path: tmp_path if "by-id" in path else Path(path),
+    )
+    assert main(["service", "install", "--port", str(device)]) == 0
+    assert f".service: {link}\n" in capsys.readouterr().err
+
+
+def test_without_a_board_there_is_no_unit(units, monkeypatch, capsys):
+    monkeypatch.setattr("rig.usb.listing.serial_ports", list)
+    assert main(["service", "install"]) == 4
+    assert "no board found" in capsys.readouterr().err
+    assert not units.exists()
