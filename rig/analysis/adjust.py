@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import Linearization, linearize, standardise
-from rig.analysis.square_root import square_root
+from rig.analysis.square_root import EquationRows, Root, square_root
+from rig.arrays import Array, Index
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from rig.analysis.drop_model import DropModel
-    from rig.analysis.square_root import EquationRows, Root
-    from rig.arrays import Array, Index
-
-    Matches = Mapping[str, Sequence[Index]]
+Matches = Mapping[str, Index]
 
 STEPS = 60
 """Greatest number of steps of a fit; a good fit needs far fewer."""
@@ -30,12 +25,9 @@ PATIENT = 4
 different slope on either side, and steps may alternate between them."""
 _DAMPED = 1e-3  # first λ of Levenberg and Marquardt
 _FAINT = 1e-12  # λ below double precision
-_FASTER = 10.0  # factor by which λ grows with each rejected step
+_FASTER = 5.0  # factor by which λ grows with each rejected step
 _SLOWER = 3.0  # factor by which λ shrinks with each accepted step
-_FORGOTTEN = 0.5  # share of a column's largest length kept at each step, to scale the damping
 _GAIN = 0.25  # least share of the linear prediction by which a step reduces the loss
-_TRIED = 0.01  # share of a step at which its second derivative is evaluated
-_BENT = 0.75  # largest ratio of second-order to first-order step; above, a step is rejected
 _MORE = 1.05  # least change of the scatter with which edges are weighed anew
 
 
@@ -162,7 +154,7 @@ def least_squares(
     damping, previous, step = 0.0, 0.0, np.zeros_like(x)
     settled, shorts = False, 0
     for _ in range(steps):
-        step = search.step(point, damping)
+        step = point.root.damp(damping).step() if damping else point.root.step()
         moved = length(step, point.root.matrix)
         near = point.size < point.usual
         # With linear convergence, the next step is shorter by the ratio of the last two.
@@ -181,6 +173,7 @@ def least_squares(
         if not ahead.loss <= point.loss - _GAIN * point.predicted_reduction(step):
             damping = damping * _FASTER or _DAMPED
             continue
+        shorts = 0 if ahead.loss < point.loss - done**2 else shorts
         point, previous = ahead, moved
         damping = damping / _SLOWER if damping > _FAINT else 0.0
     step = step if settled else np.zeros_like(x)
@@ -262,33 +255,10 @@ class _Search:
     ) -> None:
         self._linearize, self._sd, self._prior = linearize, sd, prior
         self.inflation = inflation
-        self._steepest = np.zeros_like(sd)  # largest recent lengths of the root's columns
 
     def look(self, y: Array) -> _Point:
         """Return the point `y` with its linearization."""
         return _Point(y, self._linearize(y * self._sd, self.inflation), self._sd, y - self._prior)
-
-    def step(self, point: _Point, damping: float) -> Array:
-        """Return a damped step (Marquardt 1963) with geodesic acceleration.
-
-        The second derivative along the step corrects it (Transtrum and Sethna 2012). The step is
-        NaN if that correction is too large.
-        """
-        lengths = np.linalg.norm(point.root.matrix, axis=0)
-        self._steepest = np.maximum(_FORGOTTEN * self._steepest, lengths)
-        if not damping:
-            return point.root.step()
-        root = point.root.damp(damping, self._steepest)
-        straight = root.step()
-        ahead, gradient = self.look(point.y + _TRIED * straight).seen, np.zeros_like(point.y)
-        for role, rows in point.seen.rows.items():
-            turn = ahead.rows[role].slopes - rows.slopes
-            turned = turn @ (straight * self._sd)[rows.columns]
-            gradient[rows.columns] += self._sd[rows.columns] * (turned @ rows.slopes)
-        bend = root.gradient_step(0.5 / _TRIED * gradient)
-        long = np.linalg.norm(self._steepest * straight)
-        short = 2.0 * np.linalg.norm(self._steepest * bend) <= _BENT * long
-        return straight + bend if short else straight * math.nan
 
     def scatter(self, point: _Point) -> float:
         """Return the scatter relative to the present assumption; 1 if it is close enough.
@@ -307,7 +277,6 @@ class _Search:
     def weigh(self, point: _Point, factor: float) -> _Point:
         """Return the point linearized anew with the scatter multiplied by `factor`."""
         self.inflation *= factor
-        self._steepest = self._steepest / factor
         return self.look(point.y)
 
 

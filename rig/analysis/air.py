@@ -12,19 +12,18 @@ the same for a chain in all drops, and part differs from drop to drop.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.arrays import Array, Index
+from rig.model.chain import Chain
 from rig.predictions import air_of
+from rig.protocol.protocol import Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rig.analysis.chain_records import ChainRecord
-    from rig.arrays import Array, Index
-    from rig.model.chain import Chain
-    from rig.protocol.protocol import Protocol
 
 
 SLACK_WAY = 0.5

@@ -10,32 +10,29 @@ the points of a grid of the unknowns at which most edges agree, the likeliest fi
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.air import prior_air
-from rig.analysis.chain_records import WIDER
+from rig.analysis.chain_records import WIDER, ChainRecord, EdgeTrain
+from rig.analysis.components import Components
 from rig.analysis.discrepancy import LOWEST_START
 from rig.analysis.free_flight import FAINT
-from rig.analysis.trajectory import COMMON, GRAVITY, ONE, free_trajectory, struck_trajectory
+from rig.analysis.trajectory import (
+    COMMON,
+    GRAVITY,
+    ONE,
+    Trajectory,
+    free_trajectory,
+    struck_trajectory,
+)
 from rig.analysis.unknowns import ANY_GRAVITY
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from rig.analysis.chain_records import ChainRecord, EdgeTrain
-    from rig.analysis.components import Components
-    from rig.analysis.trajectory import Trajectory
-    from rig.arrays import Array, Index
-    from rig.protocol.protocol import Protocol
-
-
-Item = TypeVar("Item", bound=np.generic)
+from rig.arrays import Array, Index
+from rig.protocol.protocol import Protocol
 
 MISSED = 0.02
 """Prior probability that an expected edge is missed."""
@@ -65,9 +62,8 @@ LEAST = 0.6
 start's votes with which another start is tried."""
 
 
-@dataclass(frozen=True, slots=True)
-class Guess:
-    """A first guess of a fall's parameters.
+class Guess(NamedTuple):
+    """A first guess of a fall's parameters, in the order of a fall's unknowns.
 
     Attributes
     ----------
@@ -75,34 +71,34 @@ class Guess:
         Time since the release fired, s.
     start
         Height of the reference point before release, m.
-    alpha
-        α of all impacts; 0 for a free chain.
-    kappa
-        κ of the air, 1/m.
     clock
         Relative rate by which the edges' clock is slow.
-    pull
-        Gravity less the stated gravity, m/s².
+    gravity
+        m/s².
+    kappa
+        κ of the air, 1/m.
+    alpha
+        α of all impacts; 0 for a free chain.
     """
 
     release: float
     start: float
-    alpha: float = 0.0
-    kappa: float = 0.0
-    clock: float = 0.0
-    pull: float = 0.0
+    clock: float
+    gravity: float
+    kappa: float
+    alpha: float
 
     @classmethod
     def from_protocol(cls, protocol: Protocol, record: ChainRecord) -> Guess:
         """Return the guess with the protocol's values."""
         kappa, _ = prior_air(protocol)
-        return cls(0.0, protocol.drop.value, record.alpha, kappa)
+        return cls(0.0, protocol.drop.value, 0.0, protocol.gravity.value, kappa, record.alpha)
 
 
-def split(line: NDArray[Item], ends: Index) -> list[NDArray[Item]]:
-    """Split an array of all trains' values at the end of each; quicker than `numpy.split`."""
-    stops = ends.tolist()
-    return [line[begin:end] for begin, end in zip([0, *stops], stops, strict=False)]
+def matched(match: Index) -> tuple[Index, Index]:
+    """Return the expected edges that are matched, and the observed edge of each."""
+    pick = np.flatnonzero(match >= 0)
+    return pick, match[pick]
 
 
 def log_density(off: Array, sigma: Array | float, speed: Array) -> Array:
@@ -159,8 +155,6 @@ class Pairing:
         Kind and rod of every expected edge.
     widths
         Width of the rod of every expected edge, m.
-    begins, ends
-        Numbers of observed edges before each train, and of expected edges up to its end.
     """
 
     times: Array
@@ -170,8 +164,6 @@ class Pairing:
     kinds: Index
     rods: Index
     widths: Array
-    begins: Index
-    ends: Index
 
     @classmethod
     def of(cls, trains: Sequence[EdgeTrain], widths: Sequence[float] = ()) -> Pairing:
@@ -200,20 +192,7 @@ class Pairing:
             kinds,
             rods,
             np.array(widths)[rods] if widths else np.full(rods.size, np.inf),
-            np.cumsum([0, *(train.times.size for train in trains)], dtype=np.intp)[:-1],
-            np.cumsum([train.rods.size for train in trains], dtype=np.intp),
         )
-
-    def indices(self, matches: Sequence[Index]) -> tuple[Index, Index]:
-        """Return the matched expected edges, and the observed edge of each."""
-        match = np.concatenate(matches)
-        pick = np.flatnonzero(match >= 0)
-        return pick, (match + self._first)[pick]
-
-    @cached_property
-    def _first(self) -> Index:
-        """Number of the first observed edge in the train of every expected edge."""
-        return self.begins[self.kinds // 2]
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
@@ -286,7 +265,7 @@ class Pairing:
         edge_of[sides[0.5 * length > WIDER * self.widths[sides]]] = -1
         return edge_of
 
-    def match(self, levels: Array, heights: Array, speeds: Array, scale: float) -> list[Index]:
+    def match(self, levels: Array, heights: Array, speeds: Array, scale: float) -> Index:
         """Match the edges to rods.
 
         Parameters
@@ -300,18 +279,12 @@ class Pairing:
 
         Returns
         -------
-        list of ndarray
-            For each train the index of the observed edge for every expected edge, −1 if missed;
-            shape ``(expected,)``.
+        ndarray
+            The observed edge for every expected edge, −1 if missed; shape ``(expected,)``.
         """
         if not levels.size or not self.times.size:
-            return split(np.full(levels.size, -1), self.ends)
-        weights = self.weights(levels, heights, speeds, scale)
-        return self.number_edges(self.chosen(weights, speeds))
-
-    def number_edges(self, edge_of: Index) -> list[Index]:
-        """Convert edge numbers to indices in each train, one array for each train."""
-        return split(np.where(edge_of >= 0, edge_of - self._first, -1), self.ends)
+            return np.full(levels.size, -1)
+        return self.chosen(self.weights(levels, heights, speeds, scale), speeds)
 
 
 class FallFit(NamedTuple):
@@ -321,8 +294,8 @@ class FallFit(NamedTuple):
     ----------
     guess
         Parameters of the fall.
-    edges
-        Observed edge of every expected edge, −1 if missed; a list with an array for each side.
+    match
+        Observed edge of every expected edge, −1 if missed.
     evidence
         Logarithm of the marginal likelihood, relative to all edges being strays.
     scatter
@@ -330,14 +303,19 @@ class FallFit(NamedTuple):
     """
 
     guess: Guess
-    edges: list[Index]
+    match: Index
     evidence: float
     scatter: float
 
     @property
+    def matches(self) -> list[Index]:
+        """`match` in a list, as of a drop with a single side."""
+        return [self.match]
+
+    @property
     def match_count(self) -> int:
         """Number of edges matched to a rod."""
-        return int(np.count_nonzero(self.edges[0] >= 0))
+        return int(np.count_nonzero(self.match >= 0))
 
 
 @dataclass(frozen=True)
@@ -353,8 +331,6 @@ class SideFall:
         The chain, and the edges of its trains.
     stated
         Fall with the protocol's values.
-    gravity
-        Stated gravity, m/s².
     sd
         Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 if known exactly, and
         1 s for the release, which has no prior.
@@ -365,7 +341,6 @@ class SideFall:
     record: ChainRecord
     pairing: Pairing
     stated: Guess
-    gravity: float
     sd: Array
     sigma: Array
 
@@ -387,8 +362,7 @@ class SideFall:
         if record.ratios is not None:
             # Standard deviation of a uniform distribution over the range of α.
             sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
-        stated, gravity = Guess.from_protocol(protocol, record), protocol.gravity.value
-        return cls(record, pairing, stated, gravity, sd, sigma)
+        return cls(record, pairing, Guess.from_protocol(protocol, record), sd, sigma)
 
     @cached_property
     def levels(self) -> Array:
@@ -409,7 +383,7 @@ class SideFall:
         """Lower and upper bounds of the unknowns: drag and gravity stay positive."""
         low, high = np.full(UNKNOWNS, -np.inf), np.full(UNKNOWNS, np.inf)
         low[START] = LOWEST_START - self.stated.start
-        low[PULL] = -0.9 * self.gravity
+        low[PULL] = -0.9 * self.stated.gravity
         low[DRAG] = FAINT - self.stated.kappa  # below FAINT, formulas without drag apply
         low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated.alpha, *ANY_ALPHA)
         exact = self.sd == 0.0
@@ -425,15 +399,19 @@ class SideFall:
         by[COMMON : COMMON + rods, ALPHA] = 1.0
         return by * self.sd
 
+    def values(self, falls: Array) -> Array:
+        """Return falls as the values of a `Guess`, shaped like `falls`."""
+        values: Array = np.array(self.stated) + falls * self.sd
+        return values
+
     def path(self, falls: Array) -> Trajectory:
         """Return the trajectories of falls released at time zero."""
-        off, record = (falls * self.sd).T[..., None], self.record
-        start, gravity = self.stated.start + off[START], self.gravity + off[PULL]
-        kappa = self.stated.kappa + off[DRAG]
+        record = self.record
+        _, start, _, gravity, kappa, alpha = self.values(falls).T[..., None]
         if record.ratios is None:
             return free_trajectory(0.0, start, gravity, kappa, record.air)
         strikes = record.strikes
-        gains = record.alpha + off[ALPHA] + np.zeros(strikes.size)
+        gains = alpha + np.zeros(strikes.size)
         return struck_trajectory(
             0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air
         )
@@ -514,16 +492,9 @@ class SideFall:
         off = height[edges[sides]] - self.levels[sides]
         evidence = float(log_density(off, sigma, speed[edges[sides]]).sum() - lost)
         scatter = math.sqrt(float(((off / sigma) ** 2).sum()) / max(1, sides.size))
-        x, stated = (fall * self.sd).tolist(), self.stated
-        guess = Guess(
-            x[RELEASE] * (1.0 + x[CLOCK]),
-            stated.start + x[START],
-            stated.alpha + x[ALPHA],
-            stated.kappa + x[DRAG],
-            x[CLOCK],
-            x[PULL],
-        )
-        return FallFit(guess, [edges], evidence if math.isfinite(evidence) else -math.inf, scatter)
+        guess = Guess(*self.values(fall).tolist())
+        guess = guess._replace(release=guess.release * (1.0 + guess.clock))
+        return FallFit(guess, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self) -> Array:
         """Return the grid of starting points, the likeliest first.

@@ -8,16 +8,13 @@ averaging does not reduce it. For runs of a joint fit the common part has a sign
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.quantities import COMMON
 from rig.analysis.result import Measured
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
 
 
 def mean(runs: Sequence[Measured]) -> Measured:

@@ -14,30 +14,25 @@ as α, the prediction has the true value: they add nothing to g·g, but 2 e·w w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.distributions import COVERAGE_95, coverage_factor
-from rig.analysis.gate_passages import gate_passages
+from rig.analysis.drop_model import DropModel
+from rig.analysis.dual import Dual
+from rig.analysis.gate_passages import GatePassage, gate_passages
+from rig.analysis.joint_fit import JointFit
+from rig.analysis.joint_step import JointDrop
 from rig.analysis.quantities import BUDGET, COMMON, AdjustedDrop, effective_degrees, measurands
 from rig.analysis.result import Deviation, Measured
 from rig.analysis.unknowns import Side
+from rig.arrays import Array, Flags, Index
 from rig.measurands import MEASURANDS
 from rig.protocol.protocol import GUESSED
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.analysis.drop_model import DropModel
-    from rig.analysis.dual import Dual
-    from rig.analysis.gate_passages import GatePassage
-    from rig.analysis.joint_fit import JointFit
-    from rig.analysis.joint_step import JointDrop
-    from rig.arrays import Array, Flags, Index
-
 
 _LINES = {name: place for place, name in enumerate(BUDGET)}
 _GUESSED = [_LINES[name] for name in ("side", "contact")]

@@ -7,30 +7,25 @@ before the rod strikes the surface, or rods that lie on it.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.analysis.air import unlike
 from rig.analysis.trajectory import ONE
+from rig.arrays import Array, Flags, Index
 from rig.errors import DomainError
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.predictions import air_shares
 from rig.protocol.contact import higher_contacts
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    from numpy.typing import NDArray
-
-    from rig.arrays import Array, Flags, Index
-    from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
-    from rig.records import Drop
-
+from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
+from rig.records import Drop
 
 QUICK = 0.3e-3
 """Edges of a gate closer than this are a flicker of the receiver, not two sides of a rod, s."""
@@ -206,6 +201,21 @@ class ChainRecord:
     def edge_count(self) -> int:
         """Number of edges that a perfect rig would report."""
         return sum(train.rods.size for train in self.trains)
+
+    def by_gate(self, match: Index) -> Iterator[tuple[EdgeTrain, slice, Index]]:
+        """Yield each train, the slice of its expected edges, and the train's edge of each.
+
+        Parameters
+        ----------
+        match
+            For each expected edge of all trains the observed edge of all trains, −1 if missed.
+        """
+        begin = first = 0
+        for train in self.trains:
+            expected = slice(begin, begin + train.rods.size)
+            edges = match[expected]
+            yield train, expected, np.where(edges >= 0, edges - first, -1)
+            begin, first = expected.stop, first + train.times.size
 
 
 def edge_train(

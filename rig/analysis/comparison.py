@@ -8,26 +8,20 @@ the mean of n falls is divided by √n.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.distributions import chi2_tail, coverage_factor
 from rig.analysis.plain_data import attributes, plain
-from rig.analysis.result import Deviation, Measured
+from rig.analysis.result import Deviation, DropResult, Measured
+from rig.arrays import Array
 from rig.measurands import averaged
 from rig.predictions import coefficient_slopes, predicted_run
-from rig.protocol.protocol import GUESSED
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.result import DropResult
-    from rig.arrays import Array
-    from rig.protocol.protocol import Condition, Protocol
-
+from rig.protocol.protocol import GUESSED, Condition, Protocol
 
 _ROUNDING = 1e-12
 

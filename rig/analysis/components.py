@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.protocol.protocol import Priors
-
-if TYPE_CHECKING:
-    from rig.arrays import Array
-    from rig.model.chain import Chain
-    from rig.protocol.protocol import Protocol
+from rig.arrays import Array
+from rig.model.chain import Chain
+from rig.protocol.protocol import Priors, Protocol
 
 _DEFAULT = Priors()
 SHARPEST = 1e-6

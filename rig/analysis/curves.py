@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rig.analysis.distributions import coverage_factor
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import predict_incline
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol
+from rig.protocol.protocol import Protocol
 
 _BEYOND = 5.0  # degrees by which curves extend beyond the outermost inclines
 _STEEPEST = 89.0

@@ -6,27 +6,22 @@ Such gates are reported, never fitted away. If a diagnosis or the fit is odd,
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.annealing import MISSED
-from rig.analysis.chain_records import SIDES
+from rig.analysis.chain_records import SIDES, ChainRecord, EdgeTrain
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import gate_values
+from rig.analysis.fit import Begun, Fit
+from rig.arrays import Index
+from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 from rig.wordings import Severity
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
-
-    from rig.analysis.chain_records import ChainRecord, EdgeTrain
-    from rig.analysis.fit import Begun, Fit
-    from rig.arrays import Index
-    from rig.protocol.protocol import Protocol
-
 
 STRANGE = 0.5
 """Matched share of its expected edges below which a gate disagrees with its chain; below `RIGHT`
@@ -184,7 +179,7 @@ def _gates(fit: Fit) -> list[_Seen]:
     return [
         _Seen(role, train, match, int((match >= 0).sum()), float(off[train.gate]))
         for role, record in fit.model.records.items()
-        for train, match in zip(record.trains, fit.matches[role], strict=True)
+        for train, _, match in record.by_gate(fit.matches[role])
         if match.size
     ]
 
@@ -233,14 +228,15 @@ def gates_too_low(
     struck: list[tuple[EdgeTrain, int, int]] = []
     rods, hidden = 0, 0
     for record in records:
-        for n, train in enumerate(record.trains):
+        match = np.full(record.edge_count, -1) if begun is None else begun.matches[record.role]
+        for train, _, edges in record.by_gate(match):
             due = np.unique(train.rods).size
             if not due or not train.times.size:
                 continue
             if begun is None:
                 unseen = max(0, due - train.times.size * due // train.rods.size)
             else:
-                unseen = np.unique(train.rods[begun.matches[record.role][n] < 0]).size
+                unseen = np.unique(train.rods[edges < 0]).size
             rods, hidden = rods + due, hidden + unseen
             if record.role == "impact":
                 struck.append((train, due, unseen))

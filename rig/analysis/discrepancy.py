@@ -10,19 +10,14 @@ chain as a whole, times a function that grows in time and a function that soon b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.trajectory import free_trajectory, struck_trajectory
-
-if TYPE_CHECKING:
-    from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.equations import ExpectedEdges
-    from rig.analysis.trajectory import Trajectory
-    from rig.arrays import Array, Index
-    from rig.protocol.protocol import Protocol
-
+from rig.analysis.chain_records import ChainRecord
+from rig.analysis.equations import ExpectedEdges
+from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
+from rig.arrays import Array, Index
+from rig.protocol.protocol import Protocol
 
 LOWEST_START = 1e-3
 """Least drop height of a striking chain, m: a trial step may go below the surface."""

@@ -3,44 +3,36 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
 
 import numpy as np
 
+from rig.analysis.annealing import LEAST
 from rig.analysis.budgets import Budgets
-from rig.analysis.chain_records import chain_records, thin
-from rig.analysis.components import priors
+from rig.analysis.chain_records import ChainRecord, chain_records, thin
+from rig.analysis.components import Components, priors
 from rig.analysis.diagnoses import FEW_GATES, gates_too_low, silent
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer, name_fault
 from rig.analysis.faults import Premise
-from rig.analysis.fit import DropFit, refit_at_rate
+from rig.analysis.fit import Begun, DropFit, Fit, refit_at_rate, settle
 from rig.analysis.gravity import free_gravity
-from rig.analysis.identify import identify_drop
+from rig.analysis.identify import DropIdentity, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
-from rig.analysis.result import GOOD, Audit, DropResult
+from rig.analysis.result import GOOD, Audit, Deviation, DropResult
 from rig.analysis.verdict import judge, judge_record, verdict_of
+from rig.arrays import Array
+from rig.clock.calibration import TimeScale
 from rig.protocol.contact import at_contact
-from rig.reasons import make_reason
+from rig.protocol.protocol import Protocol, Run
+from rig.reasons import Reason, make_reason
+from rig.records import Drop
 from rig.threads import one_thread
 from rig.wordings import Severity
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.components import Components
-    from rig.analysis.fit import Begun, Fit
-    from rig.analysis.identify import DropIdentity
-    from rig.analysis.result import Deviation
-    from rig.arrays import Array
-    from rig.clock.calibration import TimeScale
-    from rig.protocol.protocol import Protocol, Run
-    from rig.reasons import Reason
-    from rig.records import Drop
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +75,8 @@ class DropSummary:
         return replace(self, result=replace(self.result, quantities=quantities))
 
 
-class DropCase(NamedTuple):
+@dataclass(frozen=True)
+class DropCase:
     """A drop to be analysed, with its protocol and time scale.
 
     Attributes
@@ -138,10 +131,10 @@ class DropCase(NamedTuple):
         aside = summary.aside
         if aside is None:
             return None
-        case = self._at_contact()._replace(aside=aside)
+        case = replace(self._at_contact(), aside=aside)
         begun = summary.identified[aside].begun
         assert begun is not None
-        return DropFit(case._model(case._records(), begun), begun.matches, summary.x)
+        return DropFit(case._model(begun), begun.matches, summary.x)
 
     @one_thread
     def read(
@@ -163,8 +156,8 @@ class DropCase(NamedTuple):
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         case = stated = self._at_contact()
         begun = stated._identify(readings).begun
-        while low := gates_too_low(self.protocol, case._records(), begun):
-            case = case._replace(aside=(*case.aside, *low))
+        while low := gates_too_low(self.protocol, case.records, begun):
+            case = replace(case, aside=(*case.aside, *low))
             begun = case._identify(readings, begun).begun
             without = result, _ = case._judge(readings, explain=False)
             if not _wrong(result.reasons):
@@ -175,32 +168,44 @@ class DropCase(NamedTuple):
         run, protocol = self.run, self.protocol
         components = self.components or priors(protocol)
         protocol = at_contact(protocol, run.incline_deg, run.impact)
-        return self._replace(protocol=protocol, components=components)
+        return replace(self, protocol=protocol, components=components)
 
-    def _records(self) -> list[ChainRecord]:
+    @cached_property
+    def records(self) -> list[ChainRecord]:
+        """Each chain with its edges."""
         return chain_records(self.protocol, self.run, self.drop, self.scale.hz, self.aside)
 
-    def _model(self, records: Sequence[ChainRecord], begun: Begun) -> DropModel:
-        return DropModel.of(self.protocol, records, begun.guesses, self.scale.u, self.components)
+    def _model(self, begun: Begun) -> DropModel:
+        about = begun.guesses, self.scale.u, self.components
+        return DropModel.of(self.protocol, self.records, *about)
 
     def _identify(
         self, readings: dict[tuple[int, ...], DropIdentity], before: Begun | None = None
     ) -> DropIdentity:
         """Return the identification without the gates `aside`, at a rounded time scale."""
-        protocol, run, drop, scale, components, aside = self
-        assert components is not None
-        rough, reading = scale.coarse(), readings.get(aside)
-        if reading is None or reading.scale != rough:
-            reading = identify_drop(protocol, run, drop, rough, components, aside, before)
-            readings[aside] = reading
+        rough, reading = replace(self, scale=self.scale.coarse()), readings.get(self.aside)
+        if reading is None or reading.scale != rough.scale:
+            readings[self.aside] = reading = rough._identify_anew(before)
         return reading
+
+    def _identify_anew(self, before: Begun | None) -> DropIdentity:
+        """Identify the drop's edges; `before` is a fit of the same drop with more gates."""
+        if before is not None:
+            return DropIdentity(self.scale, {}, begun=settle(self._model(before), x=before.x).begun)
+        assert self.components is not None
+        about = self.protocol, self.records, self.scale.u, self.components
+        identification = identify(*about, -math.inf if self.drop.fire_tick is None else 0.0)
+        unlike = pattern_faults(identification, self.protocol.vocabulary)
+        poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
+        fit = None if unlike else identification.fit
+        return DropIdentity(self.scale, unlike, poor, fit.begun if fit else None)
 
     def _judge(
         self, readings: dict[tuple[int, ...], DropIdentity], *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
         """Return the result and fit of an identified drop."""
-        protocol, run, drop, scale, _, aside = self
-        records, reading = self._records(), readings[aside]
+        protocol, run, drop, records = self.protocol, self.run, self.drop, self.records
+        reading = readings[self.aside]
         audit = _blank_audit(drop, records)
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()
@@ -210,11 +215,11 @@ class DropCase(NamedTuple):
             if reading.unlike and explain:
                 if reading.explained is None:
                     reading = replace(reading, explained=self._unlike_fall(reading))
-                    readings[aside] = reading
+                    readings[self.aside] = reading
                 reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
         begun = reading.begun
-        fit = refit_at_rate(self._model(records, begun), begun, scale.hz / reading.scale.hz)
+        fit = refit_at_rate(self._model(begun), begun, self.scale.hz / reading.scale.hz)
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.match_count, count_unexplained(unmatched))
         joint = by_itself(fit)
@@ -231,7 +236,7 @@ class DropCase(NamedTuple):
         end = judge(protocol, run, drop, audit, measured, fit, by_passages, unmatched)
         reasons = end.reasons
         if not end.known and (explain if _wrong(reasons) else verdict_of(reasons) != "void"):
-            explainer = self._explainer(scale, end.suspects)
+            explainer = self._explainer(self.scale, end.suspects)
             if end.odd or explainer.suggests_fault(fit):
                 causes = [cause for cause in explainer.explain(fit) if cause.whole]
                 if why := name_fault(causes, protocol.vocabulary, end.accused):
@@ -243,7 +248,7 @@ class DropCase(NamedTuple):
             reasons,
             audit,
             measured,
-            fit.rods,
+            fit.rods_of(len(drop.edges)),
             fit.estimate.scatter,
             unmatched=unmatched,
             last_passages=by_passages,

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
 from rig.analysis.air import prior_air
-from rig.analysis.annealing import PART, Guess, Pairing, SideFall
+from rig.analysis.annealing import PART, Guess, Pairing, SideFall, matched
+from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import SHARPEST, Components, priors
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
 from rig.analysis.equations import STRAY, Equations, ExpectedEdges, Residuals, Seen
@@ -21,20 +23,14 @@ from rig.analysis.trajectory import (
     GRAVITY,
     RELEASE,
     START,
+    Trajectory,
     free_trajectory,
     struck_trajectory,
 )
-from rig.analysis.unknowns import Unknowns, side_slopes
+from rig.analysis.unknowns import Unknown, Unknowns, side_slopes
+from rig.arrays import Array, Flags, Index
+from rig.protocol.protocol import Protocol
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.trajectory import Trajectory
-    from rig.analysis.unknowns import Unknown
-    from rig.arrays import Array, Flags, Index
-    from rig.protocol.protocol import Protocol
 
 _TOLD = 0.5
 """Share of the prior uncertainty of strike heights that is assumed to remain during a fit. With
@@ -90,11 +86,10 @@ class DropModel:
         self.expected: dict[str, ExpectedEdges] = {
             role: ExpectedEdges.of(record, protocol) for role, record in self.records.items()
         }
-        self.pairings: dict[str, Pairing] = _pairings(records)
         if "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
             self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
-        self._seen: dict[str, tuple[Sequence[Index], Seen]] = {}
+        self._seen: dict[str, tuple[Index, Seen]] = {}
         self.unknowns = Unknowns(self)
         self.slopes = {role: side_slopes(self, role) for role in self.records}
 
@@ -117,7 +112,6 @@ class DropModel:
         content = tuple(map(_expectations, records))
         return _model_of(_Condition(protocol, content, tuple(records))).copy_with(
             records={record.role: record for record in records},
-            pairings=_pairings(records),
             guesses=_stated_guesses(protocol, records) if guesses is None else guesses,
             clock_u=clock_u,
             components=components or priors(protocol),
@@ -125,27 +119,36 @@ class DropModel:
 
     def copy_with(self, **attributes: Any) -> DropModel:
         """Return a copy with these attributes, and with priors recomputed from them."""
-        model = copy(self)
-        vars(model).update(attributes, _seen={})
+        model = self.with_edges(attributes.pop("records", self.records))
+        vars(model).update(attributes)
         model.unknowns = Unknowns(model)
         if "suspects" in attributes:
             model.slopes = {role: side_slopes(model, role) for role in model.records}
         return model
 
-    def with_priors(self, components: Components, clock_u: float, x: Array) -> DropModel:
-        """Return a copy with other priors; the prior of impulses is relative to the fitted α.
+    def refer(self, x: Array, guesses: Mapping[str, Guess]) -> None:
+        """Make unknowns that are relative to other guesses relative to those of this model."""
+        for role, guess in guesses.items():
+            own, at = self.guesses[role], self.unknowns
+            x[..., at[f"{role} release"]] += guess.release - own.release
+            if role == "impact":
+                x[..., at["alpha"]] += guess.alpha - own.alpha
 
-        Parameters
-        ----------
-        x
-            Unknowns; α moves into the guess, and its unknown is set to zero in place.
-        """
-        guesses = dict(self.guesses)
-        if "impact" in guesses:
-            at, struck = self.unknowns["alpha"], guesses["impact"]
-            guesses["impact"] = replace(struck, alpha=struck.alpha + float(x[at][0]))
-            x[at] = 0.0
-        return self.copy_with(components=components, clock_u=clock_u, guesses=guesses)
+    def with_edges(self, records: Mapping[str, ChainRecord]) -> DropModel:
+        """Return a copy with the edges of other records of the same condition."""
+        model = copy(self)
+        vars(model).update(records=records, _seen={})
+        if records is not self.records:
+            vars(model).pop("pairings", None)
+        return model
+
+    @cached_property
+    def pairings(self) -> dict[str, Pairing]:
+        """Edges of each side, prepared for matching."""
+        return {
+            role: Pairing.of(record.trains, record.rebound_widths)
+            for role, record in self.records.items()
+        }
 
     def side(self, role: str) -> SideFall:
         """Return a side for annealing; all other unknowns count as scatter of its edges."""
@@ -197,7 +200,7 @@ class DropModel:
         x[self.unknowns["drop"]] = start - self.protocol.drop.value
         x[self.unknowns["clock"]] = np.mean([guess.clock for guess in guesses])
         if "free" in self.guesses and self.protocol.surface is None:
-            x[self.unknowns["gravity"]] = self.guesses["free"].pull
+            x[self.unknowns["gravity"]] = self.guesses["free"].gravity - self.protocol.gravity.value
         x[self.unknowns["drag"]] = max(guess.kappa for guess in guesses) - self._kappa
         return x
 
@@ -209,23 +212,36 @@ class DropModel:
         """Return κ of the first chain as a whole, 1/m."""
         return self._kappa + float(x[self.unknowns["drag"]][0])
 
+    def alphas(self, x: Array) -> Array:
+        """Return the mean α of the impacts of a drop, or of many."""
+        alphas: Array = self.guesses["impact"].alpha + x[..., self.unknowns["alpha"]]
+        return alphas
+
     def trajectory(self, role: str, x: Array) -> Trajectory:
-        """Return the trajectory of one side for given unknowns."""
-        return _path_at(self, role, x.tobytes())
+        """Return the trajectory of one side for given unknowns, or those of many drops.
+
+        Parameters
+        ----------
+        x
+            Shape ``(unknowns,)`` or ``(drops, unknowns)``.
+        """
+        return _path_at(self, role, x.tobytes(), x.shape)
 
     def _trajectory(self, role: str, x: Array) -> Trajectory:
-        record, parameters = self.records[role], self.slopes[role].path @ x
-        parameters[RELEASE] += self.guesses[role].release
-        parameters[START] += self.protocol.drop.value
-        parameters[GRAVITY] += self.protocol.gravity.value
-        parameters[DRAG] += self._kappa
-        release, start, gravity, kappa = parameters[:COMMON].tolist()
-        if not gravity > 0.0:
-            gravity = math.nan  # nothing falls: NaN keeps a fit from ending here
+        record, parameters = self.records[role], x @ self.slopes[role].path.T
+        parameters[..., RELEASE] += self.guesses[role].release
+        parameters[..., START] += self.protocol.drop.value
+        parameters[..., GRAVITY] += self.protocol.gravity.value
+        parameters[..., DRAG] += self._kappa
+        common = np.moveaxis(parameters[..., :COMMON, None], -2, 0)
+        release, start, gravity, kappa = common if x.ndim > 1 else common[:, 0].tolist()
+        if not np.all(gravity > 0.0):
+            # Nothing falls: NaN keeps a fit from ending here.
+            gravity = np.where(gravity > 0.0, gravity, math.nan)
         if record.ratios is None:
             return free_trajectory(release, start, gravity, kappa, record.air)
-        start = max(start, LOWEST_START)
-        gains, places = parameters[COMMON:].reshape(2, -1)
+        start = np.maximum(start, LOWEST_START)
+        gains, places = np.split(parameters[..., COMMON:], 2, axis=-1)
         gains += self.guesses[role].alpha
         places += record.strikes
         return struck_trajectory(
@@ -239,32 +255,34 @@ class DropModel:
 
     def all_levels(self, role: str, x: Array) -> Array:
         """Return the height of the reference point at every expected edge of a side, m."""
-        return _levels_at(self, role, x.tobytes())
+        return _levels_at(self, role, x.tobytes(), x.shape)
 
-    def _matched_edges(self, role: str, matches: Sequence[Index]) -> Seen:
+    def _matched_edges(self, role: str, match: Seen | Index) -> Seen:
         """Collect the matched edges; cached, as a matching lasts for many steps of a fit."""
+        if isinstance(match, Seen):
+            return match
         last, seen = self._seen.get(role, (None, None))
-        if seen is None or last is not matches:
+        if seen is None or last is not match:
             pairing = self.pairings[role]
-            pick, edge = pairing.indices(matches)
+            pick, edge = matched(match)
             seen = self.expected[role].seen(pick, pairing.times[edge], pairing.burst[edge])
-            self._seen[role] = matches, seen
+            self._seen[role] = match, seen
         return seen
 
-    def residuals(self, role: str, x: Array, matches: Sequence[Index]) -> Residuals:
-        """Return the residuals of one side's matched edges."""
-        seen = self._matched_edges(role, matches)
-        times = seen.times * self.rate(x)
+    def residuals(self, role: str, x: Array, match: Seen | Index) -> Residuals:
+        """Return the residuals of one side's matched edges, of one drop or of many."""
+        seen = self._matched_edges(role, match)
+        times = seen.times * self._rates(x)
         path = self.trajectory(role, x)
         height, speed = path.heights(times)
-        values = height - self.all_levels(role, x)[seen.pick]
+        values = height - self.all_levels(role, x)[..., seen.pick]
         loose = np.where(seen.alone, 0.0, path.loose(times))
         return Residuals(values, self._sigma(seen, speed, loose), speed, seen.burst == 0.0, loose)
 
-    def decorrelate(self, role: str, rows: Residuals, matches: Sequence[Index]) -> Residuals:
+    def decorrelate(self, role: str, rows: Residuals, match: Index) -> Residuals:
         """Return residuals made independent: both edges of a rod share a departure."""
         rows = rows._replace(values=rows.values.copy(), sigma=rows.sigma.copy())
-        self._part(self._matched_edges(role, matches), rows.loose > 0.0, rows.values, rows.sigma)
+        self._part(self._matched_edges(role, match), rows.loose > 0.0, rows.values, rows.sigma)
         return rows
 
     def _part(self, seen: Seen, struck: Flags, values: Array, sigma: Array) -> Array:
@@ -273,12 +291,12 @@ class DropModel:
         They share a departure at a beam: the part of the second that the first predicts is
         subtracted (Cholesky of a 2 × 2 covariance).
         """
-        together = seen.paired[:-1] & struck[:-1] & struck[1:]
-        first, shared = np.flatnonzero(together), self.components.departure**2
-        carried = np.zeros(values.size)
-        carried[first + 1] = share = shared / sigma[first] ** 2
-        values[first + 1] -= share * values[first]
-        sigma[first + 1] = np.sqrt(sigma[first + 1] ** 2 - share * shared)
+        together = seen.paired[:-1] & struck[..., :-1] & struck[..., 1:]
+        first, shared = np.nonzero(together), self.components.departure**2
+        second, carried = _next(first, 1), np.zeros(values.shape)
+        carried[second] = share = shared / sigma[first] ** 2
+        values[second] -= share * values[first]
+        sigma[second] = np.sqrt(sigma[second] ** 2 - share * shared)
         return carried
 
     def _sigma(self, seen: Seen, speed: Array, loose: Array) -> Array:
@@ -289,41 +307,53 @@ class DropModel:
         sigma: Array = np.sqrt(variance + scales.departures(loose))
         return sigma
 
-    def equations(self, role: str, x: Array, matches: Sequence[Index]) -> Equations:
-        """Return the observation equations of one side's matched edges.
+    def equations(self, role: str, x: Array, match: Seen | Index) -> Equations:
+        """Return the observation equations of one side's matched edges, of one drop or of many.
 
         Derivatives are taken at the expected time of an edge, not at its stamp. Otherwise they
         would depend on the stamp's error, and bias the clock rate towards a slow clock.
         """
-        acts, seen = self.slopes[role], self._matched_edges(role, matches)
-        stamped = self.residuals(role, x, matches)
+        acts, seen, rate = self.slopes[role], self._matched_edges(role, match), self._rates(x)
+        stamped = self.residuals(role, x, match)
         late = np.zeros_like(stamped.values)
         near = (np.abs(stamped.values) <= STRAY * stamped.sigma) & (stamped.speed > 0.0)
         np.divide(stamped.values, stamped.speed, out=late, where=near)
-        times, path = seen.times * self.rate(x) + late, self.trajectory(role, x)
+        times, path = seen.times * rate + late, self.trajectory(role, x)
         height, speed, moved = path.sights(times, acts.moving, _strike_u(self, role))
-        values = height - self.all_levels(role, x)[seen.pick] + speed * late
+        values = height - self.all_levels(role, x)[..., seen.pick] + speed * late
         sigma = self._sigma(seen, speed, stamped.loose)
-        slopes = acts.sights.take(seen.pick, axis=0)
-        slopes[:, : moved.shape[1]] += moved
+        slopes = np.empty((*values.shape, acts.columns.size))
+        slopes[:] = acts.sights.take(seen.pick, axis=0)
+        slopes[..., : moved.shape[-1]] += moved
         # With a slow clock the true time is later, and the chain is lower.
         rates = self.unknowns.rate[acts.columns[acts.clocks]]
-        slopes[:, acts.clocks] -= np.outer(speed * times / self.rate(x), rates)
+        slopes[..., acts.clocks] -= (speed * times / rate)[..., None] * rates
         carried = self._part(seen, stamped.loose > 0.0, values, sigma)
-        second = np.flatnonzero(carried)
-        slopes[second] -= carried[second, None] * slopes[second - 1]
+        second = np.nonzero(carried)
+        slopes[second] -= carried[second][:, None] * slopes[_next(second, -1)]
         residuals = stamped._replace(values=values, sigma=sigma, speed=speed)
         return Equations(residuals, carried, slopes, acts.columns)
 
+    def _rates(self, x: Array) -> Array:
+        """Return the factor from stamped times to true times, shape ``(1,)`` or ``(drops, 1)``."""
+        rates: Array = 1.0 + (x @ self.unknowns.rate)[..., None]
+        return rates
+
+
+def _next(places: tuple[Index, ...], step: int) -> tuple[Index, ...]:
+    """Return the places of the edges beside those at some places."""
+    return *places[:-1], places[-1] + step
+
 
 @lru_cache(maxsize=_RECENT)
-def _path_at(model: DropModel, role: str, x: bytes) -> Trajectory:
-    return model._trajectory(role, np.frombuffer(x))
+def _path_at(model: DropModel, role: str, x: bytes, shape: tuple[int, ...]) -> Trajectory:
+    return model._trajectory(role, np.frombuffer(x).reshape(shape))
 
 
 @lru_cache(maxsize=_RECENT)
-def _levels_at(model: DropModel, role: str, x: bytes) -> Array:
-    levels: Array = model.expected[role].levels + model.slopes[role].levels @ np.frombuffer(x)
+def _levels_at(model: DropModel, role: str, x: bytes, shape: tuple[int, ...]) -> Array:
+    moved = np.frombuffer(x).reshape(shape) @ model.slopes[role].levels.T
+    levels: Array = model.expected[role].levels + moved
     return levels
 
 
@@ -370,7 +400,3 @@ def _expectations(record: ChainRecord) -> tuple[object, ...]:
 
 def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
     return {record.role: Guess.from_protocol(protocol, record) for record in records}
-
-
-def _pairings(records: Sequence[ChainRecord]) -> dict[str, Pairing]:
-    return {record.role: Pairing.of(record.trains, record.rebound_widths) for record in records}

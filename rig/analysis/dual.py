@@ -6,12 +6,11 @@ Forward-mode automatic differentiation (Griewank and Walther 2008, chapter 3).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from rig.arrays import Array
+from rig.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,24 +8,19 @@ a rebounding rod, a later passage of the object, or unexplained.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from rig.analysis.annealing import MISSED, STRAYS, split
-from rig.analysis.chain_records import QUICK, WIDER
+from rig.analysis.annealing import MISSED, STRAYS
+from rig.analysis.chain_records import QUICK, WIDER, ChainRecord, EdgeTrain
+from rig.analysis.fit import Fit
+from rig.analysis.joint_step import JointDrop
 from rig.analysis.plain_data import attributes
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from rig.analysis.chain_records import ChainRecord, EdgeTrain
-    from rig.analysis.fit import Fit
-    from rig.analysis.joint_step import JointDrop
-    from rig.analysis.trajectory import Trajectory
-    from rig.arrays import Array, Index
-
+from rig.analysis.trajectory import Trajectory
+from rig.arrays import Array, Index
 
 EdgeClass = Literal[
     "missed",
@@ -100,14 +95,14 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     for role, record in model.records.items():
         path = model.trajectory(role, x)
         lowest = min(gates[train.gate].height for train in record.trains)
-        by_gate = split(model.all_levels(role, x), model.expected[role].ends)
-        for train, levels, match in zip(record.trains, by_gate, drop.matches[role], strict=True):
+        due = path.times(model.all_levels(role, x)) / clock
+        for train, expected, match in record.by_gate(drop.matches[role]):
             gate = gates[train.gate]
             # Only the lowest beam is within reach of rebounding rods.
             near = gate.height == lowest and record.ratios is not None
             hit = float(path.time[1]) / clock if near else np.inf
             if (match < 0).any():
-                unmatched += _absent(gate.channel, train, match, path.times(levels) / clock)
+                unmatched += _absent(gate.channel, train, match, due[expected])
             if train.times.size > (match >= 0).sum():
                 back = later_passages(record, train, match, path, model.protocol.gravity.value)
                 unmatched += _surplus(gate.channel, train, match, hit, back)

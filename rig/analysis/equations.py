@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.analysis.chain_records import ChainRecord
 from rig.analysis.square_root import EquationRows
 from rig.analysis.swing import drawn, lever, strike_shifts
+from rig.arrays import Array, Flags, Index
+from rig.protocol.protocol import Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.chain_records import ChainRecord
     from rig.analysis.drop_model import DropModel
-    from rig.arrays import Array, Flags, Index
-    from rig.protocol.protocol import Protocol
 
-    Matches = Mapping[str, Sequence[Index]]
+    Matches = Mapping[str, Index] | Mapping[str, "Seen"]
 
 HUBER = 4.0
 """Standard deviations beyond which an edge is given less weight."""
@@ -31,7 +30,7 @@ about its middle and rebounds elastically (Eq. 5 with β = 1 and ξ = ⅓)."""
 
 
 class Residuals(NamedTuple):
-    """Residuals of one side's matched edges, shape ``(edges,)`` each.
+    """Residuals of one side's matched edges, shape ``(edges,)`` each; of many ``(drops, edges)``.
 
     Attributes
     ----------
@@ -96,7 +95,7 @@ class Seen(NamedTuple):
 
 
 class ExpectedEdges(NamedTuple):
-    """The expected edges of a side, gate by gate; shape ``(edges,)`` each but for `ends`.
+    """The expected edges of a side, gate by gate; shape ``(edges,)`` each.
 
     Attributes
     ----------
@@ -112,8 +111,6 @@ class ExpectedEdges(NamedTuple):
         Whether the top rod falls alone, all rods below having struck.
     landed
         Standard deviation of its rod's height from a possible earlier strike, m.
-    ends
-        Cumulative number of expected edges after each gate.
     """
 
     rods: Index
@@ -124,7 +121,6 @@ class ExpectedEdges(NamedTuple):
     drawn: Array
     alone: Flags
     landed: Array
-    ends: Index
 
     @classmethod
     def of(cls, record: ChainRecord, protocol: Protocol) -> ExpectedEdges:
@@ -156,7 +152,6 @@ class ExpectedEdges(NamedTuple):
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             last_falling,
             _landing_sd(u, to_strike),
-            np.cumsum(expected),
         )
 
     def seen(self, pick: Index, times: Array, burst: Array) -> Seen:
@@ -239,7 +234,7 @@ def linearize(
         residuals = side.values / sigma
         root = np.sqrt(robust_weights(residuals, cut))
         residuals *= root
-        slopes *= (root / sigma)[:, None]  # in place: no other reference exists
+        slopes *= (root / sigma)[..., None]  # in place: no other reference exists
         rows[role] = EquationRows(slopes, residuals, columns)
         squares = residuals * residuals
         chi2 += float(squares.sum())

@@ -12,22 +12,15 @@ it explains (also an EM step), which keeps all positive. No component falls belo
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.components import LEAST_SHARE, above
-from rig.analysis.equations import STRAY
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from rig.analysis.components import Components
-    from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import Residuals
-    from rig.arrays import Array
-
+from rig.analysis.components import LEAST_SHARE, Components, above
+from rig.analysis.drop_model import DropModel
+from rig.analysis.equations import STRAY, Residuals
+from rig.arrays import Array
 
 STATED_WEIGHT = 2.0
 """Members that a stated uncertainty counts for: a scale known to 50 % (GUM G.4.2)."""
@@ -77,32 +70,34 @@ class Evidence:
         kind
             Component that scales their prior; empty for a block without a variance component.
         y, root
-            Estimates, and R of their covariance RRᵀ, which is diagonalized here.
+            Estimates, and R of their covariance RRᵀ, which is diagonalized here; of many drops
+            with these as a first dimension.
         """
         if kind and y.size:
-            variances, sums = np.linalg.eigh(root @ root.T)
+            variances, sums = np.linalg.eigh(root @ np.swapaxes(root, -1, -2))
             told = np.maximum(1.0 - variances, np.finfo(float).eps)
             size = np.full(y.size, getattr(self.components, kind) ** -2)
-            rows = [size, ((y @ sums) / told) ** 2, variances / told, np.ones_like(y)]
+            squares = ((y[..., None, :] @ sums)[..., 0, :] / told) ** 2
+            rows = [size, squares.ravel(), (variances / told).ravel(), np.ones(y.size)]
             self._members.setdefault((kind,), []).append(np.stack(rows))
 
-    def drop(self, model: DropModel, y: Array, root: Array) -> None:
-        """Add a drop's own unknowns; `y` and `root` as in `members`."""
+    def drops(self, model: DropModel, y: Array, root: Array) -> None:
+        """Add the own unknowns of drops of a condition; `y` and `root` as in `members`."""
         at = model.unknowns
         for name, row in at.rows.items():
             # After the first strike, other departures of a chain look like swing.
             if row.shared == "drop" and name in at and name != "impact swing":
-                self.members(row.scale, y[at[name]], root[at[name]])
+                self.members(row.scale, y[:, at[name]], root[:, at[name]])
         if "impulses" in at:
-            # Convert to units of α², as drops may differ in α.
+            # Convert to units of α², as conditions may differ in α.
             block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
-            squares = (y[block] * at.sd[block]) ** 2
-            record, size = model.records["impact"], np.full(squares.size, alpha**2)
+            squares = (y[:, block] * at.sd[block]) ** 2
+            record, size = model.records["impact"], np.full(squares.shape, alpha**2)
             single = size / above(record.chain.chain) ** 2
-            told = 1.0 - np.sum(root[block] ** 2, axis=1)
+            told = 1.0 - np.sum(root[:, block] ** 2, axis=-1)
             even = size * record.uneven**2
             rows = [even, np.ones_like(size), single, squares, np.zeros_like(size), told]
-            self._members.setdefault(_IMPULSES, []).append(np.stack(rows))
+            self._members.setdefault(_IMPULSES, []).append(np.stack(rows).reshape(len(rows), -1))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:
         """Add residuals of edges outside flickers.

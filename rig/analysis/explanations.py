@@ -12,36 +12,35 @@ departs from the equations. Only a fault with clear odds against all rivals is n
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.air import prior_air
 from rig.analysis.annealing import LEAST, MISSED
-from rig.analysis.chain_records import chain_records
+from rig.analysis.chain_records import ChainRecord, chain_records
+from rig.analysis.components import Components
 from rig.analysis.diagnoses import RIGHT
-from rig.analysis.faults import Fault, faults
-from rig.analysis.fit import settle
-from rig.analysis.identify import held_back, most_votes, possible, read_quickly, weigh, well_read
+from rig.analysis.faults import Fault, Premise, faults
+from rig.analysis.fit import Fit, settle
+from rig.analysis.identify import (
+    Reading,
+    held_back,
+    most_votes,
+    possible,
+    read_quickly,
+    weigh,
+    well_read,
+)
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
-from rig.reasons import make_reason
-
-if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Sequence
-
-    from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.components import Components
-    from rig.analysis.faults import Premise
-    from rig.analysis.fit import Fit
-    from rig.analysis.identify import Reading
-    from rig.arrays import Array
-    from rig.reasons import Reason
-    from rig.records import Drop
-    from rig.vocabulary import Vocabulary
-
+from rig.arrays import Array
+from rig.reasons import Reason, make_reason
+from rig.records import Drop
+from rig.vocabulary import Vocabulary
 
 CLEAR = math.log(100.0)
 """Least log odds of a named fault against every rival and the stated protocol. Also the cost of a
@@ -170,9 +169,7 @@ class Explainer:
             return
         scales = self.components
         wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
-        x = fit.x.copy()
-        model = fit.model.with_priors(wider, self.clock_u, x)
-        reading = weigh(settle(model, x=x))
+        reading = weigh(settle(fit.model.copy_with(components=wider), x=fit.x.copy()))
         log_odds = self._absolute(reading, self.setting.hz) - CLEAR - stated
         yield Explanation(NEITHER, {}, log_odds, whole=True)
 
@@ -188,7 +185,7 @@ class Explainer:
         missed = sum(
             train.rods.size - np.setdiff1d(train.rods, train.rods[match >= 0]).size
             for role, record in fit.model.records.items()
-            for train, match in zip(record.trains, fit.matches[role], strict=True)
+            for train, _, match in record.by_gate(fit.matches[role])
         )
         return reading.evidence + ticks + missed * math.log(MISSED)
 

@@ -7,21 +7,17 @@ A fault is a change of the premise with which a drop is analysed, and the reason
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, repeat
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rig.analysis.drop_model import DropModel
 from rig.analysis.unknowns import Unknown
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-
-    from rig.analysis.drop_model import DropModel
-    from rig.arrays import Array
-    from rig.protocol.protocol import Gate, Gates, Protocol, RodChain, Run
-
+from rig.arrays import Array
+from rig.protocol.protocol import Gate, Gates, Protocol, RodChain, Run
 
 _MORE = 3  # rods by which a chain may differ
 _WIDER = 0.5  # share of the thinnest rod by which rods may differ in thickness

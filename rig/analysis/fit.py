@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
-from rig.analysis.annealing import split
+from rig.analysis.annealing import Guess, matched
+from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
+from rig.arrays import Array, Index
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.annealing import Guess
-    from rig.analysis.drop_model import DropModel
-    from rig.arrays import Array, Index
-
-    Matches = dict[str, list[Index]]
+Matches = dict[str, Index]
 
 CLOSE = 0.1
 """Length of a drop's last step in standard uncertainties; convergence is quadratic. With half of it
@@ -30,12 +26,12 @@ _MEDIANS = 2.2
 """Standard deviations for a median: 1/0.6745, times 1.5 for the scatter of few edges."""
 
 
-def count_matched(side: Sequence[Index]) -> int:
+def count_matched(match: Index) -> int:
     """Return the number of matched edges of a side."""
-    return int(np.count_nonzero(np.concatenate(side) >= 0))
+    return int(np.count_nonzero(match >= 0))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class DropFit:
     """A drop with matched edges and fitted unknowns.
 
@@ -57,17 +53,20 @@ class DropFit:
     @property
     def rods(self) -> dict[int, int]:
         """Rod of every matched edge, by its number in the drop."""
-        return {
-            edge: rod
-            for role, record in self.model.records.items()
-            for train, match in zip(record.trains, self.matches[role], strict=True)
-            for edge, rod in zip(
-                train.edge[match[match >= 0]].tolist(), train.rods[match >= 0].tolist(), strict=True
-            )
-        }
+        rods: dict[int, int] = {}
+        for role, record in self.model.records.items():
+            for train, _, match in record.by_gate(self.matches[role]):
+                pick, edge = matched(match)
+                rods |= zip(train.edge[edge].tolist(), train.rods[pick].tolist(), strict=True)
+        return rods
+
+    def rods_of(self, edges: int) -> tuple[int, ...]:
+        """Return the rod of each of the drop's edges, −1 if it belongs to none."""
+        rods = self.rods
+        return tuple(rods.get(n, -1) for n in range(edges))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit(DropFit):
     """A drop fitted by itself."""
 
@@ -97,10 +96,7 @@ def settle(model: DropModel, matches: Matches | None = None, x: Array | None = N
         estimate = adjust(model, matches, x, done=done, scatter=scatter, rough=rough)
         used, x, scatter = matches, estimate.x, estimate.scatter
         again = without_strays(model, x, match(model, x), scatter)
-        alike = all(
-            np.array_equal(np.concatenate(side), np.concatenate(again[role]))
-            for role, side in used.items()
-        )
+        alike = all(np.array_equal(side, again[role]) for role, side in used.items())
         if alike and not rough:
             break
         # Keep the same object if the matches are equal, as results are cached for it.
@@ -158,7 +154,7 @@ def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float 
     return {role: _kept(model, role, x, side, scatter) for role, side in matches.items()}
 
 
-def _kept(model: DropModel, role: str, x: Array, side: list[Index], scatter: float) -> list[Index]:
+def _kept(model: DropModel, role: str, x: Array, side: Index, scatter: float) -> Index:
     rows = model.residuals(role, x, side)
     far = np.abs(rows.values) / rows.sigma
     # Strays enlarge the scatter, so the limit also uses the median, which is robust.
@@ -175,6 +171,6 @@ def _kept(model: DropModel, role: str, x: Array, side: list[Index], scatter: flo
         stray[either] |= far[either] > 0.5 * limit
     if not stray.any():
         return side
-    line = np.concatenate(side)
-    line[np.flatnonzero(line >= 0)[stray]] = -1
-    return split(line, model.pairings[role].ends)
+    kept = side.copy()
+    kept[matched(side)[0][stray]] = -1
+    return kept

@@ -6,13 +6,9 @@ reach. κ may differ from leg to leg but not in sign, and is never 0: see `some_
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from rig.arrays import Array
-
+from rig.arrays import Array
 
 NONE = 1e-15
 """κ used in place of 0, 1/m: its effect over a metre is below an atom's width."""

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rig.analysis.dual import Dual
+from rig.analysis.fit import DropFit
 from rig.analysis.plain_data import attributes
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.analysis.fit import DropFit
-    from rig.analysis.quantities import AdjustedDrop
-    from rig.analysis.result import Measured
-    from rig.protocol.protocol import Gate
+from rig.analysis.quantities import AdjustedDrop
+from rig.analysis.result import Measured
+from rig.protocol.protocol import Gate
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +67,7 @@ def gate_passages(
     assert gates is not None
     seen = {
         train.gate
-        for train, match in zip(model.records["free"].trains, fit.matches["free"], strict=True)
+        for train, _, match in model.records["free"].by_gate(fit.matches["free"])
         if (match >= 0).any()
     }
     passages: list[GatePassage] = []

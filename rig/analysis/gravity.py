@@ -9,30 +9,24 @@ unknown: without it, a light chain would give a g several per cent too low.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rig.analysis.averages import mean
 from rig.analysis.equations import standardise
 from rig.analysis.evidence import STATED_WEIGHT
-from rig.analysis.fit import count_matched
+from rig.analysis.fit import Fit, count_matched
 from rig.analysis.plain_data import attributes
-from rig.analysis.result import GOOD, Measured
+from rig.analysis.result import GOOD, DropResult, Measured
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY
 from rig.measurands import GRAVITY
-from rig.reasons import make_reason
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rig.analysis.fit import Fit
-    from rig.analysis.result import DropResult
-    from rig.protocol.protocol import Protocol
-    from rig.reasons import Reason
-    from rig.units import Quantity
+from rig.protocol.protocol import Protocol
+from rig.reasons import Reason, make_reason
+from rig.units import Quantity
 
 _FEWEST = 8  # edges
 

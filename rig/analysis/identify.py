@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,31 +20,22 @@ from rig.analysis.annealing import (
     LEAST,
     MISSED,
     PEAKS,
+    FallFit,
     Pairing,
     SideFall,
     log_density,
 )
-from rig.analysis.chain_records import SIDES, chain_records
+from rig.analysis.chain_records import SIDES, ChainRecord
+from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY, standardise
-from rig.analysis.fit import Fit, count_matched, settle
+from rig.analysis.fit import Begun, Fit, count_matched, settle
+from rig.arrays import Index
+from rig.clock.calibration import TimeScale
 from rig.protocol.gates import CLEARANCE_M
+from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
-from rig.vocabulary import ANY_SCENE
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-    from rig.analysis.annealing import FallFit
-    from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.components import Components
-    from rig.analysis.fit import Begun
-    from rig.arrays import Index
-    from rig.clock.calibration import TimeScale
-    from rig.protocol.protocol import Protocol, Run
-    from rig.records import Drop
-    from rig.vocabulary import Vocabulary
-
+from rig.vocabulary import ANY_SCENE, Vocabulary
 
 AnyReading = TypeVar("AnyReading", "FallFit", "Reading")
 
@@ -75,9 +67,9 @@ class Reading:
     evidence: float
 
     @property
-    def edges(self) -> list[Index]:
+    def matches(self) -> list[Index]:
         """For each side the observed edge of every expected edge, −1 if missed."""
-        return [np.concatenate(side) for side in self.fit.matches.values()]
+        return [*self.fit.matches.values()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,33 +122,6 @@ class DropIdentity:
     poor: tuple[str, ...] = ()
     begun: Begun | None = None
     explained: tuple[Reason, ...] | None = None
-
-
-def identify_drop(
-    protocol: Protocol,
-    run: Run,
-    drop: Drop,
-    scale: TimeScale,
-    components: Components,
-    aside: Collection[int] = (),
-    before: Begun | None = None,
-) -> DropIdentity:
-    """Identify a drop; arguments as in `rig.analysis.drop.DropCase`.
-
-    Parameters
-    ----------
-    before
-        Fit of the same drop with more gates.
-    """
-    earliest = -math.inf if drop.fire_tick is None else 0.0
-    records = chain_records(protocol, run, drop, scale.hz, aside)
-    if before is not None:
-        model = DropModel.of(protocol, records, before.guesses, scale.u, components)
-        return DropIdentity(scale, {}, begun=settle(model, x=before.x).begun)
-    identification = identify(protocol, records, scale.u, components, earliest)
-    unlike, fit = pattern_faults(identification, protocol.vocabulary), identification.fit
-    poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
-    return DropIdentity(scale, unlike, poor, None if unlike or fit is None else fit.begun)
 
 
 def identify(
@@ -270,7 +235,7 @@ def _rank_readings(readings: Iterable[AnyReading]) -> list[AnyReading]:
     """Sort readings, the likeliest first, without those that equal a likelier reading."""
     ranked: list[AnyReading] = []
     for reading in sorted(readings, key=lambda candidate: -candidate.evidence):
-        if all(any(map(_unlike, reading.edges, likelier.edges)) for likelier in ranked):
+        if all(any(map(_unlike, reading.matches, likelier.matches)) for likelier in ranked):
             ranked.append(reading)
     return ranked
 
@@ -290,8 +255,8 @@ def log_evidence(fit: Fit) -> float:
     """
     estimate, model = fit.estimate, fit.model
     total = 0.0
-    for role, matches in fit.matches.items():
-        rows = model.decorrelate(role, model.residuals(role, estimate.x, matches), matches)
+    for role, match in fit.matches.items():
+        rows = model.decorrelate(role, model.residuals(role, estimate.x, match), match)
         sigma = rows.sigma * estimate.scatter
         beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
         total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
@@ -323,10 +288,7 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     for pair in close:
         sides = dict(zip(readings, pair, strict=True))
         begun = model.copy_with(guesses={role: side.guess for role, side in sides.items()})
-        matches = {
-            role: model.pairings[role].number_edges(side.edges[0]) for role, side in sides.items()
-        }
-        tried.append(weigh(settle(begun, matches)))
+        tried.append(weigh(settle(begun, {role: side.match for role, side in sides.items()})))
     best, *rest = _rank_readings(tried)
     shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
+from rig.analysis.fit import Fit
 from rig.errors import DomainError
 from rig.model.predict import expected_alpha
+from rig.protocol.protocol import Run
 from rig.reasons import Reason, make_reason
-
-if TYPE_CHECKING:
-    from rig.analysis.fit import Fit
-    from rig.protocol.protocol import Run
 
 CLEAR = math.log(1000.0)
 """Least log odds of another incline."""
@@ -32,9 +29,8 @@ def other_incline(fit: Fit, run: Run) -> tuple[Reason, ...]:
     surface = model.protocol.surface
     if surface is None or incline is None or "alpha" not in model.unknowns:
         return ()
-    at = model.unknowns["alpha"]
-    alpha = model.guesses["impact"].alpha + float(estimate.x[at][0])
-    u = float(estimate.own_u[at][0])
+    alpha = float(model.alphas(estimate.x)[0])
+    u = float(estimate.own_u[model.unknowns["alpha"]][0])
     likely: dict[float, tuple[float, float]] = {}  # ln p of α, and its deviation in units of sd
     for angle in (incline, *model.protocol.plan.inclines):
         with suppress(DomainError):

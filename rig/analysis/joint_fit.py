@@ -9,33 +9,26 @@ nuisance parameters are estimated on the way (`rig.analysis.evidence`).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from rig.analysis.components import priors
-from rig.analysis.equations import STRAY, standardise
+from rig.analysis.components import Components, priors
+from rig.analysis.equations import STRAY, Residuals, standardise
 from rig.analysis.evidence import Evidence
-from rig.analysis.fit import match, without_strays
-from rig.analysis.joint_step import JointDrop, joint_step, take
-from rig.analysis.likeness import likeness
+from rig.analysis.fit import DropFit, Fit, without_strays
+from rig.analysis.joint_step import DropGroup, JointDrop, group_drops, joint_step, with_priors
+from rig.analysis.likeness import Likeness, likeness
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
+from rig.analysis.square_root import Elimination
 from rig.analysis.unknowns import SharedUnknowns
+from rig.arrays import Array
 from rig.protocol.protocol import GUESSED
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.components import Components
-    from rig.analysis.equations import Residuals
-    from rig.analysis.fit import DropFit, Fit
-    from rig.analysis.likeness import Likeness
-    from rig.arrays import Array
-
 
 FEWEST = 4
 """Least number of drops for a joint fit: a block of A, B, B, A."""
@@ -154,7 +147,9 @@ class JointFit:
 def by_itself(fit: Fit) -> JointFit:
     """Return the joint fit of a single drop without shared unknowns."""
     shared, x = SharedUnknowns(()), np.zeros(0)
-    drop = replace(JointDrop.of(fit, shared), inverse=fit.estimate.inverse)
+    own, none = np.arange(fit.x.size), np.zeros(0, dtype=np.intp)
+    gain = np.zeros((own.size, 0))
+    drop = JointDrop(fit.model, fit.matches, fit.x, own, none, none, fit.estimate.inverse, gain)
     degrees = {"jitter": fit.estimate.degrees, "impulse": GUESSED}
     components, settled = fit.model.components, fit.estimate.settled
     return JointFit(shared, x, x, np.zeros((0, 0)), components, degrees, (drop,), settled)
@@ -170,42 +165,34 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         Good drops, each fitted by itself or in an earlier joint fit.
     """
     shared = SharedUnknowns(fit.model for fit in fits)
-    # A rig has a single clock: its error is shared, with the largest calibration uncertainty.
-    clock_u: dict[str | None, float] = {}
-    for model in (fit.model for fit in fits):
-        rig = model.owners.get("rig")
-        clock_u[rig] = max(model.clock_u, clock_u.get(rig, 0.0))
-    drops = [JointDrop.of(fit, shared) for fit in fits]
-    x = _average(drops, len(shared))
-    beforehand = priors(fits[0].model.protocol)
+    groups = group_drops(fits, shared)
+    x, beforehand = _average(groups, len(shared)), priors(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, moved, size, before = False, 0.0, len(shared), evidence.components
-    inverse, previous = np.eye(size), np.zeros(size + len(before.__slots__))
+    previous = np.zeros(size + len(before.__slots__))
     damping = np.ones_like(previous)
+    inverse, reduced = np.eye(size), list[Elimination]()
     for round_ in range(_ROUNDS):
-        sd, drops = np.zeros(size), [drop.at(x) for drop in drops]
-        # Update priors with the estimated scatter, and those of impulses with the estimated α.
-        for n, drop in enumerate(drops):
-            u = clock_u[drop.model.owners.get("rig")]
-            model = drop.model.with_priors(evidence.components, u, drop.x)
-            drops[n], sd[drop.here] = replace(drop, model=model), model.unknowns.sd[drop.common]
+        reduced.clear()  # most of the memory
+        groups = with_priors([group.at(x) for group in groups], evidence.components)
         if round_ == _REMATCH:
-            drops = [replace(drop, matches=match(drop.model, drop.x)) for drop in drops]
+            groups = [group.rematch() for group in groups]
         # In the first round shared and own unknowns do not fit together yet: cut no residuals.
-        root, drops = joint_step(drops, x, sd, cut=STRAY if round_ else math.inf)
+        sd, root, reduced = joint_step(groups, x, cut=STRAY if round_ else math.inf)
         step = damping[:size] * root.step()
-        moves = _move(drops, x, sd, step) if np.isfinite(step).all() else None
+        moves = _move(groups, reduced, x, sd, step) if np.isfinite(step).all() else None
         if moves is None:
             return JointFit(shared, x, sd, inverse, before, evidence.degrees, (), settled=False)
-        x, drops, residuals = moves
+        x, groups, residuals = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
-        variance = np.sum(inverse**2, axis=1)
-        last, moved = moved, float(np.abs(step / np.sqrt(variance)).max())
+        last, moved = moved, float(np.abs(step / np.linalg.norm(inverse, axis=1)).max())
         before = evidence.components
-        evidence = _weigh(evidence, shared, x, sd, inverse, drops, residuals)
+        evidence = Evidence(before, beforehand)
+        evidence.edges(residuals)
+        _weigh(evidence, shared, x, sd, inverse, groups, reduced)
         # With linear convergence, the next step is shorter by the ratio of the last two.
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
-        if settled and _steady(before, evidence.components, drops):
+        if settled and _steady(before, evidence.components, groups):
             break
         # Halve steps that alternate, as they do next to a lower bound of a component.
         ratios = damping[size:] * before.ratios(evidence.components)
@@ -214,31 +201,42 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         if round_ > _REMATCH:
             damping[ahead * previous < 0.0] *= 0.5
         previous = ahead
+    good: dict[int, JointDrop] = {}
+    for group, part in zip(groups, reduced, strict=True):
+        for n, drop in zip(group.places, group.split(part), strict=True):
+            kept = without_strays(drop.model, drop.x, drop.matches)
+            good[n] = replace(drop, matches=kept)
+    drops = tuple(good[n] for n in sorted(good))
     # Return the components used for this solution, not the updated ones.
-    good = tuple(
-        replace(drop, matches=without_strays(drop.model, drop.x, drop.matches)) for drop in drops
-    )
-    return JointFit(shared, x, sd, inverse, before, evidence.degrees, good, settled)
+    return JointFit(shared, x, sd, inverse, before, evidence.degrees, drops, settled)
 
 
 def _move(
-    drops: Sequence[JointDrop], x: Array, sd: Array, step: Array
-) -> tuple[Array, list[JointDrop], list[Residuals]] | None:
+    groups: Sequence[DropGroup],
+    reduced: Sequence[Elimination],
+    x: Array,
+    sd: Array,
+    step: Array,
+) -> tuple[Array, list[DropGroup], list[Residuals]] | None:
     """Take a step, shortened until all residuals are finite.
 
     Returns
     -------
-    x, drops, residuals
+    x, groups, residuals
         The shared unknowns, the drops, and the residuals of all edges; `None` if no part of the
         step gives finite residuals.
     """
     share = 1.0
     while share > _SHORTEST:
-        common, moved = take(drops, x, sd, step, share)
+        common = x + share * step * sd
+        moved = [
+            group.move(part, common, step, share)
+            for group, part in zip(groups, reduced, strict=True)
+        ]
         remaining = [
-            drop.model.residuals(role, drop.x, match)
-            for drop in moved
-            for role, match in drop.matches.items()
+            group.model.residuals(role, group.x, edges)
+            for group in moved
+            for role, edges in group.edges.items()
         ]
         if all(np.isfinite(residuals.values).all() for residuals in remaining):
             return common, moved, remaining
@@ -246,11 +244,13 @@ def _move(
     return None
 
 
-def _average(drops: Sequence[JointDrop], size: int) -> Array:
+def _average(groups: Sequence[DropGroup], size: int) -> Array:
     """Return the mean of the drops' own estimates of each shared unknown."""
-    places = np.concatenate([drop.here for drop in drops])
-    total = np.bincount(places, np.concatenate([drop.x[drop.common] for drop in drops]), size)
-    return total / np.bincount(places, minlength=size)
+    total, count = np.zeros(size), np.zeros(size)
+    for group in groups:
+        total[group.here] += group.x[:, group.common].sum(axis=0)
+        count[group.here] += len(group.drops)
+    return total / count
 
 
 def _weigh(
@@ -259,35 +259,31 @@ def _weigh(
     x: Array,
     sd: Array,
     inverse: Array,
-    drops: Sequence[JointDrop],
-    residuals: Sequence[Residuals],
-) -> Evidence:
+    groups: Sequence[DropGroup],
+    reduced: Sequence[Elimination],
+) -> None:
     """Estimate the variance components from residuals and estimates."""
-    new = Evidence(evidence.components, evidence.stated)
     remaining = np.sum(inverse**2, axis=1)
     for name, block in shared.blocks.items():
         places = np.arange(len(shared))[block]
         places = places[sd[places] > 0.0]
-        new.members(shared.rows[name].scale, x[places] / sd[places], inverse[places])
+        evidence.members(shared.rows[name].scale, x[places] / sd[places], inverse[places])
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
     struck = 0.0
-    for drop in drops:
-        model = drop.model
+    for group, (own_inverse, gain, _, _) in zip(groups, reduced, strict=True):
+        at, own = group.model.unknowns, group.own
         # Variance of an own unknown: given the shared ones, plus the part that these contribute.
-        by_common = drop.gain @ inverse[drop.here]
-        root = np.zeros((drop.x.size, drop.own.size + x.size))
-        root[drop.own] = np.hstack([drop.inverse, by_common])
-        told = 1.0 - np.sum(root**2, axis=1)
-        own_sd = model.unknowns.sd[drop.own]
-        parameters += float(np.sum(told[drop.own][own_sd > 0.0]))
-        if "impulses" in model.unknowns:
-            struck += float(np.sum(told[model.unknowns["impulses"]]))
-        new.drop(model, standardise(drop.x, model.unknowns.sd), root)
-    new.edges(residuals)
-    return new.estimate_components(parameters, struck)
+        root = np.zeros((*group.x.shape, own.size + x.size))
+        root[:, own] = np.concatenate([own_inverse, gain @ inverse[group.here]], axis=-1)
+        told = 1.0 - np.sum(root**2, axis=-1)
+        parameters += float(np.sum(told[:, own][:, at.sd[own] > 0.0]))
+        if "impulses" in at:
+            struck += float(np.sum(told[:, at["impulses"]]))
+        evidence.drops(group.model, standardise(group.x, at.sd), root)
+    evidence.estimate_components(parameters, struck)
 
 
-def _steady(old: Components, new: Components, drops: Sequence[JointDrop]) -> bool:
+def _steady(old: Components, new: Components, groups: Sequence[DropGroup]) -> bool:
     """Whether the components have converged; a component that is absent shrinks for ever.
 
     For impulses the scatter at the drops' α is compared. If all have about the same α, the edges
@@ -296,7 +292,9 @@ def _steady(old: Components, new: Components, drops: Sequence[JointDrop]) -> boo
     names = [name for name in old.__slots__ if name not in ("impulse", "impulse_floor", "bounce")]
     pairs = [(getattr(old, name), getattr(new, name), _LEAST.get(name, 0.0)) for name in names]
     alphas = {
-        abs(drop.model.guesses["impact"].alpha) for drop in drops if "impact" in drop.model.guesses
+        abs(group.model.guesses["impact"].alpha)
+        for group in groups
+        if "impact" in group.model.guesses
     }
     ends = np.array([1.0, math.inf])
     pairs += [

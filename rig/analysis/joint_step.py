@@ -1,25 +1,36 @@
-"""Gauss–Newton steps of a joint fit, with each drop's own unknowns eliminated."""
+"""Gauss–Newton steps of a joint fit, with each drop's own unknowns eliminated.
+
+Drops of a condition differ only in their edges, so that they are fitted as arrays.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.equations import STRAY, linearize, standardise
-from rig.analysis.fit import DropFit
-from rig.analysis.square_root import EquationRows, condense, eliminate, square_root
+from rig.analysis.annealing import matched
+from rig.analysis.components import Components
+from rig.analysis.drop_model import DropModel
+from rig.analysis.equations import STRAY, Seen, linearize, standardise
+from rig.analysis.fit import DropFit, match
+from rig.analysis.square_root import (
+    Elimination,
+    EquationRows,
+    Root,
+    condense,
+    eliminate,
+    square_root,
+)
+from rig.analysis.unknowns import SharedUnknowns
+from rig.arrays import Array, Index
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.analysis.square_root import Root
-    from rig.analysis.unknowns import SharedUnknowns
-    from rig.arrays import Array, Index
+_AT_ONCE = 1_000_000
+"""Derivatives of edges in an array: 8 MB. More are no quicker."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class JointDrop(DropFit):
     """A drop of a joint fit.
 
@@ -30,10 +41,6 @@ class JointDrop(DropFit):
         session's vector.
     inverse, gain
         As in `rig.analysis.square_root.Elimination`.
-    target
-        Step of its own unknowns for a zero step of the shared ones: `Elimination.own`.
-    centre
-        Prior means of its own unknowns, zero if not given.
     """
 
     own: Index
@@ -41,79 +48,154 @@ class JointDrop(DropFit):
     here: Index
     inverse: Array
     gain: Array
-    target: Array
-    centre: Array | None = None
 
-    @classmethod
-    def of(cls, fit: DropFit, shared: SharedUnknowns) -> JointDrop:
-        """Return a drop that was fitted by itself, or in an earlier joint fit."""
-        common, places = shared.places(fit.model)
-        own = np.setdiff1d(np.arange(len(fit.model.unknowns)), common)
-        gain = np.zeros((own.size, places.size))
-        nothing = np.zeros(own.size)
-        return cls(fit.model, fit.matches, fit.x, own, common, places, gain, gain, nothing)
 
-    def at(self, common: Array) -> JointDrop:
-        """Return the drop with other values of the session's shared unknowns."""
+@dataclass(frozen=True, slots=True, eq=False)
+class DropGroup:
+    """Drops of a joint fit that differ only in their edges.
+
+    Attributes
+    ----------
+    places
+        Places of the drops in the session.
+    model
+        Of all of them; its edges are those of any drop.
+    drops
+        Each with its edges and matches.
+    edges
+        Matched edges by role, shape ``(drops, expected)``; where none is matched, a time that is
+        infinitely uncertain.
+    x
+        Unknowns, shape ``(drops, unknowns)``.
+    own, common, here
+        As in `JointDrop`.
+    """
+
+    places: Sequence[int]
+    model: DropModel
+    drops: Sequence[DropFit]
+    edges: Mapping[str, Seen]
+    x: Array
+    own: Index
+    common: Index
+    here: Index
+
+    def at(self, shared: Array) -> DropGroup:
+        """Return the drops with other values of the session's shared unknowns."""
         x = self.x.copy()
-        x[self.common] = common[self.here]
+        x[:, self.common] = shared[self.here]
         return replace(self, x=x)
+
+    def move(self, reduced: Elimination, shared: Array, step: Array, share: float) -> DropGroup:
+        """Return the drops after a share of a step to `shared`, in units of prior uncertainties."""
+        moved, at = self.at(shared), self.own
+        own = reduced.own - reduced.gain @ step[self.here]
+        moved.x[:, at] += share * self.model.unknowns.sd[at] * own
+        return moved
+
+    def rematch(self) -> DropGroup:
+        """Return the drops with their edges matched anew."""
+        drops = []
+        for drop, x in zip(self.drops, self.x, strict=True):
+            model = self.model.with_edges(drop.model.records)
+            drops.append(DropFit(model, match(model, x), x))
+        return replace(self, drops=drops, edges=_edges(self.model, drops))
+
+    def split(self, reduced: Elimination) -> Iterator[JointDrop]:
+        """Yield each drop, with its own unknowns eliminated."""
+        places = self.own, self.common, self.here
+        for drop, x, inverse, gain in zip(self.drops, self.x, *reduced[:2], strict=True):
+            model = self.model.with_edges(drop.model.records)
+            yield JointDrop(model, drop.matches, x, *places, inverse, gain)
+
+
+def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGroup]:
+    """Return drops that were fitted by themselves, or in an earlier joint fit, as groups."""
+    # A rig has a single clock: its error is shared, with the largest calibration uncertainty.
+    clock_u: dict[str | None, float] = {}
+    alike: dict[object, list[int]] = {}
+    for n, model in enumerate(fit.model for fit in fits):
+        rig, owners = model.owners.get("rig"), tuple(sorted(model.owners.items()))
+        clock_u[rig] = max(model.clock_u, clock_u.get(rig, 0.0))
+        alike.setdefault((id(model.slopes), owners), []).append(n)
+    groups = []
+    for numbers in alike.values():
+        first = fits[numbers[0]].model
+        common, here = shared.places(first)
+        own = np.setdiff1d(np.arange(len(first.unknowns)), common)
+        model = first.copy_with(clock_u=clock_u[first.owners.get("rig")])
+        count = max(1, _AT_ONCE // sum(side.sights.size for side in model.slopes.values()))
+        for places in (numbers[n : n + count] for n in range(0, len(numbers), count)):
+            drops = [fits[n] for n in places]
+            x = np.array([drop.x for drop in drops])
+            for row, drop in zip(x, drops, strict=True):
+                model.refer(row, drop.model.guesses)
+            edges = _edges(model, drops)
+            groups.append(DropGroup(places, model, drops, edges, x, own, common, here))
+    return groups
+
+
+def with_priors(groups: Sequence[DropGroup], components: Components) -> list[DropGroup]:
+    """Return drops with other priors; those of impulses are relative to a condition's mean α."""
+    alphas: dict[int, list[Array]] = {}
+    for group in groups:
+        if "impact" in group.model.guesses:
+            alphas.setdefault(id(group.model.slopes), []).append(group.model.alphas(group.x))
+    changed = []
+    for group in groups:
+        guesses = dict(group.model.guesses)
+        if of_condition := alphas.get(id(group.model.slopes)):
+            mean = float(np.concatenate(of_condition).mean())
+            guesses["impact"] = guesses["impact"]._replace(alpha=mean)
+        model, x = group.model.copy_with(components=components, guesses=guesses), group.x.copy()
+        model.refer(x, group.model.guesses)
+        changed.append(replace(group, model=model, x=x))
+    return changed
+
+
+def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:
+    edges = {}
+    for role, expected in model.expected.items():
+        times = np.empty((len(drops), expected.rods.size))
+        burst = np.full(times.shape, np.inf)
+        for n, drop in enumerate(drops):
+            pairing = model.with_edges(drop.model.records).pairings[role]
+            pick, edge = matched(drop.matches[role])
+            # Any moment after the release: at rest, a chain has no uncertainty.
+            some_time = drop.model.guesses[role].release + 1.0
+            times[n] = pairing.times[edge].max() if edge.size else some_time
+            times[n, pick], burst[n, pick] = pairing.times[edge], pairing.burst[edge]
+        edges[role] = expected.seen(np.arange(expected.rods.size), times, burst)
+    return edges
 
 
 def joint_step(
-    drops: Sequence[JointDrop],
-    x: Array,
-    sd: Array,
-    centre: Array | None = None,
-    cut: float = STRAY,
-) -> tuple[Root, list[JointDrop]]:
-    """Eliminate each drop's own unknowns, and return the information on the shared ones.
+    groups: Sequence[DropGroup], x: Array, cut: float = STRAY
+) -> tuple[Array, Root, list[Elimination]]:
+    """Eliminate the drops' own unknowns, and return the information on the shared ones.
 
     Parameters
     ----------
-    x, sd
-        Shared unknowns and their prior uncertainties.
-    centre
-        Prior means of the shared unknowns, zero if not given.
+    x
+        Shared unknowns.
     cut
         As for `rig.analysis.equations.linearize`.
 
     Returns
     -------
-    Root, list of JointDrop
-        Root in units of `sd`, and the drops with their own unknowns eliminated.
+    sd, root, reduced
+        Prior uncertainties of the shared unknowns; the information on these, in units of `sd`; and
+        each group with its own unknowns eliminated.
     """
-    rows: list[EquationRows] = []
-    reduced = []
-    for drop in drops:
-        own_sd, pull = drop.model.unknowns.sd, np.zeros(drop.x.size)
-        off = drop.x[drop.own] if drop.centre is None else drop.x[drop.own] - drop.centre
-        pull[drop.own] = standardise(off, own_sd[drop.own])
-        blocks = [*linearize(drop.model, drop.matches, drop.x, cut=cut).rows.values()]
-        inverse, gain, target, rest = eliminate(blocks, own_sd, pull, drop.own, drop.common)
-        rows = condense([*rows, rest._replace(columns=drop.here)], x.size)
-        reduced.append(replace(drop, inverse=inverse, gain=gain, target=target))
-    pull = standardise(x if centre is None else x - centre, sd)
-    return square_root(rows, np.ones(x.size), pull), reduced
-
-
-def take(
-    drops: Sequence[JointDrop], x: Array, sd: Array, step: Array, share: float = 1.0
-) -> tuple[Array, list[JointDrop]]:
-    """Return unknowns and drops after a share of a step of the shared unknowns.
-
-    Each drop's own unknowns follow.
-
-    Parameters
-    ----------
-    step
-        Step in units of `sd`.
-    """
-    x = x + share * step * sd
-    moved = []
-    for drop in drops:
-        state = drop.at(x)
-        own = drop.target - drop.gain @ step[drop.here]
-        state.x[drop.own] += share * drop.model.unknowns.sd[drop.own] * own
-        moved.append(state)
-    return x, moved
+    sd, rows, reduced = np.zeros(x.size), list[EquationRows](), []
+    for group in groups:
+        own_sd, pull = group.model.unknowns.sd, np.zeros(group.x.shape)
+        sd[group.here] = own_sd[group.common]
+        pull[:, group.own] = standardise(group.x[:, group.own], own_sd[group.own])
+        blocks = [*linearize(group.model, group.edges, group.x, cut=cut).rows.values()]
+        part = eliminate(blocks, own_sd, pull, group.own, group.common)
+        slopes = part.rest.slopes.reshape(-1, group.here.size)
+        rows = condense([*rows, EquationRows(slopes, part.rest.left.ravel(), group.here)], x.size)
+        used = part.rest._replace(slopes=slopes[:0].copy(), left=slopes[:0, 0].copy())
+        reduced.append(part._replace(rest=used))  # without what is in `rows`
+    return sd, square_root(rows, np.ones(x.size), standardise(x, sd)), reduced

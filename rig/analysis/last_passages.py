@@ -8,23 +8,20 @@ release, so that their errors differ from those of the fit.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.annealing import matched
 from rig.analysis.dual import Dual
+from rig.analysis.fit import Fit
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.result import Measured
 from rig.analysis.square_root import EquationRows, eliminate
+from rig.arrays import Array
 from rig.measurands import MEASURANDS, SPEED
 from rig.reasons import Reason, make_reason
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from rig.analysis.fit import Fit
-    from rig.arrays import Array
-
 
 SEPARATION_RAW = MEASURANDS["separation_raw_m"]
 _NEAR = 0.02
@@ -107,7 +104,7 @@ def _passages(fit: Fit, role: str, when: float | None = None) -> _Passages:
     model = fit.model
     expected, nominal = model.expected[role], AdjustedDrop(model, np.zeros(fit.x.size))
     pairing = model.pairings[role]
-    pick, edge = pairing.indices(fit.matches[role])
+    pick, edge = matched(fit.matches[role])
     times = pairing.times[edge] * model.rate(fit.x)
     chosen = expected.alone[pick] if when is None else np.abs(times - when) < _NEAR
     pick, times = pick[chosen], times[chosen]

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from rig.analysis.adjust import adjust
+from rig.analysis.annealing import matched
 from rig.analysis.distributions import coverage_factor
+from rig.analysis.drop_model import DropModel
+from rig.analysis.fit import Fit
 from rig.analysis.quantities import measurands
 from rig.analysis.unknowns import ANYTHING
+from rig.arrays import Array
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from numpy.random import Generator
-
-    from rig.analysis.drop_model import DropModel
-    from rig.analysis.fit import Fit
-    from rig.arrays import Array
-
 
 PROBABILITY = 0.95
 _END = 2.7
@@ -112,11 +109,11 @@ def agreement(
 def _shake(fit: Fit, rng: Generator) -> DropModel:
     """Return the drop's model with edges shifted by the scatter that the fit estimated."""
     times = {}
-    for role, matches in fit.matches.items():
-        rows, pairing = fit.model.equations(role, fit.x, matches), fit.model.pairings[role]
+    for role, match in fit.matches.items():
+        rows, pairing = fit.model.equations(role, fit.x, match), fit.model.pairings[role]
         sigma = rows.residuals.sigma * fit.estimate.scatter
         off = sigma * rng.normal(size=sigma.size)
         off[1:] += rows.told[1:] * off[:-1]  # told is 0 but for the second edge of a pair
         times[role] = np.zeros(pairing.times.size)
-        times[role][pairing.indices(matches)[1]] = off / rows.residuals.speed  # m at a beam to s
+        times[role][matched(match)[1]] = off / rows.residuals.speed  # m at a beam to s
     return fit.model.shaken(times)

@@ -8,23 +8,19 @@ remains when they change places is an effect of the sides.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rig.analysis.averages import combine
 from rig.analysis.plain_data import attributes
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, DropResult, Measured
+from rig.arrays import Array
 from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs as planned_runs
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from rig.analysis.result import DropResult, Measured
-    from rig.arrays import Array
-    from rig.protocol.protocol import Protocol
+from rig.protocol.protocol import Protocol
 
 _CHAINS_OWN = ("spacing", "width")  # common lines of a budget that differ between chains
 

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.air import lags, slack
 from rig.analysis.discrepancy import STRETCHES
+from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.swing import lever
+from rig.analysis.trajectory import Trajectory
+from rig.arrays import Array
 from rig.protocol.protocol import GUESSED
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from rig.analysis.drop_model import DropModel
-    from rig.analysis.trajectory import Trajectory
-    from rig.arrays import Array
-
 
 _STEP = 1e-3
 """Way over which a rod's speed along its chain is taken, m: strings act over a hundred times it."""

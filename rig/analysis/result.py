@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -10,18 +11,15 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.plain_data import attributes, plain
 from rig.errors import InputError
-from rig.reasons import make_error, reasons_json
+from rig.protocol.protocol import Run
+from rig.reasons import Reason, make_error, reasons_json
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
+if TYPE_CHECKING:  # results are shown, and predictions made, where no drop is analysed
     import numpy as np
     from numpy.typing import NDArray
 
     from rig.analysis.edge_classes import UnmatchedEdge
     from rig.analysis.gate_passages import GatePassage
-    from rig.protocol.protocol import Run
-    from rig.reasons import Reason
 
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")
@@ -181,8 +179,9 @@ class DropResult:
     ----------
     quantities
         Measurands by JSON name (``separation_m`` …), only those of the scene.
-    matches
-        Rod of each matched edge, by the edge's number in the drop; the bottom rod is 0.
+    rods
+        Rod of each of the drop's edges, −1 if it belongs to none; the bottom rod is 0. Empty
+        without a fit.
     scatter
         Scatter of the edges relative to the assumed scatter, at least 1; `None` without a fit.
     alone
@@ -207,7 +206,7 @@ class DropResult:
     reasons: tuple[Reason, ...]
     audit: Audit
     quantities: Mapping[str, Measured] = field(default_factory=dict)
-    matches: Mapping[int, int] = field(default_factory=dict)
+    rods: tuple[int, ...] = ()
     scatter: float | None = None
     alone: Mapping[str, Measured] = field(default_factory=dict)
     unmatched: tuple[UnmatchedEdge, ...] = ()
@@ -216,6 +215,11 @@ class DropResult:
     last_passages: Mapping[str, Measured] = field(default_factory=dict)
     gates: tuple[GatePassage, ...] = ()
     gravity: Measured | None = None
+
+    @property
+    def matches(self) -> dict[int, int]:
+        """Rod of each matched edge, by the edge's number in the drop."""
+        return {n: rod for n, rod in enumerate(self.rods) if rod >= 0}
 
     @property
     def learned(self) -> bool:
@@ -229,7 +233,7 @@ class DropResult:
         fields |= {"damaged": True} if self.damaged else {}
         fields |= plain(self.quantities)
         fields |= {"edges": self.audit.json(), "unexplained_edges": self.audit.unexplained}
-        if self.matches:
+        if self.rods:
             fields["causes"] = plain(self.unmatched)
         names = ("gates", "scatter", "last_passages", "alone")
         fields |= attributes(self, *(name for name in names if getattr(self, name)))

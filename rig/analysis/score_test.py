@@ -6,16 +6,13 @@ the unknowns without a prior.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.analysis.fit import Fit
-    from rig.arrays import Array
-
+from rig.analysis.fit import Fit
+from rig.arrays import Array
 
 _UNTOLD = 1e-12  # share of a direction's information below which other unknowns replace it
 

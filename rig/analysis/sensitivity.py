@@ -8,19 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.budgets import Budgets
 from rig.analysis.fit import alone
 from rig.analysis.joint_fit import by_itself, joint_fit
-from rig.analysis.summary import summarize
-from rig.protocol.protocol import Priors
+from rig.analysis.session import Analysis
+from rig.analysis.summary import Incline, summarize
+from rig.protocol.protocol import Priors, Protocol
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from rig.analysis.session import Analysis
-    from rig.analysis.summary import Incline
-    from rig.protocol.protocol import Protocol
 
 FACTOR = 3.0
 

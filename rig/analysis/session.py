@@ -2,42 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import length_hint
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 from typing import Protocol as Interface
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.drop import DropCase
+from rig.analysis.drop import DropCase, DropSummary
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
-from rig.analysis.fit import alone
-from rig.analysis.joint_fit import FEWEST, joint_fit
+from rig.analysis.fit import DropFit, Fit, alone
+from rig.analysis.joint_fit import FEWEST, JointFit, RigEstimate, joint_fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.pairs import Effects, effects
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.processes import do_in_order
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, DropResult
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
+from rig.clock.calibration import TimeScale
 from rig.errors import InputError
 from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.plan import runs as planned_runs
-from rig.reasons import make_error, make_reason
+from rig.protocol.protocol import Protocol, Run
+from rig.reasons import Reason, make_error, make_reason
+from rig.records import Drop
 from rig.threads import one_thread
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from rig.analysis.drop import DropSummary
-    from rig.analysis.fit import DropFit, Fit
-    from rig.analysis.joint_fit import JointFit, RigEstimate
-    from rig.analysis.result import DropResult
-    from rig.clock.calibration import TimeScale
-    from rig.protocol.protocol import Protocol, Run
-    from rig.reasons import Reason
-    from rig.records import Drop
-
-    Progress = Callable[[int, int], None]
+Progress = Callable[[int, int], None]
 
 K = TypeVar("K")
 
@@ -358,7 +350,7 @@ def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> Drop
         audit=result.audit.count(drop.match_count, count_unexplained(unmatched)),
         quantities=measured,
         gates=budgets.gates(drop),
-        matches=drop.rods,
+        rods=drop.rods_of(len(result.rods)),
         alone=result.alone or result.quantities,
         unmatched=unmatched,
     )

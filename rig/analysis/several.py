@@ -6,29 +6,23 @@ same rig and their protocols agree about its owner: the posts, the beams, a chai
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from rig.analysis.components import priors
-from rig.analysis.session import fit_together, sum_up
-from rig.analysis.summary import summarize
+from rig.analysis.fit import Fit
+from rig.analysis.joint_fit import JointFit
+from rig.analysis.joint_step import JointDrop
+from rig.analysis.result import DropResult, Measured
+from rig.analysis.session import Analysis, fit_together, sum_up
+from rig.analysis.summary import Incline, summarize
 from rig.errors import InputError
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
 from rig.threads import one_thread
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.fit import Fit
-    from rig.analysis.joint_fit import JointFit
-    from rig.analysis.joint_step import JointDrop
-    from rig.analysis.result import DropResult, Measured
-    from rig.analysis.session import Analysis
-    from rig.analysis.summary import Incline
-    from rig.protocol.protocol import Protocol
-
-    Key = tuple[int, tuple[int, int]]
-    Drops = dict[Key, Fit | JointDrop]
+Key = tuple[int, tuple[int, int]]
+Drops = dict[Key, Fit | JointDrop]
 
 
 @dataclass(frozen=True, slots=True)

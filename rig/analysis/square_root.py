@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.arrays import Array, Flags, Index
-
+from rig.arrays import Array, Index
 
 _MANY = 16
 """Rows for each unknown that are reduced at once: as quick as all rows, and a few MB."""
@@ -22,9 +19,9 @@ class EquationRows(NamedTuple):
     Attributes
     ----------
     slopes
-        Derivatives, shape ``(rows, columns)``.
+        Derivatives, shape ``(rows, columns)``; of many drops ``(drops, rows, columns)``.
     left
-        Residuals for d = 0, shape ``(rows,)``.
+        Residuals for d = 0, shape ``(rows,)``, or ``(drops, rows)``.
     columns
         Places of the unknowns that they depend on; shape ``(columns,)``.
     """
@@ -61,23 +58,19 @@ class Root(NamedTuple):
         """Return the step to the least sum of squares."""
         return np.asarray(np.linalg.solve(self.matrix, -self.left), dtype=np.float64)
 
-    def gradient_step(self, gradient: Array) -> Array:
-        """Return the step −(RᵀR)⁻¹·gradient."""
-        step = np.linalg.solve(self.matrix, np.linalg.solve(self.matrix.T, -gradient))
-        return np.asarray(step, dtype=np.float64)
-
-    def damp(self, damping: float, lengths: Array) -> Root:
-        """Return the root of RᵀR + λ·diag(lengths²) (Marquardt 1963)."""
-        size = self.left.size
-        stack = np.zeros((2 * size, size + 1))
-        stack[:size, :size], stack[:size, size] = self.matrix, self.left
-        stack[size + np.arange(size), np.arange(size)] = np.sqrt(damping) * lengths
-        stack = triangle(stack)
-        return Root(stack[:size, :size], stack[:size, size])
+    def damp(self, damping: float) -> Root:
+        """Return the root of RᵀR + λ·diag(RᵀR) (Marquardt 1963)."""
+        lengths = np.sqrt(damping) * np.linalg.norm(self.matrix, axis=0)
+        stack = np.column_stack([self.matrix, self.left])
+        longer = np.column_stack([np.diag(lengths), 0.0 * self.left])
+        stack = triangle(np.concatenate([stack, longer]))
+        return Root(stack[:-1, :-1], stack[:-1, -1])
 
 
 class Elimination(NamedTuple):
     """Unknowns o eliminated from observations of o and c: best o = own − gain·c.
+
+    Of many drops, each array has their number as a first dimension.
 
     Attributes
     ----------
@@ -101,16 +94,14 @@ def square_root(blocks: Sequence[EquationRows], sd: Array, pull: Array) -> Root:
     Parameters
     ----------
     blocks
-        Observations in the unknowns' own units. Unknowns in a single block are eliminated first.
+        Observations in the unknowns' own units.
     sd
         Prior standard uncertainties, units of the root; 0 holds an unknown fixed.
     pull
         Deviations of the unknowns from their prior means, in these units.
     """
-    matrix, private, rest = _eliminate_private(blocks, sd, pull, np.arange(sd.size))
-    columns = np.flatnonzero(~private)
-    last = _stack_blocks(rest, columns, pull[columns])
-    matrix[sd.size - columns.size :, np.append(columns, sd.size)] = last[: columns.size]
+    all_places = np.arange(sd.size)
+    matrix, _ = _reduce(blocks, sd, pull, all_places, all_places[:0])
     return Root(matrix[:, :-1], matrix[:, -1])
 
 
@@ -122,21 +113,14 @@ def eliminate(
     Parameters
     ----------
     blocks, sd, pull
-        As for `square_root`.
+        As for `square_root`; blocks of many drops, and a pull of each, shape ``(drops, unknowns)``.
     own, common
         Places of the unknowns to eliminate, and of all others.
     """
-    matrix, private, rest = _eliminate_private(blocks, sd, pull, own)
-    rest_of_own = own[~private[own]]
-    columns = np.concatenate([rest_of_own, common, [sd.size]])
-    last = _stack_blocks(rest, columns[:-1], pull[rest_of_own])
-    matrix[own.size - rest_of_own.size : own.size, columns] = last[: rest_of_own.size]
-    inverse = np.linalg.inv(matrix[: own.size, own]).astype(np.float64, copy=False)
-    beside = inverse @ matrix[: own.size, columns[rest_of_own.size :]]
-    last = last[rest_of_own.size :, rest_of_own.size :]
-    return Elimination(
-        inverse, beside[:, :-1], -beside[:, -1], EquationRows(last[:, :-1], last[:, -1], common)
-    )
+    matrix, rest = _reduce(blocks, sd, pull, own, common)
+    inverse = np.linalg.inv(matrix[..., own]).astype(np.float64, copy=False)
+    beside = inverse @ matrix[..., np.append(common, sd.size)]
+    return Elimination(inverse, beside[..., :-1], -beside[..., -1], rest)
 
 
 def condense(blocks: list[EquationRows], size: int) -> list[EquationRows]:
@@ -154,57 +138,60 @@ def condense(blocks: list[EquationRows], size: int) -> list[EquationRows]:
     return [EquationRows(reduced[:, :-1], reduced[:, -1], columns)]
 
 
-def _eliminate_private(
-    blocks: Sequence[EquationRows], sd: Array, pull: Array, among: Index
-) -> tuple[Array, Flags, list[EquationRows]]:
-    """Eliminate from each block those of the unknowns `among` that no other block has.
+def _reduce(
+    blocks: Sequence[EquationRows], sd: Array, pull: Array, own: Index, common: Index
+) -> tuple[Array, EquationRows]:
+    """Return the triangle of the unknowns `own` with their priors, and what is left of the others.
 
-    Returns
-    -------
-    matrix, private, rest
-        Triangles of the eliminated unknowns, stacked, residuals in the last column, shape
-        ``(unknowns, unknowns + 1)``; their mask; and each block's rows of other unknowns.
+    Unknowns in a single block are eliminated first. Residuals are in the last column.
     """
-    size = sd.size
+    size, drops = sd.size, pull.shape[:-1]
     block_count = np.zeros(size, dtype=np.intp)
     for block in blocks:
         block_count[block.columns] += 1
     private = np.zeros(size, dtype=np.bool_)
-    private[among] = block_count[among] == 1
-    matrix, begin = np.zeros((size, size + 1)), 0
+    private[own] = block_count[own] == 1
+    matrix, begin = np.zeros((*drops, own.size, size + 1)), 0
     rest = []
     for block in blocks:
         is_private = private[block.columns]
         order = np.concatenate([np.flatnonzero(is_private), np.flatnonzero(~is_private)])
-        columns, count, rows = block.columns[order], int(is_private.sum()), block.left.size
-        stack = np.zeros((rows + count, order.size + 1))
-        np.multiply(block.slopes[:, order], sd[columns], out=stack[:rows, :-1])
-        stack[:rows, -1] = block.left
-        stack[rows + np.arange(count), np.arange(count)] = 1.0
-        stack[rows:, -1] = pull[columns[:count]]
+        columns, count, rows = block.columns[order], int(is_private.sum()), block.left.shape[-1]
+        stack = np.zeros((*drops, rows + count, order.size + 1))
+        np.multiply(block.slopes[..., order], sd[columns], out=stack[..., :rows, :-1])
+        stack[..., :rows, -1] = block.left
+        stack[..., rows + np.arange(count), np.arange(count)] = 1.0
+        stack[..., rows:, -1] = pull[..., columns[:count]]
         stack = triangle(stack)
-        matrix[begin : begin + count, np.append(columns, size)] = stack[:count]
+        matrix[..., begin : begin + count, np.append(columns, size)] = stack[..., :count, :]
         begin += count
-        rest.append(EquationRows(stack[count:, count:-1], stack[count:, -1], columns[count:]))
-    return matrix, private, rest
+        stack = stack[..., count:, count:]
+        rest.append(EquationRows(stack[..., :-1], stack[..., -1], columns[count:]))
+    several = own[~private[own]]
+    columns = np.concatenate([several, common])
+    last = _stack_blocks(rest, columns, pull[..., several])
+    matrix[..., begin:, np.append(columns, size)] = last[..., : several.size, :]
+    last = last[..., several.size :, several.size :]
+    return matrix, EquationRows(last[..., :-1], last[..., -1], common)
 
 
 def _stack_blocks(blocks: Sequence[EquationRows], columns: Index, pull: Array) -> Array:
     """Return the triangle of blocks and priors of the first columns, residuals in the last."""
     place = np.full(int(columns.max(initial=-1)) + 1, -1)
     place[columns] = np.arange(columns.size)
-    stack = np.zeros((sum(block.left.size for block in blocks) + pull.size, columns.size + 1))
+    rows, count = sum(block.left.shape[-1] for block in blocks), pull.shape[-1]
+    stack = np.zeros((*pull.shape[:-1], rows + count, columns.size + 1))
     end = 0
     for block in blocks:
-        begin, end = end, end + block.left.size
-        stack[begin:end, place[block.columns]] = block.slopes
-        stack[begin:end, -1] = block.left
-    stack[end + np.arange(pull.size), np.arange(pull.size)] = 1.0
-    stack[end:, -1] = pull
+        begin, end = end, end + block.left.shape[-1]
+        stack[..., begin:end, place[block.columns]] = block.slopes
+        stack[..., begin:end, -1] = block.left
+    stack[..., end + np.arange(count), np.arange(count)] = 1.0
+    stack[..., end:, -1] = pull
     return triangle(stack)
 
 
 def triangle(rows: Array) -> Array:
-    """Return R of the QR decomposition of rows."""
+    """Return R of the QR decomposition of rows, or of those of each drop."""
     factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
     return factor

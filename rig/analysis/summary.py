@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import fmean, stdev
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rig.analysis.averages import mean
-from rig.analysis.comparison import compare
+from rig.analysis.comparison import Comparison, Difference, compare
+from rig.analysis.gate_passages import GatePassage
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import COMMON
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, DropResult, Measured
 from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
-from rig.protocol.protocol import Condition
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-
-    from rig.analysis.comparison import Comparison, Difference
-    from rig.analysis.gate_passages import GatePassage
-    from rig.analysis.result import DropResult, Measured
-    from rig.protocol.protocol import Protocol, Run
-    from rig.units import Quantity
+from rig.protocol.protocol import Condition, Protocol, Run
+from rig.units import Quantity
 
 T = TypeVar("T")
 

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from rig.analysis.chain_records import ChainRecord
-    from rig.arrays import Array
-    from rig.model.chain import Chain
-    from rig.protocol.protocol import Protocol
+from rig.analysis.chain_records import ChainRecord
+from rig.arrays import Array
+from rig.model.chain import Chain
+from rig.protocol.protocol import Protocol
 
 
 @lru_cache(maxsize=64)  # a session needs the same two for every drop

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,10 +24,7 @@ from rig.analysis.free_flight import (
     some_air,
     speed_slope,
 )
-
-if TYPE_CHECKING:
-    from rig.arrays import Array, Index
-
+from rig.arrays import Array, Index
 
 ONE = np.ones(1)
 COMMON = 4
@@ -157,14 +154,16 @@ class Trajectory:
         pull = np.stack([by_gravity, by_kappa * self.shares(leg)], axis=-1)
         moved[..., pulled] -= pull @ pulls[[GRAVITY, DRAG]][:, pulled]
         if strike_u is not None and self.hits is not None:
-            strikes = self.time[1:]
-            rod = np.abs(times[:, None] - strikes).argmin(axis=1)  # with the nearest strike
-            off = speed * (strikes[rod] - times) / strike_u[rod]
+            strikes, legs = self.time[..., 1:], self.time.shape[-1]
+            rod = np.abs(times[..., None] - strikes[..., None, :]).argmin(axis=-1)  # the nearest
+            off = speed * (np.take_along_axis(strikes, rod, -1) - times) / strike_u[rod]
             other = 0.5 * (np.sign(off) - np.tanh(_NORMAL * off))
-            near = np.flatnonzero(np.abs(other) > _FAINT)
+            near = np.nonzero(np.abs(other) > _FAINT)
             # Moving a strike in time shifts the later path by its gain of speed.
-            kicks = other * (self.speed[1:] - self.hits.arrival)[rod]
-            moved[near] += kicks[near, None] * time[rod[near] + 1]
+            gained = self.speed[..., 1:] - self.hits.arrival
+            kicks = other * np.take_along_axis(gained, rod, -1)
+            strike = (leg - leg % legs + rod + 1)[near]
+            moved[near] += kicks[near][:, None] * time[strike]
         return self.height.take(leg) - fallen, speed, moved
 
     def passages(self, heights: Array) -> tuple[Array, Array]:
@@ -218,8 +217,9 @@ class Trajectory:
         """Return 1/M at each time, with M rods still falling; 0 before the first strike."""
         if self.hits is None:
             return np.zeros(times.shape)
-        struck = np.searchsorted(self.time[1:], times, side="left")
-        falling: Array = np.maximum(self.time.size - 1 - struck, 1)
+        legs = self.time.shape[-1]
+        struck = self._last_before(self.time, times) % legs
+        falling: Array = np.maximum(legs - 1 - struck, 1)
         return np.where(struck > 0, 1.0 / falling, 0.0)
 
     def _legs(self, times: Array) -> tuple[Index, Array]:
@@ -331,7 +331,7 @@ def _sum_legs(remaining: Array, factor: Array, added: Array) -> Array:
 
 
 def free_trajectory(
-    release: float,
+    release: float | Array,
     start: float | Array,
     gravity: float | Array,
     kappa: float | Array = 0.0,
@@ -344,7 +344,7 @@ def free_trajectory(
 
 
 def struck_trajectory(
-    release: float,
+    release: float | Array,
     start: float | Array,
     gravity: float | Array,
     gains: Array,
@@ -357,14 +357,14 @@ def struck_trajectory(
 
     Parameters
     ----------
-    start, gravity
-        m, m/s²; for many falls shape ``(falls, 1)``.
+    release, start, gravity
+        s, m, m/s²; for many falls shape ``(falls, 1)``.
     gains
         α of each impact, shape ``(rods,)`` or ``(falls, rods)``.
     ratios
         ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, 0 for the top rod; shape ``(rods,)``.
     places
-        Height of each rod's middle above the reference point, shape ``(rods,)``.
+        Height of each rod's middle above the reference point, shaped like `gains`.
     kappa, air
         κ of the air, 1/m, and of each leg in its units, as in `Trajectory`.
 
@@ -377,7 +377,7 @@ def struck_trajectory(
     height = np.empty((*gain.shape[:-1], gain.shape[-1] + 1))
     height[..., :1], height[..., 1:] = start, -places
     distance = height[..., :-1] - height[..., 1:]
-    kappas = some_air(kappa * (float(air[0]) if air.size == 1 else air[: len(places)]))
+    kappas = some_air(kappa * (float(air[0]) if air.size == 1 else air[: gain.shape[-1]]))
     reach, factor = reach_of(distance, kappas), _factors(gain)
     squares = _sum_legs(1.0 - kappas * reach, factor, gravity * reach)
     arrival = np.sqrt(np.maximum(squares, 0.0))

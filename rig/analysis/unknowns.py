@@ -9,6 +9,7 @@ a scene does not have has no prior and is left out.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
@@ -17,20 +18,17 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from rig.analysis.air import lags, prior_air, slack
-from rig.analysis.components import above
+from rig.analysis.chain_records import ChainRecord
+from rig.analysis.components import Components, above
 from rig.analysis.discrepancy import MODES
+from rig.analysis.equations import ExpectedEdges
 from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
+from rig.arrays import Array, Index
+from rig.protocol.protocol import Gates, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    from rig.analysis.chain_records import ChainRecord
-    from rig.analysis.components import Components
     from rig.analysis.drop_model import DropModel
-    from rig.analysis.equations import ExpectedEdges
-    from rig.arrays import Array, Index
-    from rig.protocol.protocol import Gates, Protocol
 
     Effect = Callable[["Side"], Array]
 

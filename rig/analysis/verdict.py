@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
+from rig.analysis.adjust import Estimate
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import SIDES
 from rig.analysis.diagnoses import Diagnosis, diagnose
 from rig.analysis.distributions import most_by_chance
+from rig.analysis.edge_classes import UnmatchedEdge
 from rig.analysis.equations import STRAY
+from rig.analysis.fit import Fit
 from rig.analysis.identify import RESTLESS
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import APART, disagreements
+from rig.analysis.result import Audit, DropResult, Measured, Verdict
 from rig.measurands import RELEASE_SKEW
+from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason
+from rig.records import Drop
 from rig.wordings import Severity
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping
-
-    from rig.analysis.adjust import Estimate
-    from rig.analysis.edge_classes import UnmatchedEdge
-    from rig.analysis.fit import Fit
-    from rig.analysis.result import Audit, DropResult, Measured, Verdict
-    from rig.protocol.protocol import Protocol, Run
-    from rig.records import Drop
 
 LATE = 0.2
 """Share of possibly late stamps, close after another stamp, above which a remark is made. Sixteen

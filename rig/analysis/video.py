@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rig.analysis.result import Measured
-
-if TYPE_CHECKING:
-    from rig.arrays import Array
-
+from rig.arrays import Array
 
 _BENT = 0.5
 """Correlation of neighbouring residuals above which frames do not follow a parabola."""

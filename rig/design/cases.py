@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import ChainRecord, EdgeTrain, chain_records
+from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
 from rig.analysis.square_root import EquationRows
 from rig.analysis.unknowns import SharedUnknowns
+from rig.arrays import Array, Index
 from rig.estimate.hypotheses import model_alpha
 from rig.protocol.contact import at_contact
 from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
+from rig.protocol.protocol import Gate, Protocol, Run
 from rig.records import Drop
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from rig.analysis.components import Components
-    from rig.arrays import Array, Index
-    from rig.protocol.protocol import Gate, Protocol, Run
-
 
 CLOCK_U = 1e-6
 """Of a board's rate after some minutes of comparing it with the computer's clock, relative."""
@@ -132,7 +127,7 @@ def predict_drop(protocol: Protocol, run: Run, components: Components) -> tuple[
     if run.impact is not None:
         chain = protocol.chains[run.impact].chain
         alpha, _ = model_alpha(protocol, chain, run.incline_deg, {})
-    guess = Guess(RELEASE_S, protocol.drop.value, alpha)
+    guess = Guess(RELEASE_S, protocol.drop.value, 0.0, protocol.gravity.value, 0.0, alpha)
     guesses: dict[str, Guess] = {record.role: guess for record in records}
     model = DropModel(protocol, records, guesses, CLOCK_U, components)
     return model, np.zeros(len(model.unknowns))
@@ -195,7 +190,7 @@ def _blocks(model: DropModel, x: Array, place: Index) -> Iterator[tuple[int, Equ
     """Yield the equations of each beam, by its number."""
     at, sd = model.unknowns, model.unknowns.sd
     for role, record in model.records.items():
-        rows = model.equations(role, x, [np.arange(train.times.size) for train in record.trains])
+        rows = model.equations(role, x, np.arange(record.edge_count))
         slopes = rows.slopes * (sd[rows.columns] / rows.residuals.sigma[:, None])
         for train in record.trains:
             own = [at[name].start + train.gate for name in _BEAMS if name in at]

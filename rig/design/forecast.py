@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.square_root import EquationRows, eliminate, square_root, triangle
+from rig.analysis.square_root import Elimination, EquationRows, eliminate, square_root, triangle
 from rig.analysis.summary import by_case
-from rig.design.cases import BEAM
+from rig.arrays import Array, Index
+from rig.design.cases import BEAM, Case
 from rig.estimate.coefficients import KNOWN, coefficients_of, held_back
 from rig.estimate.hypotheses import model_alpha
+from rig.protocol.protocol import Condition, Protocol
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-
-    from rig.analysis.square_root import Elimination
-    from rig.arrays import Array, Index
-    from rig.design.cases import Case
-    from rig.protocol.protocol import Condition, Protocol
-    from rig.units import Quantity
+from rig.units import Quantity
 
 
 class GateLayout(NamedTuple):

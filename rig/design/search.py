@@ -7,26 +7,22 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from operator import attrgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.components import Components
 from rig.design.cases import cases, with_gates
 from rig.design.forecast import GateLayout, forecast
 from rig.design.trials import MARGIN, margin
 from rig.measurands import averaged
 from rig.protocol.gates import blocking_rod, hanging_rods
 from rig.protocol.measurable import check_gates
-from rig.protocol.protocol import Gate
+from rig.protocol.protocol import Gate, Gates, Protocol
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from rig.analysis.components import Components
-    from rig.protocol.protocol import Gates, Protocol
 
 COEFFICIENTS = ("restitution", "friction")
 """What a layout is judged by beside the measurands that have means: the mean of the logarithms."""

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import cycle, islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.annealing import MISSED
+from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import priors
 from rig.analysis.identify import (
     LEAD,
@@ -27,15 +29,9 @@ from rig.analysis.identify import (
 from rig.design.cases import CLOCK_U, perfect, predict_drop, with_edges
 from rig.protocol.contact import at_contact
 from rig.protocol.plan import runs
+from rig.protocol.protocol import Protocol, Run
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.analysis.chain_records import ChainRecord
-    from rig.protocol.protocol import Protocol, Run
-    from rig.vocabulary import Vocabulary
-
+from rig.vocabulary import Vocabulary
 
 DROPS = 20
 """Trials of a layout: one drop in twenty that fails shows in two lists of three."""
@@ -144,7 +140,7 @@ def read_drop(
         for record in records
         if any(
             np.any(train.edge[match[match >= 0]] != np.flatnonzero(match >= 0))
-            for match, train in zip(matches[record.role], record.trains, strict=True)
+            for train, _, match in record.by_gate(matches[record.role])
         )
     ]
 

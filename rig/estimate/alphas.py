@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 from rig.analysis.plain_data import attributes, plain
+from rig.analysis.result import Measured
+from rig.estimate.coefficients import CoefficientProblem
 from rig.estimate.hypotheses import by_model, one_alpha, with_nuisances
-from rig.estimate.hypothesis_fit import HypothesisFit, LikelihoodRatio, fit
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.result import Measured
-    from rig.estimate.coefficients import CoefficientProblem
-    from rig.estimate.hypothesis_fit import Hypothesis
-    from rig.estimate.quadratic_forms import QuadraticForm
-    from rig.protocol.protocol import Condition, Protocol, Run
+from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit, LikelihoodRatio, fit
+from rig.estimate.quadratic_forms import QuadraticForm
+from rig.protocol.protocol import Condition, Protocol, Run
 
 
 class ConditionAlpha(NamedTuple):

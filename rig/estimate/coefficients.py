@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 from rig.estimate.hypotheses import by_model, given_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
+from rig.estimate.quadratic_forms import QuadraticForm
+from rig.model.chain import Chain
 from rig.model.impact import ALPHA, BETA, MU, PILE, impact_on, stated_coefficients
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from rig.estimate.quadratic_forms import QuadraticForm
-    from rig.model.chain import Chain
-    from rig.protocol.protocol import Protocol
-    from rig.units import Quantity
+from rig.units import Quantity
 
 KNOWN = 0.2
 """A coefficient less sure than this is not identified: all of them are within about one."""

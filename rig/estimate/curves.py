@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,20 +11,17 @@ from rig.analysis.distributions import coverage_factor
 from rig.analysis.dual import Dual
 from rig.analysis.fit import Fit
 from rig.analysis.joint_fit import JointFit, by_itself
+from rig.analysis.joint_step import JointDrop
 from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import AdjustedDrop
-from rig.analysis.trajectory import free_trajectory, struck_trajectory
+from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
+from rig.arrays import Array
 from rig.measurands import SEPARATION
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.predictions import air_of
 from rig.protocol.contact import at_contact, higher_contacts
-
-if TYPE_CHECKING:
-    from rig.analysis.joint_step import JointDrop
-    from rig.analysis.trajectory import Trajectory
-    from rig.arrays import Array
-    from rig.protocol.protocol import Protocol, Run, Side
+from rig.protocol.protocol import Protocol, Run, Side
 
 POINTS = 120
 

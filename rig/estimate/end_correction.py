@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.plain_data import attributes
+from rig.analysis.result import Measured
+from rig.estimate.coefficients import CoefficientProblem
 from rig.estimate.hypotheses import END, one_alpha, with_end_correction, with_nuisances
 from rig.estimate.hypothesis_fit import fit
 from rig.model.impact import impact_on
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason
-
-if TYPE_CHECKING:
-    from rig.analysis.result import Measured
-    from rig.estimate.coefficients import CoefficientProblem
-    from rig.protocol.protocol import Protocol
 
 STRONG = 10.0
 """ΔAIC from which the worse model has essentially no support (Burnham and Anderson 2002)."""

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from rig.analysis.air import prior_air
+from rig.arrays import Array
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
+from rig.estimate.quadratic_forms import QuadraticForm
+from rig.model.chain import Chain
 from rig.model.impact import ALPHA, impact_on, with_coefficients
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from rig.arrays import Array
-    from rig.estimate.quadratic_forms import QuadraticForm
-    from rig.model.chain import Chain
-    from rig.protocol.protocol import Protocol
+from rig.protocol.protocol import Protocol
 
 END, AIR = "end_correction", "drag"
 CONTACT_U = 1e-3

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,14 +14,9 @@ from rig.analysis.equations import Linearization, standardise
 from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
 from rig.analysis.square_root import EquationRows
+from rig.arrays import Array
 from rig.errors import RigError
-from rig.estimate.quadratic_forms import EXTRA
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from rig.arrays import Array
-    from rig.estimate.quadratic_forms import QuadraticForm
+from rig.estimate.quadratic_forms import EXTRA, QuadraticForm
 
 ANYTHING = 1.0
 """How far a parameter may be from where the search begins when nothing is known of it: coefficients

@@ -8,19 +8,17 @@ any power of their number. Nothing is drawn at random.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.distributions import special
+from rig.analysis.result import Measured
+from rig.arrays import Array
 from rig.estimate.coefficients import CoefficientProblem, best
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter
 from rig.model.impact import MU
-
-if TYPE_CHECKING:
-    from rig.analysis.result import Measured
-    from rig.arrays import Array
-    from rig.protocol.protocol import Protocol
+from rig.protocol.protocol import Protocol
 
 NODES = 41
 _REACH = 6.0  # standard uncertainties on either side

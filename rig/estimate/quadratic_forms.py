@@ -81,7 +81,7 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     at, record = model.unknowns, model.records["impact"]
     assert record.ratios is not None
     common, here = shared.places(model)
-    alphas = model.guesses["impact"].alpha + x[at["alpha"]] + x[at["impulses"]]
+    alphas = model.alphas(x) + x[at["impulses"]]
     blocks, edges = _blocks(drop, alphas)
     sd = np.append(at.sd, np.ones(alphas.size + len(EXTRA)))
     # Of one drop alone: its own unknowns, and how far each impulse is off its mean.
@@ -115,10 +115,10 @@ def _blocks(drop: Fit | JointDrop, alphas: Array) -> tuple[list[EquationRows], i
     inflation = drop.estimate.scatter if isinstance(drop, Fit) else 1.0
     nothing = [at["alpha"].start, at["drag"].start]
     blocks, edges = [], 0
-    for role, matches in drop.matches.items():
-        rows = model.equations(role, x, matches)
+    for role, match in drop.matches.items():
+        rows = model.equations(role, x, match)
         pairing = model.pairings[role]
-        times = pairing.times[pairing.indices(matches)[1]] * (1.0 + x[at["clock"]])
+        times = pairing.times[match[match >= 0]] * (1.0 + x[at["clock"]])
         path = model.trajectory(role, x).sights(times)[2]
         # A contact point higher up is met as if every rod that strikes hung that much lower.
         lower = -path[:, COMMON + alphas.size :].sum(axis=1)

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.analysis.summary import by_case
+from rig.arrays import Array
 from rig.estimate.hypotheses import one_alpha, open_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import LikelihoodRatio, fit
+from rig.estimate.quadratic_forms import QuadraticForm
+from rig.protocol.protocol import Condition, Protocol
 from rig.reasons import make_reason
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.arrays import Array
-    from rig.estimate.quadratic_forms import QuadraticForm
-    from rig.protocol.protocol import Condition, Protocol
 
 RESOLVED = 0.5
 """U95 over the predicted impulse: rods known less well are taken together with the next ones."""

@@ -8,26 +8,21 @@ those of the session's results.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, DropResult
+from rig.arrays import Array
 from rig.estimate.curves import model_fall
 from rig.measurands import FALL_TIME, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in
 from rig.protocol.contact import at_contact
-from rig.report.figure import chart
+from rig.protocol.protocol import Gates, Protocol, Side
+from rig.records import Drop
+from rig.report.figure import Chart, chart
 from rig.report.numbers import with_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from fractions import Fraction
-
-    from rig.analysis.result import DropResult
-    from rig.arrays import Array
-    from rig.protocol.protocol import Gates, Protocol, Side
-    from rig.records import Drop
-    from rig.report.figure import Chart
 
 _MOMENTS = 200
 
@@ -72,9 +67,9 @@ def passages(
     row = acceleration_in(result.quantities)
     pull = result.quantities[row.name].value if row else protocol.gravity.value
     begun: dict[tuple[int, int], float] = {}
-    rows = []
+    rows, matches = [], result.matches
     for number, edge in enumerate(drop.edges):
-        rod = result.matches.get(number)
+        rod = matches.get(number)
         if rod is None or edge.channel not in gates:
             continue
         rods = protocol.chains[str(name)]

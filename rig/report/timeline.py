@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
+from fractions import Fraction
 from itertools import accumulate, groupby, pairwise
 from operator import itemgetter
 from statistics import median
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from fractions import Fraction
-
-    from rig.analysis.result import DropResult
-    from rig.protocol.protocol import Gate
-    from rig.records import Drop
+from rig.analysis.result import DropResult
+from rig.protocol.protocol import Gate
+from rig.records import Drop
 
 _LEFT, _WIDTH, _LANE = 112, 640, 15
 _STEPS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
@@ -98,11 +96,11 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
     """
     end = _FINE * _WIDTH
     places = [round(ms * end / lanes.span_ms) for ms in _times_ms(drop, hz)]
-    bars = marks = ""
+    bars, marks, matches = "", "", result.matches
     channels = defaultdict[int, list[tuple[int, bool, bool]]](list)
     for n, (edge, place) in enumerate(zip(drop.edges, places, strict=True)):
         if place <= end:
-            channels[edge.channel].append((place, edge.blocked, n in result.matches))
+            channels[edge.channel].append((place, edge.blocked, n in matches))
     for number, gate in enumerate(lanes.gates):
         y, own = _LANE * (_FINE * number + 1), channels[gate.channel]
         # Bars run from each change to the next; an edge without a change has no effect.
@@ -114,7 +112,7 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
                 lane += f"m{begin - pen} 0h{max(until - begin, 1)}"
                 pen = max(until, begin + 1)
         bars += lane and f"M0 {y}{lane}"
-        for place, _, matched in own if result.matches else ():
+        for place, _, matched in own if matches else ():
             marks += "" if matched else f"M{place} {y}m0-10v20"
     return Timeline(result, bars, marks)
 

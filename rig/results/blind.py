@@ -9,17 +9,14 @@ all code that shows results.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis
 from rig.errors import SessionError
 from rig.measurands import RELEASE_SKEW
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from rig.analysis.result import DropResult
-    from rig.protocol.protocol import Protocol
-    from rig.session.reading import Reader
+from rig.session.reading import Reader
 
 
 def kept_back(session: Reader, protocol: Protocol) -> bool:
@@ -45,7 +42,7 @@ def veiled_drop(result: DropResult) -> DropResult:
     return replace(
         result,
         quantities={name: result.quantities[name] for name in shown_names},
-        matches={},
+        rods=(),
         unmatched=(),
         last_passages={},
         gates=(),

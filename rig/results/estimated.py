@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from rig.analysis.session import Progress
 from rig.cache.entry import recall
 from rig.estimate.session import SessionEstimate, estimate
-from rig.results.whole import complete_analysis, protocol_of
-
-if TYPE_CHECKING:
-    from rig.analysis.session import Progress
-    from rig.results.whole import SessionResults
-    from rig.session.reading import Reader
+from rig.results.whole import SessionResults, complete_analysis, protocol_of
+from rig.session.reading import Reader
 
 
 def session_estimate(

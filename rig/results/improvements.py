@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from statistics import fmean
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.analysis.quantities import BUDGET
-from rig.measurands import averaged
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from rig.analysis.summary import Incline
-    from rig.measurands import Measurand
+from rig.analysis.summary import Incline
+from rig.measurands import Measurand, averaged
 
 _BETTER = 10.0
 """Assumed improvement of an input's uncertainty, a factor."""

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from hashlib import sha256
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.analysis.drop import DropSummary
 from rig.cache.entry import CacheEntry
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol
-    from rig.records import Drop
+from rig.protocol.protocol import Protocol
+from rig.records import Drop
 
 
 class KnownDrops:

@@ -6,38 +6,30 @@ The verdict on a new drop comes from here, with or without a screen.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from statistics import median
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.analysis.curves import model_curves
-from rig.analysis.drop import DropCase
+from rig.analysis.drop import DropCase, DropSummary
 from rig.analysis.joint_fit import FEWEST
-from rig.analysis.result import GOOD
-from rig.analysis.session import gather, joins, overrule, planned_run, sum_up
+from rig.analysis.result import GOOD, DropResult
+from rig.analysis.session import Analysis, gather, joins, overrule, planned_run, sum_up
 from rig.cache.entry import CacheEntry
-from rig.clock.calibration import Calibrator
+from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.protocol.plan import runs as planned_runs
-from rig.records import Job
+from rig.protocol.protocol import Protocol, Run
+from rig.records import Drop, Job
 from rig.results.blind import kept_back, veil, veiled_drop
 from rig.results.known_drops import KnownDrops
 from rig.results.whole import SessionResults, protocol_of, rejected_drops
 from rig.session.drop_check import ByteReplay
+from rig.session.reading import Reader, StateEntry
 from rig.session.schema import RunState
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from rig.analysis.drop import DropSummary
-    from rig.analysis.result import DropResult
-    from rig.analysis.session import Analysis
-    from rig.clock.calibration import Calibration, TimeScale
-    from rig.protocol.protocol import Protocol, Run
-    from rig.records import Drop
-    from rig.session.reading import Reader, StateEntry
 
 _SAME_SCALE = 5e-6
 """Relative change of the tick rate below which a drop is not analysed again: 50 nm in 10 mm."""

@@ -5,32 +5,25 @@ Each session counts once; it must be finished, undamaged, unblinded and of the s
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.averages import combine
 from rig.analysis.plain_data import attributes
-from rig.analysis.result import GOOD
-from rig.analysis.several import SessionPart, fit_sessions
-from rig.analysis.summary import good_cases
+from rig.analysis.result import GOOD, DropResult, Measured
+from rig.analysis.session import Analysis, Progress
+from rig.analysis.several import SessionPart, SessionsFit, fit_sessions
+from rig.analysis.summary import Incline, good_cases
 from rig.errors import InputError
 from rig.measurands import averaged
 from rig.protocol.plan import runs as planned_runs
+from rig.protocol.protocol import Condition
 from rig.reasons import make_error
 from rig.results.blind import check_open
-from rig.results.whole import complete_analysis, protocol_of, results
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.result import DropResult, Measured
-    from rig.analysis.session import Analysis, Progress
-    from rig.analysis.several import SessionsFit
-    from rig.analysis.summary import Incline
-    from rig.protocol.protocol import Condition
-    from rig.results.whole import SessionResults
-    from rig.session.reading import Reader
+from rig.results.whole import SessionResults, complete_analysis, protocol_of, results
+from rig.session.reading import Reader
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,34 +4,26 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rig.analysis.gravity import check_gravity
-from rig.analysis.session import analyze
+from rig.analysis.gravity import GravityCheck, check_gravity
+from rig.analysis.session import Analysis, Progress, analyze
+from rig.analysis.summary import Incline
 from rig.cache.entry import CacheEntry
-from rig.clock.calibration import Calibrator
+from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.protocol import reader
 from rig.protocol.measurable import with_gates
-from rig.reasons import notes_in
-from rig.records import Job
+from rig.protocol.protocol import Protocol
+from rig.reasons import Reason, notes_in
+from rig.records import Drop, Job
 from rig.results.blind import check_open, kept_back, veil
 from rig.results.improvements import improvements
 from rig.results.known_drops import KnownDrops, edges_digest
+from rig.session.reading import Reader
 from rig.session.schema import RunState
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from rig.analysis.gravity import GravityCheck
-    from rig.analysis.session import Analysis, Progress
-    from rig.analysis.summary import Incline
-    from rig.clock.calibration import Calibration, TimeScale
-    from rig.protocol.protocol import Protocol
-    from rig.reasons import Reason
-    from rig.records import Drop
-    from rig.session.reading import Reader
 
 _MOST_PROCESSES = 4
 """Each process takes 150 MB, and only work drop by drop runs in parallel."""

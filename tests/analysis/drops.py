@@ -105,10 +105,10 @@ class Case:
             role: Guess(
                 path.time[0],
                 path.height[0],
-                fit.model.guesses[role].alpha
-                + (fit.x[at["alpha"]][0] if role == "impact" else 0.0),
-                fit.model.kappa(fit.x),
                 fit.x[at["clock"]][0],
+                self.protocol.gravity.value,
+                fit.model.kappa(fit.x),
+                float(fit.model.alphas(fit.x)[0]) if role == "impact" else 0.0,
             )
             for role, path in paths.items()
         }

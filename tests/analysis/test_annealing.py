@@ -58,7 +58,7 @@ def test_no_end_of_another_shadow_is_taken_for_the_top_rods():
         times = train.times.copy()
         times[begin] -= 2.5 * (times[begin + 1] - times[begin])  # so much earlier it darkens
         pairing = Pairing.of([replace(train, times=times)], side.chain.widths)
-        (match,) = pairing.match(train.levels, *FALL.heights(pairing.times), 0.5e-3)
+        match = pairing.match(train.levels, *FALL.heights(pairing.times), 0.5e-3)
         assert match[begin] == -1
         assert (match[begin + 1] == -1) == (rod == 24)
         assert (np.delete(match, [begin, begin + 1]) >= 0).all()

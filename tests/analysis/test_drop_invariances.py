@@ -39,7 +39,7 @@ def test_origin_and_unit_of_time_and_other_gates(scene, seconds):
     found, expected = other.analyze(), one.analyze()
     assert sorted(found.matches.values()) == sorted(expected.matches.values())
     # Both end where a step is short enough, and the next one would be by its square.
-    assert_same(expected, replace(found, matches=expected.matches), CLOSE**2)
+    assert_same(expected, replace(found, rods=expected.rods), CLOSE**2)
 
 
 def coarse(one: Case) -> Case:
@@ -57,5 +57,5 @@ def test_the_order_of_simultaneous_edges():
     assert order != list(range(ticks.size))
     other = replace(one, drop=replace(one.drop, edges=tuple(one.drop.edges[n] for n in order)))
     found, expected = other.analyze(), one.analyze()
-    rods = {order[n]: rod for n, rod in found.matches.items()}
-    assert_same(expected, replace(found, matches=rods), 0.0)
+    rods = tuple(found.rods[order.index(n)] for n in range(len(order)))
+    assert_same(expected, replace(found, rods=rods), 0.0)

@@ -10,11 +10,8 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
 from tests.analysis.drops import GRADED, SCENES, STATED, UNIFORM, case, with_dials
 
-STEPS = {
-    "alpha": 1e-5,
-    "impulses": 1e-5,
-    "strings": 1e-5,
-}  # of the rest: 1e-6 in m, s, m/s² and relative
+GAINS = ("alpha", "impulses", "strings")
+"""Unknowns with a step of 1e-5; of the rest it is 1e-6 in m, s, m/s² and relative."""
 
 
 def somewhere(model: DropModel, seed: int) -> np.ndarray:
@@ -24,9 +21,9 @@ def somewhere(model: DropModel, seed: int) -> np.ndarray:
 
 def steps(model: DropModel) -> np.ndarray:
     found = np.full(len(model.unknowns), 1e-6)
-    for name, step in STEPS.items():
+    for name in GAINS:
         if name in model.unknowns:
-            found[model.unknowns[name]] = step
+            found[model.unknowns[name]] = 1e-5
     return found
 
 
@@ -59,9 +56,8 @@ def stamped_as_expected(model: DropModel, matches: dict, x: np.ndarray) -> DropM
         shifts = {}
         for role, match in matches.items():
             left = model.residuals(role, x, match)
-            _, edges = model.pairings[role].indices(match)
             shifts[role] = np.zeros(model.pairings[role].times.size)
-            shifts[role][edges] = left.values / left.speed
+            shifts[role][match[match >= 0]] = left.values / left.speed
         model = model.shaken(shifts)
     return model
 
@@ -72,10 +68,10 @@ def beyond_strikes(model, role, x, match):
     Near a strike derivatives are means of both legs'; see `test_trajectory`.
     """
     path, record = model.trajectory(role, x), model.records[role]
-    pick, edge = model.pairings[role].indices(match)
+    pick = np.flatnonzero(match >= 0)
     if record.ratios is None:
         return np.full(pick.size, np.inf)
-    heights, _ = path.heights(model.pairings[role].times[edge] * model.rate(x))
+    heights, _ = path.heights(model.pairings[role].times[match[pick]] * model.rate(x))
     places = model.slopes[role].path[-record.ratios.size :]
     u = np.sqrt(places**2 @ model.unknowns.sd**2)
     off = (np.abs(heights[:, None] - path.height[1:]) / u).min(axis=1)
@@ -180,12 +176,12 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
     x = model.first()
     for role, match in matches.items():
         found = model.residuals(role, x, match)
-        trains = model.records[role].trains
-        times = np.concatenate([t.times[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
-        burst = np.concatenate([t.burst[m[m >= 0]] for t, m in zip(trains, match, strict=True)])
+        gates = [*model.records[role].by_gate(match)]
+        times = np.concatenate([t.times[m[m >= 0]] for t, _, m in gates])
+        burst = np.concatenate([t.burst[m[m >= 0]] for t, _, m in gates])
         clock = x[model.unknowns["clock"]]
         _, speed = model.trajectory(role, x).heights(times * (1.0 + clock))
-        rods = np.concatenate([t.rods[m >= 0] for t, m in zip(trains, match, strict=True)])
+        rods = np.concatenate([t.rods[m >= 0] for t, _, m in gates])
         hits = model.trajectory(role, x).time[1:]
         off = np.zeros(times.size)
         if role == "impact":
@@ -195,7 +191,7 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
             off = np.where((times > hits[0]) & ~last, np.hypot(STATED.departure, further), 0.0)
             assert left[~last].min() == 2
             assert last.any()
-        edges, seen = model.expected[role], np.concatenate(match) >= 0
+        edges, seen = model.expected[role], match >= 0
         landed = (edges.landed * ~edges.alone)[seen]
         expected = [
             math.sqrt(STATED.floor**2 + v**2 * (STATED.jitter**2 + b**2) + d**2 + early**2)

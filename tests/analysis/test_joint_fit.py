@@ -11,7 +11,7 @@ from rig.analysis.budgets import Budgets
 from rig.analysis.components import LEAST_SHARE, above
 from rig.analysis.drop import DropCase
 from rig.analysis.equations import STRAY, linearize
-from rig.analysis.joint_fit import FEWEST, by_itself
+from rig.analysis.joint_fit import FEWEST, by_itself, joint_fit
 from rig.analysis.quantities import measurands
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
@@ -22,6 +22,7 @@ from tests.analysis.drops import STATED, UNIFORM, case, true_value, with_dials
 from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits
 
 FOUR = (1, 2, 3, 4)
+NONE = np.full(400, -1)  # of 25 rods at eight gates, each with two sides
 EIGHT = tuple(range(1, 9))
 
 
@@ -92,6 +93,24 @@ def test_eliminating_drop_by_drop_is_solving_all_at_once(name, near, line):
                 assert measured.budget.get(group, 0.0) == pytest.approx(
                     part, rel=line, abs=1e-3 * near * measured.u if alone else 1e-3 * measured.u
                 )
+
+
+def test_how_many_drops_are_fitted_at_once_changes_no_result(monkeypatch):
+    """Drops of one condition: all in an array, or each in its own."""
+    together = fit_session(FOUR)
+    monkeypatch.setattr("rig.analysis.joint_step._AT_ONCE", 1)
+    each = joint_fit(fits(cases(FOUR)))
+    np.testing.assert_allclose(each.x, together.x, atol=1e-9)
+    for one, other in zip(each.drops, together.drops, strict=True):
+        np.testing.assert_allclose(one.x, other.x, atol=1e-9)
+
+
+def test_a_drop_without_any_edge_of_a_chain_harms_no_other():
+    """As where edges that fit a drop by itself fit none of its rods any more."""
+    first, *others = fits(cases(FOUR))
+    joint = joint_fit([replace(first, matches=first.matches | {"free": NONE}), *others])
+    assert joint.settled
+    assert all(np.isfinite(drop.x).all() for drop in joint.drops)
 
 
 # χ² of the members, at 1 in 10⁴ each side; what an estimate of a standard deviation may be off.

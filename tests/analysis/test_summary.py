@@ -173,17 +173,7 @@ def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
     assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (t * 0.01), rel=1e-6)
 
 
-def test_end_gauge():
-    """GUM H.1.6: components in nm, ν_eff = 16.7, taken as 16; U for 99 % is 93 nm."""
-    budget = {"standard": 25.0, "comparison": 9.7, "expansion": 2.9, "temperature": 16.6}
-    u = math.hypot(*budget.values())
-    assert u == pytest.approx(32.0, abs=0.5)
-    degrees = effective_degrees(
-        u, budget, {"standard": 18.0, "comparison": 25.6, "expansion": 50.0, "temperature": 2.0}
-    )
-    assert degrees == pytest.approx(16.7, abs=0.1)
-    assert coverage_factor(math.floor(degrees), 0.99) * 32.0 == pytest.approx(93.0, abs=0.5)
-    # A guessed size counts with 8, another one as known exactly.
+def test_a_guessed_size_counts_with_8_degrees_and_another_as_known_exactly():
     budget = {"start height": 3.0, "datum": 4.0}
     assert effective_degrees(5.0, budget, {}) == pytest.approx(5.0**4 / (3.0**4 / 8.0))
     assert effective_degrees(4.0, {"datum": 4.0}, {}) == math.inf
